@@ -1,0 +1,4 @@
+//! Entry point: parse the command line, then become what it names.
+#![forbid(unsafe_code)]
+
+fn main() {}

@@ -1,0 +1,139 @@
+//! Where the cells of the feature pyramid lie in the image, and the maps in memory.
+
+use std::ops::Range;
+
+use crate::{Model, Placement};
+
+/// One level of the pyramid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelLayout {
+    /// Side of a cell, pixels of the original image: `cell_px * 2^(level / interval)`.
+    pub scale: f64,
+    /// Size `[width, height]` of the resized image, pixels of the level.
+    pub image_size: [usize; 2],
+    /// Size `[rows, cols]` of the padded feature map, cells.
+    pub padded: [usize; 2],
+    /// Height of every response map of the level, cells.
+    pub rows: usize,
+    /// Width of every response map of the level, cells.
+    pub cols: usize,
+    /// Where the level's maps begin in the array of responses.
+    pub offset: usize,
+}
+
+/// The levels of the pyramid of an image of a given size under a given model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Size `[width, height]` of the image, pixels.
+    pub image_size: [usize; 2],
+    /// The levels, full resolution first.
+    pub levels: Vec<LevelLayout>,
+    /// Padding `[rows, cols]` without the extra ring, cells: largest filter minus 2.
+    pub pad: [usize; 2],
+    /// Number of filters of the model.
+    pub n_filters: usize,
+}
+
+/// The image has no level on which the model fits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the image is {width}x{height} pixels, but the smaller side needs at least {minimum}")]
+pub struct ImageTooSmall {
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Smallest side accepted, pixels.
+    pub minimum: usize,
+}
+
+impl Layout {
+    /// Lays out the pyramid (Yang & Ramanan's `featpyramid`: `interval` levels per octave, no
+    /// upsampled octave).
+    ///
+    /// `levels = 1 + floor(log2(min(width, height) / (5 cell_px)) * interval)`; response maps of all
+    /// filters of a level have the same size, that of the largest filter.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageTooSmall`] if a side is shorter than 10 cells (40 pixels for 4-pixel cells), below
+    /// which the reference programs write out of bounds.
+    pub fn new(model: &Model, width: usize, height: usize) -> Result<Self, ImageTooSmall> {
+        let spec = model.spec();
+        let minimum = 10 * spec.cell_px;
+        if width.min(height) < minimum {
+            return Err(ImageTooSmall {
+                width,
+                height,
+                minimum,
+            });
+        }
+        let [max_rows, max_cols] = model.max_filter();
+        let pad = [max_rows.saturating_sub(2), max_cols.saturating_sub(2)];
+        let shorter = width.min(height) as f64 / (5 * spec.cell_px) as f64;
+        let step = 2_f64.powf(1.0 / spec.interval as f64);
+        let n_levels = 1 + (shorter.ln() / step.ln()).floor() as usize;
+        let mut levels: Vec<LevelLayout> = Vec::with_capacity(n_levels);
+        let mut offset = 0;
+        for level in 0..n_levels {
+            let image_size = if level < spec.interval {
+                let shrink = 1.0 / step.powi(level as i32);
+                [width, height].map(|side| (side as f64 * shrink).round() as usize)
+            } else {
+                let [w, h] = levels[level - spec.interval].image_size;
+                [w, h].map(|side| (side as f64 * 0.5).round() as usize)
+            };
+            let cells = image_size.map(|side| (side as f64 / spec.cell_px as f64).round() as usize);
+            let inner = cells.map(|side| side.saturating_sub(2));
+            let padded = [inner[1] + 2 * (pad[0] + 1), inner[0] + 2 * (pad[1] + 1)];
+            let rows = (padded[0] + 1).saturating_sub(max_rows);
+            let cols = (padded[1] + 1).saturating_sub(max_cols);
+            levels.push(LevelLayout {
+                scale: spec.cell_px as f64 * step.powi(level as i32),
+                image_size,
+                padded,
+                rows,
+                cols,
+                offset,
+            });
+            offset += rows * cols * model.n_filters();
+        }
+        Ok(Self {
+            image_size: [width, height],
+            levels,
+            pad,
+            n_filters: model.n_filters(),
+        })
+    }
+
+    /// Number of response values of all levels and filters.
+    pub fn n_responses(&self) -> usize {
+        self.levels
+            .last()
+            .map_or(0, |it| it.offset + it.rows * it.cols * self.n_filters)
+    }
+
+    /// Where the response map of a filter lies in the array of responses.
+    pub fn map_range(&self, level: usize, filter: usize) -> Range<usize> {
+        let it = &self.levels[level];
+        let start = it.offset + filter * it.rows * it.cols;
+        start..start + it.rows * it.cols
+    }
+
+    /// Centre of a filter placed on a level, pixels of the image, top-left pixel centre = (0, 0).
+    pub fn centre(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
+        let [x1, y1, x2, y2] = self.part_box(level, filter, at);
+        [f64::midpoint(x1, x2), f64::midpoint(y1, y2)]
+    }
+
+    /// Box `[x1, y1, x2, y2]` of a filter placed on a level; see [`Self::centre`].
+    ///
+    /// `x1 = (x - pad) s`, `x2 = x1 + cols s - 1` with `s` the level's scale: the reference
+    /// programs' boxes less 1, since they count pixels from 1.
+    pub fn part_box(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 4] {
+        let scale = self.levels[level].scale;
+        let x1 = (f64::from(at.x) - self.pad[1] as f64) * scale;
+        let y1 = (f64::from(at.y) - self.pad[0] as f64) * scale;
+        let [rows, cols] = filter.map(|side| side as f64 * scale);
+        [x1, y1, x1 + cols - 1.0, y1 + rows - 1.0]
+    }
+}

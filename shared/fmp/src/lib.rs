@@ -1,0 +1,22 @@
+//! Flexible mixtures of parts in one image (Yang & Ramanan 2013; the paper's section 3).
+//!
+//! Reading order: [`Model`] (what was trained), [`Layout`] (where the cells of the feature pyramid
+//! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
+//! which finds the best tree of parts exactly, and [`Pose`], its answer.
+#![forbid(unsafe_code)]
+
+mod layout;
+mod model;
+mod pose;
+mod responses;
+mod solve;
+
+pub use layout::{ImageTooSmall, Layout, LevelLayout};
+pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
+pub use pose::{Placement, Pose};
+pub use responses::Responses;
+pub use solve::{Extra, Solver};
+
+/// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
+/// texture energies, 1 that is set in the padding only.
+pub const N_CHANNELS: usize = 32;

@@ -1,0 +1,48 @@
+//! A pose in one image: where every part is, and which of its types.
+
+use crate::{Layout, Model};
+
+/// One part, placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Placement {
+    /// Column of the response map: the filter's leftmost cell.
+    pub x: u16,
+    /// Row of the response map: the filter's topmost cell.
+    pub y: u16,
+    /// Type (mixture component) of the part, from 0.
+    pub mixture: u8,
+}
+
+/// The parts of one person in one image, all at the same level of the pyramid.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Pose {
+    /// Value of the maximised energy (eq. 1 of the paper, or eq. 3 as seen from this view).
+    pub score: f32,
+    /// Level of the pyramid, from 0 (full resolution).
+    pub level: u16,
+    /// One placement per part of the model.
+    pub parts: Vec<Placement>,
+}
+
+impl Pose {
+    /// Centre of a part's box, pixels of the image; the centre of its top-left pixel is (0, 0).
+    pub fn centre(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
+        let placement = self.parts[part];
+        let filter = model.filter(part, usize::from(placement.mixture));
+        layout.centre(usize::from(self.level), [filter.rows, filter.cols], placement)
+    }
+
+    /// Centres of all parts; see [`Self::centre`].
+    pub fn centres(&self, model: &Model, layout: &Layout) -> Vec<[f64; 2]> {
+        (0..self.parts.len())
+            .map(|part| self.centre(model, layout, part))
+            .collect()
+    }
+
+    /// Box `[x1, y1, x2, y2]` of a part, pixels of the image, both corners inside the box.
+    pub fn part_box(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 4] {
+        let placement = self.parts[part];
+        let filter = model.filter(part, usize::from(placement.mixture));
+        layout.part_box(usize::from(self.level), [filter.rows, filter.cols], placement)
+    }
+}

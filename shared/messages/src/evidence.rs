@@ -1,0 +1,26 @@
+//! The response maps of one image.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{MAX_LEVELS, Stamp, Status, Timing};
+
+/// Travels as the user header of the responses: `[f32]`, laid out as `fmp::Layout` says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
+#[type_name("EvidenceHeader.v1")]
+#[repr(C)]
+pub struct EvidenceHeader {
+    /// Which frame.
+    pub stamp: Stamp,
+    /// When.
+    pub timing: Timing,
+    /// Width of the image the evidence is of, pixels.
+    pub width: u32,
+    /// Height of the image, pixels.
+    pub height: u32,
+    /// Whether there is evidence.
+    pub status: Status,
+    /// How many entries of `levels` count.
+    pub n_levels: u32,
+    /// Levels of the pyramid that hold valid values, ascending.
+    pub levels: [u16; MAX_LEVELS],
+}

@@ -1,0 +1,49 @@
+//! Plain data that crosses process boundaries, the names it travels under, and nothing else.
+//!
+//! Every message begins with a [`Stamp`], says with a [`Status`] whether it carries a result or why
+//! not, and with [`Timing`] what it cost. Counts come before fixed-size arrays; entries past the
+//! count are zero. Receivers treat every count and index as untrusted (`wire` checks them).
+#![forbid(unsafe_code)]
+
+mod evidence;
+mod frame;
+mod health;
+mod pose;
+mod pose3d;
+mod quality;
+mod stamp;
+pub mod topic;
+
+pub use evidence::EvidenceHeader;
+pub use frame::FrameHeader;
+pub use health::Health;
+pub use pose::{PairHypothesis, PairPose, PoseMessage, ViewPose};
+pub use pose3d::{FusedView, Joint3d, Pose3d};
+pub use quality::ViewQuality;
+pub use stamp::{Stamp, Status, Timing};
+
+/// Most parts of a model that messages can carry.
+pub const MAX_PARTS: usize = 32;
+/// Most views of a rig.
+pub const MAX_VIEWS: usize = 16;
+/// Most candidates that a view offers.
+pub const MAX_CANDIDATES: usize = 8;
+/// Most joints of a joint set.
+pub const MAX_JOINTS: usize = 32;
+/// Most levels of a pyramid (96 = 15 000 pixels at ten levels an octave).
+pub const MAX_LEVELS: usize = 96;
+
+const _: () = {
+    assert!(size_of::<Stamp>() == 32);
+    assert!(size_of::<Timing>() == 16);
+    assert!(size_of::<FrameHeader>() == 72);
+    assert!(size_of::<EvidenceHeader>() == 256);
+    assert!(size_of::<PoseMessage>() == 168);
+    assert!(size_of::<ViewPose>() == 1408);
+    assert!(size_of::<ViewQuality>() == 184);
+    assert!(size_of::<PairPose>() == 808);
+    assert!(size_of::<Joint3d>() == 88);
+    assert!(size_of::<FusedView>() == 544);
+    assert!(size_of::<Pose3d>() == 11600);
+    assert!(size_of::<Health>() == 96);
+};

@@ -1,0 +1,73 @@
+//! The result: joints in the world, and what every view made of it.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::{MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
+
+/// One joint in the world.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[type_name("Joint3d.v1")]
+#[repr(C)]
+pub struct Joint3d {
+    /// Position in the world of the rig, metres.
+    pub in_world: [f64; 3],
+    /// Covariance `[xx, xy, xz, yy, yz, zz]`, metres^2.
+    pub covariance: [f64; 6],
+    /// Root mean square distance of the reprojected joint from the views used, pixels.
+    pub reprojection_px: f64,
+    /// Bit `v` is set if view `v` was used.
+    pub views_used: u32,
+    /// Whether there is a position.
+    pub status: Status,
+}
+
+/// The pose of one view after fusion: the mean over its pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[type_name("FusedView.v1")]
+#[repr(C)]
+pub struct FusedView {
+    /// Sum of the joint energies of the pairs that were averaged.
+    pub energy: f64,
+    /// Pairs that were averaged; 0 if the pose is the view's own, or if there is none.
+    pub n_pairs: u32,
+    /// Whether there is a pose.
+    pub status: Status,
+    /// 1 if the view sees the person from behind, and left and right have been exchanged.
+    pub exchanged: u32,
+    /// How many centres count.
+    pub n_parts: u32,
+    /// Centre of every anatomical part, pixels of the frame.
+    pub centres_px: [[f64; 2]; MAX_PARTS],
+    /// Score of the view's single-view answer.
+    pub single_score: f64,
+}
+
+/// The skeleton of one frame.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("Pose3d.v1")]
+#[repr(C)]
+pub struct Pose3d {
+    /// Which frame; `view` is 0.
+    pub stamp: Stamp,
+    /// When.
+    pub timing: Timing,
+    /// Whether there is a skeleton.
+    pub status: Status,
+    /// How many joints count.
+    pub n_joints: u32,
+    /// How many views count.
+    pub n_views: u32,
+    /// Bit `v` is set if view `v` delivered a pose in time.
+    pub views_present: u32,
+    /// Bit `v` is set if any joint uses view `v`.
+    pub views_used: u32,
+    /// How many pairs delivered.
+    pub n_pairs: u32,
+    /// How sure the exchange of left and right is: energy of the chosen assignment less that of the
+    /// best other one.
+    pub facing_margin: f64,
+    /// The joints.
+    pub joints: [Joint3d; MAX_JOINTS],
+    /// The views.
+    pub views: [FusedView; MAX_VIEWS],
+}

@@ -1,0 +1,74 @@
+//! Which frame of which view, how it went, and when.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+/// What a message belongs to. Stages join on (session, frame), never on arrival.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("Stamp.v1")]
+#[repr(C)]
+pub struct Stamp {
+    /// Run of the deployment; a message of another session is ignored.
+    pub session: u64,
+    /// Index of the frame in the footage, from 0, the same in all synchronised views.
+    pub frame: u64,
+    /// When the frame was captured, `CLOCK_MONOTONIC`, nanoseconds.
+    pub captured_at_nanos: u64,
+    /// Index of the view in the rig, or of the pair in a [`PairPose`](crate::PairPose); 0 in a
+    /// message about all views.
+    pub view: u32,
+    /// How often the sender has been restarted.
+    pub epoch: u32,
+}
+
+/// Whether a message carries a result, or why not.
+///
+/// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("Status.v1")]
+#[repr(C)]
+pub struct Status(pub u32);
+
+impl Status {
+    /// The message carries a result.
+    pub const OK: Self = Self(0);
+    /// Nothing follows: the footage has ended. The rest of the message is empty.
+    pub const END: Self = Self(1);
+    /// The source could not deliver this frame.
+    pub const NO_FRAME: Self = Self(2);
+    /// No pose scored above the threshold.
+    pub const NO_DETECTION: Self = Self(3);
+    /// The predictor has nothing to say about this frame.
+    pub const NO_PREDICTION: Self = Self(4);
+    /// Too few views were there in time.
+    pub const TOO_FEW_VIEWS: Self = Self(5);
+    /// A message that this one needed was malformed.
+    pub const BAD_INPUT: Self = Self(6);
+
+    /// The reason in words.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::OK => "ok",
+            Self::END => "end of footage",
+            Self::NO_FRAME => "no frame",
+            Self::NO_DETECTION => "no detection",
+            Self::NO_PREDICTION => "no prediction",
+            Self::TOO_FEW_VIEWS => "too few views",
+            Self::BAD_INPUT => "malformed input",
+            Self(_) => "unknown",
+        }
+    }
+}
+
+/// When a stage had all it needed, and when it sent its answer; `CLOCK_MONOTONIC`, nanoseconds.
+///
+/// The difference is computation; from one stage's `sent` to the next one's `received` is transport.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("Timing.v1")]
+#[repr(C)]
+pub struct Timing {
+    /// The last input arrived (capture: the pixels were asked for).
+    pub received_at_nanos: u64,
+    /// Just before the message was sent.
+    pub sent_at_nanos: u64,
+}

@@ -1,0 +1,48 @@
+//! Names of the services of a deployment. The number is the version of what travels there.
+//!
+//! Views, pairs and processes are named by index or by role, so that no user text gets into a
+//! service name.
+
+/// Pixels of a view: `[u8]` with [`FrameHeader`](crate::FrameHeader).
+#[must_use]
+pub fn frame(view: usize) -> String {
+    format!("frame/v1/{view}")
+}
+
+/// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
+#[must_use]
+pub fn view_pose(view: usize) -> String {
+    format!("view-pose/v1/{view}")
+}
+
+/// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
+#[must_use]
+pub fn evidence(view: usize) -> String {
+    format!("evidence/v1/{view}")
+}
+
+/// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).
+#[must_use]
+pub fn view_quality(view: usize) -> String {
+    format!("view-quality/v1/{view}")
+}
+
+/// Answers of one fusion worker: [`PairPose`](crate::PairPose).
+#[must_use]
+pub fn pair_pose(worker: usize) -> String {
+    format!("pair-pose/v1/{worker}")
+}
+
+/// The result: [`Pose3d`](crate::Pose3d).
+#[must_use]
+pub fn pose3d() -> String {
+    "pose3d/v1".to_owned()
+}
+
+/// Signs of life of a process: [`Health`](crate::Health).
+///
+/// * `process`: its unique name in the deployment, for example `pose-2`.
+#[must_use]
+pub fn health(process: &str) -> String {
+    format!("health/v1/{process}")
+}

@@ -1,0 +1,2 @@
+//! One energy over several views, maximised by alternating exact single-view solutions.
+#![forbid(unsafe_code)]

@@ -1,0 +1,13 @@
+//! The body: parts of the 26-part model, evaluated joints, and the maps between them.
+//!
+//! A *part* is what the detector finds (a filter on the image); a *joint* is what is evaluated.
+//! Parts are numbered from 0 here and from 1 in the reference programs and in everything a user
+//! sees. The model names its parts by the side of the *image* they lie on when the person faces the
+//! camera: `mirror` is the exchange that makes a person seen from behind anatomically right.
+#![forbid(unsafe_code)]
+
+mod joints;
+mod parts;
+
+pub use joints::{HUMANEVA20, Joint, JointSet, PARSE14, UMPM15};
+pub use parts::{MIRROR, N_PARTS, PARENT, PART_NAMES};

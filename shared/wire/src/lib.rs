@@ -1,0 +1,2 @@
+//! Messages to domain types and back, each direction checked.
+#![forbid(unsafe_code)]

@@ -1,0 +1,1 @@
+//! Starts services as real processes and stops them again.
