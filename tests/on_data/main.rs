@@ -1,0 +1,18 @@
+//! What must hold on real data: runs only where the data folder lies beside the repository.
+//!
+//! `cargo test --release -p system-tests --features data --test on_data`
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::{Path, PathBuf};
+
+/// The folder with data and reference numbers, or `None` (and a line that says so) where it is absent.
+fn shared_dir() -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let dir = root.join("../shared");
+    if dir.join("data").is_dir() && dir.join("reference").is_dir() {
+        return Some(dir);
+    }
+    eprintln!("skipped: no data and reference numbers in {}", dir.display());
+    None
+}
