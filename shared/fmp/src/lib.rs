@@ -5,17 +5,21 @@
 //! which finds the best tree of parts exactly, and [`Pose`], its answer.
 #![forbid(unsafe_code)]
 
+pub mod files;
+
+mod extract;
 mod layout;
 mod model;
 mod pose;
 mod responses;
 mod solve;
 
+pub use extract::Extractor;
 pub use layout::{ImageTooSmall, Layout, LevelLayout};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 pub use pose::{Placement, Pose};
 pub use responses::Responses;
-pub use solve::{Extra, Solver};
+pub use solve::{CandidateSettings, Extra, Solver};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
 /// texture energies, 1 that is set in the padding only.

@@ -1,0 +1,83 @@
+//! An 8-bit colour image that somebody else owns.
+
+/// Interleaved 8-bit RGB, row major, without padding between rows.
+///
+/// The pixels may lie in shared memory; nothing here copies them.
+#[derive(Debug, Clone, Copy)]
+pub struct Rgb8View<'a> {
+    width: usize,
+    height: usize,
+    data: &'a [u8],
+}
+
+/// The pixels do not fill the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("an RGB image of {width}x{height} pixels has {expected} bytes, got {got}")]
+pub struct ImageSizeError {
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Bytes that the size asks for.
+    pub expected: usize,
+    /// Bytes offered.
+    pub got: usize,
+}
+
+impl<'a> Rgb8View<'a> {
+    /// Views `data` as an image of `width` x `height` pixels, 3 bytes each.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageSizeError`] if `data` is not exactly `3 * width * height` bytes.
+    pub fn new(width: usize, height: usize, data: &'a [u8]) -> Result<Self, ImageSizeError> {
+        let expected = width.saturating_mul(height).saturating_mul(3);
+        if data.len() == expected {
+            Ok(Self {
+                width,
+                height,
+                data,
+            })
+        } else {
+            Err(ImageSizeError {
+                width,
+                height,
+                expected,
+                got: data.len(),
+            })
+        }
+    }
+
+    /// Width, pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height, pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The bytes: `height x width x 3`.
+    pub fn data(&self) -> &'a [u8] {
+        self.data
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refuses_pixels_that_do_not_fill_the_image() {
+        let got = Rgb8View::new(2, 3, &[0; 17]).unwrap_err();
+        let want = ImageSizeError {
+            width: 2,
+            height: 3,
+            expected: 18,
+            got: 17,
+        };
+        assert_eq!(got, want);
+        assert!(Rgb8View::new(usize::MAX, usize::MAX, &[]).is_err());
+    }
+}
