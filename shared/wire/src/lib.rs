@@ -1,2 +1,21 @@
 //! Messages to domain types and back, each direction checked.
+//!
+//! Whatever arrives was written by another process, so every count, index and number is compared
+//! with its limit before it is used; what a [`Model`](fmp::Model) and a [`Layout`](fmp::Layout)
+//! allow is the limit. Entries past a count are ignored when read and zero when written.
 #![forbid(unsafe_code)]
+
+mod error;
+mod evidence;
+mod pose;
+mod quality;
+
+pub use error::WireError;
+pub use evidence::{evidence_from_message, levels_to_message};
+pub use pose::{
+    candidates_from_message, candidates_to_message, pose_from_message, pose_to_message,
+};
+pub use quality::{sigma_from_message, sigma_to_message};
+
+#[cfg(test)]
+mod testing;

@@ -1,0 +1,289 @@
+//! Poses and the candidates of a view.
+
+use fmp::{Layout, Model, Placement, Pose};
+use messages::{MAX_CANDIDATES, MAX_PARTS, PoseMessage, Status, ViewPose};
+
+use crate::WireError;
+use crate::error::{count, equal, finite, index};
+
+/// Writes a pose.
+///
+/// # Errors
+///
+/// [`WireError::TooMany`] if the pose has more than [`MAX_PARTS`] parts.
+pub fn pose_to_message(pose: &Pose) -> Result<PoseMessage, WireError> {
+    let n_parts = count("n_parts", pose.parts.len(), MAX_PARTS)?;
+    let mut message = PoseMessage {
+        score: pose.score,
+        level: pose.level,
+        n_parts: n_parts as u16,
+        ..PoseMessage::default()
+    };
+    for (part, placement) in pose.parts.iter().enumerate() {
+        message.x[part] = placement.x;
+        message.y[part] = placement.y;
+        message.mixture[part] = placement.mixture;
+    }
+    Ok(message)
+}
+
+/// Reads a pose that must lie on `layout` and have the parts of `model`.
+///
+/// # Errors
+///
+/// [`WireError`] if the number of parts, the level, a cell or a type is not one of the model's, or
+/// the score is not finite.
+pub fn pose_from_message(
+    message: &PoseMessage,
+    model: &Model,
+    layout: &Layout,
+) -> Result<Pose, WireError> {
+    equal("n_parts", usize::from(message.n_parts), model.n_parts())?;
+    let n_parts = count("n_parts", model.n_parts(), MAX_PARTS)?;
+    finite("score", 0, f64::from(message.score))?;
+    let level = index("level", 0, usize::from(message.level), layout.levels.len())?;
+    let [rows, cols] = [layout.levels[level].rows, layout.levels[level].cols];
+    let parts = (0..n_parts)
+        .map(|part| {
+            let (x, y) = (message.x[part], message.y[part]);
+            let mixture = message.mixture[part];
+            index("x", part, usize::from(x), cols)?;
+            index("y", part, usize::from(y), rows)?;
+            index("mixture", part, usize::from(mixture), model.n_types(part))?;
+            Ok(Placement { x, y, mixture })
+        })
+        .collect::<Result<_, WireError>>()?;
+    Ok(Pose {
+        score: message.score,
+        level: message.level,
+        parts,
+    })
+}
+
+/// Writes the candidates of a view, best first, and the image size `[width, height]`; the caller
+/// fills in stamp and timing.
+///
+/// No candidate is written as [`Status::NO_DETECTION`].
+///
+/// # Errors
+///
+/// [`WireError::TooMany`] if there are more than [`MAX_CANDIDATES`], or too many parts.
+pub fn candidates_to_message(
+    candidates: &[Pose],
+    image_size: [usize; 2],
+) -> Result<ViewPose, WireError> {
+    let n_candidates = count("n_candidates", candidates.len(), MAX_CANDIDATES)?;
+    let mut message = ViewPose {
+        status: if n_candidates == 0 {
+            Status::NO_DETECTION
+        } else {
+            Status::OK
+        },
+        n_candidates: n_candidates as u32,
+        width: image_size[0] as u32,
+        height: image_size[1] as u32,
+        ..ViewPose::default()
+    };
+    for (slot, pose) in message.candidates.iter_mut().zip(candidates) {
+        *slot = pose_to_message(pose)?;
+    }
+    Ok(message)
+}
+
+/// Reads the candidates of a view, best first; none unless the status is [`Status::OK`].
+///
+/// # Errors
+///
+/// [`WireError`] if the image size is not that of `layout`, or a candidate is malformed.
+pub fn candidates_from_message(
+    message: &ViewPose,
+    model: &Model,
+    layout: &Layout,
+) -> Result<Vec<Pose>, WireError> {
+    if message.status != Status::OK {
+        return Ok(Vec::new());
+    }
+    equal("width", message.width as usize, layout.image_size[0])?;
+    equal("height", message.height as usize, layout.image_size[1])?;
+    let n = count(
+        "n_candidates",
+        message.n_candidates as usize,
+        MAX_CANDIDATES,
+    )?;
+    message.candidates[..n]
+        .iter()
+        .map(|it| pose_from_message(it, model, layout))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{any_pose, layout, model, pose_message};
+
+    proptest! {
+        #[test]
+        fn a_pose_comes_back_as_it_was_sent(pose in any_pose()) {
+            let message = pose_to_message(&pose).unwrap();
+            prop_assert_eq!(pose_from_message(&message, &model(), &layout()).unwrap(), pose);
+        }
+
+        #[test]
+        fn candidates_come_back_in_their_order(
+            poses in prop::collection::vec(any_pose(), 0..=MAX_CANDIDATES),
+        ) {
+            let message = candidates_to_message(&poses, layout().image_size).unwrap();
+            prop_assert_eq!(message.status == Status::OK, !poses.is_empty());
+            let back = candidates_from_message(&message, &model(), &layout()).unwrap();
+            prop_assert_eq!(back, poses);
+        }
+
+        #[test]
+        fn whatever_arrives_is_either_refused_or_inside_the_layout(
+            message in pose_message(),
+            status in 0_u32..8,
+            n_candidates in any::<u32>(),
+        ) {
+            let (model, layout) = (model(), layout());
+            if let Ok(pose) = pose_from_message(&message, &model, &layout) {
+                prop_assert!(pose.centres(&model, &layout).iter().flatten().all(|it| it.is_finite()));
+                let level = &layout.levels[usize::from(pose.level)];
+                for part in &pose.parts {
+                    prop_assert!(usize::from(part.x) < level.cols && usize::from(part.y) < level.rows);
+                }
+            }
+            let view = ViewPose {
+                status: Status(status),
+                n_candidates,
+                width: 80,
+                height: 60,
+                candidates: [message; MAX_CANDIDATES],
+                ..ViewPose::default()
+            };
+            if let Ok(poses) = candidates_from_message(&view, &model, &layout) {
+                prop_assert!(poses.len() <= MAX_CANDIDATES);
+            }
+        }
+    }
+
+    fn sent() -> PoseMessage {
+        let pose = Pose {
+            score: 1.0,
+            level: 1,
+            parts: vec![Placement::default(); model().n_parts()],
+        };
+        pose_to_message(&pose).unwrap()
+    }
+
+    fn refused(message: PoseMessage) -> WireError {
+        pose_from_message(&message, &model(), &layout()).unwrap_err()
+    }
+
+    #[test]
+    fn refuses_the_pose_of_another_model() {
+        let got = refused(PoseMessage {
+            n_parts: 7,
+            ..sent()
+        });
+        assert_eq!(got.to_string(), "n_parts is 7, expected 3");
+    }
+
+    #[test]
+    fn refuses_a_level_that_is_not_there() {
+        let limit = layout().levels.len();
+        let level = limit as u16;
+        let got = refused(PoseMessage { level, ..sent() });
+        assert_eq!(
+            got,
+            WireError::OutOfRange {
+                field: "level",
+                entry: 0,
+                got: limit,
+                limit
+            }
+        );
+    }
+
+    #[test]
+    fn refuses_a_cell_outside_the_map() {
+        let mut message = sent();
+        let level = layout().levels[1];
+        message.x[2] = level.cols as u16;
+        assert!(matches!(
+            refused(message),
+            WireError::OutOfRange {
+                field: "x",
+                entry: 2,
+                ..
+            }
+        ));
+        message.x[2] = 0;
+        message.y[1] = level.rows as u16;
+        assert!(matches!(
+            refused(message),
+            WireError::OutOfRange {
+                field: "y",
+                entry: 1,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn refuses_a_type_that_the_part_does_not_have() {
+        let mut message = sent();
+        message.mixture[0] = 1;
+        assert!(matches!(
+            refused(message),
+            WireError::OutOfRange {
+                field: "mixture",
+                entry: 0,
+                got: 1,
+                limit: 1
+            }
+        ));
+    }
+
+    #[test]
+    fn refuses_a_score_that_is_not_a_number() {
+        let got = refused(PoseMessage {
+            score: f32::NAN,
+            ..sent()
+        });
+        assert!(matches!(got, WireError::Value { field: "score", .. }));
+    }
+
+    #[test]
+    fn refuses_candidates_of_another_image_size() {
+        let pose = pose_from_message(&sent(), &model(), &layout()).unwrap();
+        let message = candidates_to_message(&[pose], [81, 60]).unwrap();
+        let got = candidates_from_message(&message, &model(), &layout()).unwrap_err();
+        assert_eq!(got.to_string(), "width is 81, expected 80");
+    }
+
+    #[test]
+    fn refuses_to_send_more_than_fits() {
+        let pose = Pose {
+            parts: vec![Placement::default(); MAX_PARTS + 1],
+            ..Pose::default()
+        };
+        assert!(matches!(
+            pose_to_message(&pose),
+            Err(WireError::TooMany {
+                got: 33,
+                limit: 32,
+                ..
+            })
+        ));
+        let many = vec![Pose::default(); MAX_CANDIDATES + 1];
+        assert!(matches!(
+            candidates_to_message(&many, [80, 60]),
+            Err(WireError::TooMany {
+                field: "n_candidates",
+                ..
+            })
+        ));
+    }
+}

@@ -1,0 +1,114 @@
+//! Expected errors of a view.
+
+use messages::{MAX_PARTS, Status, ViewQuality};
+
+use crate::WireError;
+use crate::error::{count, equal, finite};
+
+/// Writes a prediction, or that there is none; the caller fills in stamp and timing.
+///
+/// * `sigma_px`: expected error of every part, pixels of the frame.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+pub fn sigma_to_message(sigma_px: Option<&[f32]>) -> Result<ViewQuality, WireError> {
+    let Some(sigma_px) = sigma_px else {
+        return Ok(ViewQuality {
+            status: Status::NO_PREDICTION,
+            ..ViewQuality::default()
+        });
+    };
+    let mut message = ViewQuality {
+        status: Status::OK,
+        n_parts: count("n_parts", sigma_px.len(), MAX_PARTS)? as u32,
+        ..ViewQuality::default()
+    };
+    for (part, &sigma) in sigma_px.iter().enumerate() {
+        message.sigma_px[part] = checked(part, sigma)?;
+    }
+    Ok(message)
+}
+
+/// Reads a prediction; `None` unless the status is [`Status::OK`].
+///
+/// # Errors
+///
+/// [`WireError`] if it is not for `n_parts` parts, or a value is negative or not finite.
+pub fn sigma_from_message(
+    message: &ViewQuality,
+    n_parts: usize,
+) -> Result<Option<Vec<f32>>, WireError> {
+    if message.status != Status::OK {
+        return Ok(None);
+    }
+    equal("n_parts", message.n_parts as usize, n_parts)?;
+    count("n_parts", n_parts, MAX_PARTS)?;
+    let sigma = message.sigma_px[..n_parts].iter().enumerate();
+    sigma
+        .map(|(part, &sigma)| checked(part, sigma))
+        .collect::<Result<_, _>>()
+        .map(Some)
+}
+
+fn checked(part: usize, sigma: f32) -> Result<f32, WireError> {
+    finite("sigma_px", part, f64::from(sigma))?;
+    if sigma < 0.0 {
+        return Err(WireError::Value {
+            field: "sigma_px",
+            entry: part,
+            got: f64::from(sigma),
+            expected: "at least 0",
+        });
+    }
+    Ok(sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_prediction_comes_back_as_it_was_sent(
+            sigma in prop::collection::vec(0.0_f32..1e3, 1..=MAX_PARTS),
+        ) {
+            let message = sigma_to_message(Some(&sigma)).unwrap();
+            prop_assert_eq!(sigma_from_message(&message, sigma.len()).unwrap(), Some(sigma));
+        }
+
+        #[test]
+        fn whatever_arrives_is_refused_or_a_distance(
+            status in 0_u32..8,
+            n_parts in any::<u32>(),
+            bits in prop::array::uniform32(any::<u32>()),
+        ) {
+            let sigma_px = bits.map(f32::from_bits);
+            let message = ViewQuality { status: Status(status), n_parts, sigma_px, ..ViewQuality::default() };
+            for n in [3, n_parts as usize] {
+                if let Ok(Some(sigma)) = sigma_from_message(&message, n) {
+                    prop_assert_eq!(sigma.len(), n);
+                    prop_assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_prediction_is_not_a_prediction_of_zero() {
+        let message = sigma_to_message(None).unwrap();
+        assert_eq!(message.status, Status::NO_PREDICTION);
+        assert_eq!(sigma_from_message(&message, 26).unwrap(), None);
+    }
+
+    #[test]
+    fn refuses_a_negative_error() {
+        let got = sigma_to_message(Some(&[1.0, -1.0])).unwrap_err();
+        assert_eq!(
+            got.to_string(),
+            "sigma_px of entry 1 is -1, expected at least 0"
+        );
+    }
+}

@@ -1,0 +1,86 @@
+//! A tiny model, its layout, and poses on it.
+
+use fmp::{
+    Edge, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose, Spring, Springs,
+};
+use messages::{MAX_PARTS, PoseMessage};
+use proptest::prelude::*;
+
+/// Three parts in a chain with one, two and three types.
+pub(crate) fn model() -> Model {
+    let filter = Filter {
+        rows: 3,
+        cols: 3,
+        weights: vec![0.0; 9 * N_CHANNELS],
+    };
+    let spring = Spring {
+        w: [0.01, 0.0, 0.01, 0.0],
+        anchor: [0, 1],
+    };
+    let part = |part: usize, first: usize| PartSpec {
+        name: format!("part {part}"),
+        filter_of_type: (first..=first + part).collect(),
+        edge: (part > 0).then(|| Edge {
+            parent: part - 1,
+            bias: vec![vec![0.0; part + 1]; part],
+            springs: Springs::PerChildType(vec![spring; part + 1]),
+        }),
+    };
+    Model::new(ModelSpec {
+        name: "chain".to_owned(),
+        parts: vec![part(0, 0), part(1, 1), part(2, 3)],
+        filters: vec![filter; 6],
+        root_bias: 0.0,
+        interval: 5,
+        cell_px: 4,
+        threshold: -1.0,
+        mirror: None,
+    })
+    .unwrap()
+}
+
+/// The layout of an image of 80x60 pixels.
+pub(crate) fn layout() -> Layout {
+    Layout::new(&model(), 80, 60).unwrap()
+}
+
+/// Poses that lie on [`layout`].
+pub(crate) fn any_pose() -> impl Strategy<Value = Pose> {
+    let layout = layout();
+    let levels = layout.levels.len();
+    (0..levels, -10.0_f32..10.0).prop_flat_map(move |(level, score)| {
+        let at = layout.levels[level];
+        let part =
+            move |part: u8| {
+                (0..at.cols as u16, 0..at.rows as u16, 0..=part)
+                    .prop_map(|(x, y, mixture)| Placement { x, y, mixture })
+            };
+        (part(0), part(1), part(2)).prop_map(move |(a, b, c)| Pose {
+            score,
+            level: level as u16,
+            parts: vec![a, b, c],
+        })
+    })
+}
+
+/// Messages of any bytes, often almost right.
+pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
+    let number = || prop_oneof![0_u16..6, any::<u16>()];
+    let cells = || prop::collection::vec(number(), MAX_PARTS);
+    let types = prop::collection::vec(prop_oneof![0_u8..2, any::<u8>()], MAX_PARTS);
+    let parts = prop_oneof![Just(3_u16), any::<u16>()];
+    (any::<u32>(), number(), parts, cells(), cells(), types).prop_map(
+        |(score, level, n_parts, x, y, mixture)| {
+            let mut message = PoseMessage {
+                score: f32::from_bits(score),
+                level,
+                n_parts,
+                ..PoseMessage::default()
+            };
+            message.x.copy_from_slice(&x);
+            message.y.copy_from_slice(&y);
+            message.mixture.copy_from_slice(&mixture);
+            message
+        },
+    )
+}
