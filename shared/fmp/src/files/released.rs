@@ -1,0 +1,172 @@
+//! What the released models' formats have in common: everything is named by 1-based indices.
+
+use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
+
+use crate::{Edge, Filter, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
+
+/// A released model, as it lies in the file; nothing is known to hold yet.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Released {
+    /// All biases; which is whose is told by [`ReleasedPart::bias_ids`].
+    pub(super) biases: Vec<f64>,
+    /// All filters.
+    pub(super) filters: Vec<Filter>,
+    /// All springs.
+    pub(super) springs: Vec<Spring>,
+    /// The parts, in the file's order.
+    pub(super) parts: Vec<ReleasedPart>,
+    /// Levels per octave.
+    pub(super) interval: usize,
+    /// Side of a cell, pixels.
+    pub(super) cell_px: usize,
+    /// Lowest score that training asked for.
+    pub(super) threshold: f64,
+}
+
+/// One part, its belongings named by 1-based indices.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ReleasedPart {
+    /// The parent; 0 for the root.
+    pub(super) parent: usize,
+    /// One filter per type.
+    pub(super) filter_ids: Vec<usize>,
+    /// `[parent type][child type]`, 0 where the pair never occurs; the root uses `[0][0]` only.
+    pub(super) bias_ids: Vec<Vec<usize>>,
+    /// The springs; not looked at for the root.
+    pub(super) spring_ids: SpringIds,
+}
+
+/// Which springs a part hangs on.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum SpringIds {
+    /// One per type of the child.
+    PerChildType(Vec<usize>),
+    /// `[parent type][child type]`, 0 where the pair never occurs.
+    PerTypePair(Vec<Vec<usize>>),
+}
+
+impl Released {
+    /// Replaces every index by what it names.
+    ///
+    /// A tree of 26 parts with the published models' parents gets their part names and their mirror
+    /// permutation; any other gets `part 1`, `part 2`, ... and no mirror.
+    pub(super) fn into_spec(self) -> Result<ModelSpec, ModelError> {
+        let names_known = self.parts.len() == N_PARTS
+            && self
+                .parts
+                .iter()
+                .zip(PARENT)
+                .all(|(part, parent)| part.parent == parent.map_or(0, |it| it + 1));
+        let mut parts = Vec::with_capacity(self.parts.len());
+        for (part_idx, part) in self.parts.iter().enumerate() {
+            let filter_of_type = part
+                .filter_ids
+                .iter()
+                .map(|&id| self.index(part_idx, "filter", id, self.filters.len()))
+                .collect::<Result<_, _>>()?;
+            let edge = match part.parent {
+                0 => None,
+                parent => Some(self.edge(part_idx, parent - 1)?),
+            };
+            parts.push(PartSpec {
+                name: if names_known {
+                    PART_NAMES[part_idx].to_owned()
+                } else {
+                    format!("part {}", part_idx + 1)
+                },
+                filter_of_type,
+                edge,
+            });
+        }
+        Ok(ModelSpec {
+            name: "unnamed".to_owned(),
+            parts,
+            root_bias: self.root_bias()?,
+            interval: self.interval,
+            cell_px: self.cell_px,
+            threshold: self.threshold,
+            mirror: names_known.then(|| MIRROR.to_vec()),
+            filters: self.filters,
+        })
+    }
+
+    fn root_bias(&self) -> Result<f64, ModelError> {
+        let root = self.parts.first().ok_or(ModelError::NoParts)?;
+        let id = root.bias_ids.first().and_then(|row| row.first());
+        let idx = self.index(0, "bias", id.copied().unwrap_or(0), self.biases.len())?;
+        Ok(self.biases[idx])
+    }
+
+    fn edge(&self, part: usize, parent: usize) -> Result<Edge, ModelError> {
+        let own = &self.parts[part];
+        let bias = map_pairs(&own.bias_ids, |id| {
+            if id == 0 {
+                return Ok(f64::NEG_INFINITY);
+            }
+            let idx = self.index(part, "bias", id, self.biases.len())?;
+            Ok(self.biases[idx])
+        })?;
+        let spring = |id| {
+            let idx = self.index(part, "spring", id, self.springs.len())?;
+            Ok(self.springs[idx])
+        };
+        let springs = match &own.spring_ids {
+            SpringIds::PerChildType(ids) => {
+                Springs::PerChildType(ids.iter().map(|&id| spring(id)).collect::<Result<_, _>>()?)
+            }
+            SpringIds::PerTypePair(ids) => Springs::PerTypePair(map_pairs(ids, |id| {
+                (id > 0).then(|| spring(id)).transpose()
+            })?),
+        };
+        Ok(Edge {
+            parent,
+            bias,
+            springs,
+        })
+    }
+
+    fn index(
+        &self,
+        part: usize,
+        what: &'static str,
+        id: usize,
+        count: usize,
+    ) -> Result<usize, ModelError> {
+        id.checked_sub(1)
+            .filter(|&idx| idx < count)
+            .ok_or(ModelError::Missing {
+                part: part + 1,
+                what,
+                index: id,
+                count,
+            })
+    }
+}
+
+/// A filter from its values as the files hold them: row fastest, channel slowest.
+///
+/// * `values`: `rows x cols x N_CHANNELS` of them.
+pub(super) fn filter_from_planes(rows: usize, cols: usize, values: &[f64]) -> Filter {
+    let mut weights = Vec::with_capacity(values.len());
+    for row in 0..rows {
+        for col in 0..cols {
+            weights
+                .extend((0..N_CHANNELS).map(|channel| values[(channel * cols + col) * rows + row]));
+        }
+    }
+    Filter {
+        rows,
+        cols,
+        weights,
+    }
+}
+
+/// Maps every entry of a table `[parent type][child type]`.
+fn map_pairs<T>(
+    ids: &[Vec<usize>],
+    mut f: impl FnMut(usize) -> Result<T, ModelError>,
+) -> Result<Vec<Vec<T>>, ModelError> {
+    ids.iter()
+        .map(|row| row.iter().map(|&id| f(id)).collect())
+        .collect()
+}

@@ -1,0 +1,115 @@
+//! Whitespace-separated tokens of a text, one at a time, that know where they stand.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::text::TextError;
+
+/// Where a token stands in a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Line, from 1.
+    pub line: usize,
+    /// Token of the file, from 1.
+    pub token: usize,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {} (token {})", self.line, self.token)
+    }
+}
+
+/// The tokens of a text.
+#[derive(Debug, Clone)]
+pub(super) struct Tokens<'a> {
+    rest: &'a str,
+    place: Place,
+}
+
+impl<'a> Tokens<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        let mut tokens = Self {
+            rest: text,
+            place: Place { line: 1, token: 0 },
+        };
+        tokens.advance(0);
+        tokens
+    }
+
+    /// Where the next token stands.
+    pub(super) fn place(&self) -> Place {
+        self.place
+    }
+
+    /// The next token, left where it is.
+    pub(super) fn peek(&self) -> Option<&'a str> {
+        self.rest.split_whitespace().next()
+    }
+
+    /// Steps over the next token if it is this key word.
+    pub(super) fn skip(&mut self, word: &str) -> bool {
+        let found = self.peek() == Some(word);
+        if found {
+            self.advance(word.len());
+        }
+        found
+    }
+
+    /// Steps over a key word that has to be there.
+    pub(super) fn keyword(&mut self, field: &'static str) -> Result<(), TextError> {
+        let place = self.place();
+        match self.peek() {
+            _ if self.skip(field) => Ok(()),
+            None => Err(TextError::Ended { field, place }),
+            Some(got) => Err(TextError::Keyword {
+                field,
+                place,
+                got: shortened(got),
+            }),
+        }
+    }
+
+    /// The next token as a number; `kind` says which numbers would do.
+    pub(super) fn number<T: FromStr>(
+        &mut self,
+        field: &'static str,
+        kind: &'static str,
+    ) -> Result<T, TextError> {
+        let Some(got) = self.peek() else {
+            return Err(TextError::Ended {
+                field,
+                place: self.place(),
+            });
+        };
+        let Ok(value) = got.parse() else {
+            return Err(TextError::Number {
+                field,
+                place: self.place(),
+                kind,
+                got: shortened(got),
+            });
+        };
+        self.advance(got.len());
+        Ok(value)
+    }
+
+    /// Most tokens that can still come: what may be reserved on a count's word.
+    pub(super) fn at_most(&self) -> usize {
+        self.rest.len().div_ceil(2)
+    }
+
+    /// Steps over `bytes` of the next token, which is all of it, and the white space behind it.
+    fn advance(&mut self, bytes: usize) {
+        let behind = &self.rest[bytes..];
+        self.rest = behind.trim_start();
+        let space = &behind[..behind.len() - self.rest.len()];
+        self.place.line += space.bytes().filter(|&it| it == b'\n').count();
+        self.place.token += 1;
+    }
+}
+
+/// At most 24 characters of a token, for an error.
+pub(super) fn shortened(token: &str) -> String {
+    token.chars().take(24).collect()
+}
