@@ -1,0 +1,128 @@
+//! What can be wrong with footage.
+
+use std::path::PathBuf;
+
+use crate::Size;
+
+/// Why footage cannot be opened or read. Names the file, and the numbers needed to act.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FootageError {
+    /// There is no file, folder or match of that name.
+    #[error("no such footage: {path}")]
+    NotFound {
+        /// As the user wrote it.
+        path: String,
+    },
+    /// A glob that cannot be parsed.
+    #[error("cannot understand the pattern {pattern}")]
+    BadPattern {
+        /// As the user wrote it.
+        pattern: String,
+        /// Where and why.
+        source: glob::PatternError,
+    },
+    /// A folder or pattern without any image.
+    #[error("no image (png, jpg, jpeg, bmp) in {path}")]
+    NoImages {
+        /// As the user wrote it.
+        path: String,
+    },
+    /// The operating system refuses.
+    #[error("cannot read {}", path.display())]
+    Io {
+        /// What could not be read.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file of 0 bytes.
+    #[error("{} is empty (0 bytes)", path.display())]
+    Empty {
+        /// Which.
+        path: PathBuf,
+    },
+    /// Not an image, damaged, or cut off.
+    #[error("cannot decode the image {}", path.display())]
+    Image {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+    /// The images of one sequence must be of one size.
+    #[error("{} is {found}, but the sequence began with {expected} ({})", path.display(), first.display())]
+    SizeDiffers {
+        /// The image that differs.
+        path: PathBuf,
+        /// Its size.
+        found: Size,
+        /// The first image.
+        first: PathBuf,
+        /// The size of the first image.
+        expected: Size,
+    },
+    /// Too small to find anybody in it.
+    #[error("{} is {size}: width and height must be at least {min_side} pixels", path.display())]
+    TooSmall {
+        /// Which.
+        path: PathBuf,
+        /// Its size.
+        size: Size,
+        /// The least that was asked for.
+        min_side: usize,
+    },
+    /// `step` is 0.
+    #[error("frame step must be at least 1, got 0")]
+    ZeroStep,
+    /// `frame_rate_hz` is not a positive number.
+    #[error("frame rate must be a positive number of hertz, got {rate_hz}")]
+    BadRate {
+        /// As given.
+        rate_hz: f64,
+    },
+    /// `start` lies behind the last frame.
+    #[error("first frame {start} lies beyond the {n_frames} frames (counted from 0) of {path}")]
+    StartBeyondEnd {
+        /// As the user wrote it.
+        path: String,
+        /// First frame asked for, from 0.
+        start: u64,
+        /// Frames that there are.
+        n_frames: u64,
+    },
+    /// The executable that decodes videos is absent.
+    #[error(
+        "cannot run {}, which is needed to read the video {}: install ffmpeg (`apt-get install ffmpeg`, \
+         `brew install ffmpeg`, or https://ffmpeg.org/download.html) and put it on the PATH",
+        executable.display(), path.display()
+    )]
+    FfmpegMissing {
+        /// What was looked for.
+        executable: PathBuf,
+        /// The video that needs it.
+        path: PathBuf,
+        /// Why it did not start.
+        source: std::io::Error,
+    },
+    /// Not a video, or damaged.
+    #[error("cannot decode the video {}: {message}", path.display())]
+    Video {
+        /// Which.
+        path: PathBuf,
+        /// What the decoder says.
+        message: String,
+    },
+    /// The video ends before its last frame.
+    #[error("the video {} is cut off or damaged: {n_read} frames of {n_expected} could be read: {message}", path.display())]
+    VideoTruncated {
+        /// Which.
+        path: PathBuf,
+        /// Frames that could be read.
+        n_read: u64,
+        /// Frames that its header or index promises.
+        n_expected: u64,
+        /// What the decoder says.
+        message: String,
+    },
+}

@@ -1,0 +1,69 @@
+//! When a frame is due.
+
+/// When frame `k` is due on a clock that the caller reads: `start + k / rate`.
+///
+/// All cameras of a deployment share the start, so that frames of one index are due together. Nothing
+/// here reads a clock or sleeps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pacer {
+    start_nanos: u64,
+    rate_hz: Option<f64>,
+}
+
+impl Pacer {
+    /// Every frame is due at once.
+    pub const fn as_fast_as_possible() -> Self {
+        Self {
+            start_nanos: 0,
+            rate_hz: None,
+        }
+    }
+
+    /// Frame `k` is due `k / rate_hz` seconds after `start_nanos`.
+    ///
+    /// # Panics
+    ///
+    /// If `rate_hz` is not a positive finite number.
+    pub fn realtime(start_nanos: u64, rate_hz: f64) -> Self {
+        assert!(
+            rate_hz.is_finite() && rate_hz > 0.0,
+            "a frame rate is positive, got {rate_hz}"
+        );
+        Self {
+            start_nanos,
+            rate_hz: Some(rate_hz),
+        }
+    }
+
+    /// When frame `k` is due, nanoseconds of the caller's clock; 0 without a rate.
+    pub fn due_nanos(&self, k: u64) -> u64 {
+        match self.rate_hz {
+            None => 0,
+            Some(rate_hz) => self
+                .start_nanos
+                .saturating_add((k as f64 * 1e9 / rate_hz).round() as u64),
+        }
+    }
+
+    /// How long after `now_nanos` frame `k` is due; 0 if it is due already.
+    pub fn wait_nanos(&self, k: u64, now_nanos: u64) -> u64 {
+        self.due_nanos(k).saturating_sub(now_nanos)
+    }
+
+    /// The latest frame that is due, for a reader who drops what it missed.
+    ///
+    /// `None` before the start, and always without a rate, where there is nothing to miss.
+    /// Satisfies `due_nanos(k) <= now_nanos < due_nanos(k + 1)`.
+    pub fn latest_due(&self, now_nanos: u64) -> Option<u64> {
+        let rate_hz = self.rate_hz?;
+        let elapsed = now_nanos.checked_sub(self.start_nanos)?;
+        let mut k = (elapsed as f64 * 1e-9 * rate_hz) as u64;
+        while k > 0 && self.due_nanos(k) > now_nanos {
+            k -= 1;
+        }
+        while k < u64::MAX && self.due_nanos(k + 1) <= now_nanos {
+            k += 1;
+        }
+        Some(k)
+    }
+}
