@@ -1,4 +1,6 @@
 //! Entry point: parse the command line, then become what it names.
 #![forbid(unsafe_code)]
 
+mod deployment;
+
 fn main() {}

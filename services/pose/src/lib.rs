@@ -1,2 +1,6 @@
-//! To be written.
+//! Frames in, single-view candidates and their evidence out.
 #![forbid(unsafe_code)]
+
+mod config;
+
+pub use config::{All, Config, Window};

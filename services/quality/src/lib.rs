@@ -1,2 +1,6 @@
-//! To be written.
+//! Frames and candidates in, the expected error of every part out.
 #![forbid(unsafe_code)]
+
+mod config;
+
+pub use config::Config;

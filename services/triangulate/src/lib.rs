@@ -1,2 +1,6 @@
-//! To be written.
+//! The answers of the pairs in, joints in the world out.
 #![forbid(unsafe_code)]
+
+mod config;
+
+pub use config::Config;

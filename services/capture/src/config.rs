@@ -1,0 +1,78 @@
+//! Section `[capture]` of a deployment file, and its `[[camera]]` entries.
+
+use serde::{Deserialize, Serialize};
+
+/// Where the pictures of one camera come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// The camera of the rig, by its name there.
+    pub name: String,
+    /// A video, an image, a folder of images, or a glob such as `frames/*.png`.
+    pub source: String,
+    /// Where the source's top-left pixel lies on the calibrated sensor, `[x, y]` pixels.
+    #[serde(default)]
+    pub source_offset_px: [i32; 2],
+}
+
+/// What happens when a stage is slower than its input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Nothing is dropped: senders wait for their receivers.
+    #[default]
+    Lossless,
+    /// The latest message wins; what was not read in time is dropped and counted.
+    Realtime,
+}
+
+/// How fast recorded frames are handed out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pace {
+    /// As fast as they can be read and taken.
+    #[default]
+    Fast,
+    /// At the frame rate of the footage.
+    Realtime,
+}
+
+/// How pixels get into the pipeline.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Whether anything may be dropped.
+    pub mode: Mode,
+    /// How fast recorded frames are handed out.
+    pub pace: Pace,
+    /// Size `[width, height]` of the frames that the pipeline sees, pixels.
+    pub size: Option<[usize; 2]>,
+    /// Size of the frames as a share of the camera's; instead of `size`.
+    pub scale: Option<f64>,
+    /// Turn every frame about the optical axis until the world's up points up, where the rig knows it.
+    pub upright: bool,
+    /// Frames per second of image folders, and of a video that does not say.
+    pub frame_rate_hz: Option<f64>,
+    /// First frame of the footage to use, from 0.
+    pub start_frame: u64,
+    /// Use every n-th frame.
+    pub frame_step: u64,
+    /// Most frames to use; all without it.
+    pub n_frames: Option<u64>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Lossless,
+            pace: Pace::Fast,
+            size: None,
+            scale: None,
+            upright: true,
+            frame_rate_hz: None,
+            start_frame: 0,
+            frame_step: 1,
+            n_frames: None,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! A deployment file: what a user starts, typed, with every default filled in.
+
+mod error;
+mod keys;
+mod load;
+mod rules;
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+pub(crate) use error::ConfigError;
+pub(crate) use keys::{Entry, Origin};
+pub(crate) use load::Loaded;
+
+/// Everything a user may say about a run. Defaults are those of the services' `Config`s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Deployment {
+    /// Name of the deployment: its processes share memory under it.
+    pub name: String,
+    /// Calibration of the cameras.
+    pub rig: PathBuf,
+    /// Trained model.
+    pub model: PathBuf,
+    /// Folder for the results.
+    pub output: PathBuf,
+    /// The cameras, in the order in which views are numbered.
+    #[serde(rename = "camera")]
+    pub cameras: Vec<capture::Camera>,
+    /// How pixels get in.
+    #[serde(default)]
+    pub capture: capture::Config,
+    /// The single-view solver.
+    #[serde(default)]
+    pub pose: pose::Config,
+    /// Expected errors.
+    #[serde(default)]
+    pub quality: quality::Config,
+    /// The energy over pairs of views.
+    #[serde(default)]
+    pub fuse: fuse::Config,
+    /// Joints in the world.
+    #[serde(default)]
+    pub triangulate: triangulate::Config,
+    /// What is left behind.
+    #[serde(default)]
+    pub record: record::Config,
+    /// Deadlines and restarts.
+    #[serde(default)]
+    pub supervise: Supervision,
+}
+
+/// Section `[supervise]`: how long to wait, and how often to try again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Supervision {
+    /// How long a stage waits for a view that is late, milliseconds; by mode if not given.
+    pub deadline_ms: Option<u64>,
+    /// Most restarts of one process within the window before it is given up.
+    pub max_restarts: u32,
+    /// The window in which restarts are counted, seconds.
+    pub restart_window_s: u64,
+}
+
+impl Default for Supervision {
+    fn default() -> Self {
+        Self {
+            deadline_ms: None,
+            max_restarts: 5,
+            restart_window_s: 60,
+        }
+    }
+}
+
+impl Deployment {
+    /// How long a stage waits for a view that is late, milliseconds.
+    pub(crate) fn deadline_ms(&self) -> u64 {
+        self.supervise
+            .deadline_ms
+            .unwrap_or(match self.capture.mode {
+                capture::Mode::Lossless => 10_000,
+                capture::Mode::Realtime => 200,
+            })
+    }
+
+    /// Takes every relative path as relative to `base`.
+    fn resolve(&mut self, base: &Path) {
+        for path in [&mut self.rig, &mut self.model, &mut self.output] {
+            *path = base.join(&path);
+        }
+        for camera in &mut self.cameras {
+            camera.source = base.join(&camera.source).to_string_lossy().into_owned();
+        }
+        if let Some(table) = &mut self.quality.table {
+            *table = base.join(&table);
+        }
+        for tables in &mut self.fuse.compatibility {
+            for file in &mut tables.files {
+                *file = base.join(&file);
+            }
+        }
+    }
+}

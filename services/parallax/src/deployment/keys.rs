@@ -1,0 +1,163 @@
+//! Every key of a deployment file, what it means, its value and where that came from.
+
+use toml::{Table, Value};
+
+use super::Loaded;
+
+/// Who said a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Origin {
+    /// Nobody.
+    Default,
+    /// The deployment file.
+    File,
+    /// `--set` or another option.
+    CommandLine,
+}
+
+impl Origin {
+    /// In words.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::File => "file",
+            Self::CommandLine => "command line",
+        }
+    }
+}
+
+/// One key.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub(crate) struct Entry {
+    /// With its section.
+    pub key: &'static str,
+    /// As TOML; `None` if it is not set and has no default.
+    pub value: Option<Value>,
+    /// Who said it.
+    pub origin: Origin,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// Keys in the order in which they are shown.
+const KEYS: &[(&str, &str)] = &[
+    ("name", "name of the deployment: its processes share memory under it"),
+    ("rig", "calibration of the cameras"),
+    ("model", "trained model"),
+    ("output", "folder for the results"),
+    ("camera", "name in the rig, source (video, image, folder, glob), source_offset_px of a cropped source"),
+    ("capture.mode", "lossless: nothing is dropped; realtime: the latest frame wins"),
+    ("capture.pace", "fast: as fast as frames are taken; realtime: at the frame rate"),
+    ("capture.size", "[width, height] of the frames that the pipeline sees, pixels"),
+    ("capture.scale", "the same as a share of the camera's image; without either: the camera's size"),
+    ("capture.upright", "turn frames until the world's up points up, where the rig knows it"),
+    ("capture.frame_rate_hz", "frames per second of images, and of a video that does not say"),
+    ("capture.start_frame", "first frame to use, from 0"),
+    ("capture.frame_step", "use every n-th frame"),
+    ("capture.n_frames", "most frames to use; all without it"),
+    ("pose.evidence_window", "levels either side of every candidate's that fusion may use, or \"all\""),
+    ("pose.candidates", "most distinct candidates that a view offers to fusion"),
+    ("pose.min_separation", "least mean distance of two candidates' parts, in box sides"),
+    ("pose.threads", "threads of one pose process"),
+    ("quality.table", "expected errors: subject, action, frame, camera, then one per part, pixels"),
+    ("quality.subject", "subject in that table"),
+    ("quality.action", "action in that table"),
+    ("quality.frame_offset", "frame in that table = frame of the footage + this"),
+    ("fuse.energy", "paper, or released: what the authors' program computes"),
+    ("fuse.alpha", "weight of the geometric term; 0.01 per squared cell (paper), 0.07 (released)"),
+    ("fuse.beta", "weight of the part-type term"),
+    ("fuse.max_distance_cells", "distance beyond which the geometric term grows no more; none without it"),
+    ("fuse.compatibility", "part-type tables: views = [a, b], files = [a wrt b, b wrt a]"),
+    ("fuse.tau_px", "expected error above which a part is switched off, one per part; never if empty"),
+    ("fuse.facing", "decide for every view whether it sees the person from behind"),
+    ("fuse.workers", "fusion processes; pairs of views are dealt to them in turn"),
+    ("fuse.max_iterations", "most single-view solutions of a pair"),
+    ("fuse.epsilon_px", "mean movement below which a view counts as settled"),
+    ("fuse.pairs", "pairs of cameras to fuse, by name; all if empty"),
+    ("triangulate.joints", "parse14, umpm15 or humaneva20"),
+    ("triangulate.loss_px", "reprojection error at which an observation begins to count less"),
+    ("record.trc", "write pose3d.trc for OpenSim"),
+    ("record.overlay_every", "draw every n-th frame of every view; 0 draws none"),
+    ("record.epipolar_part", "part whose epipolar lines are drawn, from 1"),
+    ("supervise.deadline_ms", "how long a stage waits for a late view; 10000 lossless, 200 realtime"),
+    ("supervise.max_restarts", "restarts of one process within the window before it is given up"),
+    ("supervise.restart_window_s", "that window, seconds"),
+];
+
+impl Loaded {
+    /// Every key with its value, in order.
+    pub(crate) fn entries(&self) -> Result<Vec<Entry>, toml::ser::Error> {
+        let table = Table::try_from(&self.deployment)?;
+        Ok(KEYS
+            .iter()
+            .map(|&(key, meaning)| Entry {
+                key,
+                value: lookup(&table, key).cloned(),
+                origin: self.origin(key),
+                meaning,
+            })
+            .collect())
+    }
+
+    fn origin(&self, key: &str) -> Origin {
+        if lookup(&self.on_command_line, key).is_some() {
+            Origin::CommandLine
+        } else if lookup(&self.in_file, key).is_some() {
+            Origin::File
+        } else {
+            Origin::Default
+        }
+    }
+}
+
+fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    match key.split_once('.') {
+        Some((section, rest)) => lookup(table.get(section)?.as_table()?, rest),
+        None => table.get(key),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deployment::Deployment;
+
+    const MINIMAL: &str = "name = 'a'\nrig = 'r'\nmodel = 'm'\noutput = 'o'\ncamera = []\n";
+
+    fn defaults() -> Deployment {
+        toml::from_str(MINIMAL).unwrap()
+    }
+
+    #[test]
+    fn every_key_that_has_a_value_is_explained() {
+        for (section, value) in &Table::try_from(defaults()).unwrap() {
+            let keys: Vec<String> = match value {
+                Value::Table(inner) => inner.keys().map(|it| format!("{section}.{it}")).collect(),
+                _ => vec![section.clone()],
+            };
+            for key in keys {
+                assert!(KEYS.iter().any(|it| it.0 == key), "{key} is not explained");
+            }
+        }
+    }
+
+    #[test]
+    fn every_explained_key_exists() {
+        // A key that the file format does not know is refused as unknown; any other complaint about
+        // the value proves that the key was found.
+        for (key, _) in KEYS {
+            let nested = key
+                .rsplit('.')
+                .fold(Value::Array(vec![Value::Integer(-1); 9]), |inner, name| {
+                    Value::Table(Table::from_iter([(name.to_owned(), inner)]))
+                });
+            let Value::Table(table) = nested else { continue };
+            let mut whole: Table = MINIMAL.parse().unwrap();
+            whole.extend(table);
+            if let Err(error) = whole.try_into::<Deployment>() {
+                assert!(!error.message().contains("unknown field"), "{key}: {error}");
+            }
+        }
+    }
+}

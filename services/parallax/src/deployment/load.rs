@@ -1,0 +1,260 @@
+//! From a file and the options of the command line to a deployment.
+
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::de::DeTable;
+use toml::{Table, Value};
+
+use super::{ConfigError, Deployment, rules};
+
+/// A deployment, and what of it was said by whom.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    /// The file.
+    pub file: PathBuf,
+    /// What it says, paths resolved, defaults filled in.
+    pub deployment: Deployment,
+    /// What the file says, as it stands there.
+    pub(super) in_file: Table,
+    /// What the command line says.
+    pub(super) on_command_line: Table,
+}
+
+impl Loaded {
+    /// Reads a deployment file; `set` are `key=value` pairs that replace what it says.
+    ///
+    /// Relative paths are relative to the file, whoever says them.
+    pub(crate) fn read(file: &Path, set: &[String]) -> Result<Self, ConfigError> {
+        let text = fs::read_to_string(file).map_err(|source| ConfigError::Read {
+            file: file.to_owned(),
+            source,
+        })?;
+        let malformed = |error: &toml::de::Error| {
+            let place = place(file, &text, error.span());
+            ConfigError::explain(place, error.message())
+        };
+        let mut deployment: Deployment = toml::from_str(&text).map_err(|it| malformed(&it))?;
+        let in_file: Table = toml::from_str(&text).map_err(|it| malformed(&it))?;
+        let on_command_line = overrides(set)?;
+        if !on_command_line.is_empty() {
+            let mut table = in_file.clone();
+            merge(&mut table, on_command_line.clone());
+            deployment = table.try_into().map_err(|error: toml::de::Error| {
+                ConfigError::explain("--set".to_owned(), error.message())
+            })?;
+        }
+        deployment.resolve(&base(file));
+        rules::check(&deployment).map_err(|complaint| ConfigError::Value {
+            place: place(file, &text, span_of(&text, &complaint.key)),
+            key: complaint.key,
+            got: complaint.got,
+            expected: complaint.expected,
+        })?;
+        Ok(Self {
+            file: file.to_owned(),
+            deployment,
+            in_file,
+            on_command_line,
+        })
+    }
+}
+
+/// The folder of a file, absolute where the working folder is known.
+fn base(file: &Path) -> PathBuf {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
+}
+
+/// `file:line` of a span; the file alone where there is none.
+fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
+    let Some(before) = span.and_then(|it| text.get(..it.start)) else {
+        return file.display().to_string();
+    };
+    let line = 1 + before.matches('\n').count();
+    format!("{}:{line}", file.display())
+}
+
+/// Where a dotted key stands in `text`; where its section does if the key itself is not there.
+fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
+    let document = DeTable::parse(text).ok()?;
+    let mut table = document.into_inner();
+    let mut found = None;
+    for name in key.split('.') {
+        let (name, value) = table.into_iter().find(|(it, _)| it.get_ref() == name)?;
+        found = Some(name.span());
+        match value.into_inner() {
+            toml::de::DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found
+}
+
+/// What `--set section.key=value` says, as a table.
+///
+/// A value that is not TOML is taken as text, so that `--set fuse.energy=released` needs no quotes.
+fn overrides(set: &[String]) -> Result<Table, ConfigError> {
+    let mut table = Table::new();
+    for argument in set {
+        let malformed = |message: &str| ConfigError::Malformed {
+            place: format!("--set {argument}"),
+            message: message.to_owned(),
+        };
+        let (key, value) = argument
+            .split_once('=')
+            .ok_or_else(|| malformed("expected key=value, for example fuse.workers=2"))?;
+        let value = format!("it = {value}")
+            .parse::<Table>()
+            .ok()
+            .and_then(|mut it| it.remove("it"))
+            .unwrap_or_else(|| Value::String(value.to_owned()));
+        let nested = key.trim().rsplit('.').fold(value, |inner, name| {
+            Value::Table(Table::from_iter([(name.to_owned(), inner)]))
+        });
+        if let Value::Table(nested) = nested {
+            merge(&mut table, nested);
+        }
+    }
+    Ok(table)
+}
+
+/// Puts what `over` says in the place of what `table` says, key by key.
+fn merge(table: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(over)) => merge(inner, over),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHORT: &str = r#"
+name = "two"
+rig = "rig.toml"
+model = "/models/m.mat"
+output = "out"
+
+[[camera]]
+name = "a"
+source = "videos/a.mp4"
+
+[[camera]]
+name = "b"
+source = "/videos/b.mp4"
+
+[fuse]
+workers = 2
+"#;
+
+    fn read(text: &str, set: &[&str]) -> Result<Loaded, ConfigError> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("deployment.toml");
+        fs::write(&file, text).unwrap();
+        let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+        Loaded::read(&file, &set)
+    }
+
+    fn refused(text: &str, set: &[&str]) -> String {
+        let error = read(text, set).unwrap_err().to_string();
+        error.split_once("deployment.toml").map_or_else(
+            || error.clone(),
+            |(_, rest)| format!("deployment.toml{rest}"),
+        )
+    }
+
+    #[test]
+    fn a_short_file_is_enough() {
+        let got = read(SHORT, &[]).unwrap().deployment;
+        assert_eq!(got.fuse.workers, 2);
+        assert_eq!(got.pose, pose::Config::default());
+        assert_eq!(got.cameras.len(), 2);
+    }
+
+    #[test]
+    fn relative_paths_are_relative_to_the_file() {
+        let loaded = read(SHORT, &[]).unwrap();
+        let folder = loaded.file.parent().unwrap();
+        assert_eq!(loaded.deployment.rig, folder.join("rig.toml"));
+        assert_eq!(loaded.deployment.model, Path::new("/models/m.mat"));
+        assert!(Path::new(&loaded.deployment.cameras[0].source).starts_with(folder));
+        assert_eq!(loaded.deployment.cameras[1].source, "/videos/b.mp4");
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_file() {
+        let set = ["fuse.workers=3", "fuse.energy=released", "capture.n_frames=7"];
+        let got = read(SHORT, &set).unwrap().deployment;
+        assert_eq!(got.fuse.workers, 3);
+        assert_eq!(got.fuse.energy, fuse::Energy::Released);
+        assert_eq!(got.capture.n_frames, Some(7));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_a_suggestion() {
+        let text = SHORT.replace("workers", "wrokers");
+        assert_eq!(
+            refused(&text, &[]),
+            "deployment.toml:16: unknown key `wrokers`, did you mean `workers`?"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_of_the_command_line_is_named_too() {
+        assert_eq!(
+            refused(SHORT, &["fuse.wrokers=3"]),
+            "--set: unknown key `wrokers`, did you mean `workers`?"
+        );
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        let text = SHORT.replace("rig = ", "# rig = ");
+        assert!(refused(&text, &[]).contains("missing key `rig`"));
+    }
+
+    #[test]
+    fn a_value_of_another_kind_is_refused_with_its_line() {
+        let text = SHORT.replace("workers = 2", "workers = \"two\"");
+        let got = refused(&text, &[]);
+        assert!(got.starts_with("deployment.toml:16: "), "{got}");
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_is_refused_with_its_line() {
+        let text = SHORT.replace("workers = 2", "workers = 0");
+        assert_eq!(
+            refused(&text, &[]),
+            "deployment.toml:16: `fuse.workers` is 0, expected 1 to 16"
+        );
+    }
+
+    #[test]
+    fn text_that_is_not_toml_is_refused_with_its_line() {
+        let got = refused(&SHORT.replace("[fuse]", "[fuse"), &[]);
+        assert!(got.starts_with("deployment.toml:15: "), "{got}");
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_named() {
+        let error = Loaded::read(Path::new("/nowhere/d.toml"), &[]).unwrap_err();
+        assert!(error.to_string().contains("/nowhere/d.toml"));
+    }
+
+    #[test]
+    fn an_override_without_a_value_is_refused() {
+        assert!(refused(SHORT, &["fuse.workers"]).contains("expected key=value"));
+    }
+}

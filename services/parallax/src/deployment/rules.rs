@@ -1,0 +1,147 @@
+//! What must hold of a deployment before anything is started.
+
+use messages::{MAX_CANDIDATES, MAX_VIEWS};
+
+use super::Deployment;
+
+/// A value that cannot be.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Complaint {
+    /// The key, with its section.
+    pub key: String,
+    /// Its value.
+    pub got: String,
+    /// What would do.
+    pub expected: String,
+}
+
+/// Checks the values that the types alone do not.
+pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
+    name(&it.name)?;
+    cameras(it)?;
+    capture(&it.capture)?;
+    pose(&it.pose)?;
+    quality(&it.quality)?;
+    fuse(it)?;
+    let joints = &it.triangulate.joints;
+    let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
+    demand(
+        skeleton::JointSet::by_name(joints).is_some(),
+        "triangulate.joints",
+        joints,
+        &format!("one of {known}"),
+    )?;
+    positive("triangulate.loss_px", it.triangulate.loss_px)
+}
+
+fn name(name: &str) -> Result<(), Complaint> {
+    let good = |it: char| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '-';
+    demand(
+        (1..=32).contains(&name.len()) && name.chars().all(good),
+        "name",
+        &format!("{name:?}"),
+        "1 to 32 lower-case letters, digits and hyphens",
+    )
+}
+
+fn cameras(it: &Deployment) -> Result<(), Complaint> {
+    let n = it.cameras.len();
+    within("camera", n, 1, MAX_VIEWS)?;
+    for (index, camera) in it.cameras.iter().enumerate() {
+        let twin = it.cameras[..index].iter().any(|other| other.name == camera.name);
+        demand(!twin, "camera", &format!("twice {:?}", camera.name), "every camera once")?;
+    }
+    Ok(())
+}
+
+fn capture(it: &capture::Config) -> Result<(), Complaint> {
+    demand(
+        it.size.is_none() || it.scale.is_none(),
+        "capture.scale",
+        "given together with size",
+        "either of the two",
+    )?;
+    if let Some([width, height]) = it.size {
+        within("capture.size", width, 1, 16_384)?;
+        within("capture.size", height, 1, 16_384)?;
+    }
+    if let Some(scale) = it.scale {
+        positive("capture.scale", scale)?;
+        demand(scale <= 8.0, "capture.scale", &scale.to_string(), "at most 8")?;
+    }
+    if let Some(rate) = it.frame_rate_hz {
+        positive("capture.frame_rate_hz", rate)?;
+    }
+    demand(it.frame_step > 0, "capture.frame_step", "0", "at least 1")
+}
+
+fn pose(it: &pose::Config) -> Result<(), Complaint> {
+    within("pose.candidates", it.candidates, 1, MAX_CANDIDATES)?;
+    within("pose.threads", it.threads, 1, 256)?;
+    not_negative("pose.min_separation", it.min_separation)
+}
+
+fn quality(it: &quality::Config) -> Result<(), Complaint> {
+    for (key, value) in [("quality.subject", &it.subject), ("quality.action", &it.action)] {
+        demand(
+            it.table.is_none() || value.is_some(),
+            key,
+            "not given",
+            "the name that quality.table uses",
+        )?;
+    }
+    Ok(())
+}
+
+fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.fuse;
+    within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
+    within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
+    not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
+    not_negative("fuse.beta", it.beta)?;
+    not_negative("fuse.epsilon_px", it.epsilon_px)?;
+    if let Some(cells) = it.max_distance_cells {
+        positive("fuse.max_distance_cells", cells)?;
+    }
+    for tau in &it.tau_px {
+        not_negative("fuse.tau_px", f64::from(*tau))?;
+    }
+    let tables = it.compatibility.iter().map(|it| ("fuse.compatibility", &it.views));
+    let pairs = it.pairs.iter().map(|it| ("fuse.pairs", it));
+    for (key, names) in tables.chain(pairs) {
+        for name in names {
+            demand(
+                deployment.cameras.iter().any(|it| it.name == *name),
+                key,
+                &format!("{name:?}"),
+                "the name of a [[camera]] of this file",
+            )?;
+        }
+        demand(names[0] != names[1], key, &format!("{:?} twice", names[0]), "two cameras")?;
+    }
+    Ok(())
+}
+
+fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {
+    if holds {
+        return Ok(());
+    }
+    Err(Complaint {
+        key: key.to_owned(),
+        got: got.to_owned(),
+        expected: expected.to_owned(),
+    })
+}
+
+fn within(key: &str, got: usize, least: usize, most: usize) -> Result<(), Complaint> {
+    let expected = format!("{least} to {most}");
+    demand((least..=most).contains(&got), key, &got.to_string(), &expected)
+}
+
+fn positive(key: &str, got: f64) -> Result<(), Complaint> {
+    demand(got.is_finite() && got > 0.0, key, &got.to_string(), "a number above 0")
+}
+
+fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
+    demand(got.is_finite() && got >= 0.0, key, &got.to_string(), "a number of at least 0")
+}

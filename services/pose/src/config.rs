@@ -1,0 +1,46 @@
+//! Section `[pose]` of a deployment file.
+
+use serde::{Deserialize, Serialize};
+
+/// The single-view solver, and what it hands on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Which levels of the pyramid are offered to fusion.
+    pub evidence_window: Window,
+    /// Most distinct candidates that a view offers.
+    pub candidates: usize,
+    /// Least mean distance between two candidates' part centres, in box sides.
+    pub min_separation: f64,
+    /// Threads of one pose process.
+    pub threads: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            evidence_window: Window::Levels(5),
+            candidates: 5,
+            min_separation: 1.0,
+            threads: 1,
+        }
+    }
+}
+
+/// Levels of the pyramid around those of the candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number of levels, or \"all\"")]
+pub enum Window {
+    /// So many levels either side of every candidate's own.
+    Levels(u16),
+    /// All of them.
+    All(All),
+}
+
+/// The word `all`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum All {
+    /// Everything.
+    All,
+}

@@ -1,0 +1,25 @@
+//! Section `[record]` of a deployment file.
+
+use serde::{Deserialize, Serialize};
+
+/// What a run leaves behind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Write `pose3d.trc` for `OpenSim`.
+    pub trc: bool,
+    /// Draw every n-th frame of every view; 0 draws none.
+    pub overlay_every: u64,
+    /// The part whose epipolar lines are drawn, from 1 as in the model's tables.
+    pub epipolar_part: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            trc: true,
+            overlay_every: 10,
+            epipolar_part: 7,
+        }
+    }
+}
