@@ -1,13 +1,17 @@
 //! Model files: the two released formats and Parallax's own.
 
-mod released;
+pub mod mat;
 pub mod text;
+
+mod mat5;
+mod released;
 mod tokens;
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use mat5::ContainerError;
 pub use tokens::Place;
 
 use crate::{Model, ModelError, ModelSpec};
@@ -55,6 +59,14 @@ pub enum ModelFileError {
         /// What is wrong with it.
         source: text::TextError,
     },
+    /// A MATLAB file, but not a model.
+    #[error("the model file {} cannot be read", path.display())]
+    Mat {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: mat::MatError,
+    },
     /// The file can be read, but its model makes no sense.
     #[error("the model in {} was refused", path.display())]
     Model {
@@ -90,21 +102,16 @@ pub fn read(path: &Path) -> Result<Model, ModelFileError> {
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     let path = path.to_owned();
-    let beginning = || String::from_utf8_lossy(&bytes[..bytes.len().min(16)]).into_owned();
-    let mut spec = match std::str::from_utf8(bytes) {
-        Ok(text) if text.trim_start().starts_with("partsNbr") => {
-            text::parse(text).map_err(|source| ModelFileError::Text {
-                path: path.clone(),
-                source,
-            })?
-        }
-        _ => {
-            let beginning = beginning();
-            return Err(ModelFileError::NotAModel { path, beginning });
-        }
+    let stem = path.file_stem().map(|it| it.to_string_lossy().into_owned());
+    let mut spec = if bytes.starts_with(b"MATLAB ") {
+        mat::parse(bytes).map_err(|source| ModelFileError::Mat { path, source })?
+    } else if bytes.trim_ascii_start().starts_with(b"partsNbr") {
+        let text = String::from_utf8_lossy(bytes);
+        text::parse(&text).map_err(|source| ModelFileError::Text { path, source })?
+    } else {
+        let beginning = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]).into_owned();
+        return Err(ModelFileError::NotAModel { path, beginning });
     };
-    if let Some(stem) = path.file_stem() {
-        spec.name = stem.to_string_lossy().into_owned();
-    }
+    spec.name = stem.unwrap_or_default();
     Ok(spec)
 }
