@@ -1,0 +1,221 @@
+//! Rules of the house that the compiler cannot see.
+//!
+//! Each rule is one test; each failure names the file and what to do.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A crate may depend only on crates in rows above its own.
+const LAYERS: &[&[&str]] = &[
+    &["skeleton"],
+    &["geometry", "kernels", "messages", "footage"],
+    &["runtime", "fmp"],
+    &["multiview", "viewquality"],
+    &["pipeline", "evaluation"],
+    &["wire"],
+    &[
+        "capture",
+        "pose",
+        "quality",
+        "fuse",
+        "triangulate",
+        "record",
+        "supervise",
+    ],
+    &["parallax"],
+];
+
+/// The only crates that may contain the word.
+const MAY_BE_UNSAFE: &[&str] = &["kernels", "runtime"];
+
+/// The only crates that may know the transport.
+const MAY_KNOW_TRANSPORT: &[&str] = &["messages", "runtime"];
+
+const MAX_LINES: usize = 500;
+const MAX_MAIN_LINES: usize = 100;
+
+#[test]
+fn crates_depend_downwards() {
+    let row = |name: &str| LAYERS.iter().position(|row| row.contains(&name));
+    for (name, dir) in crates() {
+        if name == "testkit" {
+            continue; // for tests only; see below
+        }
+        let own = row(&name).unwrap_or_else(|| panic!("{name} has no row in LAYERS"));
+        for dependency in dependencies(&dir) {
+            if let Some(theirs) = row(&dependency) {
+                assert!(
+                    theirs < own,
+                    "{name} may not depend on {dependency}: see LAYERS"
+                );
+            }
+            assert_ne!(dependency, "testkit", "{name}: testkit is for tests only");
+        }
+    }
+}
+
+#[test]
+fn only_the_runtime_knows_the_transport() {
+    for (name, dir) in crates() {
+        let knows = dependencies(&dir).iter().any(|it| it == "iceoryx2");
+        assert!(
+            !knows || MAY_KNOW_TRANSPORT.contains(&name.as_str()),
+            "{name} may not depend on iceoryx2: go through `runtime`"
+        );
+    }
+}
+
+#[test]
+fn unsafe_stays_where_it_is_allowed() {
+    for (name, dir) in crates() {
+        if MAY_BE_UNSAFE.contains(&name.as_str()) {
+            continue;
+        }
+        let root = ["src/lib.rs", "src/main.rs"]
+            .iter()
+            .find_map(|file| fs::read_to_string(dir.join(file)).ok())
+            .unwrap();
+        assert!(
+            root.contains("#![forbid(unsafe_code)]"),
+            "{name}: forbid unsafe_code in lib.rs"
+        );
+    }
+}
+
+#[test]
+fn files_stay_readable() {
+    for (_, dir) in crates() {
+        for file in rust_files(&dir) {
+            let text = fs::read_to_string(&file).unwrap();
+            let main = file.ends_with("src/main.rs");
+            let limit = if main { MAX_MAIN_LINES } else { MAX_LINES };
+            let lines = text.lines().count();
+            assert!(
+                lines <= limit,
+                "{} has {lines} lines, more than {limit}: split it",
+                file.display()
+            );
+            assert!(
+                text.starts_with("//! "),
+                "{} says nothing about itself: open with a `//!` sentence",
+                file.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn no_test_is_ignored_and_no_work_is_left_marked() {
+    // Put together here so that this file does not find itself.
+    let marks = [
+        ["#[ign", "ore"].concat(),
+        ["TO", "DO"].concat(),
+        ["FIX", "ME"].concat(),
+        ["unimpl", "emented!"].concat(),
+    ];
+    for (_, dir) in crates() {
+        for file in rust_files(&dir) {
+            let text = fs::read_to_string(&file).unwrap();
+            for mark in &marks {
+                assert!(
+                    !text.contains(mark.as_str()),
+                    "{} contains {mark}",
+                    file.display()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn every_crate_is_on_its_map() {
+    for group in ["services", "shared"] {
+        let map = fs::read_to_string(root().join(group).join("README.md")).unwrap();
+        for entry in fs::read_dir(root().join(group)).unwrap() {
+            let entry = entry.unwrap();
+            if entry.path().is_dir() {
+                let name = entry.file_name().into_string().unwrap();
+                assert!(
+                    map.contains(&format!("`{name}`")),
+                    "{group}/README.md does not mention `{name}`"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn only_the_agreed_entries_lie_at_the_top() {
+    let agreed = [
+        ".ci",
+        ".gitignore",
+        "Cargo.lock",
+        "Cargo.toml",
+        "LICENSE-APACHE",
+        "LICENSE-MIT",
+        "README.md",
+        "configs",
+        "scripts",
+        "services",
+        "shared",
+        "tests",
+    ];
+    let Ok(listing) = Command::new("git")
+        .args(["ls-tree", "--name-only", "HEAD"])
+        .current_dir(root())
+        .output()
+    else {
+        eprintln!("skipped: git is absent");
+        return;
+    };
+    for name in String::from_utf8(listing.stdout).unwrap().lines() {
+        assert!(agreed.contains(&name), "{name} lies at the top: move it");
+    }
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_owned()
+}
+
+fn dependencies(dir: &Path) -> Vec<String> {
+    let manifest: toml::Table = fs::read_to_string(dir.join("Cargo.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
+    manifest
+        .get("dependencies")
+        .and_then(toml::Value::as_table)
+        .into_iter()
+        .flat_map(toml::Table::keys)
+        .cloned()
+        .collect()
+}
+
+fn crates() -> Vec<(String, PathBuf)> {
+    ["services", "shared"]
+        .iter()
+        .flat_map(|group| fs::read_dir(root().join(group)).unwrap())
+        .map(|entry| entry.unwrap())
+        .filter(|entry| entry.path().join("Cargo.toml").exists())
+        .map(|entry| (entry.file_name().into_string().unwrap(), entry.path()))
+        .collect()
+}
+
+fn rust_files(dir: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|it| it == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
