@@ -24,3 +24,17 @@ pub struct EvidenceHeader {
     /// Levels of the pyramid that hold valid values, ascending.
     pub levels: [u16; MAX_LEVELS],
 }
+
+impl Default for EvidenceHeader {
+    fn default() -> Self {
+        Self {
+            stamp: Stamp::default(),
+            timing: Timing::default(),
+            width: 0,
+            height: 0,
+            status: Status::default(),
+            n_levels: 0,
+            levels: [0; MAX_LEVELS],
+        }
+    }
+}

@@ -1,2 +1,30 @@
-//! To be written.
-#![forbid(unsafe_code)]
+//! Ports, wake-up, stopping, health and logging: the only crate that talks to iceoryx2 and to the
+//! operating system.
+
+mod namespace;
+mod topic;
+
+mod bus;
+mod memory;
+mod payload;
+mod publisher;
+mod service;
+mod subscriber;
+mod waiter;
+
+mod clock;
+mod progress;
+mod stop;
+
+pub use bus::{Bus, BusError, Topic};
+pub use clock::now_nanos;
+pub use memory::{MemoryError, free_shared_memory};
+pub use namespace::{Namespace, NamespaceError};
+pub use payload::{Element, Header, Message};
+pub use progress::Progress;
+pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
+pub use service::PortError;
+pub use stop::Stop;
+pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
+pub use topic::{Delivery, Limits, TopicPlan};
+pub use waiter::{WaitError, Waiter, Woken};

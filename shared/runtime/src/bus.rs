@@ -1,0 +1,229 @@
+//! A process's connection to the shared memory of its deployment.
+
+use core::fmt::Debug;
+use core::time::Duration;
+use std::io;
+use std::path::PathBuf;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeCreationFailure;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::{
+    FilePath, Node, NodeBuilder, NodeName, SemanticString as _, SignalHandlingMode, ipc,
+};
+use iceoryx2::service::builder::event::EventCreateError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
+use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
+
+use crate::payload::{Header, Message};
+use crate::service::{self, PortError};
+use crate::topic::TopicPlan;
+use crate::{Namespace, NamespaceError, Progress, Stop};
+
+/// How long a sender waits for a receiver without room, unless told otherwise.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// The deployment's shared memory cannot be reached, or a topic not be created.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The working directory cannot be created or written to.
+    #[error("cannot use working directory {path:?}")]
+    Directory {
+        /// The directory or a file below it.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// The namespace does not suit iceoryx2.
+    #[error(transparent)]
+    Namespace(#[from] NamespaceError),
+    /// The process cannot be registered.
+    #[error("cannot register process {process:?} below {root:?}; is the directory another user's?")]
+    Node {
+        /// Name of the process.
+        process: String,
+        /// Where.
+        root: PathBuf,
+        /// Why.
+        #[source]
+        source: NodeCreationFailure,
+    },
+    /// The topic cannot be created.
+    #[error("cannot create topic {topic:?}")]
+    Create {
+        /// Name of the topic.
+        topic: String,
+        /// Why.
+        #[source]
+        source: PublishSubscribeCreateError,
+    },
+    /// The wake-up of a topic cannot be created.
+    #[error("cannot create wake-up of topic {topic:?}: {source:?}")]
+    CreateWakeUp {
+        /// Name of the topic.
+        topic: String,
+        /// Why.
+        source: EventCreateError,
+    },
+    /// The name of a topic or a process is not one that iceoryx2 accepts.
+    #[error("name {name:?} is empty, too long, or not plain text")]
+    Name {
+        /// The name.
+        name: String,
+    },
+}
+
+/// Keeps a topic in being while no process uses it.
+#[derive(Debug)]
+pub struct Topic {
+    _messages: Box<dyn Debug>,
+    _wake_ups: Vec<EventFactory<ipc::Service>>,
+}
+
+/// A process's connection to the shared memory of its deployment: makes ports.
+#[derive(Debug)]
+pub struct Bus {
+    node: Node<ipc::Service>,
+    namespace: Namespace,
+    process: String,
+    stop: Stop,
+    progress: Progress,
+    patience: Duration,
+}
+
+impl Bus {
+    /// Registers this process in the deployment.
+    ///
+    /// * `process`: its unique name in the deployment, for example `pose-2`.
+    /// * `stop`: ends every wait.
+    ///
+    /// # Errors
+    ///
+    /// [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`], [`BusError::Name`].
+    pub fn open(namespace: &Namespace, process: &str, stop: &Stop) -> Result<Self, BusError> {
+        let config = prepare(namespace)?;
+        let name = NodeName::new(process).map_err(|_| BusError::Name {
+            name: process.to_owned(),
+        })?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|source| BusError::Node {
+                process: process.to_owned(),
+                root: namespace.root().to_owned(),
+                source,
+            })?;
+        Ok(Self {
+            node,
+            namespace: namespace.clone(),
+            process: process.to_owned(),
+            stop: stop.clone(),
+            progress: Progress::default(),
+            patience: PATIENCE,
+        })
+    }
+
+    /// Sets how long a sender waits for a receiver without room before it fails; two minutes if it
+    /// is not set.
+    #[must_use]
+    pub fn with_patience(mut self, patience: Duration) -> Self {
+        self.patience = patience;
+        self
+    }
+
+    /// The deployment.
+    pub fn namespace(&self) -> &Namespace {
+        &self.namespace
+    }
+
+    /// The name of this process in the deployment.
+    pub fn process(&self) -> &str {
+        &self.process
+    }
+
+    /// What ends every wait.
+    pub fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    /// The counter of the process's main loop.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    pub(crate) fn patience(&self) -> Duration {
+        self.patience
+    }
+
+    /// Creates topics, which exist as long as the answer is kept or a port is open on them.
+    ///
+    /// The supervisor does this once, before it starts processes; ports only open what is there.
+    /// So the quality of service has one source, and topics outlive the processes that use them.
+    ///
+    /// # Errors
+    ///
+    /// [`BusError::Create`], [`BusError::CreateWakeUp`], [`BusError::Name`].
+    pub fn create_topics(&self, plans: &[TopicPlan]) -> Result<Vec<Topic>, BusError> {
+        plans.iter().map(|plan| plan.create(self)).collect()
+    }
+
+    /// Creates the services of one topic; the type parameters were fixed by its plan.
+    pub(crate) fn create_topic<E: Message, H: Header>(
+        &self,
+        plan: &TopicPlan,
+    ) -> Result<Topic, BusError> {
+        let messages = service::create_messages::<E, H>(&self.node, plan)?;
+        let mut wake_ups = Vec::new();
+        for name in service::wake_up_names(plan) {
+            wake_ups.push(service::create_wake_up(&self.node, &name)?);
+        }
+        Ok(Topic {
+            _messages: Box::new(messages),
+            _wake_ups: wake_ups,
+        })
+    }
+
+    pub(crate) fn notifier(&self, name: &str) -> Result<Notifier<ipc::Service>, PortError> {
+        service::open_wake_up(&self.node, name)?
+            .notifier_builder()
+            .create()
+            .map_err(|source| PortError::Notifier {
+                topic: name.to_owned(),
+                source,
+            })
+    }
+
+    pub(crate) fn node(&self) -> &Node<ipc::Service> {
+        &self.node
+    }
+}
+
+/// Makes the directory of a deployment and points iceoryx2 to it.
+pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
+    let config = namespace.config()?;
+    let path = namespace.config_file();
+    let directory = |source| BusError::Directory {
+        path: path.clone(),
+        source,
+    };
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(directory)?;
+    }
+    if !path.exists() {
+        // Written beside and renamed, so that no process ever reads half of it.
+        let draft = path.with_extension(format!("{}.draft", std::process::id()));
+        std::fs::write(&draft, namespace.config_text()).map_err(directory)?;
+        std::fs::rename(&draft, &path).map_err(directory)?;
+    }
+    // The clean-up of dead nodes falls back to the process's global configuration where a node died
+    // before it had written its own (iceoryx2 0.10, node/mod.rs), so that must say the same.
+    if let Ok(file) = FilePath::new(path.as_os_str().as_encoded_bytes())
+        && let Err(error) = Config::setup_global_config_from_file(&file)
+    {
+        tracing::warn!(%error, "cannot set the global configuration of iceoryx2");
+    }
+    Ok(config)
+}

@@ -1,0 +1,178 @@
+//! Where the shared memory and files of one deployment live, so that two of them never meet.
+
+use std::path::{Path, PathBuf};
+
+use iceoryx2::config::Config;
+use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
+
+/// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
+const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
+/// Bytes of `sun_path`, less the closing NUL (unix(7)).
+const SOCKET_PATH_MAX: usize = 107;
+/// Characters of a prefix: `px`, eight hexadecimal digits, `_`.
+const PREFIX_LEN: usize = 11;
+/// Longest root directory, bytes.
+pub(crate) const ROOT_LEN_MAX: usize = SOCKET_PATH_MAX - SOCKET_NAME_LEN - PREFIX_LEN;
+const NAME_LEN_MAX: usize = 32;
+
+/// A deployment name or a directory that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NamespaceError {
+    /// The name would not do as the name of a directory.
+    #[error(
+        "deployment name {name:?} must be 1 to 32 characters of a-z, A-Z, 0-9, '-', '_', '.' and not begin with '.'"
+    )]
+    Name {
+        /// What was asked for.
+        name: String,
+    },
+    /// Unix sockets have short paths.
+    #[error("working directory {root:?} has {len} bytes, sockets below it allow {max}")]
+    RootTooLong {
+        /// The directory.
+        root: PathBuf,
+        /// Its length in bytes.
+        len: usize,
+        /// What is allowed.
+        max: usize,
+    },
+    /// The path is not absolute, or not text that iceoryx2 accepts as a path.
+    #[error("working directory {root:?} must be an absolute path of plain characters")]
+    Root {
+        /// The directory.
+        root: PathBuf,
+    },
+}
+
+/// The name of a deployment, with the directory and the prefix that keep it apart from others.
+///
+/// Files lie in `root`, shared memory under `/dev/shm/<prefix>*`. Both follow from the user, the
+/// name and the directory alone, so every process of a deployment computes the same, and what a
+/// killed run left behind is found again. Creating a `Namespace` touches nothing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Namespace {
+    name: String,
+    prefix: String,
+    root: PathBuf,
+    base: PathBuf,
+}
+
+impl Namespace {
+    /// The namespace of `deployment` in `parallax-<user id>` below the system's temporary directory.
+    ///
+    /// # Errors
+    ///
+    /// [`NamespaceError`].
+    pub fn new(deployment: &str) -> Result<Self, NamespaceError> {
+        let user = rustix::process::getuid().as_raw();
+        Self::below(
+            deployment,
+            &std::env::temp_dir().join(format!("parallax-{user}")),
+        )
+    }
+
+    /// The namespace of `deployment` below a directory of the caller's choice.
+    ///
+    /// * `base`: absolute and short; the root is `base/deployment` and has at most 50 bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`NamespaceError`].
+    pub fn below(deployment: &str, base: &Path) -> Result<Self, NamespaceError> {
+        let fits = (1..=NAME_LEN_MAX).contains(&deployment.len())
+            && !deployment.starts_with('.')
+            && deployment
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte));
+        if !fits {
+            return Err(NamespaceError::Name {
+                name: deployment.to_owned(),
+            });
+        }
+        let root = base.join(deployment);
+        let len = root.as_os_str().len();
+        if len > ROOT_LEN_MAX {
+            return Err(NamespaceError::RootTooLong {
+                root,
+                len,
+                max: ROOT_LEN_MAX,
+            });
+        }
+        let Some(text) = root.to_str().filter(|_| root.is_absolute()) else {
+            return Err(NamespaceError::Root { root });
+        };
+        let plain = text
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || b"-_./".contains(&byte));
+        if !plain {
+            return Err(NamespaceError::Root { root });
+        }
+        let user = rustix::process::getuid().as_raw();
+        Ok(Self {
+            name: deployment.to_owned(),
+            prefix: format!("px{:08x}_", fingerprint(user, text)),
+            root,
+            base: base.to_owned(),
+        })
+    }
+
+    /// The name of the deployment.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What all its files in `/dev/shm` begin with.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
+    /// The directory of its sockets, service descriptions and lock.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The directory that the root lies in.
+    pub fn base(&self) -> &Path {
+        &self.base
+    }
+
+    /// The file that points iceoryx2, and its command line tools when run in the root, to this
+    /// deployment.
+    pub fn config_file(&self) -> PathBuf {
+        self.root.join("config").join("iceoryx2.toml")
+    }
+
+    /// The content of [`config_file`](Self::config_file).
+    pub(crate) fn config_text(&self) -> String {
+        format!(
+            "[global]\nroot-path = \"{}\"\nprefix = \"{}\"\n",
+            self.root.display(),
+            self.prefix
+        )
+    }
+
+    /// What iceoryx2 has to know.
+    ///
+    /// # Errors
+    ///
+    /// [`NamespaceError::Root`] if iceoryx2 refuses the path.
+    pub(crate) fn config(&self) -> Result<Config, NamespaceError> {
+        let refused = || NamespaceError::Root {
+            root: self.root.clone(),
+        };
+        let mut config = Config::default();
+        config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| refused())?;
+        let root = IoxPath::new(self.root.as_os_str().as_encoded_bytes()).map_err(|_| refused())?;
+        config.global.set_root_path(&root);
+        Ok(config)
+    }
+}
+
+/// FNV-1a over the user and the root, folded to 32 bits.
+fn fingerprint(user: u32, root: &str) -> u32 {
+    let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
+    for byte in user.to_le_bytes().into_iter().chain(root.bytes()) {
+        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    }
+    (hash ^ (hash >> 32)) as u32
+}

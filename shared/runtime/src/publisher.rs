@@ -1,0 +1,368 @@
+//! The sending ends of a topic.
+
+use core::time::Duration;
+use std::cell::Cell;
+use std::sync::Arc;
+use std::time::Instant;
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher as IoxPublisher;
+use iceoryx2::port::{BackpressureAction, LoanError as IoxLoanError, SendError as IoxSendError};
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as _, ipc};
+use iceoryx2::sample_mut::SampleMut;
+
+use crate::bus::Bus;
+use crate::memory;
+use crate::payload::{Element, Header, Message};
+use crate::service::{self, Messages, PortError};
+use crate::topic::Delivery;
+use crate::{Progress, Stop};
+
+/// Longest pause between two looks at the subscribers of a topic.
+const CONNECT_PAUSE: Duration = Duration::from_millis(20);
+
+/// A message could not be delivered.
+#[derive(Debug, thiserror::Error)]
+pub enum SendError {
+    /// There is no memory to write the message into.
+    #[error("topic {topic:?} has no memory for another message")]
+    Loan {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// Why.
+        #[source]
+        source: IoxLoanError,
+    },
+    /// The array is longer than the topic was made for.
+    #[error("topic {topic:?} carries at most {max_len} elements, got {len}")]
+    TooLong {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// What was asked for, elements.
+        len: usize,
+        /// What fits.
+        max_len: usize,
+    },
+    /// The process was asked to stop while it waited for a slow receiver.
+    #[error("stopped while a receiver of topic {topic:?} had no room")]
+    Stopped {
+        /// Name of the topic.
+        topic: Arc<str>,
+    },
+    /// A receiver made no room for too long.
+    #[error("a receiver of topic {topic:?} had no room for {} s", .waited.as_secs())]
+    Stuck {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// For how long.
+        waited: Duration,
+    },
+    /// iceoryx2 failed.
+    #[error("cannot send on topic {topic:?}")]
+    Transport {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// Why.
+        #[source]
+        source: IoxSendError,
+    },
+}
+
+impl SendError {
+    /// Whether the process was merely asked to stop.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Self::Stopped { .. })
+    }
+}
+
+/// Sends messages that are copied into shared memory.
+#[derive(Debug)]
+pub struct Publisher<T: Message> {
+    port: Port<T, ()>,
+}
+
+impl<T: Message> Publisher<T> {
+    /// Sends a copy and wakes the receivers. With [`Delivery::Lossless`] it waits for room.
+    ///
+    /// Returns how many subscribers got it.
+    ///
+    /// # Errors
+    ///
+    /// [`SendError`].
+    pub fn send(&self, message: &T) -> Result<usize, SendError> {
+        let sample = self
+            .port
+            .publisher
+            .loan_slice_uninit(1)
+            .map_err(|source| self.port.loan_failed(1, source))?;
+        self.port
+            .deliver(sample.write_from_slice(core::slice::from_ref(message)))
+    }
+
+    /// Processes that are subscribed.
+    pub fn n_connected(&self) -> usize {
+        self.port.n_connected()
+    }
+
+    /// See [`SlicePublisher::wait_for_subscribers`].
+    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+        self.port.wait_for_subscribers(n, limit)
+    }
+}
+
+/// Sends arrays that are written where they will be read.
+#[derive(Debug)]
+pub struct SlicePublisher<E: Element, H: Header> {
+    port: Port<E, H>,
+}
+
+impl<E: Element, H: Header> SlicePublisher<E, H> {
+    /// Takes memory for an array of `len` elements.
+    ///
+    /// Its content is what an earlier message left there: write every element before sending.
+    ///
+    /// # Errors
+    ///
+    /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held.
+    pub fn loan(&self, len: usize) -> Result<Loan<'_, E, H>, SendError> {
+        let sample = self
+            .port
+            .publisher
+            .loan_slice_uninit(len)
+            .map_err(|source| self.port.loan_failed(len, source))?;
+        Ok(Loan {
+            sample: memory::assume_written(sample),
+            port: &self.port,
+        })
+    }
+
+    /// Longest array, elements.
+    pub fn max_len(&self) -> usize {
+        self.port.max_len
+    }
+
+    /// Processes that are subscribed.
+    pub fn n_connected(&self) -> usize {
+        self.port.n_connected()
+    }
+
+    /// Waits until `n` subscribers are there, and with [`Delivery::Lossless`] until they have said
+    /// that they hear this publisher: before that, what does not fit into their buffers is lost.
+    ///
+    /// Returns how many there are, which is less than `n` after `limit` or when the process is asked
+    /// to stop.
+    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+        self.port.wait_for_subscribers(n, limit)
+    }
+}
+
+/// An array in shared memory that nobody else sees yet; dropping it gives the memory back.
+#[derive(Debug)]
+pub struct Loan<'a, E: Element, H: Header> {
+    sample: SampleMut<ipc::Service, [E], H>,
+    port: &'a Port<E, H>,
+}
+
+impl<E: Element, H: Header> Loan<'_, E, H> {
+    /// The array. It begins on a multiple of 64 bytes.
+    pub fn payload_mut(&mut self) -> &mut [E] {
+        self.sample.payload_mut()
+    }
+
+    /// What travels with it; at first its default.
+    pub fn header_mut(&mut self) -> &mut H {
+        self.sample.user_header_mut()
+    }
+
+    /// Sends the array and wakes the receivers. With [`Delivery::Lossless`] it waits for room.
+    ///
+    /// Returns how many subscribers got it.
+    ///
+    /// # Errors
+    ///
+    /// [`SendError::Stopped`], [`SendError::Stuck`], [`SendError::Transport`].
+    pub fn send(self) -> Result<usize, SendError> {
+        self.port.deliver(self.sample)
+    }
+}
+
+#[derive(Debug)]
+struct Port<E: Message, H: Header> {
+    topic: Arc<str>,
+    max_len: usize,
+    delivery: Delivery,
+    publisher: IoxPublisher<ipc::Service, [E], H>,
+    notifier: Option<Notifier<ipc::Service>>,
+    /// Hears the acknowledgements of subscribers.
+    ready: Option<Listener<ipc::Service>>,
+    n_ready: Cell<usize>,
+    messages: Messages<E, H>,
+    stop: Stop,
+    progress: Progress,
+}
+
+impl Bus {
+    /// Makes the sending end of a topic of messages.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn publisher<T: Message>(&self, topic: &str) -> Result<Publisher<T>, PortError> {
+        Ok(Publisher {
+            port: Port::open(self, topic)?,
+        })
+    }
+
+    /// Makes the sending end of a topic of arrays, and reserves all its memory.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn slice_publisher<E: Element, H: Header>(
+        &self,
+        topic: &str,
+    ) -> Result<SlicePublisher<E, H>, PortError> {
+        Ok(SlicePublisher {
+            port: Port::open(self, topic)?,
+        })
+    }
+}
+
+impl<E: Message, H: Header> Port<E, H> {
+    fn open(bus: &Bus, topic: &str) -> Result<Self, PortError> {
+        let messages = service::open_messages::<E, H>(bus.node(), topic)?;
+        let extras = service::extras(&messages);
+        // The listener comes first: whoever sees the publisher must find it.
+        let ready = match extras.delivery {
+            Delivery::Realtime => None,
+            Delivery::Lossless => Some(bus.listener(&service::ready_name(topic))?),
+        };
+        let notifier = if extras.wakes {
+            Some(bus.notifier(topic)?)
+        } else {
+            None
+        };
+        let publisher = messages
+            .publisher_builder()
+            .initial_max_slice_len(extras.max_len)
+            .allocation_strategy(AllocationStrategy::Static)
+            .max_loaned_samples(extras.loaned)
+            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+            .set_backpressure_handler(patience(bus))
+            .create()
+            .map_err(|source| PortError::Publisher {
+                topic: topic.to_owned(),
+                source,
+            })?;
+        memory::populate(bus.namespace().prefix(), publisher.id().value()).map_err(|source| {
+            PortError::Memory {
+                topic: topic.to_owned(),
+                source,
+            }
+        })?;
+        Ok(Self {
+            topic: Arc::from(topic),
+            max_len: extras.max_len,
+            delivery: extras.delivery,
+            publisher,
+            notifier,
+            ready,
+            n_ready: Cell::new(0),
+            messages,
+            stop: bus.stop().clone(),
+            progress: bus.progress().clone(),
+        })
+    }
+
+    fn loan_failed(&self, len: usize, source: IoxLoanError) -> SendError {
+        let topic = Arc::clone(&self.topic);
+        if len > self.max_len {
+            return SendError::TooLong {
+                topic,
+                len,
+                max_len: self.max_len,
+            };
+        }
+        SendError::Loan { topic, source }
+    }
+
+    fn deliver(&self, sample: SampleMut<ipc::Service, [E], H>) -> Result<usize, SendError> {
+        let begin = Instant::now();
+        let sent = sample.send();
+        if let Some(notifier) = &self.notifier
+            && let Err(error) = notifier.notify()
+        {
+            // Receivers look at their buffers from time to time in any case.
+            tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
+        }
+        let topic = || Arc::clone(&self.topic);
+        sent.map_err(|source| match source {
+            IoxSendError::UnableToDeliver if self.stop.is_requested() => {
+                SendError::Stopped { topic: topic() }
+            }
+            IoxSendError::UnableToDeliver => SendError::Stuck {
+                topic: topic(),
+                waited: begin.elapsed(),
+            },
+            source => SendError::Transport {
+                topic: topic(),
+                source,
+            },
+        })
+    }
+
+    fn n_connected(&self) -> usize {
+        self.messages.dynamic_config().number_of_subscribers()
+    }
+
+    fn n_ready(&self) -> usize {
+        match (&self.ready, self.delivery) {
+            (Some(ready), Delivery::Lossless) => {
+                let heard = ready.try_wait(|event| {
+                    self.n_ready.set(self.n_ready.get() + event.count as usize);
+                });
+                if let Err(error) = heard {
+                    tracing::debug!(topic = %self.topic, ?error, "cannot hear acknowledgements");
+                }
+                self.n_ready.get().min(self.n_connected())
+            }
+            _ => self.n_connected(),
+        }
+    }
+
+    fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+        let begin = Instant::now();
+        loop {
+            let ready = self.n_ready();
+            if ready >= n || begin.elapsed() >= limit || self.stop.is_requested() {
+                return ready;
+            }
+            self.progress.tick();
+            // Wakes subscribers that were there first, so that they connect.
+            if let Some(notifier) = &self.notifier
+                && let Err(error) = notifier.notify()
+            {
+                tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
+            }
+            std::thread::sleep(CONNECT_PAUSE);
+        }
+    }
+}
+
+/// What to do while a receiver has no room: wait, but not for ever, and not against the user's will.
+fn patience(
+    bus: &Bus,
+) -> impl Fn(&iceoryx2::port::BackpressureInfo) -> BackpressureAction + Send + 'static {
+    let stop = bus.stop().clone();
+    let progress = bus.progress().clone();
+    let limit = bus.patience();
+    move |info| {
+        progress.tick();
+        if stop.is_requested() || info.elapsed_time >= limit {
+            BackpressureAction::DiscardDataAndFail
+        } else {
+            BackpressureAction::Retry
+        }
+    }
+}

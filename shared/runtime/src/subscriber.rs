@@ -1,0 +1,245 @@
+//! The receiving ends of a topic.
+
+use core::fmt::Debug;
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use iceoryx2::port::ReceiveError as IoxReceiveError;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
+use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
+use iceoryx2::sample::Sample as IoxSample;
+
+use crate::Waiter;
+use crate::bus::Bus;
+use crate::payload::{Element, Header, Message};
+use crate::service::{self, Messages, PortError};
+use crate::topic::Delivery;
+
+/// A message could not be taken in.
+#[derive(Debug, thiserror::Error)]
+pub enum ReceiveError {
+    /// The process holds as many messages of the topic as it may.
+    #[error("too many messages of topic {topic:?} are held at the same time")]
+    TooManyHeld {
+        /// Name of the topic.
+        topic: Arc<str>,
+    },
+    /// iceoryx2 failed.
+    #[error("cannot receive from topic {topic:?}")]
+    Transport {
+        /// Name of the topic.
+        topic: Arc<str>,
+        /// Why.
+        #[source]
+        source: IoxReceiveError,
+    },
+}
+
+/// Receives messages as copies.
+#[derive(Debug)]
+pub struct Subscriber<T: Message> {
+    port: Port<T, ()>,
+}
+
+impl<T: Message> Subscriber<T> {
+    /// Takes the oldest message that waits, if one does.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive(&self) -> Result<Option<T>, ReceiveError> {
+        while let Some(sample) = self.port.receive()? {
+            if let Some(message) = sample.payload().first() {
+                return Ok(Some(*message));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Takes all messages that wait and answers with the newest.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn latest(&self) -> Result<Option<T>, ReceiveError> {
+        let mut latest = None;
+        while let Some(message) = self.receive()? {
+            latest = Some(message);
+        }
+        Ok(latest)
+    }
+
+    /// Processes that may send, dead ones included until they are cleaned away.
+    pub fn n_publishers(&self) -> usize {
+        self.port.n_publishers()
+    }
+}
+
+/// Receives arrays where they lie.
+#[derive(Debug)]
+pub struct SliceSubscriber<E: Element, H: Header> {
+    port: Port<E, H>,
+}
+
+impl<E: Element, H: Header> SliceSubscriber<E, H> {
+    /// Takes the oldest array that waits, if one does. Its memory is held until it is dropped.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
+        Ok(self.port.receive()?.map(|sample| Sample { sample }))
+    }
+
+    /// Takes all arrays that wait and answers with the newest.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn latest(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
+        let mut latest = None;
+        while let Some(sample) = self.receive()? {
+            latest = Some(sample);
+        }
+        Ok(latest)
+    }
+
+    /// Processes that may send, dead ones included until they are cleaned away.
+    pub fn n_publishers(&self) -> usize {
+        self.port.n_publishers()
+    }
+}
+
+/// An array in shared memory, which its sender will not overwrite while this is held.
+#[derive(Debug)]
+pub struct Sample<E: Element, H: Header> {
+    sample: IoxSample<ipc::Service, [E], H>,
+}
+
+impl<E: Element, H: Header> Sample<E, H> {
+    /// The array. It begins on a multiple of 64 bytes.
+    pub fn payload(&self) -> &[E] {
+        self.sample.payload()
+    }
+
+    /// What travels with it. Check it against the array before use: it comes from another process.
+    pub fn header(&self) -> &H {
+        self.sample.user_header()
+    }
+}
+
+#[derive(Debug)]
+struct Port<E: Message, H: Header> {
+    topic: Arc<str>,
+    subscriber: IoxSubscriber<ipc::Service, [E], H>,
+    messages: Messages<E, H>,
+    /// Tells publishers that this subscriber hears them; only where nothing may be lost.
+    ready: Option<Notifier<ipc::Service>>,
+    known_publishers: RefCell<Vec<u128>>,
+}
+
+impl Bus {
+    /// Makes the receiving end of a topic of messages; new messages wake `waiter`.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn subscriber<T: Message>(
+        &self,
+        topic: &str,
+        waiter: &mut Waiter,
+    ) -> Result<Subscriber<T>, PortError> {
+        Ok(Subscriber {
+            port: Port::open(self, topic, waiter)?,
+        })
+    }
+
+    /// Makes the receiving end of a topic of arrays; new arrays wake `waiter`.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn slice_subscriber<E: Element, H: Header>(
+        &self,
+        topic: &str,
+        waiter: &mut Waiter,
+    ) -> Result<SliceSubscriber<E, H>, PortError> {
+        Ok(SliceSubscriber {
+            port: Port::open(self, topic, waiter)?,
+        })
+    }
+}
+
+impl<E: Message, H: Header> Port<E, H> {
+    fn open(bus: &Bus, topic: &str, waiter: &mut Waiter) -> Result<Self, PortError> {
+        let messages = service::open_messages::<E, H>(bus.node(), topic)?;
+        let extras = service::extras(&messages);
+        let ready = match extras.delivery {
+            Delivery::Realtime => None,
+            Delivery::Lossless => Some(bus.notifier(&service::ready_name(topic))?),
+        };
+        if extras.wakes {
+            waiter.watch(bus.listener(topic)?);
+        }
+        let subscriber =
+            messages
+                .subscriber_builder()
+                .create()
+                .map_err(|source| PortError::Subscriber {
+                    topic: topic.to_owned(),
+                    source,
+                })?;
+        let port = Self {
+            topic: Arc::from(topic),
+            subscriber,
+            messages,
+            ready,
+            known_publishers: RefCell::new(Vec::new()),
+        };
+        port.acknowledge(port.publishers());
+        Ok(port)
+    }
+
+    fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
+        // Listed before the connections are brought up to date, so that none is acknowledged that
+        // was not connected.
+        let publishers = self.ready.as_ref().map(|_| self.publishers());
+        let topic = || Arc::clone(&self.topic);
+        let sample = self.subscriber.receive().map_err(|source| match source {
+            IoxReceiveError::ExceedsMaxBorrows => ReceiveError::TooManyHeld { topic: topic() },
+            source => ReceiveError::Transport {
+                topic: topic(),
+                source,
+            },
+        })?;
+        if let Some(publishers) = publishers {
+            self.acknowledge(publishers);
+        }
+        Ok(sample)
+    }
+
+    fn publishers(&self) -> Vec<u128> {
+        let mut ids = Vec::new();
+        self.messages.dynamic_config().list_publishers(|details| {
+            ids.push(details.publisher_id.value());
+            CallbackProgression::Continue
+        });
+        ids
+    }
+
+    /// Says once to every publisher that it is heard.
+    fn acknowledge(&self, publishers: Vec<u128>) {
+        let Some(ready) = &self.ready else { return };
+        let mut known = self.known_publishers.borrow_mut();
+        let is_new = publishers.iter().any(|id| !known.contains(id));
+        if is_new && let Err(error) = ready.notify() {
+            tracing::debug!(topic = %self.topic, ?error, "cannot acknowledge a publisher");
+        }
+        *known = publishers;
+    }
+
+    fn n_publishers(&self) -> usize {
+        self.messages.dynamic_config().number_of_publishers()
+    }
+}

@@ -1,0 +1,151 @@
+//! The quality of service of one topic, fixed before any process starts.
+
+use crate::bus::{Bus, BusError, Topic};
+use crate::payload::{Element, Header, Message};
+
+/// What happens when a receiver is slower than its sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delivery {
+    /// The sender never waits: a full buffer loses its oldest message, so the latest wins.
+    #[default]
+    Realtime,
+    /// Nothing is lost: a full buffer makes the sender wait.
+    Lossless,
+}
+
+/// How many ports a topic has and how much each of them may hold.
+///
+/// Memory is reserved for the worst case, so that a sender never runs out:
+/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Ports that may send at the same time.
+    pub publishers: usize,
+    /// Ports that may receive at the same time.
+    pub subscribers: usize,
+    /// Messages that wait for one subscriber.
+    pub buffer: usize,
+    /// Messages that one subscriber may hold at the same time.
+    pub borrowed: usize,
+    /// Messages that one publisher may write at the same time.
+    pub loaned: usize,
+}
+
+impl Limits {
+    /// One publisher that writes one message at a time.
+    ///
+    /// * `buffer`: messages that wait for one subscriber.
+    /// * `borrowed`: messages that one subscriber may hold at the same time.
+    pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
+        Self {
+            publishers: 1,
+            subscribers,
+            buffer,
+            borrowed,
+            loaned: 1,
+        }
+    }
+}
+
+/// One topic of a deployment: its name, what travels there, and how.
+#[derive(Debug, Clone)]
+pub struct TopicPlan {
+    topic: String,
+    delivery: Delivery,
+    limits: Limits,
+    max_len: usize,
+    chunk_bytes: usize,
+    wakes: bool,
+    create: fn(&Bus, &Self) -> Result<Topic, BusError>,
+}
+
+impl TopicPlan {
+    /// A topic of messages that are copied in and out: [`Bus::publisher`], [`Bus::subscriber`].
+    pub fn messages<T: Message>(topic: String, delivery: Delivery, limits: Limits) -> Self {
+        Self {
+            topic,
+            delivery,
+            limits,
+            max_len: 1,
+            chunk_bytes: chunk_bytes(0, size_of::<T>()),
+            wakes: true,
+            create: Bus::create_topic::<T, ()>,
+        }
+    }
+
+    /// A topic of arrays with a header, written and read where they lie:
+    /// [`Bus::slice_publisher`], [`Bus::slice_subscriber`].
+    ///
+    /// * `max_len`: longest array, elements.
+    pub fn slices<E: Element, H: Header>(
+        topic: String,
+        delivery: Delivery,
+        limits: Limits,
+        max_len: usize,
+    ) -> Self {
+        Self {
+            topic,
+            delivery,
+            limits,
+            max_len,
+            chunk_bytes: chunk_bytes(size_of::<H>(), size_of::<E>() * max_len),
+            wakes: true,
+            create: Bus::create_topic::<E, H>,
+        }
+    }
+
+    /// Leaves out the wake-up: receivers of this topic look at it when they see fit.
+    #[must_use]
+    pub fn without_wake_up(mut self) -> Self {
+        self.wakes = false;
+        self
+    }
+
+    /// The name of the topic.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// What happens when a receiver is slower than its sender.
+    pub fn delivery(&self) -> Delivery {
+        self.delivery
+    }
+
+    /// How many ports, and how much each may hold.
+    pub fn limits(&self) -> Limits {
+        self.limits
+    }
+
+    /// Longest array, elements; 1 for messages.
+    pub fn max_len(&self) -> usize {
+        self.max_len
+    }
+
+    /// Whether senders wake receivers.
+    pub fn wakes(&self) -> bool {
+        self.wakes
+    }
+
+    /// Shared memory that all publishers of the topic take together, bytes.
+    pub fn pool_bytes(&self) -> u64 {
+        let limits = self.limits;
+        let chunks = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
+        (limits.publishers * chunks) as u64 * self.chunk_bytes as u64
+    }
+
+    /// Creates the services of the topic.
+    pub(crate) fn create(&self, bus: &Bus) -> Result<Topic, BusError> {
+        (self.create)(bus, self)
+    }
+}
+
+/// Alignment of all payloads, bytes: a cache line, and enough for 512-bit loads.
+pub(crate) const ALIGNMENT: usize = 64;
+/// What iceoryx2 puts before the user header.
+const TRANSPORT_HEADER_BYTES: usize = 64;
+
+/// Bytes of one chunk, generously rounded.
+fn chunk_bytes(header: usize, payload: usize) -> usize {
+    (TRANSPORT_HEADER_BYTES + header).next_multiple_of(ALIGNMENT)
+        + payload.next_multiple_of(ALIGNMENT)
+}
