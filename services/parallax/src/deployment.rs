@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use error::ConfigError;
-pub(crate) use keys::{Entry, Origin};
+pub(crate) use keys::Entry;
 pub(crate) use load::Loaded;
 
 /// Everything a user may say about a run. Defaults are those of the services' `Config`s.

@@ -19,9 +19,9 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            evidence_window: Window::Levels(5),
+            evidence_window: Window::All(All::All),
             candidates: 5,
-            min_separation: 1.0,
+            min_separation: 0.5,
             threads: 1,
         }
     }

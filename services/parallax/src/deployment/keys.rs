@@ -42,46 +42,130 @@ pub(crate) struct Entry {
 
 /// Keys in the order in which they are shown.
 const KEYS: &[(&str, &str)] = &[
-    ("name", "name of the deployment: its processes share memory under it"),
+    (
+        "name",
+        "name of the deployment: its processes share memory under it",
+    ),
     ("rig", "calibration of the cameras"),
     ("model", "trained model"),
     ("output", "folder for the results"),
-    ("camera", "name in the rig, source (video, image, folder, glob), source_offset_px of a cropped source"),
-    ("capture.mode", "lossless: nothing is dropped; realtime: the latest frame wins"),
-    ("capture.pace", "fast: as fast as frames are taken; realtime: at the frame rate"),
-    ("capture.size", "[width, height] of the frames that the pipeline sees, pixels"),
-    ("capture.scale", "the same as a share of the camera's image; without either: the camera's size"),
-    ("capture.upright", "turn frames until the world's up points up, where the rig knows it"),
-    ("capture.frame_rate_hz", "frames per second of images, and of a video that does not say"),
+    (
+        "camera",
+        "name in the rig, source (video, image, folder, glob), source_offset_px of a cropped source",
+    ),
+    (
+        "capture.mode",
+        "lossless: nothing is dropped; realtime: the latest frame wins",
+    ),
+    (
+        "capture.pace",
+        "fast: as fast as frames are taken; realtime: at the frame rate",
+    ),
+    (
+        "capture.size",
+        "[width, height] of the frames that the pipeline sees, pixels",
+    ),
+    (
+        "capture.scale",
+        "the same as a share of the camera's image; without either: the camera's size",
+    ),
+    (
+        "capture.upright",
+        "turn frames until the world's up points up, where the rig knows it",
+    ),
+    (
+        "capture.frame_rate_hz",
+        "frames per second of images, and of a video that does not say",
+    ),
     ("capture.start_frame", "first frame to use, from 0"),
     ("capture.frame_step", "use every n-th frame"),
     ("capture.n_frames", "most frames to use; all without it"),
-    ("pose.evidence_window", "levels either side of every candidate's that fusion may use, or \"all\""),
-    ("pose.candidates", "most distinct candidates that a view offers to fusion"),
-    ("pose.min_separation", "least mean distance of two candidates' parts, in box sides"),
+    (
+        "pose.evidence_window",
+        "levels either side of every candidate's that fusion may use, or \"all\"",
+    ),
+    (
+        "pose.candidates",
+        "most distinct candidates that a view offers to fusion",
+    ),
+    (
+        "pose.min_separation",
+        "least mean distance of two candidates' parts, in box sides",
+    ),
     ("pose.threads", "threads of one pose process"),
-    ("quality.table", "expected errors: subject, action, frame, camera, then one per part, pixels"),
+    (
+        "quality.table",
+        "expected errors: subject, action, frame, camera, then one per part, pixels",
+    ),
     ("quality.subject", "subject in that table"),
     ("quality.action", "action in that table"),
-    ("quality.frame_offset", "frame in that table = frame of the footage + this"),
-    ("fuse.energy", "paper, or released: what the authors' program computes"),
-    ("fuse.alpha", "weight of the geometric term; 0.01 per squared cell (paper), 0.07 (released)"),
+    (
+        "quality.frame_offset",
+        "frame in that table = frame of the footage + this",
+    ),
+    (
+        "fuse.energy",
+        "paper, or released: what the authors' program computes",
+    ),
+    (
+        "fuse.alpha",
+        "weight of the geometric term; 0.01 per squared cell (paper), 0.07 (released)",
+    ),
     ("fuse.beta", "weight of the part-type term"),
-    ("fuse.max_distance_cells", "distance beyond which the geometric term grows no more; none without it"),
-    ("fuse.compatibility", "part-type tables: views = [a, b], files = [a wrt b, b wrt a]"),
-    ("fuse.tau_px", "expected error above which a part is switched off, one per part; never if empty"),
-    ("fuse.facing", "decide for every view whether it sees the person from behind"),
-    ("fuse.workers", "fusion processes; pairs of views are dealt to them in turn"),
-    ("fuse.max_iterations", "most single-view solutions of a pair"),
-    ("fuse.epsilon_px", "mean movement below which a view counts as settled"),
-    ("fuse.pairs", "pairs of cameras to fuse, by name; all if empty"),
+    (
+        "fuse.max_distance_cells",
+        "distance beyond which the geometric term grows no more; none without it",
+    ),
+    (
+        "fuse.compatibility",
+        "part-type tables: views = [a, b], files = [a wrt b, b wrt a]",
+    ),
+    (
+        "fuse.tau_px",
+        "expected error above which a part is switched off, one per part; never if empty",
+    ),
+    (
+        "fuse.facing",
+        "decide for every view whether it sees the person from behind",
+    ),
+    (
+        "fuse.workers",
+        "fusion processes; pairs of views are dealt to them in turn",
+    ),
+    (
+        "fuse.max_iterations",
+        "most single-view solutions of a pair",
+    ),
+    (
+        "fuse.epsilon_px",
+        "mean movement below which a view counts as settled",
+    ),
+    (
+        "fuse.pairs",
+        "pairs of cameras to fuse, by name; all if empty",
+    ),
     ("triangulate.joints", "parse14, umpm15 or humaneva20"),
-    ("triangulate.loss_px", "reprojection error at which an observation begins to count less"),
+    (
+        "triangulate.loss_px",
+        "reprojection error at which an observation begins to count less",
+    ),
     ("record.trc", "write pose3d.trc for OpenSim"),
-    ("record.overlay_every", "draw every n-th frame of every view; 0 draws none"),
-    ("record.epipolar_part", "part whose epipolar lines are drawn, from 1"),
-    ("supervise.deadline_ms", "how long a stage waits for a late view; 10000 lossless, 200 realtime"),
-    ("supervise.max_restarts", "restarts of one process within the window before it is given up"),
+    (
+        "record.overlay_every",
+        "draw every n-th frame of every view; 0 draws none",
+    ),
+    (
+        "record.epipolar_part",
+        "part whose epipolar lines are drawn, from 1",
+    ),
+    (
+        "supervise.deadline_ms",
+        "how long a stage waits for a late view; 10000 lossless, 200 realtime",
+    ),
+    (
+        "supervise.max_restarts",
+        "restarts of one process within the window before it is given up",
+    ),
     ("supervise.restart_window_s", "that window, seconds"),
 ];
 
@@ -152,7 +236,9 @@ mod tests {
                 .fold(Value::Array(vec![Value::Integer(-1); 9]), |inner, name| {
                     Value::Table(Table::from_iter([(name.to_owned(), inner)]))
                 });
-            let Value::Table(table) = nested else { continue };
+            let Value::Table(table) = nested else {
+                continue;
+            };
             let mut whole: Table = MINIMAL.parse().unwrap();
             whole.extend(table);
             if let Err(error) = whole.try_into::<Deployment>() {

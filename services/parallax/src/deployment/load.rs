@@ -17,9 +17,9 @@ pub(crate) struct Loaded {
     /// What it says, paths resolved, defaults filled in.
     pub deployment: Deployment,
     /// What the file says, as it stands there.
-    pub(super) in_file: Table,
+    pub in_file: Table,
     /// What the command line says.
-    pub(super) on_command_line: Table,
+    pub on_command_line: Table,
 }
 
 impl Loaded {
@@ -56,6 +56,27 @@ impl Loaded {
             file: file.to_owned(),
             deployment,
             in_file,
+            on_command_line,
+        })
+    }
+}
+
+/// What stands in the place of a file that only the defaults are asked of.
+const NO_FILE: &str = "name = \"\"\nrig = \"\"\nmodel = \"\"\noutput = \"\"\ncamera = []\n";
+
+impl Loaded {
+    /// The defaults alone; the keys that have none are empty.
+    pub(crate) fn defaults(set: &[String]) -> Result<Self, ConfigError> {
+        let mut table = Table::new();
+        let on_command_line = overrides(set)?;
+        let explain =
+            |error: toml::de::Error| ConfigError::explain("--set".to_owned(), error.message());
+        merge(&mut table, NO_FILE.parse().map_err(explain)?);
+        merge(&mut table, on_command_line.clone());
+        Ok(Self {
+            file: PathBuf::new(),
+            deployment: table.try_into().map_err(explain)?,
+            in_file: Table::new(),
             on_command_line,
         })
     }
@@ -195,7 +216,11 @@ workers = 2
 
     #[test]
     fn the_command_line_wins_over_the_file() {
-        let set = ["fuse.workers=3", "fuse.energy=released", "capture.n_frames=7"];
+        let set = [
+            "fuse.workers=3",
+            "fuse.energy=released",
+            "capture.n_frames=7",
+        ];
         let got = read(SHORT, &set).unwrap().deployment;
         assert_eq!(got.fuse.workers, 3);
         assert_eq!(got.fuse.energy, fuse::Energy::Released);

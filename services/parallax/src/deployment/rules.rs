@@ -48,8 +48,15 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
     let n = it.cameras.len();
     within("camera", n, 1, MAX_VIEWS)?;
     for (index, camera) in it.cameras.iter().enumerate() {
-        let twin = it.cameras[..index].iter().any(|other| other.name == camera.name);
-        demand(!twin, "camera", &format!("twice {:?}", camera.name), "every camera once")?;
+        let twin = it.cameras[..index]
+            .iter()
+            .any(|other| other.name == camera.name);
+        demand(
+            !twin,
+            "camera",
+            &format!("twice {:?}", camera.name),
+            "every camera once",
+        )?;
     }
     Ok(())
 }
@@ -67,7 +74,12 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
     }
     if let Some(scale) = it.scale {
         positive("capture.scale", scale)?;
-        demand(scale <= 8.0, "capture.scale", &scale.to_string(), "at most 8")?;
+        demand(
+            scale <= 8.0,
+            "capture.scale",
+            &scale.to_string(),
+            "at most 8",
+        )?;
     }
     if let Some(rate) = it.frame_rate_hz {
         positive("capture.frame_rate_hz", rate)?;
@@ -82,7 +94,10 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
 }
 
 fn quality(it: &quality::Config) -> Result<(), Complaint> {
-    for (key, value) in [("quality.subject", &it.subject), ("quality.action", &it.action)] {
+    for (key, value) in [
+        ("quality.subject", &it.subject),
+        ("quality.action", &it.action),
+    ] {
         demand(
             it.table.is_none() || value.is_some(),
             key,
@@ -106,7 +121,10 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
     for tau in &it.tau_px {
         not_negative("fuse.tau_px", f64::from(*tau))?;
     }
-    let tables = it.compatibility.iter().map(|it| ("fuse.compatibility", &it.views));
+    let tables = it
+        .compatibility
+        .iter()
+        .map(|it| ("fuse.compatibility", &it.views));
     let pairs = it.pairs.iter().map(|it| ("fuse.pairs", it));
     for (key, names) in tables.chain(pairs) {
         for name in names {
@@ -117,7 +135,12 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
                 "the name of a [[camera]] of this file",
             )?;
         }
-        demand(names[0] != names[1], key, &format!("{:?} twice", names[0]), "two cameras")?;
+        demand(
+            names[0] != names[1],
+            key,
+            &format!("{:?} twice", names[0]),
+            "two cameras",
+        )?;
     }
     Ok(())
 }
@@ -135,13 +158,28 @@ fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Compl
 
 fn within(key: &str, got: usize, least: usize, most: usize) -> Result<(), Complaint> {
     let expected = format!("{least} to {most}");
-    demand((least..=most).contains(&got), key, &got.to_string(), &expected)
+    demand(
+        (least..=most).contains(&got),
+        key,
+        &got.to_string(),
+        &expected,
+    )
 }
 
 fn positive(key: &str, got: f64) -> Result<(), Complaint> {
-    demand(got.is_finite() && got > 0.0, key, &got.to_string(), "a number above 0")
+    demand(
+        got.is_finite() && got > 0.0,
+        key,
+        &got.to_string(),
+        "a number above 0",
+    )
 }
 
 fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
-    demand(got.is_finite() && got >= 0.0, key, &got.to_string(), "a number of at least 0")
+    demand(
+        got.is_finite() && got >= 0.0,
+        key,
+        &got.to_string(),
+        "a number of at least 0",
+    )
 }

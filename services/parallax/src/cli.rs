@@ -1,0 +1,92 @@
+//! The command line, as `--help` shows it.
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+
+use crate::commands::{calib, config, detect, fuse_frame, model, run, service};
+use crate::failure::EXIT_CODES;
+
+const LONG_ABOUT: &str = "\
+Calibrated, synchronised cameras in, 3D human skeletons out.
+
+A run is described by a deployment file (ten lines: the cameras, their calibration, a model) and
+consists of one process per stage and camera, all started and watched by `parallax run`:
+
+    capture -> pose -> (quality) -> fuse -> triangulate -> record";
+
+const EXAMPLES: &str = "\
+Examples:
+    parallax run configs/pose2sim-balancing.toml        four cameras to 3D
+    parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
+    parallax run my.toml --dry-run                      what would be started, and its memory
+    parallax config show my.toml                        every value, and who said it
+    parallax detect photo.jpg --model parse.mat --json  people in single images
+    parallax model import parse.mat --out parse.plx     another format's model as our own
+    parallax calib show Calib.toml                      what a calibration file says
+";
+
+/// Calibrated cameras in, 3D human skeletons out.
+#[derive(Debug, Parser)]
+#[command(
+    name = "parallax",
+    version,
+    about,
+    long_about = LONG_ABOUT,
+    after_help = EXIT_CODES,
+    after_long_help = format!("{EXAMPLES}\n{EXIT_CODES}"),
+    propagate_version = true,
+    max_term_width = 100
+)]
+pub(crate) struct Cli {
+    /// Options of every command.
+    #[command(flatten)]
+    pub globals: Globals,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Options of every command.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct Globals {
+    /// Say less: errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice says everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run a deployment: all its processes, from footage to 3D.
+    Run(run::Arguments),
+    /// Find people in single images.
+    Detect(detect::Arguments),
+    /// Fuse one synchronised set of still images, in this process.
+    FuseFrame(fuse_frame::Arguments),
+    /// Read, show and convert models.
+    #[command(subcommand)]
+    Model(model::Command),
+    /// Read, show, check and convert calibrations.
+    #[command(subcommand)]
+    Calib(calib::Command),
+    /// Show and check deployment files.
+    #[command(subcommand)]
+    Config(config::Command),
+    /// Become one process of a deployment; `run` does this.
+    #[command(hide = true)]
+    Service(service::Arguments),
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,27 @@
+//! The commands, one file each.
+
+pub(crate) mod calib;
+pub(crate) mod config;
+pub(crate) mod detect;
+pub(crate) mod fuse_frame;
+pub(crate) mod model;
+pub(crate) mod run;
+pub(crate) mod service;
+
+use std::process::ExitCode;
+
+use crate::cli::{Cli, Command};
+use crate::failure::Failure;
+
+/// Does what the command line asks for.
+pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
+    match cli.command {
+        Command::Run(it) => run::run(&it, cli.globals),
+        Command::Detect(it) => detect::run(&it),
+        Command::FuseFrame(it) => fuse_frame::run(&it),
+        Command::Model(it) => model::run(&it),
+        Command::Calib(it) => calib::run(&it),
+        Command::Config(it) => config::run(&it),
+        Command::Service(it) => service::run(&it, cli.globals),
+    }
+}

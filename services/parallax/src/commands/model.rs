@@ -1,0 +1,118 @@
+//! `parallax model`: what a model is made of, and other formats as our own.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Subcommand;
+use fmp::{Model, Springs};
+use serde_json::{Value, json};
+
+use crate::failure::Failure;
+use crate::{inputs, output};
+
+/// What to do with a model.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Convert a model (Yang & Ramanan's .mat, the authors' .txt) into Parallax's own format.
+    Import {
+        /// The model to convert.
+        file: PathBuf,
+        /// The file to write.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+    /// Print what a model is made of.
+    Show {
+        /// The model file.
+        file: PathBuf,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Imports or shows.
+pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Import { file, out } => import(file, out),
+        Command::Show { file, json } => show(file, *json),
+    }
+}
+
+fn import(file: &Path, _out: &Path) -> Result<ExitCode, Failure> {
+    let _model = inputs::model(file)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(file: &Path, as_json: bool) -> Result<ExitCode, Failure> {
+    let model = inputs::model(file)?;
+    if as_json {
+        output::json(&description(file, &model))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let spec = model.spec();
+    let [rows, cols] = model.max_filter();
+    output::line(format_args!("{}: {}", file.display(), spec.name))?;
+    output::line(format_args!(
+        "  {} parts, {} filters of up to {rows}x{cols} cells of {} px, {} levels an octave",
+        model.n_parts(),
+        model.n_filters(),
+        spec.cell_px,
+        spec.interval
+    ))?;
+    output::line(format_args!(
+        "  root bias {:.4}, trained threshold {:.4}, mirror {}",
+        spec.root_bias,
+        spec.threshold,
+        if spec.mirror.is_some() {
+            "known"
+        } else {
+            "unknown"
+        }
+    ))?;
+    for (part, it) in spec.parts.iter().enumerate() {
+        let parent = it.edge.as_ref().map_or("root".to_owned(), |edge| {
+            format!("parent {}", edge.parent + 1)
+        });
+        let n_types = model.n_types(part);
+        output::line(format_args!(
+            "  {:>3} {:<18} {n_types} types, {parent}",
+            part + 1,
+            it.name
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Parts and parents count from 1, as in the models' own tables.
+fn description(file: &Path, model: &Model) -> Value {
+    let spec = model.spec();
+    let parts: Vec<Value> = spec
+        .parts
+        .iter()
+        .map(|it| {
+            json!({
+                "name": it.name,
+                "types": it.filter_of_type.len(),
+                "parent": it.edge.as_ref().map(|edge| edge.parent + 1),
+                "springs": it.edge.as_ref().map(|edge| match edge.springs {
+                    Springs::PerChildType(_) => "per child type",
+                    Springs::PerTypePair(_) => "per pair of types",
+                }),
+            })
+        })
+        .collect();
+    json!({
+        "schema_version": 1,
+        "file": file,
+        "name": spec.name,
+        "parts": parts,
+        "filters": model.n_filters(),
+        "max_filter_cells": model.max_filter(),
+        "cell_px": spec.cell_px,
+        "interval": spec.interval,
+        "root_bias": spec.root_bias,
+        "threshold": spec.threshold,
+        "mirror": spec.mirror.as_ref().map(|it| it.iter().map(|part| part + 1).collect::<Vec<_>>()),
+    })
+}
