@@ -1,0 +1,109 @@
+//! Percentage of correctly detected parts in one image.
+
+/// A stick: the mean of some joints at either end.
+type Stick = (&'static str, &'static [usize], &'static [usize]);
+
+/// The ten sticks of the PARSE evaluation, ends in `skeleton::PARSE14` order.
+///
+/// Torso from the middle of the shoulders to the middle of the hips, limbs from joint to joint, head
+/// from neck to head top.
+pub const PARSE_STICKS: [Stick; 10] = [
+    ("torso", &[8, 9], &[2, 3]),
+    ("right upper leg", &[2], &[1]),
+    ("left upper leg", &[3], &[4]),
+    ("right lower leg", &[1], &[0]),
+    ("left lower leg", &[4], &[5]),
+    ("right upper arm", &[8], &[7]),
+    ("left upper arm", &[9], &[10]),
+    ("right lower arm", &[7], &[6]),
+    ("left lower arm", &[10], &[11]),
+    ("head", &[12], &[13]),
+];
+
+/// How the two ends of a stick are judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PcpRule {
+    /// Either end lies within half the stick's true length.
+    BothEnds,
+    /// The mean of the two distances does.
+    MeanOfEnds,
+}
+
+/// Correct sticks out of those judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Pcp {
+    /// Sticks found.
+    pub correct: usize,
+    /// Sticks judged.
+    pub total: usize,
+}
+
+impl Pcp {
+    /// Percentage, 0 if nothing was judged.
+    pub fn percent(&self) -> f64 {
+        if self.total == 0 {
+            return 0.0;
+        }
+        100.0 * self.correct as f64 / self.total as f64
+    }
+
+    /// Adds another image.
+    pub fn add(&mut self, other: Self) {
+        self.correct += other.correct;
+        self.total += other.total;
+    }
+}
+
+/// Judges the ten sticks of one image, with half of the true length as the limit.
+///
+/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, pixels.
+pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp {
+    let end = |joints: &[[f64; 2]; 14], of: &[usize]| {
+        let n = of.len() as f64;
+        let sum = of.iter().fold([0.0; 2], |sum, &it| {
+            [sum[0] + joints[it][0], sum[1] + joints[it][1]]
+        });
+        [sum[0] / n, sum[1] / n]
+    };
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let correct = PARSE_STICKS
+        .iter()
+        .filter(|(_, from, to)| {
+            let limit = 0.5 * distance(end(truth, from), end(truth, to));
+            let errors = [from, to].map(|it| distance(end(found, it), end(truth, it)));
+            match rule {
+                PcpRule::BothEnds => errors.iter().all(|it| *it <= limit),
+                PcpRule::MeanOfEnds => f64::midpoint(errors[0], errors[1]) <= limit,
+            }
+        })
+        .count();
+    Pcp {
+        correct,
+        total: PARSE_STICKS.len(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn person() -> [[f64; 2]; 14] {
+        std::array::from_fn(|joint| [10.0 * (joint % 4) as f64, 25.0 * (joint / 4) as f64])
+    }
+
+    #[test]
+    fn the_truth_is_all_correct() {
+        let got = pcp(&person(), &person(), PcpRule::BothEnds);
+        assert_eq!((got.correct, got.percent()), (10, 100.0));
+    }
+
+    #[test]
+    fn one_bad_end_fails_the_strict_rule_and_passes_the_mean() {
+        let truth = person();
+        let mut found = truth;
+        let length = (truth[12][0] - truth[13][0]).hypot(truth[12][1] - truth[13][1]);
+        found[13][0] += 0.8 * length;
+        assert_eq!(pcp(&found, &truth, PcpRule::BothEnds).correct, 9);
+        assert_eq!(pcp(&found, &truth, PcpRule::MeanOfEnds).correct, 10);
+    }
+}
