@@ -75,6 +75,9 @@ pub enum FootageError {
     /// `step` is 0.
     #[error("frame step must be at least 1, got 0")]
     ZeroStep,
+    /// `count` is 0.
+    #[error("number of frames must be at least 1, got 0")]
+    ZeroCount,
     /// `frame_rate_hz` is not a positive number.
     #[error("frame rate must be a positive number of hertz, got {rate_hz}")]
     BadRate {

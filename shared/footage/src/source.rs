@@ -1,5 +1,18 @@
 //! Footage, frame by frame.
 
+mod decode;
+mod images;
+mod listing;
+mod log;
+mod probe;
+mod video;
+
+use std::path::Path;
+
+use images::{Images, Still, is_image};
+use listing::Listing;
+use video::Video;
+
 use crate::{FootageError, Size, SourceSpec};
 
 /// What footage is made of.
@@ -18,9 +31,9 @@ pub enum SourceKind {
 pub struct SourceInfo {
     /// Size of every frame.
     pub size: Size,
-    /// Frames that will be handed out, as far as the footage tells beforehand.
-    pub n_frames: Option<u64>,
-    /// Frames handed out per second of the scene, where it is known.
+    /// Frames that will be handed out. A damaged video may have fewer, and then says so.
+    pub n_frames: u64,
+    /// Frames handed out per second of the scene (the footage's rate over `step`), where it is known.
     pub frame_rate_hz: Option<f64>,
     /// What it is made of.
     pub kind: SourceKind,
@@ -33,20 +46,76 @@ pub struct FrameView<'a> {
     pub index: u64,
     /// Presentation time, seconds after frame 0 of the footage; `None` where no rate is known.
     pub time_s: Option<f64>,
-    /// The pixels, RGB, `width * height * 3` bytes.
+    /// The pixels, RGB, row major, `width * height * 3` bytes.
     pub rgb: &'a [u8],
 }
 
-/// Open footage.
+/// Open footage, which hands out its frames in order.
+///
+/// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
+/// channel dropped, 16 bits are rounded to 8. Orientation tags (EXIF, or the display matrix of a
+/// phone's video) are ignored, because a calibration speaks of pixels as they are stored.
+///
+/// ```no_run
+/// use footage::{Source, SourceSpec};
+///
+/// let mut source = Source::open(&SourceSpec::new("cam01.mp4"))?;
+/// println!("{} frames of {}", source.info().n_frames, source.info().size);
+/// while let Some(frame) = source.next_frame()? {
+///     println!("frame {} begins with {:?}", frame.index, &frame.rgb[..3]);
+/// }
+/// # Ok::<(), footage::FootageError>(())
+/// ```
 #[derive(Debug)]
 pub struct Source {
     info: SourceInfo,
+    clock: Clock,
+    reader: Reader,
+    /// The end was reached, or reading failed.
+    is_over: bool,
+    buffer: Vec<u8>,
+}
+
+#[derive(Debug)]
+enum Reader {
+    Still(Still),
+    Images(Images),
+    Video(Box<Video>),
 }
 
 impl Source {
-    /// Opens footage.
-    pub fn open(_spec: &SourceSpec) -> Result<Self, FootageError> {
-        todo!()
+    /// Opens footage; of a video this starts the decoder.
+    ///
+    /// # Errors
+    ///
+    /// Every [`FootageError`] except [`SizeDiffers`](FootageError::SizeDiffers) and
+    /// [`VideoTruncated`](FootageError::VideoTruncated), which only show while reading.
+    pub fn open(spec: &SourceSpec) -> Result<Self, FootageError> {
+        spec.check()?;
+        let (path, reader) = match listing::list(&spec.path)? {
+            Listing::Images(paths) => {
+                let images = Images::open(paths, spec)?;
+                (images.first().to_path_buf(), Reader::Images(images))
+            }
+            Listing::File(path) if is_image(&path)? => {
+                let still = Still::open(&path, spec.count.unwrap_or(1))?;
+                (path, Reader::Still(still))
+            }
+            Listing::File(path) => {
+                let video = Box::new(Video::open(&path, spec)?);
+                (path, Reader::Video(video))
+            }
+        };
+        let clock = Clock::of(&reader, spec);
+        let info = reader.info(clock.rate_hz.map(|it| it / spec.step as f64));
+        check_min_side(&path, info.size, spec.min_side)?;
+        Ok(Self {
+            info,
+            clock,
+            reader,
+            is_over: false,
+            buffer: Vec::new(),
+        })
     }
 
     /// What is known of it.
@@ -55,20 +124,150 @@ impl Source {
     }
 
     /// The next frame, in a buffer of the source's own; `None` at the end, and ever after.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError`]: what cannot be read, in which file. After an error there are no more frames.
     pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
-        todo!()
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.resize(self.info.size.rgb_bytes(), 0);
+        let read = self.read_into(&mut buffer);
+        self.buffer = buffer;
+        Ok(read?.map(|(index, time_s)| FrameView {
+            index,
+            time_s,
+            rgb: &self.buffer,
+        }))
     }
 
-    /// The next frame, decoded into `rgb`, `width * height * 3` bytes; `None` at the end, and ever after.
+    /// The next frame, decoded into `rgb`; `None` at the end, and ever after.
+    ///
+    /// * `rgb`: `width * height * 3` bytes, all of them written; what they are after `None` or an error
+    ///   is not said.
+    ///
+    /// # Errors
+    ///
+    /// As [`next_frame`](Self::next_frame).
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` has another length.
     pub fn next_into<'a>(
         &mut self,
-        _rgb: &'a mut [u8],
+        rgb: &'a mut [u8],
     ) -> Result<Option<FrameView<'a>>, FootageError> {
-        todo!()
+        let size = self.info.size;
+        assert_eq!(rgb.len(), size.rgb_bytes(), "a frame is {size} in RGB");
+        let read = self.read_into(rgb)?;
+        Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
-    /// Passes over the next `n` frames; returns how many there were.
-    pub fn skip(&mut self, _n: u64) -> Result<u64, FootageError> {
-        todo!()
+    /// Passes over the next `n` frames, and returns how many there were.
+    ///
+    /// Images are not even opened; the frames of a video have to be decoded.
+    ///
+    /// # Errors
+    ///
+    /// As [`next_frame`](Self::next_frame).
+    pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
+        for n_skipped in 0..n {
+            let is_there = match &mut self.reader {
+                Reader::Video(_) => self.next_frame()?.is_some(),
+                Reader::Images(images) if !self.is_over => self.clock.tick(images.skip_one()),
+                Reader::Still(still) if !self.is_over => self.clock.tick(still.skip_one()),
+                Reader::Images(_) | Reader::Still(_) => false,
+            };
+            if !is_there {
+                self.is_over = true;
+                return Ok(n_skipped);
+            }
+        }
+        Ok(n)
     }
+
+    fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<(u64, Option<f64>)>, FootageError> {
+        if self.is_over {
+            return Ok(None);
+        }
+        // A failure must end the footage too.
+        self.is_over = true;
+        let is_there = match &mut self.reader {
+            Reader::Images(images) => images.read_into(rgb)?,
+            Reader::Video(video) => video.read_into(rgb)?,
+            Reader::Still(still) => still.read_into(rgb),
+        };
+        self.is_over = !is_there;
+        let stamp = self.clock.stamp();
+        Ok(self.clock.tick(is_there).then_some(stamp))
+    }
+}
+
+impl Reader {
+    fn info(&self, frame_rate_hz: Option<f64>) -> SourceInfo {
+        let (kind, size, n_frames) = match self {
+            Self::Still(still) => (SourceKind::Still, still.size, still.n_left),
+            Self::Images(images) => (SourceKind::Images, images.size, images.n_frames),
+            Self::Video(video) => (SourceKind::Video, video.probe.size, video.n_frames),
+        };
+        SourceInfo {
+            size,
+            n_frames,
+            frame_rate_hz,
+            kind,
+        }
+    }
+}
+
+/// Index and time of the next frame.
+#[derive(Debug)]
+struct Clock {
+    index: u64,
+    step: u64,
+    /// Rate of the footage itself.
+    rate_hz: Option<f64>,
+    /// Times of its frames, if they are not equally spaced.
+    times_s: Option<Vec<f64>>,
+}
+
+impl Clock {
+    fn of(reader: &Reader, spec: &SourceSpec) -> Self {
+        let (own_hz, times_s) = match reader {
+            Reader::Video(video) => (video.probe.rate_hz, video.probe.times_s.clone()),
+            Reader::Still(_) | Reader::Images(_) => (None, None),
+        };
+        Self {
+            index: spec.start,
+            step: spec.step,
+            rate_hz: own_hz.or(spec.frame_rate_hz),
+            times_s,
+        }
+    }
+
+    fn stamp(&self) -> (u64, Option<f64>) {
+        let by_rate = || self.rate_hz.map(|it| self.index as f64 / it);
+        let listed = self
+            .times_s
+            .as_ref()
+            .and_then(|it| it.get(self.index as usize));
+        (self.index, listed.copied().or_else(by_rate))
+    }
+
+    /// Moves on if there was a frame, and hands the answer back.
+    fn tick(&mut self, was_there: bool) -> bool {
+        if was_there {
+            self.index = self.index.saturating_add(self.step);
+        }
+        was_there
+    }
+}
+
+fn check_min_side(path: &Path, size: Size, min_side: usize) -> Result<(), FootageError> {
+    if size.width.min(size.height) < min_side {
+        return Err(FootageError::TooSmall {
+            path: path.to_path_buf(),
+            size,
+            min_side,
+        });
+    }
+    Ok(())
 }

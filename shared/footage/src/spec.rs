@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::FootageError;
+
 /// Footage as a user names it, and which of its frames to hand out.
 ///
 /// Frames are counted from 0 in the order of the footage; those handed out are `start`,
@@ -11,19 +13,20 @@ pub struct SourceSpec {
     /// One of: a folder of images; a glob (`frames/*.png`); a numbered pattern (`frames/%05d.png`);
     /// an image; a video. A path that exists is taken as it is, whatever characters it contains.
     pub path: String,
-    /// First frame, from 0.
+    /// First frame, from 0. For a numbered pattern this counts files, not the numbers in their names.
     pub start: u64,
     /// Distance between frames, at least 1.
     pub step: u64,
-    /// Most frames to hand out; all without it. A still image is handed out this often (once without it).
+    /// Most frames to hand out, at least 1; all without it. A still image is handed out this often (once without
+    /// it), and has no other end.
     pub count: Option<u64>,
     /// Frames per second where the footage does not say: images never do, videos do.
     pub frame_rate_hz: Option<f64>,
     /// Smallest width and height accepted, pixels.
     pub min_side: usize,
-    /// The `ffmpeg` executable, a name on the search path or a path.
+    /// The `ffmpeg` executable, a name on the search path or a path. Needed for videos only.
     pub ffmpeg: PathBuf,
-    /// The `ffprobe` executable, a name on the search path or a path.
+    /// The `ffprobe` executable, a name on the search path or a path. Needed for videos only.
     pub ffprobe: PathBuf,
 }
 
@@ -39,6 +42,87 @@ impl SourceSpec {
             min_side: 1,
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),
+        }
+    }
+
+    /// Refuses numbers that no footage can satisfy.
+    pub(crate) fn check(&self) -> Result<(), FootageError> {
+        if self.step == 0 {
+            return Err(FootageError::ZeroStep);
+        }
+        if self.count == Some(0) {
+            return Err(FootageError::ZeroCount);
+        }
+        match self.frame_rate_hz {
+            Some(rate_hz) if !(rate_hz.is_finite() && rate_hz > 0.0) => {
+                Err(FootageError::BadRate { rate_hz })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// How many of `n_frames` are handed out.
+    pub(crate) fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
+        if self.start >= n_frames {
+            return Err(FootageError::StartBeyondEnd {
+                path: self.path.clone(),
+                start: self.start,
+                n_frames,
+            });
+        }
+        let available = (n_frames - self.start).div_ceil(self.step);
+        Ok(self.count.map_or(available, |count| count.min(available)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn delivered(start: u64, step: u64, count: Option<u64>) -> Option<u64> {
+        let spec = SourceSpec {
+            start,
+            step,
+            count,
+            ..SourceSpec::new("x")
+        };
+        spec.n_delivered(10).ok()
+    }
+
+    #[test]
+    fn counts_the_frames_that_start_step_and_count_leave() {
+        assert_eq!(delivered(0, 1, None), Some(10));
+        assert_eq!(delivered(9, 1, None), Some(1));
+        assert_eq!(delivered(10, 1, None), None);
+        assert_eq!(delivered(0, 3, None), Some(4)); // 0 3 6 9
+        assert_eq!(delivered(1, 3, None), Some(3)); // 1 4 7
+        assert_eq!(delivered(1, 3, Some(2)), Some(2));
+        assert_eq!(delivered(1, 3, Some(9)), Some(3));
+        assert_eq!(delivered(0, u64::MAX, Some(9)), Some(1));
+    }
+
+    #[test]
+    fn refuses_no_frames_at_all() {
+        let none = SourceSpec {
+            count: Some(0),
+            ..SourceSpec::new("x")
+        };
+        assert!(matches!(none.check(), Err(FootageError::ZeroCount)));
+    }
+
+    #[test]
+    fn refuses_a_step_of_zero_and_a_rate_that_is_not_positive() {
+        let zero_step = SourceSpec {
+            step: 0,
+            ..SourceSpec::new("x")
+        };
+        assert!(matches!(zero_step.check(), Err(FootageError::ZeroStep)));
+        for rate_hz in [0.0, -25.0, f64::NAN, f64::INFINITY] {
+            let spec = SourceSpec {
+                frame_rate_hz: Some(rate_hz),
+                ..SourceSpec::new("x")
+            };
+            assert!(matches!(spec.check(), Err(FootageError::BadRate { .. })));
         }
     }
 }

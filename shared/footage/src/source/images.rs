@@ -1,0 +1,119 @@
+//! Image files as footage: a sequence, or one image repeated.
+
+use std::path::{Path, PathBuf};
+
+use super::decode::Encoded;
+use crate::{FootageError, Size, SourceSpec};
+
+/// The images that are handed out, in order.
+#[derive(Debug)]
+pub(super) struct Images {
+    paths: std::vec::IntoIter<PathBuf>,
+    first: PathBuf,
+    pub(super) size: Size,
+    pub(super) n_frames: u64,
+}
+
+impl Images {
+    pub(super) fn open(paths: Vec<PathBuf>, spec: &SourceSpec) -> Result<Self, FootageError> {
+        let n_frames = spec.n_delivered(paths.len() as u64)?;
+        let step = usize::try_from(spec.step).unwrap_or(usize::MAX);
+        let paths: Vec<PathBuf> = paths
+            .into_iter()
+            .skip(spec.start as usize)
+            .step_by(step)
+            .take(n_frames as usize)
+            .collect();
+        let first = paths.first().cloned().unwrap_or_default();
+        let size = Encoded::read(&first)?.size()?;
+        Ok(Self {
+            paths: paths.into_iter(),
+            first,
+            size,
+            n_frames,
+        })
+    }
+
+    pub(super) fn first(&self) -> &Path {
+        &self.first
+    }
+
+    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
+        let Some(path) = self.paths.next() else {
+            return Ok(false);
+        };
+        let encoded = Encoded::read(&path)?;
+        let found = encoded.size()?;
+        if found != self.size {
+            return Err(FootageError::SizeDiffers {
+                path,
+                found,
+                first: self.first.clone(),
+                expected: self.size,
+            });
+        }
+        encoded.decode_into(rgb)?;
+        Ok(true)
+    }
+
+    /// Passes over the next image without opening it.
+    pub(super) fn skip_one(&mut self) -> bool {
+        self.paths.next().is_some()
+    }
+}
+
+/// One image, decoded once and handed out again and again.
+#[derive(Debug)]
+pub(super) struct Still {
+    rgb: Vec<u8>,
+    pub(super) size: Size,
+    pub(super) n_left: u64,
+}
+
+impl Still {
+    pub(super) fn open(path: &Path, n_frames: u64) -> Result<Self, FootageError> {
+        let encoded = Encoded::read(path)?;
+        let size = encoded.size()?;
+        let mut rgb = vec![0; size.rgb_bytes()];
+        encoded.decode_into(&mut rgb)?;
+        Ok(Self {
+            rgb,
+            size,
+            n_left: n_frames,
+        })
+    }
+
+    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> bool {
+        let is_there = self.skip_one();
+        if is_there {
+            rgb.copy_from_slice(&self.rgb);
+        }
+        is_there
+    }
+
+    pub(super) fn skip_one(&mut self) -> bool {
+        let is_there = self.n_left > 0;
+        self.n_left -= u64::from(is_there);
+        is_there
+    }
+}
+
+/// Whether the content of a file is that of an image (an empty file of an image's name counts as one).
+pub(super) fn is_image(path: &Path) -> Result<bool, FootageError> {
+    use std::io::Read as _;
+    let mut head = Vec::with_capacity(32);
+    std::fs::File::open(path)
+        .and_then(|it| it.take(32).read_to_end(&mut head))
+        .map_err(|source| FootageError::Io {
+            path: path.to_path_buf(),
+            source,
+        })?;
+    if head.is_empty() {
+        return Err(FootageError::Empty {
+            path: path.to_path_buf(),
+        });
+    }
+    let by_content = image::guess_format(&head).is_ok_and(|it| it.reading_enabled());
+    let by_name = image::ImageFormat::from_path(path).is_ok_and(|it| it.reading_enabled());
+    Ok(by_content || by_name)
+}

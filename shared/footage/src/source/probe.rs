@@ -1,0 +1,170 @@
+//! Asks `ffprobe` what a video is.
+
+use std::io;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+use crate::{FootageError, Size, SourceSpec};
+
+/// What is known of a video before it is decoded.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Probe {
+    /// Size as stored: a rotation tag is not applied.
+    pub(super) size: Size,
+    pub(super) rate_hz: Option<f64>,
+    /// Frames in the stream: exact, from the container or by counting.
+    pub(super) n_frames: u64,
+    /// Frames that the duration in the header promises, to find files that were cut off.
+    pub(super) n_promised: u64,
+    /// Presentation times, seconds after the first frame, where frames are not equally spaced.
+    pub(super) times_s: Option<Vec<f64>>,
+    /// Whether the option that keeps every frame is called `-fps_mode` (since 5.1) or `-vsync`.
+    pub(super) has_fps_mode: bool,
+}
+
+const ENTRIES: &str = "program_version=version:\
+    stream=width,height,nb_frames,avg_frame_rate,r_frame_rate:format=duration";
+
+/// Asks for the first video stream of `path`; reads the whole file (without decoding) only if the
+/// container does not tell the number of frames, or their times are irregular.
+pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
+    let answer = ask(
+        path,
+        spec,
+        &["-show_program_version", "-show_entries", ENTRIES],
+    )?;
+    let stream = &answer["streams"][0];
+    let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
+    let size = Size::new(side("width"), side("height"));
+    if size.rgb_bytes() == 0 {
+        return Err(FootageError::Video {
+            path: path.to_path_buf(),
+            message: "it has no video stream".to_owned(),
+        });
+    }
+    let rate_hz = fraction(&stream["avg_frame_rate"]);
+    let nominal_hz = fraction(&stream["r_frame_rate"]);
+    let mut n_frames = number(&stream["nb_frames"]).map_or(0, |it| it as u64);
+    let mut times_s = None;
+    if n_frames == 0 || rate_hz != nominal_hz {
+        let packets = ask(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
+        let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
+        // Packets in front of the first frame that is shown are marked `D`, to be discarded.
+        let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
+        n_frames = shown.len() as u64;
+        times_s = (rate_hz != nominal_hz).then(|| presentation_times(&shown));
+    }
+    let duration_s = number(&answer["format"]["duration"]).unwrap_or(0.0);
+    Ok(Probe {
+        size,
+        rate_hz,
+        n_frames,
+        n_promised: n_frames.max((duration_s * rate_hz.unwrap_or(0.0)).round() as u64),
+        times_s,
+        has_fps_mode: has_fps_mode(answer["program_version"]["version"].as_str().unwrap_or("")),
+    })
+}
+
+fn ask(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, FootageError> {
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = Command::new(&spec.ffprobe)
+        .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
+        .args(wanted)
+        .arg(input_name(path))
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|source| missing(&spec.ffprobe, path, source))?;
+    let unreadable = |message: String| FootageError::Video {
+        path: path.to_path_buf(),
+        message,
+    };
+    if !status.success() {
+        return Err(unreadable(super::log::summary(&stderr)));
+    }
+    serde_json::from_slice(&stdout)
+        .map_err(|it| unreadable(format!("ffprobe answered what is not JSON: {it}")))
+}
+
+/// The name of a file for ffmpeg, which would take `concat:x` or `-x` for something else.
+pub(super) fn input_name(path: &Path) -> std::ffi::OsString {
+    let mut name = std::ffi::OsString::from("file:");
+    name.push(path);
+    name
+}
+
+pub(super) fn missing(executable: &Path, path: &Path, source: io::Error) -> FootageError {
+    FootageError::FfmpegMissing {
+        executable: executable.to_path_buf(),
+        path: path.to_path_buf(),
+        source,
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_str()?.parse().ok()
+}
+
+/// `"60000/1001"`; `"0/0"` stands for unknown.
+fn fraction(value: &Value) -> Option<f64> {
+    let (numerator, denominator) = value.as_str()?.split_once('/')?;
+    let rate = numerator.parse::<f64>().ok()? / denominator.parse::<f64>().ok()?;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+fn is_discarded(packet: &Value) -> bool {
+    packet["flags"].as_str().is_some_and(|it| it.contains('D'))
+}
+
+fn presentation_times(packets: &[&Value]) -> Vec<f64> {
+    let mut times: Vec<f64> = packets
+        .iter()
+        .filter_map(|it| number(&it["pts_time"]))
+        .collect();
+    times.sort_by(f64::total_cmp);
+    let first = times.first().copied().unwrap_or(0.0);
+    times.iter().map(|it| it - first).collect()
+}
+
+/// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are taken for new ones.
+fn has_fps_mode(version: &str) -> bool {
+    let mut numbers = version
+        .trim_start_matches('n')
+        .split(|it: char| !it.is_ascii_digit())
+        .map(str::parse::<u32>);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => (major, minor) >= (5, 1),
+        _ => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_versions_are_asked_in_their_own_words() {
+        for (version, expect) in [
+            ("5.1.9-0+deb12u1", true),
+            ("n7.0", true),
+            ("5.0.1", false),
+            ("4.4.2-0ubuntu0.22.04.1", false),
+            ("N-112345-gabcdef", true),
+            ("", true),
+        ] {
+            assert_eq!(has_fps_mode(version), expect, "{version}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_rate_is_no_rate() {
+        assert_eq!(fraction(&"60000/1001".into()), Some(60000.0 / 1001.0));
+        for unknown in ["0/0", "0/1", "25", "x/y", ""] {
+            assert_eq!(fraction(&unknown.into()), None, "{unknown}");
+        }
+    }
+}
