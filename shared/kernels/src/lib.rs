@@ -1,5 +1,18 @@
 //! Grids, images and the hot loops, each loop written twice: once to be read, once to be fast.
+#![expect(
+    unsafe_code,
+    reason = "SIMD dispatch, loads and stores; every block states why it is sound"
+)]
 
+mod correlate;
+mod gradient;
+mod hog;
 mod image;
+mod isa;
+mod planes;
 
+pub use correlate::{FeatureMap, FilterBank, Template, correlate_f64};
+pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
+pub use isa::Isa;
+pub use planes::{Planes, reduce, reduced, resize};

@@ -1,0 +1,164 @@
+//! Histograms of oriented gradients (Felzenszwalb et al. 2010, section 6), 32 channels.
+//!
+//! A cell has 18 contrast-sensitive orientations, 9 contrast-insensitive ones, 4 texture energies
+//! and one channel that is 1 in the padding and 0 inside.
+
+mod reference;
+mod single;
+
+pub use reference::hog_f64;
+pub use single::{HogWorkspace, hog};
+
+/// Channels of a cell.
+pub const N_CHANNELS: usize = 32;
+
+/// Upper limit of a normalised histogram entry.
+const CLIP: f64 = 0.2;
+/// Added to the energy of a block, so that flat blocks have a norm.
+const FLAT: f64 = 0.0001;
+/// Weight of the texture channels, about `1 / sqrt(18)`.
+const TEXTURE: f64 = 0.2357;
+
+/// How the feature map of an image is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HogShape {
+    /// Side of a cell, pixels.
+    pub cell_px: usize,
+    /// Rows and columns of padding on every side of the map, cells.
+    pub pad: [usize; 2],
+}
+
+impl HogShape {
+    /// Cells `[rows, cols]` that the image is divided into: `round(side / cell_px)`.
+    fn cells(&self, width: usize, height: usize) -> [usize; 2] {
+        [height, width].map(|side| (side as f64 / self.cell_px as f64).round() as usize)
+    }
+
+    /// Size `[rows, cols]` of the padded feature map; the outer ring of cells has no features.
+    pub fn map_size(&self, width: usize, height: usize) -> [usize; 2] {
+        let [rows, cols] = self.cells(width, height);
+        [
+            rows.saturating_sub(2) + 2 * self.pad[0],
+            cols.saturating_sub(2) + 2 * self.pad[1],
+        ]
+    }
+}
+
+/// Where a pixel votes along one axis: the cell before it and the shares of that cell and the next.
+#[derive(Debug, Clone, Copy)]
+struct Vote {
+    /// Counted from 1: cell 0 is a ring outside of the image that nobody reads.
+    cell: usize,
+    share: [f64; 2],
+}
+
+impl Vote {
+    fn of(pixel: usize, cell_px: usize) -> Self {
+        let at = (pixel as f64 + 0.5) / cell_px as f64 - 0.5;
+        let next = at - at.floor();
+        Self {
+            cell: (at.floor() + 1.0) as usize,
+            share: [1.0 - next, next],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{Isa, Planes};
+
+    const SHAPE: HogShape = HogShape {
+        cell_px: 4,
+        pad: [3, 4],
+    };
+
+    /// Images of sixteen grey levels, so that equal gradients and flat regions are common.
+    fn images() -> impl Strategy<Value = Planes> {
+        (12..45_usize, 12..45_usize, any::<u64>()).prop_map(|(width, height, seed)| {
+            let mut state = seed | 1;
+            let data = std::iter::repeat_with(|| {
+                state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
+                ((state >> 60) * 17) as f64
+            });
+            Planes::from_samples(width, height, data.take(3 * width * height).collect())
+        })
+    }
+
+    fn single(isa: Isa, image: &Planes) -> Vec<f32> {
+        let [rows, cols] = SHAPE.map_size(image.width(), image.height());
+        let mut out = vec![f32::NAN; rows * cols * N_CHANNELS];
+        hog(isa, image, SHAPE, &mut HogWorkspace::default(), &mut out);
+        out
+    }
+
+    proptest! {
+        #[test]
+        fn single_precision_differs_from_the_reference_by_rounding_only(image in images()) {
+            let want = hog_f64(&image, SHAPE);
+            let got = single(Isa::best(), &image);
+            prop_assert_eq!(want.len(), got.len());
+            for (want, got) in want.iter().zip(&got) {
+                prop_assert!((want - f64::from(*got)).abs() < 2e-6, "{} {}", want, got);
+            }
+        }
+
+        #[test]
+        fn every_instruction_set_gives_the_same_bits(image in images()) {
+            let want = single(Isa::available()[0], &image);
+            for isa in Isa::available() {
+                prop_assert_eq!(&single(isa, &image), &want, "{:?}", isa);
+            }
+        }
+
+        #[test]
+        fn adding_a_constant_to_the_image_changes_nothing(image in images(), offset in 1..50_u8) {
+            let brighter = image.data().iter().map(|it| it + f64::from(offset)).collect();
+            let brighter = Planes::from_samples(image.width(), image.height(), brighter);
+            prop_assert_eq!(hog_f64(&brighter, SHAPE), hog_f64(&image, SHAPE));
+        }
+
+        #[test]
+        fn turning_the_contrast_round_leaves_the_insensitive_channels(image in images()) {
+            let negative = image.data().iter().map(|it| 255.0 - it).collect();
+            let negative = Planes::from_samples(image.width(), image.height(), negative);
+            let (a, b) = (hog_f64(&negative, SHAPE), hog_f64(&image, SHAPE));
+            for (a, b) in a.chunks_exact(N_CHANNELS).zip(b.chunks_exact(N_CHANNELS)) {
+                for channel in 18..27 {
+                    prop_assert!((a[channel] - b[channel]).abs() < 1e-12);
+                }
+                for channel in 0..9 {
+                    prop_assert!((a[channel] - b[channel + 9]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_vertical_edge_votes_for_the_first_orientation_only() {
+        let data = (0..3 * 24 * 24).map(|at| f64::from(u8::from(at % 24 >= 12)) * 200.0);
+        let map = hog_f64(&Planes::from_samples(24, 24, data.collect()), SHAPE);
+        let cols = SHAPE.map_size(24, 24)[1];
+        let cell = &map[((3 + 2) * cols + 4 + 2) * N_CHANNELS..][..N_CHANNELS];
+        assert!(cell[0] > 0.3 && cell[18] > 0.3, "{cell:?}");
+        assert!(cell[1..18].iter().all(|&it| it == 0.0), "{cell:?}");
+    }
+
+    #[test]
+    fn padding_is_zero_but_for_its_own_channel() {
+        let map = hog_f64(&Planes::from_samples(16, 16, vec![9.0; 3 * 256]), SHAPE);
+        let [rows, cols] = SHAPE.map_size(16, 16);
+        assert_eq!([rows, cols], [2 + 6, 2 + 8]);
+        for (at, cell) in map.chunks_exact(N_CHANNELS).enumerate() {
+            let (y, x) = (at / cols, at % cols);
+            let inside = (3..rows - 3).contains(&y) && (4..cols - 4).contains(&x);
+            let expected = if inside { 0.0 } else { 1.0 };
+            assert_eq!(cell[31], expected);
+            assert!(cell[..31].iter().all(|&it| it == 0.0));
+        }
+    }
+}

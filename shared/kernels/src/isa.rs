@@ -1,0 +1,62 @@
+//! Which instructions the machine has.
+
+/// An instruction set that this machine is known to have.
+///
+/// Every kernel gives the same bits on all of them; only the speed differs. A value can only be
+/// had from [`Self::best`] and [`Self::available`], so holding one proves that it was detected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Isa(pub(crate) Kind);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Whatever the target guarantees. Needs a fused multiply-add in hardware to be fast.
+    Portable,
+    /// AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// AVX-512 F, VL and what AVX2 means here.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Isa {
+    /// The fastest one.
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 =
+                std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma");
+            let avx512 = std::is_x86_feature_detected!("avx512f")
+                && std::is_x86_feature_detected!("avx512vl");
+            if avx2 && avx512 {
+                return Self(Kind::Avx512);
+            }
+            if avx2 {
+                return Self(Kind::Avx2);
+            }
+        }
+        Self(Kind::Portable)
+    }
+
+    /// All of them, slowest first; for tests and comparisons.
+    pub fn available() -> Vec<Self> {
+        let mut all = vec![Self(Kind::Portable)];
+        #[cfg(target_arch = "x86_64")]
+        {
+            let best = Self::best();
+            if best.0 == Kind::Avx512 {
+                all.push(Self(Kind::Avx2));
+            }
+            if best.0 != Kind::Portable {
+                all.push(best);
+            }
+        }
+        all
+    }
+}
+
+impl Default for Isa {
+    fn default() -> Self {
+        Self::best()
+    }
+}
