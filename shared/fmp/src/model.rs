@@ -1,6 +1,6 @@
 //! A trained flexible mixture of parts, checked once when it is made.
 
-use crate::N_CHANNELS;
+mod check;
 
 /// A linear template over feature cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,7 +91,9 @@ pub enum ModelError {
         part: usize,
     },
     /// The parents do not form a tree in which every parent comes before its children.
-    #[error("part {part} names part {parent} as its parent: the tree has a cycle or is out of order")]
+    #[error(
+        "part {part} names part {parent} as its parent: the tree has a cycle or is out of order"
+    )]
     Tree {
         /// 1-based part.
         part: usize,
@@ -122,7 +124,51 @@ pub enum ModelError {
         /// Entries expected.
         expected: usize,
     },
-    /// A number is not finite, or a spring does not pull.
+    /// A count is beyond what a model may have.
+    #[error("{what} of {whose} is {got}, expected {min} to {max}")]
+    Limit {
+        /// The count.
+        what: &'static str,
+        /// The model, or a part or filter, 1-based.
+        whose: String,
+        /// Its value.
+        got: usize,
+        /// Least accepted.
+        min: usize,
+        /// Most accepted.
+        max: usize,
+    },
+    /// A type of the parent forbids all types of the child, so that no pose could contain it.
+    #[error("no type of part {part} goes with type {parent_type} of its parent")]
+    DeadEnd {
+        /// 1-based part.
+        part: usize,
+        /// 1-based type of its parent.
+        parent_type: usize,
+    },
+    /// A pair of types may occur, but nothing says where.
+    #[error(
+        "part {part} has a bias but no spring for type {parent_type} of its parent and its type {own_type}"
+    )]
+    NoSpring {
+        /// 1-based part.
+        part: usize,
+        /// 1-based type of its parent.
+        parent_type: usize,
+        /// 1-based type.
+        own_type: usize,
+    },
+    /// The mirror is not an exchange that leaves the tree as it is.
+    #[error(
+        "part {part} mirrors part {other}, but not the other way round or not on the same tree"
+    )]
+    Mirror {
+        /// 1-based part.
+        part: usize,
+        /// 1-based mirror part.
+        other: usize,
+    },
+    /// A number is not finite or absurdly large, or a spring does not pull.
     #[error("{what} of {whose} is {value}, expected {expected}")]
     Value {
         /// The number.
@@ -154,7 +200,7 @@ impl Model {
     ///
     /// See [`ModelError`].
     pub fn new(spec: ModelSpec) -> Result<Self, ModelError> {
-        check(&spec)?;
+        check::check(&spec)?;
         Ok(Self(spec))
     }
 
@@ -196,8 +242,4 @@ impl Model {
     pub fn detection_threshold(&self) -> f64 {
         self.0.threshold.min(-1.0)
     }
-}
-
-fn check(_spec: &ModelSpec) -> Result<(), ModelError> {
-    Ok(())
 }

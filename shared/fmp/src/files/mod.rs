@@ -4,6 +4,8 @@ pub mod mat;
 pub mod text;
 
 mod mat5;
+#[cfg(test)]
+pub(crate) mod planted;
 mod released;
 mod tokens;
 
