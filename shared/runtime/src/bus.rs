@@ -4,6 +4,7 @@ use core::fmt::Debug;
 use core::time::Duration;
 use std::io;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeCreationFailure;
@@ -84,7 +85,7 @@ pub struct Topic {
 /// A process's connection to the shared memory of its deployment: makes ports.
 #[derive(Debug)]
 pub struct Bus {
-    node: Node<ipc::Service>,
+    node: Arc<Node<ipc::Service>>,
     namespace: Namespace,
     process: String,
     stop: Stop,
@@ -117,7 +118,7 @@ impl Bus {
                 source,
             })?;
         Ok(Self {
-            node,
+            node: Arc::new(node),
             namespace: namespace.clone(),
             process: process.to_owned(),
             stop: stop.clone(),
@@ -142,6 +143,16 @@ impl Bus {
     /// The name of this process in the deployment.
     pub fn process(&self) -> &str {
         &self.process
+    }
+
+    /// What another thread needs to make ports of its own.
+    pub(crate) fn seed(&self) -> Seed {
+        Seed {
+            node: Arc::clone(&self.node),
+            namespace: self.namespace.clone(),
+            process: self.process.clone(),
+            stop: self.stop.clone(),
+        }
     }
 
     /// What ends every wait.
@@ -198,6 +209,28 @@ impl Bus {
 
     pub(crate) fn node(&self) -> &Node<ipc::Service> {
         &self.node
+    }
+}
+
+/// A [`Bus`] on its way to another thread.
+pub(crate) struct Seed {
+    node: Arc<Node<ipc::Service>>,
+    namespace: Namespace,
+    process: String,
+    stop: Stop,
+}
+
+impl Seed {
+    /// The bus, with a counter of its own: what the thread does is no progress of the main loop.
+    pub(crate) fn grow(self) -> Bus {
+        Bus {
+            node: self.node,
+            namespace: self.namespace,
+            process: self.process,
+            stop: self.stop,
+            progress: Progress::default(),
+            patience: PATIENCE,
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Ports, wake-up, stopping, health and logging: the only crate that talks to iceoryx2 and to the
 //! operating system.
 
+mod deployment;
 mod namespace;
 mod topic;
 
@@ -13,14 +14,25 @@ mod subscriber;
 mod waiter;
 
 mod clock;
+mod failure;
+mod health;
+mod launch;
+mod log;
+mod process;
 mod progress;
 mod stop;
 
 pub use bus::{Bus, BusError, Topic};
 pub use clock::now_nanos;
+pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, health_topic, preflight};
+pub use failure::{ExitKind, Failure, Fault, OrFail};
+pub use health::{Health, HealthError};
+pub use launch::{Launch, LaunchError};
+pub use log::init_logging;
 pub use memory::{MemoryError, free_shared_memory};
 pub use namespace::{Namespace, NamespaceError};
 pub use payload::{Element, Header, Message};
+pub use process::{Service, raise_file_limit, run_service};
 pub use progress::Progress;
 pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
 pub use service::PortError;

@@ -1,0 +1,264 @@
+//! All topics of a deployment, what they take, and whether there is room for them.
+
+use std::io;
+
+use messages::{
+    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+};
+
+use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
+
+/// Small messages that wait for one subscriber when the latest wins.
+const SMALL_BUFFER_REALTIME: usize = 4;
+/// Small messages that wait for one subscriber when nothing may be lost.
+const SMALL_BUFFER_LOSSLESS: usize = 16;
+/// Images or response maps that wait for one subscriber.
+const LARGE_BUFFER: usize = 1;
+/// Subscribers of small topics beyond those of the deployment: the command line tools.
+const SPARE: usize = 2;
+/// Queues and management of one process, bytes; measured below this.
+const OVERHEAD_BYTES: u64 = 4 << 20;
+
+/// What decides the topics of a deployment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeploymentPlan {
+    /// What happens when a receiver is slower than its sender.
+    pub delivery: Delivery,
+    /// The views.
+    pub views: Vec<ViewPlan>,
+    /// Processes that fuse.
+    pub n_workers: usize,
+    /// Processes that write results.
+    pub n_recorders: usize,
+    /// Images or response maps of one view that one process may hold at the same time.
+    pub held: usize,
+    /// The names of all processes.
+    pub processes: Vec<String>,
+}
+
+/// What decides the topics of one view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ViewPlan {
+    /// Largest image, bytes.
+    pub frame_bytes: usize,
+    /// Longest response maps, values.
+    pub evidence_values: usize,
+    /// Fusing processes that read this view.
+    pub n_workers: usize,
+}
+
+/// There is not enough shared memory for a deployment.
+#[derive(Debug, thiserror::Error)]
+pub enum PreflightError {
+    /// The pools do not fit.
+    #[error(
+        "deployment needs {} MB of shared memory, {} MB are free in /dev/shm; largest: {largest}",
+        .needed_bytes.div_ceil(1_000_000), .free_bytes / 1_000_000
+    )]
+    TooLarge {
+        /// What all pools take.
+        needed_bytes: u64,
+        /// What is free.
+        free_bytes: u64,
+        /// The topic that takes most, with its size.
+        largest: String,
+    },
+    /// The file system of shared memory cannot be asked.
+    #[error("cannot tell how much of /dev/shm is free")]
+    Unknown(#[source] io::Error),
+}
+
+impl Fault for PreflightError {
+    fn kind(&self) -> ExitKind {
+        ExitKind::Config
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::TooLarge { needed_bytes, .. } => {
+                let megabytes = needed_bytes.div_ceil(1_000_000);
+                Some(format!(
+                    "use smaller images, a smaller window of levels or fewer workers, or make room: \
+                     `mount -o remount,size={megabytes}m /dev/shm`, in Docker --shm-size={megabytes}m \
+                     (its default is 64m)"
+                ))
+            }
+            Self::Unknown(_) => None,
+        }
+    }
+}
+
+impl DeploymentPlan {
+    /// All topics.
+    pub fn topics(&self) -> Vec<TopicPlan> {
+        let mut topics = Vec::new();
+        for (index, view) in self.views.iter().enumerate() {
+            // Images: pose, quality and the recorders.
+            topics.push(TopicPlan::slices::<u8, FrameHeader>(
+                topic::frame(index),
+                self.delivery,
+                Limits::new(2 + self.n_recorders, LARGE_BUFFER, self.held),
+                view.frame_bytes,
+            ));
+            topics.push(TopicPlan::slices::<f32, EvidenceHeader>(
+                topic::evidence(index),
+                self.delivery,
+                Limits::new(view.n_workers.max(1), LARGE_BUFFER, self.held),
+                view.evidence_values,
+            ));
+            // Poses and expected errors: quality, triangulate, fusion and the recorders.
+            let small = self.small(2 + view.n_workers + self.n_recorders);
+            topics.push(TopicPlan::messages::<ViewPose>(
+                topic::view_pose(index),
+                self.delivery,
+                small,
+            ));
+            topics.push(TopicPlan::messages::<ViewQuality>(
+                topic::view_quality(index),
+                self.delivery,
+                small,
+            ));
+        }
+        for worker in 0..self.n_workers {
+            topics.push(TopicPlan::messages::<PairPose>(
+                topic::pair_pose(worker),
+                self.delivery,
+                self.small(1 + self.n_recorders),
+            ));
+        }
+        topics.push(TopicPlan::messages::<Pose3d>(
+            topic::pose3d(),
+            self.delivery,
+            self.small(self.n_recorders),
+        ));
+        topics.extend(self.processes.iter().map(|name| health_topic(name)));
+        topics
+    }
+
+    fn small(&self, subscribers: usize) -> Limits {
+        let buffer = match self.delivery {
+            Delivery::Realtime => SMALL_BUFFER_REALTIME,
+            Delivery::Lossless => SMALL_BUFFER_LOSSLESS,
+        };
+        Limits::new(subscribers + SPARE, buffer, 2)
+    }
+}
+
+/// The topic of a process's signs of life: never waits, wakes nobody.
+pub fn health_topic(process: &str) -> TopicPlan {
+    TopicPlan::messages::<Health>(
+        topic::health(process),
+        Delivery::Realtime,
+        Limits::new(1 + SPARE, 2, 1),
+    )
+    .without_wake_up()
+}
+
+/// Checks that the pools of all topics fit into what is free of `/dev/shm`.
+///
+/// # Errors
+///
+/// [`PreflightError`].
+pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
+    check_room(
+        topics,
+        free_shared_memory().map_err(PreflightError::Unknown)?,
+    )
+}
+
+fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightError> {
+    let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
+    let n_processes = topics.iter().filter(|plan| !plan.wakes()).count() as u64;
+    let needed_bytes = pools + OVERHEAD_BYTES * n_processes;
+    if needed_bytes <= free_bytes {
+        return Ok(());
+    }
+    let largest = topics.iter().max_by_key(|plan| plan.pool_bytes());
+    Err(PreflightError::TooLarge {
+        needed_bytes,
+        free_bytes,
+        largest: largest.map_or_else(String::new, |plan| {
+            format!("{} with {} MB", plan.topic(), plan.pool_bytes() / 1_000_000)
+        }),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DeploymentPlan, PreflightError, ViewPlan, check_room};
+    use crate::{Delivery, Fault as _};
+
+    fn plan() -> DeploymentPlan {
+        DeploymentPlan {
+            delivery: Delivery::Realtime,
+            views: vec![
+                ViewPlan {
+                    frame_bytes: 272 * 480 * 3,
+                    evidence_values: 10_000_000,
+                    n_workers: 2,
+                };
+                4
+            ],
+            n_workers: 2,
+            n_recorders: 1,
+            held: 2,
+            processes: (0..12).map(|index| format!("process-{index}")).collect(),
+        }
+    }
+
+    #[test]
+    fn counts_chunks_as_subscribers_times_held_and_waiting_and_the_loaned_one() {
+        let topics = plan().topics();
+        let evidence = topics
+            .iter()
+            .find(|it| it.topic() == "evidence/v1/0")
+            .unwrap();
+        // 2 workers x (1 waiting + 2 held) + 1 being written, of 40 MB and the headers.
+        let chunk = 40_000_000 + 320;
+        assert_eq!(evidence.pool_bytes(), 7 * chunk);
+    }
+
+    #[test]
+    fn every_topic_has_its_own_name() {
+        let mut names: Vec<_> = plan()
+            .topics()
+            .iter()
+            .map(|it| it.topic().to_owned())
+            .collect();
+        let n = names.len();
+        assert_eq!(n, 4 * 4 + 2 + 1 + 12);
+        names.sort();
+        names.dedup();
+        assert_eq!(names.len(), n);
+    }
+
+    #[test]
+    fn a_deployment_that_does_not_fit_is_refused_with_the_numbers() {
+        let topics = plan().topics();
+        let error = check_room(&topics, 64 << 20).unwrap_err();
+        let PreflightError::TooLarge {
+            needed_bytes,
+            free_bytes,
+            ..
+        } = &error
+        else {
+            panic!("{error}");
+        };
+        assert!(*needed_bytes > 4 * 7 * 40_000_000, "{needed_bytes}");
+        assert_eq!(*free_bytes, 64 << 20);
+        assert!(error.to_string().contains("67 MB are free"), "{error}");
+        assert!(error.to_string().contains("evidence/v1/"), "{error}");
+        assert!(error.hint().unwrap().contains("--shm-size"), "{error}");
+    }
+
+    #[test]
+    fn exactly_enough_is_enough() {
+        let topics = plan().topics();
+        let PreflightError::TooLarge { needed_bytes, .. } = check_room(&topics, 0).unwrap_err()
+        else {
+            panic!("must not fit into nothing");
+        };
+        assert!(check_room(&topics, needed_bytes).is_ok());
+        assert!(check_room(&topics, needed_bytes - 1).is_err());
+    }
+}

@@ -1,0 +1,213 @@
+//! How a process ends badly: what happened, why, what to try, and its exit status.
+
+use core::error::Error;
+use core::fmt;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// Exit statuses, the same for the command and for all its services.
+///
+/// | status | meaning |
+/// |---|---|
+/// | 0 | done |
+/// | 1 | the run failed: a process, the transport or the system gave up |
+/// | 2 | the command line is wrong |
+/// | 3 | a configuration is wrong: an unknown key, a value out of range, settings that contradict |
+/// | 4 | an input is missing, unreadable or malformed: footage, model, table |
+/// | 5 | a calibration cannot be used: not a rotation, another image size, a camera without one |
+/// | 6 | a limit that was asked for was missed |
+/// | 7 | the run ended, but degraded: a view or a process was given up |
+/// | 130 | interrupted |
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExitKind {
+    /// The run failed.
+    Run,
+    /// The command line is wrong.
+    Usage,
+    /// A configuration is wrong.
+    Config,
+    /// An input is missing, unreadable or malformed.
+    Input,
+    /// A calibration cannot be used.
+    Calibration,
+    /// A limit that was asked for was missed.
+    Limit,
+    /// The run ended, but degraded.
+    Degraded,
+    /// Interrupted.
+    Interrupted,
+}
+
+impl ExitKind {
+    /// All kinds.
+    pub const ALL: [Self; 8] = [
+        Self::Run,
+        Self::Usage,
+        Self::Config,
+        Self::Input,
+        Self::Calibration,
+        Self::Limit,
+        Self::Degraded,
+        Self::Interrupted,
+    ];
+
+    /// The exit status of the process.
+    pub fn status(self) -> u8 {
+        match self {
+            Self::Run => 1,
+            Self::Usage => 2,
+            Self::Config => 3,
+            Self::Input => 4,
+            Self::Calibration => 5,
+            Self::Limit => 6,
+            Self::Degraded => 7,
+            Self::Interrupted => 130,
+        }
+    }
+
+    /// The kind with an exit status, if there is one.
+    pub fn of_status(status: i32) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|kind| i32::from(kind.status()) == status)
+    }
+
+    /// Whether the process would fail again in the same way: the fault is in what it was given.
+    pub fn is_permanent(self) -> bool {
+        matches!(
+            self,
+            Self::Usage | Self::Config | Self::Input | Self::Calibration
+        )
+    }
+}
+
+/// Why a process ends, with its exit status and a hint.
+#[derive(Debug)]
+pub struct Failure {
+    kind: ExitKind,
+    hint: Option<String>,
+    source: Box<dyn Error + Send + Sync>,
+}
+
+impl Failure {
+    /// A failure of a kind.
+    ///
+    /// * `source`: an error, or a text.
+    pub fn new(kind: ExitKind, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self {
+            kind,
+            hint: None,
+            source: source.into(),
+        }
+    }
+
+    /// Adds what the user may try.
+    #[must_use]
+    pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Its kind.
+    pub fn kind(&self) -> ExitKind {
+        self.kind
+    }
+
+    /// What happened.
+    pub fn source(&self) -> &(dyn Error + 'static) {
+        self.source.as_ref()
+    }
+
+    /// Writes `error:`, one line `cause:` for each cause, and `hint:` if there is one.
+    ///
+    /// # Errors
+    ///
+    /// Those of `out`.
+    pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "error: {}", self.source)?;
+        let mut cause = self.source.source();
+        while let Some(error) = cause {
+            writeln!(out, "  cause: {error}")?;
+            cause = error.source();
+        }
+        if let Some(hint) = &self.hint {
+            writeln!(out, "  hint: {hint}")?;
+        }
+        out.flush()
+    }
+
+    /// Reports to standard error and turns into the exit status.
+    pub fn exit(&self) -> ExitCode {
+        if self.report(&mut io::stderr().lock()).is_err() {
+            // There is nobody left to tell.
+        }
+        ExitCode::from(self.kind.status())
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.source.fmt(f)
+    }
+}
+
+/// An error that knows its exit status, so that `?` turns it into a [`Failure`].
+pub trait Fault: Error + Send + Sync + 'static {
+    /// The kind of failure.
+    fn kind(&self) -> ExitKind {
+        ExitKind::Run
+    }
+
+    /// What the user may try.
+    fn hint(&self) -> Option<String> {
+        None
+    }
+}
+
+impl<E: Fault> From<E> for Failure {
+    fn from(error: E) -> Self {
+        let (kind, hint) = (error.kind(), error.hint());
+        Self {
+            kind,
+            hint,
+            source: Box::new(error),
+        }
+    }
+}
+
+impl Fault for crate::BusError {}
+impl Fault for crate::PortError {}
+impl Fault for crate::ReceiveError {}
+impl Fault for crate::WaitError {}
+
+impl Fault for crate::NamespaceError {
+    fn kind(&self) -> ExitKind {
+        ExitKind::Config
+    }
+}
+
+impl Fault for crate::SendError {
+    fn kind(&self) -> ExitKind {
+        if self.is_stopped() {
+            ExitKind::Interrupted
+        } else {
+            ExitKind::Run
+        }
+    }
+}
+
+/// Gives an error its exit status.
+pub trait OrFail<T> {
+    /// Turns the error into a [`Failure`] of a kind.
+    ///
+    /// # Errors
+    ///
+    /// The error, if there is one.
+    fn or_fail(self, kind: ExitKind) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrFail<T> for Result<T, E> {
+    fn or_fail(self, kind: ExitKind) -> Result<T, Failure> {
+        self.map_err(|error| Failure::new(kind, error))
+    }
+}

@@ -1,0 +1,242 @@
+//! What a supervisor tells the processes it starts, as command line arguments.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use tracing::Level;
+
+use crate::{Delivery, ExitKind, Fault, Namespace, NamespaceError};
+
+/// The arguments of a service are not those that a supervisor gives.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LaunchError {
+    /// A flag is not there.
+    #[error("service needs {flag}; services are started by `parallax run`")]
+    Missing {
+        /// The flag.
+        flag: &'static str,
+    },
+    /// A value cannot be understood.
+    #[error("{flag} {value:?} is not {expected}")]
+    Value {
+        /// The flag.
+        flag: &'static str,
+        /// What was given.
+        value: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// The namespace is wrong.
+    #[error(transparent)]
+    Namespace(#[from] NamespaceError),
+}
+
+impl Fault for LaunchError {
+    fn kind(&self) -> ExitKind {
+        ExitKind::Usage
+    }
+}
+
+/// What a process has to know about the deployment it is part of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Launch {
+    /// Where its shared memory lives.
+    pub namespace: Namespace,
+    /// Its unique name in the deployment, for example `pose-2`.
+    pub process: String,
+    /// The run; goes into the stamp of every message.
+    pub session: u64,
+    /// How often the process has been restarted; goes into the stamp of every message.
+    pub epoch: u32,
+    /// What happens when a receiver is slower than its sender.
+    pub delivery: Delivery,
+    /// The process that started it, and without which it ends.
+    pub supervisor: Option<u32>,
+    /// The least important events that are logged.
+    pub log: Level,
+}
+
+const DEPLOYMENT: &str = "--deployment";
+const BASE: &str = "--base";
+const PROCESS: &str = "--process";
+const SESSION: &str = "--session";
+const EPOCH: &str = "--epoch";
+const DELIVERY: &str = "--delivery";
+const SUPERVISOR: &str = "--supervisor";
+const LOG: &str = "--log";
+const FLAGS: [&str; 8] = [
+    DEPLOYMENT, BASE, PROCESS, SESSION, EPOCH, DELIVERY, SUPERVISOR, LOG,
+];
+
+impl Launch {
+    /// The arguments that [`from_args`](Self::from_args) understands.
+    pub fn to_args(&self) -> Vec<OsString> {
+        let delivery = match self.delivery {
+            Delivery::Realtime => "realtime",
+            Delivery::Lossless => "lossless",
+        };
+        let mut args: Vec<OsString> = vec![
+            DEPLOYMENT.into(),
+            self.namespace.name().into(),
+            BASE.into(),
+            self.namespace.base().into(),
+            PROCESS.into(),
+            self.process.clone().into(),
+            SESSION.into(),
+            self.session.to_string().into(),
+            EPOCH.into(),
+            self.epoch.to_string().into(),
+            DELIVERY.into(),
+            delivery.into(),
+            LOG.into(),
+            self.log.as_str().to_ascii_lowercase().into(),
+        ];
+        if let Some(pid) = self.supervisor {
+            args.extend([SUPERVISOR.into(), pid.to_string().into()]);
+        }
+        args
+    }
+
+    /// Takes its own arguments out of a command line and answers with the rest, in order.
+    ///
+    /// # Errors
+    ///
+    /// [`LaunchError`].
+    pub fn from_args(
+        args: impl IntoIterator<Item = OsString>,
+    ) -> Result<(Self, Vec<OsString>), LaunchError> {
+        let mut own: Vec<(&str, OsString)> = Vec::new();
+        let mut rest = Vec::new();
+        let mut args = args.into_iter();
+        while let Some(arg) = args.next() {
+            match FLAGS.into_iter().find(|flag| arg == **flag) {
+                Some(flag) => {
+                    let value = args.next().ok_or(LaunchError::Missing { flag })?;
+                    own.push((flag, value));
+                }
+                None => rest.push(arg),
+            }
+        }
+        let base = Given(&own).path(BASE)?;
+        let given = Given(&own);
+        let launch = Self {
+            namespace: Namespace::below(&given.text(DEPLOYMENT)?, &base)?,
+            process: given.text(PROCESS)?,
+            session: given.parsed(SESSION, "a number")?,
+            epoch: given.parsed(EPOCH, "a number")?,
+            delivery: given.delivery()?,
+            supervisor: match given.find(SUPERVISOR) {
+                Some(_) => Some(given.parsed(SUPERVISOR, "a process id")?),
+                None => None,
+            },
+            log: given.parsed(LOG, "error, warn, info, debug or trace")?,
+        };
+        Ok((launch, rest))
+    }
+}
+
+struct Given<'a>(&'a [(&'static str, OsString)]);
+
+impl Given<'_> {
+    fn find(&self, flag: &str) -> Option<&OsString> {
+        self.0
+            .iter()
+            .rev()
+            .find(|(name, _)| *name == flag)
+            .map(|(_, value)| value)
+    }
+
+    fn path(&self, flag: &'static str) -> Result<PathBuf, LaunchError> {
+        let value = self.find(flag).ok_or(LaunchError::Missing { flag })?;
+        Ok(PathBuf::from(value))
+    }
+
+    fn text(&self, flag: &'static str) -> Result<String, LaunchError> {
+        let value = self.find(flag).ok_or(LaunchError::Missing { flag })?;
+        Ok(value.to_string_lossy().into_owned())
+    }
+
+    fn parsed<T: core::str::FromStr>(
+        &self,
+        flag: &'static str,
+        expected: &'static str,
+    ) -> Result<T, LaunchError> {
+        let value = self.text(flag)?;
+        value.parse().map_err(|_| LaunchError::Value {
+            flag,
+            value,
+            expected,
+        })
+    }
+
+    fn delivery(&self) -> Result<Delivery, LaunchError> {
+        match self.text(DELIVERY)?.as_str() {
+            "realtime" => Ok(Delivery::Realtime),
+            "lossless" => Ok(Delivery::Lossless),
+            other => Err(LaunchError::Value {
+                flag: DELIVERY,
+                value: other.to_owned(),
+                expected: "realtime or lossless",
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::OsString;
+    use std::path::Path;
+
+    use tracing::Level;
+
+    use super::{Launch, LaunchError};
+    use crate::{Delivery, Namespace};
+
+    fn launch() -> Launch {
+        Launch {
+            namespace: Namespace::below("walk", Path::new("/tmp/x")).unwrap(),
+            process: "pose-2".to_owned(),
+            session: u64::MAX,
+            epoch: 3,
+            delivery: Delivery::Lossless,
+            supervisor: Some(4711),
+            log: Level::DEBUG,
+        }
+    }
+
+    #[test]
+    fn arguments_come_back_as_they_went() {
+        let (read, rest) = Launch::from_args(launch().to_args()).unwrap();
+        assert_eq!(read, launch());
+        assert_eq!(rest, Vec::<OsString>::new());
+    }
+
+    #[test]
+    fn other_arguments_are_left_in_order() {
+        let mut args: Vec<OsString> = vec!["--view".into(), "2".into()];
+        args.extend(launch().to_args());
+        args.push("--last".into());
+        let (_, rest) = Launch::from_args(args).unwrap();
+        assert_eq!(rest, ["--view", "2", "--last"].map(OsString::from));
+    }
+
+    #[test]
+    fn a_missing_flag_is_named() {
+        let args = launch().to_args().split_off(2);
+        let error = Launch::from_args(args).unwrap_err();
+        assert_eq!(
+            error,
+            LaunchError::Missing {
+                flag: "--deployment"
+            }
+        );
+    }
+
+    #[test]
+    fn a_bad_value_is_named() {
+        let mut args = launch().to_args();
+        args.extend(["--epoch".into(), "often".into()]);
+        let error = Launch::from_args(args).unwrap_err();
+        assert_eq!(error.to_string(), "--epoch \"often\" is not a number");
+    }
+}

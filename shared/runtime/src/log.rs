@@ -1,0 +1,76 @@
+//! Events on standard error, one line each, with the time and the name of the process.
+
+use core::fmt;
+use std::io;
+use std::sync::Arc;
+
+use iceoryx2::prelude::{LogLevel, set_log_level, set_logger};
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
+use tracing_subscriber::registry::LookupSpan;
+
+/// Sends the events of this process, and those of iceoryx2, to standard error.
+///
+/// A second call changes nothing.
+///
+/// * `process`: goes into every line.
+/// * `level`: the least important events that are shown.
+pub fn init_logging(process: &str, level: Level) {
+    let set = tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(io::stderr)
+        .log_internal_errors(false)
+        .event_format(Line {
+            process: Arc::from(process),
+        })
+        .try_init();
+    if set.is_ok() {
+        set_logger(&FromTransport);
+        set_log_level(match level {
+            Level::TRACE => LogLevel::Trace,
+            Level::DEBUG => LogLevel::Debug,
+            _ => LogLevel::Error,
+        });
+    }
+}
+
+/// `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.
+struct Line {
+    process: Arc<str>,
+}
+
+impl<S, N> FormatEvent<S, N> for Line
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        SystemTime.format_time(&mut writer)?;
+        write!(writer, " {} {}: ", event.metadata().level(), self.process)?;
+        context.format_fields(writer.by_ref(), event)?;
+        writeln!(writer)
+    }
+}
+
+/// iceoryx2's own log, whose errors are failures that this crate reports as well: kept for those who
+/// ask for details.
+struct FromTransport;
+
+impl iceoryx2_log::Log for FromTransport {
+    fn log(&self, level: LogLevel, origin: fmt::Arguments<'_>, message: fmt::Arguments<'_>) {
+        match level {
+            LogLevel::Fatal => tracing::error!(%origin, "iceoryx2: {message}"),
+            LogLevel::Error | LogLevel::Warn => tracing::debug!(%origin, "iceoryx2: {message}"),
+            LogLevel::Trace | LogLevel::Debug | LogLevel::Info => {
+                tracing::trace!(%origin, "iceoryx2: {message}");
+            }
+        }
+    }
+}
