@@ -1,2 +1,33 @@
-//! To be written.
+//! Cameras and points: project, undistort, frame, triangulate, and read calibration files.
+//!
+//! Everything is `f64`. The world is in metres; cameras look along +z, with x to the right and y
+//! down (`OpenCV`), and are stored as `camera_from_world`. The centre of the top-left pixel is (0, 0).
+//! A *pixel* is a point of the recorded, distorted image; an *ideal pixel* is where the same ray
+//! would fall through a pinhole with the same focal lengths and principal point.
+//! No clock and no threads; the only input and output is in [`files::read`] and its kin.
 #![forbid(unsafe_code)]
+
+mod lens;
+
+mod camera;
+
+mod rig;
+
+pub mod epipolar;
+
+mod framing;
+
+mod triangulate;
+
+pub mod files;
+
+#[cfg(test)]
+mod testing;
+
+pub use camera::{Camera, Intrinsics, Ray};
+pub use framing::{Framing, FramingError, OutSize, upright_roll};
+pub use lens::{Lens, LensModel};
+pub use rig::{NotARotation, Rig, RigError, rotation_from_matrix};
+pub use triangulate::{
+    MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
+};

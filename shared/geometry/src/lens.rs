@@ -1,0 +1,203 @@
+//! What a lens does to a ray: the distortion models, their derivatives and their inverses.
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+mod inverse;
+mod limit;
+
+/// The shape of a lens's distortion, as `OpenCV` writes it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum LensModel {
+    /// No distortion.
+    #[default]
+    Pinhole,
+    /// Rational radial and tangential distortion of the normalised point (x, y), with r² = x² + y²:
+    /// `x (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²)`,
+    /// and alike for y with p1 and p2 exchanged. `OpenCV` lists the same as k1 k2 p1 p2 k3 k4 k5 k6.
+    BrownConrady {
+        /// Radial coefficients k1 to k6; the last three divide.
+        k: [f64; 6],
+        /// Tangential coefficients p1 and p2.
+        p: [f64; 2],
+    },
+    /// Fisheye: the angle θ to the axis becomes the radius
+    /// `θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` (Kannala & Brandt 2006; `cv::fisheye`).
+    KannalaBrandt {
+        /// Coefficients k1 to k4.
+        k: [f64; 4],
+    },
+}
+
+/// A lens: its model and the part of the image in which that model can be inverted.
+///
+/// Distortion polynomials turn back on themselves somewhere outside the image they were fitted to.
+/// A lens refuses every ray beyond the first such turning point, and beyond 87 degrees off the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    model: LensModel,
+    max_radius: f64,
+}
+
+impl Default for Lens {
+    fn default() -> Self {
+        Self::new(LensModel::Pinhole)
+    }
+}
+
+impl From<LensModel> for Lens {
+    fn from(model: LensModel) -> Self {
+        Self::new(model)
+    }
+}
+
+impl Lens {
+    /// Finds the valid range of `model`. Takes microseconds: do it once for each camera.
+    pub fn new(model: LensModel) -> Self {
+        Self {
+            model,
+            max_radius: limit::max_radius(&model),
+        }
+    }
+
+    /// The model and its coefficients.
+    pub fn model(&self) -> &LensModel {
+        &self.model
+    }
+
+    /// The largest distance from the axis, in undistorted normalised coordinates, that the lens accepts.
+    pub fn max_radius(&self) -> f64 {
+        self.max_radius
+    }
+
+    /// Where the ray through the normalised point (x / z, y / z) falls, in normalised coordinates.
+    ///
+    /// `None` outside the valid range of the model.
+    pub fn distort(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
+        self.distort_with_jacobian(point)
+            .map(|(distorted, _)| distorted)
+    }
+
+    /// [`distort`](Self::distort) with its derivative, row = output, column = input.
+    pub fn distort_with_jacobian(
+        &self,
+        point: &Point2<f64>,
+    ) -> Option<(Point2<f64>, Matrix2<f64>)> {
+        // Negated so that NaN is refused too.
+        if !(point.coords.norm() <= self.max_radius) {
+            return None;
+        }
+        let (distorted, jacobian) = self.model.distort(point.coords);
+        (jacobian.determinant() > 0.0).then_some((distorted.into(), jacobian))
+    }
+
+    /// The normalised point whose ray falls on `distorted` (normalised): the inverse of
+    /// [`distort`](Self::distort).
+    ///
+    /// `None` where no ray of the valid range falls, or the iteration does not reach it.
+    pub fn undistort(&self, distorted: &Point2<f64>) -> Option<Point2<f64>> {
+        inverse::undistort(self, distorted)
+    }
+}
+
+impl LensModel {
+    /// True if the model moves no point.
+    pub fn is_pinhole(&self) -> bool {
+        match self {
+            Self::Pinhole => true,
+            Self::BrownConrady { k, p } => k.iter().chain(p).all(|&c| c == 0.0),
+            Self::KannalaBrandt { .. } => false,
+        }
+    }
+
+    /// The coefficients of the model, none for a pinhole; radial before tangential.
+    pub fn coefficients(&self) -> impl Iterator<Item = f64> + '_ {
+        let (k, p): (&[f64], &[f64]) = match self {
+            Self::Pinhole => (&[], &[]),
+            Self::BrownConrady { k, p } => (k, p),
+            Self::KannalaBrandt { k } => (k, &[]),
+        };
+        k.iter().chain(p).copied()
+    }
+
+    /// The model seen by a camera that is turned about its axis: coordinates turn by `angle`.
+    ///
+    /// Radial terms do not change; (p2, p1) is a vector in the image and turns with it.
+    #[must_use]
+    pub fn rotated(self, angle: f64) -> Self {
+        match self {
+            Self::BrownConrady { k, p } => {
+                let (sin, cos) = angle.sin_cos();
+                let turned = [cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]];
+                Self::BrownConrady { k, p: turned }
+            }
+            other => other,
+        }
+    }
+
+    /// The radius at which a ray of undistorted radius `r` falls, tangential terms left out, and its derivative.
+    fn radius(&self, r: f64) -> (f64, f64) {
+        match self {
+            Self::Pinhole => (r, 1.0),
+            Self::BrownConrady { k, .. } => {
+                let (factor, slope) = rational(k, r * r);
+                (r * factor, factor + 2.0 * r * r * slope)
+            }
+            Self::KannalaBrandt { k } => {
+                let angle = r.atan();
+                let (distorted, slope) = fisheye(k, angle);
+                (distorted, slope / (1.0 + r * r))
+            }
+        }
+    }
+
+    /// The distorted point and its derivative, without regard to the valid range.
+    fn distort(&self, v: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+        match self {
+            Self::Pinhole => (v, Matrix2::identity()),
+            Self::BrownConrady { k, p } => {
+                let (x, y) = (v.x, v.y);
+                let (factor, slope) = rational(k, v.norm_squared());
+                let q = Vector2::new(p[1], p[0]);
+                let along = q.dot(&v);
+                let distorted = v * (factor + 2.0 * along) + q * v.norm_squared();
+                let cross = 2.0 * (q.x * y + q.y * x);
+                let jacobian = Matrix2::new(
+                    factor + 2.0 * slope * x * x + 6.0 * q.x * x + 2.0 * q.y * y,
+                    2.0 * slope * x * y + cross,
+                    2.0 * slope * x * y + cross,
+                    factor + 2.0 * slope * y * y + 6.0 * q.y * y + 2.0 * q.x * x,
+                );
+                (distorted, jacobian)
+            }
+            Self::KannalaBrandt { .. } => {
+                let r = v.norm();
+                if r < 1e-12 {
+                    return (v, Matrix2::identity());
+                }
+                let (distorted, slope) = self.radius(r);
+                let unit = v / r;
+                let outer = unit * unit.transpose();
+                let jacobian = outer * slope + (Matrix2::identity() - outer) * (distorted / r);
+                (unit * distorted, jacobian)
+            }
+        }
+    }
+}
+
+/// The rational radial factor at `s` = r², and its derivative by s.
+fn rational(k: &[f64; 6], s: f64) -> (f64, f64) {
+    let over = 1.0 + s * (k[0] + s * (k[1] + s * k[2]));
+    let under = 1.0 + s * (k[3] + s * (k[4] + s * k[5]));
+    let d_over = k[0] + s * (2.0 * k[1] + s * 3.0 * k[2]);
+    let d_under = k[3] + s * (2.0 * k[4] + s * 3.0 * k[5]);
+    let factor = over / under;
+    (factor, (d_over - factor * d_under) / under)
+}
+
+/// The fisheye radius at an angle, and its derivative by the angle.
+fn fisheye(k: &[f64; 4], angle: f64) -> (f64, f64) {
+    let s = angle * angle;
+    let factor = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));
+    let slope = 1.0 + s * (3.0 * k[0] + s * (5.0 * k[1] + s * (7.0 * k[2] + s * 9.0 * k[3])));
+    (angle * factor, slope)
+}

@@ -1,0 +1,41 @@
+//! How far from the axis a distortion model keeps its order.
+
+use super::LensModel;
+
+/// Rays further off the axis than this (tangent of 87 degrees) are refused by every lens.
+const WIDEST: f64 = 19.0;
+
+/// Steps of the scan for the first turning point; the last step is bisected.
+const STEPS: u32 = 1900;
+
+/// The largest undistorted radius up to which the distorted radius grows all the way.
+pub(super) fn max_radius(model: &LensModel) -> f64 {
+    let mut inside = 0.0;
+    for i in 1..=STEPS {
+        let outside = WIDEST * f64::from(i) / f64::from(STEPS);
+        if !grows(model, inside, outside) {
+            return turning_point(model, inside, outside);
+        }
+        inside = outside;
+    }
+    WIDEST
+}
+
+/// Whether the distorted radius is finite, positive and growing at `r`, and above what it is at `before`.
+fn grows(model: &LensModel, before: f64, r: f64) -> bool {
+    let (distorted, slope) = model.radius(r);
+    slope > 0.0 && distorted.is_finite() && distorted > model.radius(before).0
+}
+
+fn turning_point(model: &LensModel, mut inside: f64, mut outside: f64) -> f64 {
+    let start = inside;
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if grows(model, start, middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}

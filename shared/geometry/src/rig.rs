@@ -1,0 +1,283 @@
+//! A set of calibrated cameras in one world.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
+
+use crate::{Camera, Intrinsics};
+
+/// Why a set of cameras is no rig.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RigError {
+    /// No camera at all.
+    #[error("a rig needs at least one camera")]
+    NoCameras,
+    /// A camera without a name.
+    #[error("camera {index} has an empty name")]
+    EmptyName {
+        /// Position in the list, from 0.
+        index: usize,
+    },
+    /// Two cameras of one name.
+    #[error("two cameras are named {name:?}")]
+    DuplicateName {
+        /// The name.
+        name: String,
+    },
+    /// A number is infinite or not a number.
+    #[error("camera {camera:?}: {quantity} is {value}, not a finite number")]
+    NotFinite {
+        /// Name of the camera.
+        camera: String,
+        /// What the number is.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// An image without pixels.
+    #[error("camera {camera:?}: image size is {width}x{height}, both must be at least 1", width = .size[0], height = .size[1])]
+    EmptyImage {
+        /// Name of the camera.
+        camera: String,
+        /// Width and height.
+        size: [u32; 2],
+    },
+    /// A focal length that is zero or negative.
+    #[error("camera {camera:?}: focal length {value} px is not positive")]
+    Focal {
+        /// Name of the camera.
+        camera: String,
+        /// The focal length in pixels.
+        value: f64,
+    },
+    /// A principal point further from the image than the image is wide.
+    #[error(
+        "camera {camera:?}: principal point {quantity} = {value} px is far outside an image of {extent} px"
+    )]
+    PrincipalPoint {
+        /// Name of the camera.
+        camera: String,
+        /// Either `cx` or `cy`.
+        quantity: &'static str,
+        /// The coordinate in pixels.
+        value: f64,
+        /// Width or height of the image.
+        extent: u32,
+    },
+    /// The rotation is none.
+    #[error("camera {camera:?}: rotation")]
+    Rotation {
+        /// Name of the camera.
+        camera: String,
+        /// How far it is from a rotation.
+        source: NotARotation,
+    },
+}
+
+/// A matrix that does not rotate.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "not a rotation: largest entry of R Rᵀ - I is {deviation:e} (limit {limit:e}), determinant {determinant}"
+)]
+pub struct NotARotation {
+    /// Largest absolute entry of R Rᵀ - I.
+    pub deviation: f64,
+    /// The largest deviation accepted.
+    pub limit: f64,
+    /// Determinant; -1 for a mirrored frame.
+    pub determinant: f64,
+}
+
+/// The rotation nearest to a matrix that was written with few digits.
+///
+/// # Errors
+///
+/// [`NotARotation`] if an entry of R Rᵀ - I exceeds 1e-3, or the matrix mirrors.
+pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, NotARotation> {
+    const LIMIT: f64 = 1e-3;
+    let deviation = (matrix * matrix.transpose() - Matrix3::identity())
+        .abs()
+        .max();
+    let determinant = matrix.determinant();
+    // `Matrix::max` passes over NaN, so the entries are asked too.
+    let finite = matrix.iter().all(|entry| entry.is_finite());
+    if !finite || deviation > LIMIT || determinant <= 0.0 {
+        return Err(NotARotation {
+            deviation,
+            limit: LIMIT,
+            determinant,
+        });
+    }
+    let mut nearest = *matrix;
+    // Newton's iteration for the polar decomposition: squares the deviation at every step.
+    for _ in 0..4 {
+        let Some(inverse) = nearest.try_inverse() else {
+            break;
+        };
+        nearest = (nearest + inverse.transpose()) * 0.5;
+    }
+    Ok(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(nearest),
+    ))
+}
+
+/// Calibrated cameras of one world, checked when they are put together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rig {
+    cameras: Vec<Camera>,
+    up_in_world: Option<UnitVector3<f64>>,
+    source: String,
+}
+
+impl Rig {
+    /// Puts cameras together.
+    ///
+    /// * `up_in_world`: the direction against gravity, where it is known.
+    /// * `source`: where the numbers come from, for people.
+    ///
+    /// # Errors
+    ///
+    /// One [`RigError`] for each thing that a camera of a rig cannot have.
+    pub fn new(
+        cameras: Vec<Camera>,
+        up_in_world: Option<UnitVector3<f64>>,
+        source: impl Into<String>,
+    ) -> Result<Self, RigError> {
+        if cameras.is_empty() {
+            return Err(RigError::NoCameras);
+        }
+        for (index, camera) in cameras.iter().enumerate() {
+            if camera.name.is_empty() {
+                return Err(RigError::EmptyName { index });
+            }
+            if cameras[..index]
+                .iter()
+                .any(|other| other.name == camera.name)
+            {
+                return Err(RigError::DuplicateName {
+                    name: camera.name.clone(),
+                });
+            }
+            check_camera(camera)?;
+        }
+        Ok(Self {
+            cameras,
+            up_in_world,
+            source: source.into(),
+        })
+    }
+
+    /// The cameras, in the order of the file.
+    pub fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// The camera of a name.
+    pub fn camera(&self, name: &str) -> Option<&Camera> {
+        self.cameras.iter().find(|camera| camera.name == name)
+    }
+
+    /// The direction against gravity, where it is known.
+    pub fn up_in_world(&self) -> Option<UnitVector3<f64>> {
+        self.up_in_world
+    }
+
+    /// Where the numbers come from.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The point nearest to all optical axes (least squares), in metres.
+    ///
+    /// `None` if the axes are parallel, as they are for a single camera.
+    pub fn focus(&self) -> Option<Point3<f64>> {
+        let origin = self.cameras.first()?.centre_in_world();
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for camera in &self.cameras {
+            let axis = camera.axis_in_world().into_inner();
+            let across = Matrix3::identity() - axis * axis.transpose();
+            normal += across;
+            right += across * (camera.centre_in_world() - origin);
+        }
+        let eigen = normal.symmetric_eigenvalues();
+        // About half a degree between two axes; less is no meeting point.
+        if eigen.min() < 1e-4 {
+            return None;
+        }
+        normal
+            .cholesky()
+            .map(|factor| origin + factor.solve(&right))
+    }
+}
+
+fn check_camera(camera: &Camera) -> Result<(), RigError> {
+    let Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        size,
+        lens,
+    } = camera.intrinsics;
+    let name = || camera.name.clone();
+    let Isometry3 {
+        rotation,
+        translation,
+    } = camera.camera_from_world;
+    let numbers = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)]
+        .into_iter()
+        .chain(
+            lens.model()
+                .coefficients()
+                .map(|c| ("a lens coefficient", c)),
+        )
+        .chain(
+            rotation
+                .coords
+                .iter()
+                .map(|&c| ("a number of the rotation", c)),
+        )
+        .chain(
+            translation
+                .vector
+                .iter()
+                .map(|&c| ("a number of the translation", c)),
+        );
+    for (quantity, value) in numbers {
+        if !value.is_finite() {
+            return Err(RigError::NotFinite {
+                camera: name(),
+                quantity,
+                value,
+            });
+        }
+    }
+    if size.contains(&0) {
+        return Err(RigError::EmptyImage {
+            camera: name(),
+            size,
+        });
+    }
+    if let Some(value) = [fx, fy].into_iter().find(|&f| f <= 0.0) {
+        return Err(RigError::Focal {
+            camera: name(),
+            value,
+        });
+    }
+    for (quantity, value, extent) in [("cx", cx, size[0]), ("cy", cy, size[1])] {
+        let extent_px = f64::from(extent);
+        if value < -extent_px || value > 2.0 * extent_px {
+            return Err(RigError::PrincipalPoint {
+                camera: name(),
+                quantity,
+                value,
+                extent,
+            });
+        }
+    }
+    rotation_from_matrix(rotation.to_rotation_matrix().matrix()).map_err(|source| {
+        RigError::Rotation {
+            camera: name(),
+            source,
+        }
+    })?;
+    Ok(())
+}

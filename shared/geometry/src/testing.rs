@@ -1,0 +1,1 @@
+//! Generators of cameras for the tests of this crate.
