@@ -10,9 +10,13 @@ mod hog;
 mod image;
 mod isa;
 mod planes;
+mod spring;
+mod vote;
 
 pub use correlate::{FeatureMap, FilterBank, Template, correlate_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
 pub use planes::{Planes, reduce, reduced, resize};
+pub use spring::Spring;
+pub use vote::{Found, Grid, ROW_ALIGN, VoteRule, VoteWorkspace, spread};

@@ -1,0 +1,113 @@
+//! Where a vote came from: the arguments of the maxima, looked up for one cell when they are asked for.
+
+use super::{Grid, VoteRule};
+use crate::spring::Spring;
+
+/// The child that a vote came from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Value of the vote.
+    pub score: f32,
+    /// The child's type.
+    pub child_type: usize,
+    /// The child's row.
+    pub y: usize,
+    /// The child's column.
+    pub x: usize,
+}
+
+impl VoteRule {
+    /// The child that the vote at one cell of the parent came from.
+    ///
+    /// Evaluates the same expressions as [`cast`](Self::cast), so `score` is what that added, bit for
+    /// bit. Ties go to the first choice, then to the first column, then to the first row, as in the
+    /// reference programs. `None` if every child is impossible.
+    ///
+    /// * `child`, `spreads`: as for [`cast`](Self::cast).
+    /// * `at`: `[row, column]` of the parent.
+    ///
+    /// # Panics
+    ///
+    /// If the lengths disagree or `parent_type` or `at` is out of range.
+    pub fn trace(
+        &self,
+        grid: Grid,
+        (child, spreads): (&[f32], &[f32]),
+        parent_type: usize,
+        at: [usize; 2],
+    ) -> Option<Found> {
+        self.check(grid, child, spreads);
+        assert!(at[0] < grid.rows && at[1] < grid.cols, "a cell of the grid");
+        let mut best: Option<Found> = None;
+        for &(spring, bias) in &self.choices[parent_type] {
+            let (child_type, spring) = &self.springs[spring];
+            let plane = &child[child_type * grid.plane()..][..grid.plane()];
+            let Some((score, [y, x])) = best_child(grid, plane, spring, spreads[*child_type], at)
+            else {
+                continue;
+            };
+            let score = score + bias;
+            if best.map_or(score > f32::NEG_INFINITY, |it| score > it.score) {
+                best = Some(Found {
+                    score,
+                    child_type: *child_type,
+                    y,
+                    x,
+                });
+            }
+        }
+        best
+    }
+
+    /// The value of a vote in which the child is given, or minus infinity if the types never meet.
+    ///
+    /// The same expression as in [`cast`](Self::cast): `((score + vertical) + horizontal) + bias`.
+    ///
+    /// * `child_score`: of the child at `child`, `[row, column]`.
+    /// * `types`: the parent's and the child's.
+    pub fn vote(
+        &self,
+        child_score: f32,
+        types: [usize; 2],
+        parent: [usize; 2],
+        child: [usize; 2],
+    ) -> f32 {
+        let [down, along] = [0, 1].map(|axis| child[axis] as isize - parent[axis] as isize);
+        let choice = |&(spring, bias): &(usize, f32)| {
+            let (child_type, spring) = &self.springs[spring];
+            let stretched = child_score + spring.y().score(down) + spring.x().score(along) + bias;
+            (*child_type == types[1]).then_some(stretched)
+        };
+        let votes = self.choices[types[0]].iter().filter_map(choice);
+        votes.fold(f32::NEG_INFINITY, f32::max)
+    }
+}
+
+/// The best child of one plane for a parent at `at`, and its `[row, column]`.
+fn best_child(
+    grid: Grid,
+    plane: &[f32],
+    spring: &Spring,
+    spread: f32,
+    at: [usize; 2],
+) -> Option<(f32, [usize; 2])> {
+    let rows = spring.y().window(at[0], grid.rows, spread);
+    let cols = spring.x().window(at[1], grid.cols, spread);
+    let mut best = None;
+    let mut most = f32::NEG_INFINITY;
+    for x in cols {
+        let (mut column, mut row) = (f32::NEG_INFINITY, 0);
+        for y in rows.clone() {
+            let score = plane[grid.at(y, x)] + spring.y().score(y as isize - at[0] as isize);
+            if score > column {
+                (column, row) = (score, y);
+            }
+        }
+        let score = column + spring.x().score(x as isize - at[1] as isize);
+        if score > most {
+            most = score;
+            best = Some((score, [row, x]));
+        }
+    }
+    best
+}
