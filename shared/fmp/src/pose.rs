@@ -29,7 +29,11 @@ impl Pose {
     pub fn centre(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
-        layout.centre(usize::from(self.level), [filter.rows, filter.cols], placement)
+        layout.centre(
+            usize::from(self.level),
+            [filter.rows, filter.cols],
+            placement,
+        )
     }
 
     /// Centres of all parts; see [`Self::centre`].
@@ -43,6 +47,10 @@ impl Pose {
     pub fn part_box(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 4] {
         let placement = self.parts[part];
         let filter = model.filter(part, usize::from(placement.mixture));
-        layout.part_box(usize::from(self.level), [filter.rows, filter.cols], placement)
+        layout.part_box(
+            usize::from(self.level),
+            [filter.rows, filter.cols],
+            placement,
+        )
     }
 }

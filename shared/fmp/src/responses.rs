@@ -24,7 +24,9 @@ impl<'a> Responses<'a> {
     pub fn new(layout: &'a Layout, values: &'a [f32], levels: &'a [u16]) -> Self {
         assert!(values.len() >= layout.n_responses(), "one value per cell");
         assert!(
-            levels.iter().all(|&it| usize::from(it) < layout.levels.len()),
+            levels
+                .iter()
+                .all(|&it| usize::from(it) < layout.levels.len()),
             "levels of the layout"
         );
         Self {

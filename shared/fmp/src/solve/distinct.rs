@@ -1,0 +1,96 @@
+//! The best few poses that are different people, or different ideas of one.
+
+use super::{Root, Solver};
+use crate::{Pose, Responses};
+
+/// Roots that are backtracked at once when a level is asked for the first time; then twice as many.
+const BATCH: usize = 16;
+
+impl Solver {
+    /// The best `n` poses that are distinct; the first one is [`Self::best`].
+    ///
+    /// Greedy, best first, over the local maxima of the root's scores on every level: a pose is kept
+    /// if it is far enough from all that were kept before it.
+    ///
+    /// * `min_separation`: least mean distance between the part centres of two poses, in units of
+    ///   the mean side of the boxes of both.
+    ///
+    /// # Panics
+    ///
+    /// If the evidence is another model's.
+    pub fn distinct(&self, evidence: &Responses<'_>, n: usize, min_separation: f64) -> Vec<Pose> {
+        let peaks = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
+            let roots: Vec<_> = sweep.roots().collect();
+            peaks(&roots)
+        });
+        let mut peaks = peaks.concat();
+        peaks.sort_by(Root::best_first);
+        let mut poses: Vec<Option<Pose>> = vec![None; peaks.len()];
+        let mut batches = vec![BATCH; evidence.layout().levels.len()];
+        let mut kept: Vec<Pose> = Vec::new();
+        for at in 0..peaks.len() {
+            if kept.len() >= n {
+                break;
+            }
+            if poses[at].is_none() {
+                let level = peaks[at].level;
+                let batch = &mut batches[usize::from(level)];
+                let next: Vec<_> = (at..peaks.len())
+                    .filter(|&it| peaks[it].level == level)
+                    .take(*batch)
+                    .collect();
+                *batch *= 2;
+                let found = self.sweep_levels(evidence, &[level], None, |sweep| {
+                    let trees = next.iter().map(|&it| (it, sweep.backtrack(peaks[it])));
+                    trees.collect::<Vec<_>>()
+                });
+                for (it, pose) in found.into_iter().flatten() {
+                    poses[it] = pose;
+                }
+            }
+            let Some(pose) = poses[at].take() else {
+                continue;
+            };
+            if kept
+                .iter()
+                .all(|it| self.separation(evidence, it, &pose) >= min_separation)
+            {
+                kept.push(pose);
+            }
+        }
+        kept
+    }
+
+    /// Mean distance between the part centres of two poses, in units of the mean side of their boxes.
+    fn separation(&self, evidence: &Responses<'_>, a: &Pose, b: &Pose) -> f64 {
+        let (model, layout) = (&*self.model, evidence.layout());
+        let (mut distances, mut sides) = (0.0, 0.0);
+        for part in 0..model.n_parts() {
+            let [p, q] = [a, b].map(|it| it.centre(model, layout, part));
+            distances += (p[0] - q[0]).hypot(p[1] - q[1]);
+            for pose in [a, b] {
+                let [x1, y1, x2, y2] = pose.part_box(model, layout, part);
+                sides += f64::midpoint(x2 - x1 + 1.0, y2 - y1 + 1.0);
+            }
+        }
+        distances / (sides / 2.0)
+    }
+}
+
+/// Roots with no better neighbour among the eight around them, and no equal one before them.
+fn peaks(roots: &[Root]) -> Vec<Root> {
+    let Some(last) = roots.last() else {
+        return Vec::new();
+    };
+    let (rows, cols) = (last.y + 1, last.x + 1);
+    let is_peak = |it: &&Root| {
+        let mut around = (it.y.saturating_sub(1)..rows.min(it.y + 2))
+            .flat_map(|y| (it.x.saturating_sub(1)..cols.min(it.x + 2)).map(move |x| (y, x)));
+        it.score > f32::NEG_INFINITY
+            && around.all(|(y, x)| {
+                let other = roots[y * cols + x].score;
+                other < it.score || (other == it.score && (y, x) >= (it.y, it.x))
+            })
+    };
+    roots.iter().filter(is_peak).copied().collect()
+}

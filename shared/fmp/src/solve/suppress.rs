@@ -1,0 +1,107 @@
+//! Several people in one image: thresholding and non-maximum suppression.
+
+use super::{CandidateSettings, Root, Solver};
+use crate::{Layout, Model, Pose, Responses};
+
+/// Most candidates that suppression looks at, as in the reference programs.
+const MOST: usize = 1000;
+
+impl Solver {
+    /// Every pose whose root scores at least the threshold, less those that overlap a better one.
+    ///
+    /// The reference programs' rule: of the 1000 best, a candidate is dropped when it overlaps a
+    /// picked one by more than `overlap`, where the overlap of two candidates is the largest share
+    /// of the picked one's box that the other's covers, over all parts and over the rectangles
+    /// around all parts. Best first; ties as in [`Self::best`].
+    ///
+    /// # Panics
+    ///
+    /// If the evidence is another model's.
+    pub fn candidates(&self, evidence: &Responses<'_>, settings: &CandidateSettings) -> Vec<Pose> {
+        let roots = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
+            let roots = sweep.roots();
+            roots
+                .filter(|it| it.score >= settings.threshold && it.score > f32::NEG_INFINITY)
+                .collect::<Vec<_>>()
+        });
+        let mut roots = roots.concat();
+        roots.sort_by(Root::best_first);
+        roots.truncate(MOST);
+        let mut levels: Vec<_> = roots.iter().map(|it| it.level).collect();
+        levels.sort_unstable();
+        levels.dedup();
+        let poses = self.sweep_levels(evidence, &levels, None, |sweep| {
+            let of_level = roots.iter().enumerate();
+            of_level
+                .filter(|(_, it)| it.level == sweep.level())
+                .filter_map(|(rank, it)| Some((rank, sweep.backtrack(*it)?)))
+                .collect::<Vec<_>>()
+        });
+        let mut poses = poses.concat();
+        poses.sort_unstable_by_key(|(rank, _)| *rank);
+        let poses = poses.into_iter().map(|(_, pose)| pose);
+        suppress(&self.model, evidence.layout(), poses, settings)
+    }
+}
+
+impl Root {
+    /// Highest score first, then lowest level, then row-major order.
+    pub(super) fn best_first(&self, other: &Self) -> std::cmp::Ordering {
+        let place = |it: &Self| (it.level, it.y, it.x);
+        other
+            .score
+            .total_cmp(&self.score)
+            .then_with(|| place(self).cmp(&place(other)))
+    }
+}
+
+/// Boxes `[x1, y1, x2, y2]` of all parts, then the rectangle around them.
+type Boxes = Vec<[f64; 4]>;
+
+fn suppress(
+    model: &Model,
+    layout: &Layout,
+    best_first: impl Iterator<Item = Pose>,
+    settings: &CandidateSettings,
+) -> Vec<Pose> {
+    let mut picked: Vec<(Pose, Boxes)> = Vec::new();
+    for pose in best_first {
+        if picked.len() >= settings.max {
+            break;
+        }
+        let boxes = boxes(model, layout, &pose);
+        if picked
+            .iter()
+            .all(|(_, it)| overlap(it, &boxes) <= settings.overlap)
+        {
+            picked.push((pose, boxes));
+        }
+    }
+    picked.into_iter().map(|(pose, _)| pose).collect()
+}
+
+fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
+    let mut all: Boxes = (0..model.n_parts())
+        .map(|part| pose.part_box(model, layout, part))
+        .collect();
+    let around = all.iter().copied().reduce(|a, b| {
+        [
+            a[0].min(b[0]),
+            a[1].min(b[1]),
+            a[2].max(b[2]),
+            a[3].max(b[3]),
+        ]
+    });
+    all.extend(around);
+    all
+}
+
+/// Largest share of a picked box that the other covers.
+fn overlap(picked: &Boxes, other: &Boxes) -> f64 {
+    let share = |(a, b): (&[f64; 4], &[f64; 4])| {
+        let side = |low: f64, high: f64| (high - low + 1.0).max(0.0);
+        let common = side(a[0].max(b[0]), a[2].min(b[2])) * side(a[1].max(b[1]), a[3].min(b[3]));
+        common / (side(a[0], a[2]) * side(a[1], a[3]))
+    };
+    picked.iter().zip(other).map(share).fold(0.0, f64::max)
+}

@@ -1,0 +1,256 @@
+//! All votes on one level, from the leaves to the root, and the way back.
+
+use kernels::{Grid, VoteWorkspace, spread};
+
+use super::{Extra, Root, Solver};
+use crate::{Model, Placement, Pose, Responses};
+
+/// Score planes of one level, used again from level to level.
+#[derive(Debug, Default)]
+pub(super) struct Workspace {
+    /// One plane per part and type, part by part; their children's votes are added.
+    planes: Vec<f32>,
+    /// See [`kernels::spread`]; one per plane.
+    spreads: Vec<f32>,
+    /// Whether the part's own score has been written.
+    begun: Vec<bool>,
+    /// A part's position term, `rows x cols`.
+    term: Vec<f32>,
+    votes: VoteWorkspace,
+}
+
+/// A level on which all votes have been cast.
+#[derive(Debug)]
+pub(super) struct Sweep<'a> {
+    solver: &'a Solver,
+    level: u16,
+    grid: Grid,
+    workspace: &'a Workspace,
+}
+
+impl<'a> Sweep<'a> {
+    pub(super) fn run(
+        solver: &'a Solver,
+        evidence: &Responses<'_>,
+        level: u16,
+        extra: Option<&dyn Extra>,
+        workspace: &'a mut Workspace,
+    ) -> Self {
+        let model = &*solver.model;
+        let it = &evidence.layout().levels[usize::from(level)];
+        let grid = Grid {
+            rows: it.rows,
+            cols: it.cols,
+        };
+        let n_planes = first_plane(model, model.n_parts());
+        workspace.planes.resize(n_planes * grid.plane(), 0.0);
+        workspace.spreads.resize(n_planes, 0.0);
+        workspace.begun.clear();
+        workspace.begun.resize(model.n_parts(), false);
+        for part in (0..model.n_parts()).rev() {
+            workspace.begin(model, part, evidence, (level, grid), extra);
+            let edge = model.spec().parts[part].edge.as_ref();
+            if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
+                workspace.begin(model, edge.parent, evidence, (level, grid), extra);
+                let planes = first_plane(model, part)..first_plane(model, part + 1);
+                let (before, child) = workspace.planes.split_at_mut(planes.start * grid.plane());
+                let child = &child[..planes.len() * grid.plane()];
+                let spreads = &mut workspace.spreads[planes];
+                for (to, plane) in spreads
+                    .iter_mut()
+                    .zip(child.chunks_exact(grid.plane().max(1)))
+                {
+                    *to = spread(grid, plane);
+                }
+                let first = first_plane(model, edge.parent) * grid.plane();
+                let parent = &mut before[first..][..model.n_types(edge.parent) * grid.plane()];
+                rule.cast(
+                    solver.isa,
+                    grid,
+                    (child, spreads),
+                    parent,
+                    &mut workspace.votes,
+                );
+            }
+        }
+        Self {
+            solver,
+            level,
+            grid,
+            workspace,
+        }
+    }
+
+    pub(super) fn level(&self) -> u16 {
+        self.level
+    }
+
+    /// The best root of the level: first cell in row-major order, then first type.
+    pub(super) fn best_root(&self) -> Option<Root> {
+        let better = |a: Root, b: Root| if b.score > a.score { b } else { a };
+        self.roots()
+            .reduce(better)
+            .filter(|it| it.score > f32::NEG_INFINITY)
+    }
+
+    /// The best type of the root at every cell, in row-major order.
+    pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
+        let bias = self.solver.model.spec().root_bias as f32;
+        let planes = self.planes(0);
+        let cells = (0..self.grid.rows).flat_map(|y| (0..self.grid.cols).map(move |x| (y, x)));
+        cells.map(move |(y, x)| {
+            let of_type = planes.chunks_exact(self.grid.plane());
+            let scores = of_type.map(|plane| plane[self.grid.at(y, x)] + bias);
+            let first = (0, f32::NEG_INFINITY);
+            let (mixture, score) = scores
+                .enumerate()
+                .fold(first, |best, it| if it.1 > best.1 { it } else { best });
+            Root {
+                score,
+                level: self.level,
+                y,
+                x,
+                mixture,
+            }
+        })
+    }
+
+    /// The tree that hangs on `root`.
+    pub(super) fn backtrack(&self, root: Root) -> Option<Pose> {
+        let model = &*self.solver.model;
+        let mut parts = Vec::with_capacity(model.n_parts());
+        parts.push(placement(root.y, root.x, root.mixture));
+        for part in 1..model.n_parts() {
+            let edge = model.spec().parts[part].edge.as_ref()?;
+            let parent: Placement = parts[edge.parent];
+            let planes = first_plane(model, part)..first_plane(model, part + 1);
+            let found = self.solver.rules[part].as_ref()?.trace(
+                self.grid,
+                (self.planes(part), &self.workspace.spreads[planes]),
+                usize::from(parent.mixture),
+                [usize::from(parent.y), usize::from(parent.x)],
+            )?;
+            parts.push(placement(found.y, found.x, found.child_type));
+        }
+        Some(Pose {
+            score: root.score,
+            level: self.level,
+            parts,
+        })
+    }
+
+    fn planes(&self, part: usize) -> &[f32] {
+        let model = &*self.solver.model;
+        let size = self.grid.plane();
+        &self.workspace.planes[first_plane(model, part) * size..][..model.n_types(part) * size]
+    }
+}
+
+impl Workspace {
+    /// Writes the part's own score, unless that has been done on this level.
+    fn begin(
+        &mut self,
+        model: &Model,
+        part: usize,
+        evidence: &Responses<'_>,
+        (level, grid): (u16, Grid),
+        extra: Option<&dyn Extra>,
+    ) {
+        if std::mem::replace(&mut self.begun[part], true) {
+            return;
+        }
+        let level = usize::from(level);
+        let term = position_term(part, level, grid, extra, &mut self.term);
+        let first = first_plane(model, part) * grid.plane();
+        let planes = self.planes[first..].chunks_exact_mut(grid.plane());
+        for (mixture, plane) in planes.take(model.n_types(part)).enumerate() {
+            let map = evidence.map(level, model.spec().parts[part].filter_of_type[mixture]);
+            let constant = extra.map(|it| it.of_type(part, mixture));
+            let lines = plane.chunks_exact_mut(grid.stride());
+            for (y, (line, map)) in lines.zip(map.chunks_exact(grid.cols)).enumerate() {
+                let (line, padding) = line.split_at_mut(grid.cols);
+                padding.fill(f32::NEG_INFINITY);
+                line.copy_from_slice(map);
+                if let Some(term) = term {
+                    for (score, term) in line.iter_mut().zip(&term[y * grid.cols..]) {
+                        *score += term;
+                    }
+                }
+                if let Some(constant) = constant {
+                    for score in line {
+                        *score += constant;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// See [`Solver::score`].
+pub(super) fn score(
+    solver: &Solver,
+    evidence: &Responses<'_>,
+    pose: &Pose,
+    extra: Option<&dyn Extra>,
+) -> f32 {
+    let model = &*solver.model;
+    let level = usize::from(pose.level);
+    let it = &evidence.layout().levels[level];
+    let grid = Grid {
+        rows: it.rows,
+        cols: it.cols,
+    };
+    assert_eq!(pose.parts.len(), model.n_parts(), "a pose of this model");
+    let mut buffer = Vec::new();
+    let mut own = |part: usize| {
+        let (at, mixture) = (pose.parts[part], usize::from(pose.parts[part].mixture));
+        assert!(
+            usize::from(at.y) < grid.rows && usize::from(at.x) < grid.cols,
+            "a placement on the level"
+        );
+        let cell = usize::from(at.y) * grid.cols + usize::from(at.x);
+        let map = evidence.map(level, model.spec().parts[part].filter_of_type[mixture]);
+        let term = position_term(part, level, grid, extra, &mut buffer);
+        let score = term.map_or(map[cell], |term| map[cell] + term[cell]);
+        extra.map_or(score, |it| score + it.of_type(part, mixture))
+    };
+    let mut scores: Vec<f32> = (0..model.n_parts()).map(&mut own).collect();
+    for part in (1..model.n_parts()).rev() {
+        let edge = model.spec().parts[part].edge.as_ref();
+        if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
+            let [of_parent, of_child] = [edge.parent, part].map(|it| pose.parts[it]);
+            let cell = |it: Placement| [usize::from(it.y), usize::from(it.x)];
+            let types = [of_parent, of_child].map(|it| usize::from(it.mixture));
+            let vote = rule.vote(scores[part], types, cell(of_parent), cell(of_child));
+            scores[edge.parent] += vote;
+        }
+    }
+    scores[0] + model.spec().root_bias as f32
+}
+
+/// The part's position term, `rows x cols`, if it has one.
+fn position_term<'b>(
+    part: usize,
+    level: usize,
+    grid: Grid,
+    extra: Option<&dyn Extra>,
+    buffer: &'b mut Vec<f32>,
+) -> Option<&'b [f32]> {
+    let extra = extra?;
+    buffer.clear();
+    buffer.resize(grid.rows * grid.cols, 0.0);
+    extra.add_position(part, level, buffer).then_some(buffer)
+}
+
+/// Number of planes before those of `part`.
+fn first_plane(model: &Model, part: usize) -> usize {
+    (0..part).map(|it| model.n_types(it)).sum()
+}
+
+fn placement(y: usize, x: usize, mixture: usize) -> Placement {
+    Placement {
+        x: x as u16,
+        y: y as u16,
+        mixture: mixture as u8,
+    }
+}
