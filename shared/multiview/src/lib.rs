@@ -1,2 +1,33 @@
 //! One energy over several views, maximised by alternating exact single-view solutions.
+//!
+//! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewAnswer`], what a
+//! view brings; [`choose_start`], which candidate of every view is the person; [`estimate_pair`], the
+//! optimiser; [`decide_facing`] and [`average`], from the pairs back to one pose per view.
 #![forbid(unsafe_code)]
+
+mod settings;
+
+mod term;
+mod view;
+
+mod consistency;
+mod heat_map;
+mod released;
+
+mod average;
+mod facing;
+mod optimise;
+mod start;
+
+mod anatomy;
+mod compatibility;
+
+pub use anatomy::anatomical_evidence;
+pub use average::{FusedPose, anatomical, average};
+pub use compatibility::{Compatibility, CompatibilityError};
+pub use facing::{Facing, PairEnergies, decide_facing};
+pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair};
+pub use settings::{EnergyKind, Settings, TypeTables};
+pub use start::{Start, choose_start};
+pub use term::Epipolar;
+pub use view::{ViewAnswer, ViewPlan};

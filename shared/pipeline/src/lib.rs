@@ -1,2 +1,16 @@
-//! To be written.
+//! All the pure steps, and the whole of them in one process.
+//!
+//! The services call the steps one by one; [`Estimator`] runs them one after the other, and is what
+//! the system tests compare the processes with: the same input gives the same bits.
 #![forbid(unsafe_code)]
+
+mod fuse_step;
+mod skeleton_step;
+mod view_step;
+
+mod estimate;
+
+pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
+pub use fuse_step::{Answer, FuseStep, PairAnswer, all_pairs};
+pub use skeleton_step::{FusedView, Skeleton, SkeletonSettings, SkeletonStep};
+pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

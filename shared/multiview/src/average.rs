@@ -1,0 +1,79 @@
+//! One pose per view out of the poses that its pairs found.
+
+/// The pose of one view after fusion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FusedPose {
+    /// Centre of every anatomical part, pixels of the frame.
+    pub centres_px: Vec<[f64; 2]>,
+    /// Pairs that were averaged; 0 if this is the view's own answer.
+    pub n_pairs: usize,
+    /// Sum of the energies of those pairs.
+    pub energy: f64,
+}
+
+/// The mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
+///
+/// * `candidates`: one pose per pair: its energy and its part centres, as the model names them.
+/// * `mirror`: if the view is exchanged, the part on the other side for every part.
+/// * Returns `None` if there is no candidate.
+///
+/// # Panics
+///
+/// If two candidates differ in their number of parts.
+pub fn average(candidates: &[(f64, Vec<[f64; 2]>)], mirror: Option<&[usize]>) -> Option<FusedPose> {
+    let n_parts = candidates.first()?.1.len();
+    let mut sum = vec![[0.0; 2]; n_parts];
+    for (_, centres) in candidates {
+        assert_eq!(centres.len(), n_parts, "one model for all pairs");
+        for (sum, centre) in sum.iter_mut().zip(centres) {
+            sum[0] += centre[0];
+            sum[1] += centre[1];
+        }
+    }
+    let n = candidates.len() as f64;
+    let mean: Vec<[f64; 2]> = sum.iter().map(|it| it.map(|sum| sum / n)).collect();
+    Some(FusedPose {
+        centres_px: anatomical(&mean, mirror),
+        n_pairs: candidates.len(),
+        energy: candidates.iter().map(|it| it.0).sum(),
+    })
+}
+
+/// Renames the parts of an exchanged view after the side of the body instead of the side of the image.
+pub fn anatomical(centres: &[[f64; 2]], mirror: Option<&[usize]>) -> Vec<[f64; 2]> {
+    match mirror {
+        Some(mirror) => mirror.iter().map(|&part| centres[part]).collect(),
+        None => centres.to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn candidates_are_averaged_part_by_part() {
+        let got = average(
+            &[
+                (1.0, vec![[0.0, 0.0], [4.0, 2.0]]),
+                (0.5, vec![[2.0, 4.0], [6.0, 2.0]]),
+            ],
+            None,
+        );
+        let got = got.expect("two candidates");
+        assert_eq!(got.centres_px, [[1.0, 2.0], [5.0, 2.0]]);
+        assert_eq!((got.n_pairs, got.energy), (2, 1.5));
+    }
+
+    #[test]
+    fn an_exchanged_view_is_renamed() {
+        let centres = vec![[0.0; 2], [1.0; 2], [2.0; 2]];
+        let got = average(&[(0.0, centres)], Some(&[0, 2, 1])).expect("one candidate");
+        assert_eq!(got.centres_px, [[0.0; 2], [2.0; 2], [1.0; 2]]);
+    }
+
+    #[test]
+    fn no_candidate_is_no_pose() {
+        assert_eq!(average(&[], None), None);
+    }
+}

@@ -1,0 +1,214 @@
+//! The authors' heat map: closeness of every cell to a rasterised epipolar line, between 0 and 1.
+//!
+//! Written from the description of what the released program computes: a line one pixel wide is
+//! drawn on an image of the original size, the image is shrunk by area to the size of the response
+//! map, every cell whose average differs from the background is on the line, a 3x3 chamfer distance
+//! transform measures cells from it, and `1 - sqrt(d / d_max)` is the heat. The map also covers the
+//! padding cells, so the line is off by up to a cell towards the borders; that is the program's way.
+
+/// Weights of the 3x3 chamfer mask.
+const STRAIGHT: f32 = 0.955;
+const DIAGONAL: f32 = 1.3693;
+
+/// Heat of a line through a map.
+///
+/// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
+///   pixels (from 1); rounded half to even, then used as if counted from 0.
+/// * `image_size`: `[width, height]`, pixels.
+/// * `rows`, `cols`: size of the response map; returns one value per cell, row major.
+pub(crate) fn heat_map(
+    ends: [[f64; 2]; 2],
+    image_size: [usize; 2],
+    rows: usize,
+    cols: usize,
+) -> Vec<f32> {
+    let mut distance = vec![f32::INFINITY; rows * cols];
+    for (cell, covered) in coverage(ends, image_size, rows, cols).iter().enumerate() {
+        // Eight-bit averaging: white (255) turns to 254 from half a grey level on.
+        if *covered > 0.5 / 255.0 {
+            distance[cell] = 0.0;
+        }
+    }
+    chamfer(&mut distance, rows, cols);
+    let largest = distance.iter().copied().fold(0.0, f32::max);
+    if !largest.is_finite() || largest == 0.0 {
+        return vec![0.0; rows * cols];
+    }
+    distance
+        .iter()
+        .map(|d| 1.0 - (d / largest).sqrt())
+        .collect()
+}
+
+/// Share of every cell that the line covers.
+fn coverage(ends: [[f64; 2]; 2], size: [usize; 2], rows: usize, cols: usize) -> Vec<f64> {
+    let [width, height] = size;
+    let cell = [width as f64 / cols as f64, height as f64 / rows as f64];
+    let mut covered = vec![0.0; rows * cols];
+    let ends = ends.map(|end| end.map(|it| it.round_ties_even() as i64));
+    let Some([from, to]) = clip(ends, [width as i64 - 1, height as i64 - 1]) else {
+        return covered;
+    };
+    for [x, y] in line_pixels(from, to) {
+        let (x, y) = (x as f64, y as f64);
+        for row in overlapped(y, cell[1], rows) {
+            let tall = overlap(row, cell[1], y);
+            for col in overlapped(x, cell[0], cols) {
+                covered[row * cols + col] += tall * overlap(col, cell[0], x) / (cell[0] * cell[1]);
+            }
+        }
+    }
+    covered
+}
+
+/// Cells that the pixel from `at` to `at + 1` touches.
+fn overlapped(at: f64, cell: f64, count: usize) -> std::ops::Range<usize> {
+    let first = (at / cell) as usize;
+    let last = (((at + 1.0) / cell) as usize + 1).min(count);
+    first..last.max(first)
+}
+
+fn overlap(index: usize, cell: f64, pixel: f64) -> f64 {
+    let (lo, hi) = (index as f64 * cell, (index + 1) as f64 * cell);
+    (hi.min(pixel + 1.0) - lo.max(pixel)).max(0.0)
+}
+
+/// Sides of the image that a point may lie beyond, besides left (1) and right (2).
+const ABOVE: i64 = 0b0100;
+const BELOW: i64 = 0b1000;
+const VERTICAL: i64 = ABOVE | BELOW;
+
+/// Clips a line to `[0, right] x [0, bottom]` (Cohen & Sutherland), integers truncated towards zero.
+fn clip(ends: [[i64; 2]; 2], [right, bottom]: [i64; 2]) -> Option<[[i64; 2]; 2]> {
+    let [[mut x1, mut y1], [mut x2, mut y2]] = ends;
+    let side = |x: i64| i64::from(x < 0) + 2 * i64::from(x > right);
+    let code = |x: i64, y: i64| side(x) + ABOVE * i64::from(y < 0) + BELOW * i64::from(y > bottom);
+    let (mut c1, mut c2) = (code(x1, y1), code(x2, y2));
+    if c1 & c2 == 0 && (c1 | c2) != 0 {
+        if c1 & VERTICAL != 0 {
+            let edge = if c1 < BELOW { 0 } else { bottom };
+            x1 += (edge - y1) * (x2 - x1) / (y2 - y1);
+            y1 = edge;
+            c1 = side(x1);
+        }
+        if c2 & VERTICAL != 0 {
+            let edge = if c2 < BELOW { 0 } else { bottom };
+            x2 += (edge - y2) * (x2 - x1) / (y2 - y1);
+            y2 = edge;
+            c2 = side(x2);
+        }
+        if c1 & c2 == 0 && (c1 | c2) != 0 {
+            if c1 != 0 {
+                let edge = if c1 == 1 { 0 } else { right };
+                y1 += (edge - x1) * (y2 - y1) / (x2 - x1);
+                x1 = edge;
+                c1 = 0;
+            }
+            if c2 != 0 {
+                let edge = if c2 == 1 { 0 } else { right };
+                y2 += (edge - x2) * (y2 - y1) / (x2 - x1);
+                x2 = edge;
+                c2 = 0;
+            }
+        }
+    }
+    (c1 | c2 == 0).then_some([[x1, y1], [x2, y2]])
+}
+
+/// Pixels of an 8-connected line (Bresenham), drawn from left to right.
+fn line_pixels(from: [i64; 2], to: [i64; 2]) -> Vec<[i64; 2]> {
+    let ([x1, y1], [x2, y2]) = if to[0] < from[0] {
+        (to, from)
+    } else {
+        (from, to)
+    };
+    let (dx, dy, down) = (x2 - x1, (y2 - y1).abs(), if y2 < y1 { -1 } else { 1 });
+    let steep = dy > dx;
+    let (long, short) = if steep { (dy, dx) } else { (dx, dy) };
+    let (mut at, mut error) = ([x1, y1], long - 2 * short);
+    (0..=long)
+        .map(|_| {
+            let pixel = at;
+            let sideways = error < 0;
+            error += if sideways { 2 * long } else { 0 } - 2 * short;
+            at[0] += i64::from(!steep || sideways);
+            at[1] += if steep || sideways { down } else { 0 };
+            pixel
+        })
+        .collect()
+}
+
+/// Two passes of the 3x3 chamfer distance transform, in place.
+fn chamfer(distance: &mut [f32], rows: usize, cols: usize) {
+    let forward = [
+        (-1, -1, DIAGONAL),
+        (-1, 0, STRAIGHT),
+        (-1, 1, DIAGONAL),
+        (0, -1, STRAIGHT),
+    ];
+    let relax = |distance: &mut [f32], row: usize, col: usize, sign: isize| {
+        for (down, right, weight) in forward {
+            let y = row.checked_add_signed(sign * down);
+            let x = col.checked_add_signed(sign * right);
+            if let (Some(y), Some(x)) = (y.filter(|it| *it < rows), x.filter(|it| *it < cols)) {
+                let through = distance[y * cols + x] + weight;
+                let here = &mut distance[row * cols + col];
+                *here = here.min(through);
+            }
+        }
+    };
+    for row in 0..rows {
+        for col in 0..cols {
+            relax(distance, row, col, 1);
+        }
+    }
+    for row in (0..rows).rev() {
+        for col in (0..cols).rev() {
+            relax(distance, row, col, -1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_misses_the_image_warms_nothing() {
+        let missed = heat_map([[-1.0, -1.0]; 2], [64, 48], 6, 8);
+        assert_eq!(missed, vec![0.0; 48]);
+    }
+
+    #[test]
+    fn the_line_is_hot_and_the_farthest_cell_is_cold() {
+        let map = heat_map([[0.5, 24.0], [64.5, 24.0]], [64, 48], 12, 16);
+        let row = |it: usize| map[it * 16];
+        assert_eq!(row(6), 1.0);
+        assert_eq!(row(0), 0.0);
+        assert!(row(5) > row(4) && row(4) > row(3), "cools with distance");
+    }
+
+    #[test]
+    fn a_vertical_line_is_drawn_too() {
+        let map = heat_map([[32.0, 0.5], [32.0, 48.5]], [64, 48], 12, 16);
+        for row in 0..12 {
+            assert_eq!(map[row * 16 + 8], 1.0, "row {row}");
+        }
+    }
+
+    #[test]
+    fn the_direction_of_the_line_does_not_matter() {
+        let there = heat_map([[3.0, 40.0], [60.0, 5.0]], [64, 48], 12, 16);
+        let back = heat_map([[60.0, 5.0], [3.0, 40.0]], [64, 48], 12, 16);
+        assert_eq!(there, back);
+    }
+
+    #[test]
+    fn a_line_far_outside_is_clipped_away() {
+        assert!(clip([[-50, -5], [-20, 90]], [63, 47]).is_none());
+        assert_eq!(
+            clip([[-10, 10], [70, 10]], [63, 47]),
+            Some([[0, 10], [63, 10]])
+        );
+    }
+}

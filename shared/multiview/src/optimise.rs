@@ -1,0 +1,208 @@
+//! Alternating exact single-view solutions of one pair of views, until nothing moves.
+
+use fmp::{Pose, Responses, Solver};
+
+use crate::consistency::{Consistency, PairTerms};
+use crate::released::{self, ReleasedTerms};
+use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewAnswer};
+
+/// A pair of views of one frame.
+#[derive(Debug, Clone, Copy)]
+pub struct PairInput<'a> {
+    /// The two views.
+    pub views: [ViewAnswer<'a>; 2],
+    /// Their geometry, from the first to the second.
+    pub epipolar: Epipolar,
+    /// Part-type tables of the pair, if any were learned.
+    pub tables: Option<&'a TypeTables>,
+}
+
+/// Where a pair starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PairStart {
+    /// Candidate of either view.
+    pub candidates: [usize; 2],
+    /// Whether left and right of the second view are exchanged with respect to the first.
+    pub exchanged: bool,
+}
+
+/// One single-view solution on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Iteration {
+    /// The view that was solved, 0 or 1; the other one supported.
+    pub target: usize,
+    /// Energy of the pair after it (`Paper`), or the score of the target's pose (`Released`).
+    pub score: f64,
+    /// Mean movement of the target's part centres, pixels.
+    pub moved_px: f64,
+    /// The target's pose after it.
+    pub pose: Pose,
+}
+
+/// What a pair agreed on under one assumption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairEstimate {
+    /// Where it started.
+    pub start: PairStart,
+    /// The joint energy (eq. 3) at the end; `Released`: sum of the two last scores.
+    pub energy: f64,
+    /// The way there.
+    pub iterations: Vec<Iteration>,
+    /// Whether nothing moved any more at the end.
+    pub converged: bool,
+    /// Whether the consistency terms of each part of the first view were switched on.
+    pub active: Vec<bool>,
+    /// The pose in the first and in the second view; parts as the model names them, not exchanged.
+    pub poses: [Pose; 2],
+}
+
+/// Maximises the joint energy of a pair from a given start.
+///
+/// Eq. 3 of the paper is maximised by solving one view exactly while the other one (the support) is
+/// fixed, then exchanging roles (section 6). Under [`EnergyKind::Paper`] a solution is taken only if
+/// the energy rises, so the energy never falls and a cycle is impossible; it ends when a view no
+/// longer moves although its support is settled. Under [`EnergyKind::Released`] every solution is taken, as in the
+/// authors' program, and the cap on iterations may end a two-cycle.
+///
+/// * `evidence`: the responses of either view, where they lie.
+pub fn estimate_pair(
+    solver: &Solver,
+    settings: &Settings,
+    pair: &PairInput<'_>,
+    evidence: [&Responses<'_>; 2],
+    start: PairStart,
+) -> PairEstimate {
+    match settings.energy {
+        EnergyKind::Paper => paper(solver, settings, pair, evidence, start),
+        EnergyKind::Released => released_pair(solver, settings, pair, evidence, start),
+    }
+}
+
+fn paper(
+    solver: &Solver,
+    settings: &Settings,
+    pair: &PairInput<'_>,
+    evidence: [&Responses<'_>; 2],
+    start: PairStart,
+) -> PairEstimate {
+    let terms = PairTerms::new(settings, pair, start.exchanged);
+    let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
+    let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
+    let mut between = terms.between(&poses);
+    let mut target = 1 - initial_support(pair, &poses);
+    let (mut iterations, mut converged) = (Vec::new(), false);
+    for iteration in 0..settings.max_iterations {
+        let moved_px = {
+            let consistency = Consistency::new(&terms, target, &poses[1 - target]);
+            let found = solver.best(evidence[target], Some(&consistency));
+            let better = found.and_then(|pose| {
+                let mut trial = poses.clone();
+                trial[target] = pose;
+                let score = own_score(solver, evidence[target], &trial[target]);
+                let term = terms.between(&trial);
+                (score + term > own[target] + between).then_some((trial, score, term))
+            });
+            better.map_or(0.0, |(trial, score, term)| {
+                let moved = mean_movement(pair, target, &poses[target], &trial[target]);
+                (poses, own[target], between) = (trial, score, term);
+                moved
+            })
+        };
+        iterations.push(Iteration {
+            target,
+            score: own[0] + own[1] + between,
+            moved_px,
+            pose: poses[target].clone(),
+        });
+        // From the second iteration on the support has itself been solved against this target.
+        if iteration > 0 && moved_px <= settings.epsilon_px {
+            converged = true;
+            break;
+        }
+        target = 1 - target;
+    }
+    PairEstimate {
+        start,
+        energy: own[0] + own[1] + between,
+        iterations,
+        converged,
+        active: terms.active().to_vec(),
+        poses,
+    }
+}
+
+fn released_pair(
+    solver: &Solver,
+    settings: &Settings,
+    pair: &PairInput<'_>,
+    evidence: [&Responses<'_>; 2],
+    start: PairStart,
+) -> PairEstimate {
+    let weights = released::weights(settings, pair);
+    let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
+    let mut target = 1 - initial_support(pair, &poses);
+    let (mut iterations, mut converged) = (Vec::<Iteration>::new(), false);
+    for _ in 0..settings.max_iterations {
+        let support = 1 - target;
+        let terms = ReleasedTerms::new(
+            settings,
+            pair,
+            target,
+            &poses[support],
+            (&weights[support], start.exchanged),
+        );
+        let Some(pose) = solver.best(evidence[target], Some(&terms)) else {
+            break;
+        };
+        let moved_px = mean_movement(pair, target, &poses[target], &pose);
+        poses[target] = pose;
+        iterations.push(Iteration {
+            target,
+            score: f64::from(poses[target].score),
+            moved_px,
+            pose: poses[target].clone(),
+        });
+        let settled = |it: &Iteration| it.moved_px <= settings.epsilon_px;
+        if iterations.len() >= 2 && iterations[iterations.len() - 2..].iter().all(settled) {
+            converged = true;
+            break;
+        }
+        target = support;
+    }
+    PairEstimate {
+        start,
+        energy: poses.iter().map(|it| f64::from(it.score)).sum(),
+        iterations,
+        converged,
+        active: weights[0].clone(),
+        poses,
+    }
+}
+
+/// Score of a pose in its own view alone, eq. 1.
+fn own_score(solver: &Solver, evidence: &Responses<'_>, pose: &Pose) -> f64 {
+    f64::from(solver.score(evidence, pose, None))
+}
+
+/// The view whose single-view pose is expected to be better: lower expected error, or higher score
+/// where either view has no expectation; ties go to the first view.
+fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
+    let expected = pair
+        .views
+        .map(|view| view.sigma_px.map(|it| it.iter().sum::<f32>()));
+    match expected {
+        [Some(first), Some(second)] => usize::from(second < first),
+        _ => usize::from(poses[1].score > poses[0].score),
+    }
+}
+
+fn mean_movement(pair: &PairInput<'_>, view: usize, from: &Pose, to: &Pose) -> f64 {
+    let plan = pair.views[view].plan;
+    let (from, to) = (plan.centres(from), plan.centres(to));
+    let sum: f64 = from
+        .iter()
+        .zip(&to)
+        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .sum();
+    sum / from.len().max(1) as f64
+}

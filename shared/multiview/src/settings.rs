@@ -1,0 +1,90 @@
+//! What a deployment may choose about fusion.
+
+use std::sync::Arc;
+
+use crate::Compatibility;
+
+/// Which energy ties two views together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum EnergyKind {
+    /// The paper's: squared point-to-line distances in both directions, joint type table, a part
+    /// switched off if either view is expected to be off.
+    #[default]
+    Paper,
+    /// What the authors' program computes: normalised heat maps, conditional type tables, a part
+    /// switched off by the supporting view alone.
+    Released,
+}
+
+/// The part-type tables of one pair of views.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TypeTables {
+    /// `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
+    pub conditional: [Arc<Compatibility>; 2],
+    /// `p(type in first, type in second)`, for [`EnergyKind::Paper`].
+    pub joint: Arc<Compatibility>,
+}
+
+/// Settings of the optimiser; the defaults are the documentation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Which energy.
+    pub energy: EnergyKind,
+    /// Weight of the geometric term.
+    ///
+    /// `Paper`: score per squared cell. Distances are divided by the cell size of the pose's own
+    /// level before they are squared, so that the weight means the same for a near and a far person
+    /// and at every resolution, and compares directly with the springs of the model (whose weakest
+    /// is 0.01 per squared cell). `Released`: score of a cell on the line; 0.07 in the authors' runs.
+    pub alpha: f64,
+    /// Weight of the appearance term: score of two types that always occur together.
+    pub beta: f64,
+    /// Distance beyond which the geometric term of the paper's energy grows no more, cells.
+    /// Infinite is the paper's own form.
+    pub max_distance_cells: f64,
+    /// Most single-view solutions of a pair.
+    pub max_iterations: usize,
+    /// Mean movement of the part centres below which a view counts as settled, pixels.
+    pub epsilon_px: f64,
+    /// Expected error above which a part is switched off, pixels of the frame, one per part; empty:
+    /// never.
+    pub tau_px: Vec<f32>,
+    /// `Released` only: difference of the expected errors beyond which the better of two views that
+    /// are both off is switched on again, pixels, one per part (the median training errors); empty:
+    /// never.
+    pub rescue_px: Vec<f32>,
+    /// Decide for every view whether left and right are exchanged; off in the paper.
+    pub facing: bool,
+    /// Most candidates of a view that a start may combine; 1 is the paper's start.
+    pub n_candidates: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            energy: EnergyKind::Paper,
+            alpha: 0.01,
+            beta: 0.03,
+            max_distance_cells: f64::INFINITY,
+            max_iterations: 12,
+            epsilon_px: 0.1,
+            tau_px: Vec::new(),
+            rescue_px: Vec::new(),
+            facing: true,
+            n_candidates: 5,
+        }
+    }
+}
+
+impl Settings {
+    /// The settings of the authors' runs: their energy, weights and start.
+    pub fn released() -> Self {
+        Self {
+            energy: EnergyKind::Released,
+            alpha: 0.07,
+            facing: false,
+            n_candidates: 1,
+            ..Self::default()
+        }
+    }
+}

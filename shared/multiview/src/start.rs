@@ -1,0 +1,261 @@
+//! The start of a frame: which candidate of every view is the person, and which way each view sees it.
+
+use crate::consistency::PairTerms;
+use crate::{Epipolar, PairInput, Settings, TypeTables, ViewAnswer};
+
+/// Exhaustive search is used up to this many joint states.
+const MAX_STATES: usize = 200_000;
+
+/// The joint start of all views of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// Candidate of every view.
+    pub candidates: Vec<usize>,
+    /// Whether left and right of a view are exchanged with respect to the first view.
+    pub exchanged: Vec<bool>,
+    /// Sum over all pairs of their joint energy (eq. 3) at the start.
+    pub energy: f64,
+}
+
+/// Chooses the candidates, and the exchange of left and right, that the energies of all pairs like best.
+///
+/// The sum of eq. 3 over all pairs of views is maximised over one candidate per view and one exchange
+/// per view but the first (an exchange in all views changes nothing that two views could tell). With
+/// one candidate per view and `facing` off this is the paper's start. Up to 200 000 joint states are
+/// searched through; beyond that views join one by one and are then revised until nothing changes.
+///
+/// * `views`: the views that answered, in a fixed order.
+/// * `tables`: part-type tables of a pair of indices into `views`.
+pub fn choose_start<'a>(
+    settings: &Settings,
+    views: &[ViewAnswer<'a>],
+    tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
+) -> Start {
+    let states: Vec<Vec<State>> = views
+        .iter()
+        .enumerate()
+        .map(|(view, answer)| states(settings, answer, view))
+        .collect();
+    let unary: Vec<Vec<f64>> = views
+        .iter()
+        .zip(&states)
+        .map(|(answer, states)| {
+            let weight = views.len().saturating_sub(1).max(1) as f64;
+            let score = |it: &State| f64::from(answer.candidates[it.candidate].score);
+            states.iter().map(|it| weight * score(it)).collect()
+        })
+        .collect();
+    let problem = Problem {
+        unary,
+        between: between(settings, views, &states, tables),
+    };
+    let (chosen, energy) = problem.solve();
+    let pick = |view: usize| states[view][chosen[view]];
+    Start {
+        candidates: (0..views.len()).map(|it| pick(it).candidate).collect(),
+        exchanged: (0..views.len()).map(|it| pick(it).exchanged).collect(),
+        energy,
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct State {
+    candidate: usize,
+    exchanged: bool,
+}
+
+fn states(settings: &Settings, answer: &ViewAnswer<'_>, view: usize) -> Vec<State> {
+    let can_exchange = settings.facing && answer.plan.model().spec().mirror.is_some() && view > 0;
+    let n = answer.candidates.len().min(settings.n_candidates.max(1));
+    [false, true]
+        .into_iter()
+        .take(1 + usize::from(can_exchange))
+        .flat_map(|exchanged| {
+            (0..n).map(move |candidate| State {
+                candidate,
+                exchanged,
+            })
+        })
+        .collect()
+}
+
+/// `[first][second - first - 1][state of first][state of second]`.
+type Between = Vec<Vec<Vec<Vec<f64>>>>;
+
+fn between<'a>(
+    settings: &Settings,
+    views: &[ViewAnswer<'a>],
+    states: &[Vec<State>],
+    tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
+) -> Between {
+    let pair = |first: usize, second: usize| -> Vec<Vec<f64>> {
+        let input = PairInput {
+            views: [views[first], views[second]],
+            epipolar: Epipolar::new(views[first].plan, views[second].plan),
+            tables: tables(first, second),
+        };
+        let terms = [false, true].map(|exchanged| PairTerms::new(settings, &input, exchanged));
+        let value = |a: &State, b: &State| {
+            let poses = [
+                views[first].candidates[a.candidate].clone(),
+                views[second].candidates[b.candidate].clone(),
+            ];
+            terms[usize::from(a.exchanged != b.exchanged)].between(&poses)
+        };
+        states[first]
+            .iter()
+            .map(|a| states[second].iter().map(|b| value(a, b)).collect())
+            .collect()
+    };
+    (0..views.len())
+        .map(|first| {
+            (first + 1..views.len())
+                .map(|second| pair(first, second))
+                .collect()
+        })
+        .collect()
+}
+
+/// A small pairwise maximisation over the complete graph of views.
+#[derive(Debug)]
+struct Problem {
+    unary: Vec<Vec<f64>>,
+    between: Between,
+}
+
+impl Problem {
+    fn solve(&self) -> (Vec<usize>, f64) {
+        let n_states = self
+            .unary
+            .iter()
+            .try_fold(1_usize, |product, it| product.checked_mul(it.len()));
+        if n_states.is_some_and(|it| it <= MAX_STATES) {
+            let mut best = (vec![0; self.unary.len()], f64::NEG_INFINITY);
+            self.search(&mut Vec::new(), 0.0, &mut best);
+            best
+        } else {
+            self.climb()
+        }
+    }
+
+    /// What `state` of the next view adds to the views chosen so far.
+    fn gain(&self, chosen: &[usize], state: usize) -> f64 {
+        let view = chosen.len();
+        let pairs: f64 = chosen
+            .iter()
+            .enumerate()
+            .map(|(other, &theirs)| self.between[other][view - other - 1][theirs][state])
+            .sum();
+        self.unary[view][state] + pairs
+    }
+
+    fn search(&self, chosen: &mut Vec<usize>, value: f64, best: &mut (Vec<usize>, f64)) {
+        if chosen.len() == self.unary.len() {
+            if value > best.1 {
+                *best = (chosen.clone(), value);
+            }
+            return;
+        }
+        for state in 0..self.unary[chosen.len()].len() {
+            let gain = self.gain(chosen, state);
+            chosen.push(state);
+            self.search(chosen, value + gain, best);
+            chosen.pop();
+        }
+    }
+
+    fn value(&self, chosen: &[usize]) -> f64 {
+        (0..chosen.len())
+            .map(|view| self.gain(&chosen[..view], chosen[view]))
+            .sum()
+    }
+
+    /// Greedy from every state of the first view, then one view at a time until nothing changes.
+    fn climb(&self) -> (Vec<usize>, f64) {
+        let mut best = (vec![0; self.unary.len()], f64::NEG_INFINITY);
+        for first in 0..self.unary[0].len() {
+            let mut chosen = vec![first];
+            while chosen.len() < self.unary.len() {
+                let next = argmax(self.unary[chosen.len()].len(), |it| self.gain(&chosen, it));
+                chosen.push(next);
+            }
+            let mut value = self.value(&chosen);
+            loop {
+                for view in 0..chosen.len() {
+                    chosen[view] = argmax(self.unary[view].len(), |it| {
+                        let mut trial = chosen.clone();
+                        trial[view] = it;
+                        self.value(&trial)
+                    });
+                }
+                let raised = self.value(&chosen);
+                if raised <= value {
+                    break;
+                }
+                value = raised;
+            }
+            if value > best.1 {
+                best = (chosen, value);
+            }
+        }
+        best
+    }
+}
+
+fn argmax(n: usize, value: impl Fn(usize) -> f64) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for it in 0..n {
+        let value = value(it);
+        if value > best.1 {
+            best = (it, value);
+        }
+    }
+    best.0
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn problems() -> impl Strategy<Value = Problem> {
+        vec(vec(-2.0..2.0_f64, 3), 4).prop_flat_map(|unary| {
+            let pairs = vec(vec(vec(-2.0..2.0_f64, 3), 3), 6);
+            pairs.prop_map(move |mut pairs| {
+                let between = (0..4)
+                    .map(|first| (first + 1..4).map(|_| pairs.remove(0)).collect())
+                    .collect();
+                Problem {
+                    unary: unary.clone(),
+                    between,
+                }
+            })
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_search_beats_every_assignment(problem in problems()) {
+            let (chosen, value) = problem.solve();
+            prop_assert!((problem.value(&chosen) - value).abs() < 1e-9);
+            for state in 0..81 {
+                let other = [state % 3, state / 3 % 3, state / 9 % 3, state / 27];
+                prop_assert!(problem.value(&other) <= value + 1e-9);
+            }
+        }
+
+        #[test]
+        fn climbing_ends_where_no_single_view_can_improve(problem in problems()) {
+            let (chosen, value) = problem.climb();
+            for view in 0..4 {
+                for state in 0..3 {
+                    let mut other = chosen.clone();
+                    other[view] = state;
+                    prop_assert!(problem.value(&other) <= value + 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! What a view brings to fusion: its camera, where its cells lie, and its own answer.
+
+use std::sync::Arc;
+
+use fmp::{Layout, Model, Placement, Pose};
+use geometry::Camera;
+use nalgebra::Point2;
+
+/// A view prepared once: camera, pyramid, and where every cell's centre lies without lens distortion.
+#[derive(Debug)]
+pub struct ViewPlan {
+    camera: Camera,
+    model: Arc<Model>,
+    layout: Arc<Layout>,
+    /// Class of filter size of every part.
+    class_of_part: Vec<usize>,
+    /// `[class][level]`: undistorted centre of every cell, row major, pixels; NaN where the lens
+    /// model has no answer.
+    cells: Vec<Vec<Vec<[f64; 2]>>>,
+}
+
+impl ViewPlan {
+    /// Prepares a view.
+    ///
+    /// A part's centre is that of its first type's filter; in a model that mixes filter sizes within
+    /// one part the others are off by at most half the difference, in cells.
+    ///
+    /// * `camera`: the camera of the frame that the pyramid was built on, after resizing and turning.
+    pub fn new(camera: Camera, model: Arc<Model>, layout: Arc<Layout>) -> Self {
+        let mut sizes: Vec<[usize; 2]> = Vec::new();
+        let class_of_part = (0..model.n_parts())
+            .map(|part| {
+                let filter = model.filter(part, 0);
+                let size = [filter.rows, filter.cols];
+                sizes.iter().position(|it| *it == size).unwrap_or_else(|| {
+                    sizes.push(size);
+                    sizes.len() - 1
+                })
+            })
+            .collect();
+        let cells = sizes
+            .iter()
+            .map(|size| {
+                (0..layout.levels.len())
+                    .map(|level| undistorted_cells(&camera, &layout, level, *size))
+                    .collect()
+            })
+            .collect();
+        Self {
+            camera,
+            model,
+            layout,
+            class_of_part,
+            cells,
+        }
+    }
+
+    /// The camera of the frame.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The pyramid of the frame.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Size of a cell of a level, pixels of the frame.
+    pub fn scale(&self, level: usize) -> f64 {
+        self.layout.levels[level].scale
+    }
+
+    /// Undistorted centres of a part at all cells of a level, row major, pixels.
+    pub fn cells(&self, part: usize, level: usize) -> &[[f64; 2]] {
+        &self.cells[self.class_of_part[part]][level]
+    }
+
+    /// Undistorted centre of a part of a pose, pixels; NaN where the lens model has no answer.
+    pub fn ideal_centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
+        let level = usize::from(pose.level);
+        let at = pose.parts[part];
+        let cell = usize::from(at.y) * self.layout.levels[level].cols + usize::from(at.x);
+        self.cells(part, level)[cell]
+    }
+
+    /// Centres of all parts of a pose, pixels of the frame.
+    pub fn centres(&self, pose: &Pose) -> Vec<[f64; 2]> {
+        pose.centres(&self.model, &self.layout)
+    }
+}
+
+fn undistorted_cells(
+    camera: &Camera,
+    layout: &Layout,
+    level: usize,
+    size: [usize; 2],
+) -> Vec<[f64; 2]> {
+    let it = &layout.levels[level];
+    (0..it.rows * it.cols)
+        .map(|cell| {
+            let at = Placement {
+                x: (cell % it.cols) as u16,
+                y: (cell / it.cols) as u16,
+                mixture: 0,
+            };
+            let [x, y] = layout.centre(level, size, at);
+            camera
+                .undistorted_px(&Point2::new(x, y))
+                .map_or([f64::NAN; 2], |point| [point.x, point.y])
+        })
+        .collect()
+}
+
+/// What one view says about one frame, besides its evidence.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewAnswer<'a> {
+    /// The prepared view.
+    pub plan: &'a ViewPlan,
+    /// Its distinct candidates, best first; never empty.
+    pub candidates: &'a [Pose],
+    /// Expected error of every part, pixels; `None` where there is no prediction.
+    pub sigma_px: Option<&'a [f32]>,
+}

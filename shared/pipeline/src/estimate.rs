@@ -1,0 +1,185 @@
+//! One synchronised set of images in, one skeleton out, without processes.
+
+use std::sync::Arc;
+
+use fmp::{ImageTooSmall, Layout, Model, Responses};
+use geometry::Camera;
+use kernels::Rgb8View;
+use multiview::{Settings, TypeTables, ViewPlan};
+use nalgebra::UnitVector3;
+use rayon::prelude::*;
+
+use crate::{
+    Answer, FuseStep, PairAnswer, Skeleton, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep,
+    all_pairs,
+};
+
+/// Why an estimator could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EstimatorError {
+    /// A view's frames are too small for the model.
+    #[error("view {view:?}")]
+    TooSmall {
+        /// Name of the camera.
+        view: String,
+        /// How small.
+        source: ImageTooSmall,
+    },
+}
+
+/// What one set of images gave.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// What every view answered alone.
+    pub answers: Vec<Option<Answer>>,
+    /// The joint start: candidate and exchange of every view.
+    pub start: Vec<Option<(usize, bool)>>,
+    /// What every pair found.
+    pub pairs: Vec<PairAnswer>,
+    /// The result.
+    pub skeleton: Skeleton,
+}
+
+/// The whole pipeline in one process.
+#[derive(Debug)]
+pub struct Estimator {
+    views: Vec<ViewStep>,
+    fuse: FuseStep,
+    skeleton: SkeletonStep,
+    plans: Vec<Arc<ViewPlan>>,
+    responses: Vec<Vec<f32>>,
+}
+
+impl Estimator {
+    /// Prepares the pipeline for a rig.
+    ///
+    /// * `cameras`: the cameras of the frames, after resizing and turning, in the rig's order; the
+    ///   frames' size is the camera's.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::TooSmall`].
+    pub fn new(
+        model: &Arc<Model>,
+        cameras: &[Camera],
+        up_in_world: Option<UnitVector3<f64>>,
+        settings: &EstimatorSettings,
+    ) -> Result<Self, EstimatorError> {
+        let plans = cameras
+            .iter()
+            .map(|camera| plan(model, camera))
+            .collect::<Result<Vec<_>, _>>()?;
+        let steps: Vec<ViewStep> = plans
+            .iter()
+            .map(|it| {
+                let layout = Arc::new(it.layout().clone());
+                ViewStep::new(Arc::clone(model), layout, settings.view)
+            })
+            .collect();
+        Ok(Self {
+            responses: vec![Vec::new(); steps.len()],
+            views: steps,
+            fuse: FuseStep::new(
+                Arc::clone(model),
+                settings.fuse.clone(),
+                plans.clone(),
+                settings.tables.clone(),
+            ),
+            skeleton: SkeletonStep::new(plans.clone(), up_in_world, settings.skeleton.clone()),
+            plans,
+        })
+    }
+
+    /// The prepared views.
+    pub fn plans(&self) -> &[Arc<ViewPlan>] {
+        &self.plans
+    }
+
+    /// Estimates one frame. Runs views and pairs side by side on rayon's current pool; the result
+    /// does not depend on the number of its threads.
+    ///
+    /// * `images`: one per view; `None` for a view that is missing.
+    /// * `sigma_px`: expected error of every part of every view, where there is a prediction.
+    ///
+    /// # Panics
+    ///
+    /// If the number of images, or the size of one, is not that of the rig.
+    pub fn estimate(
+        &mut self,
+        images: &[Option<Rgb8View<'_>>],
+        sigma_px: &[Option<Vec<f32>>],
+    ) -> Estimate {
+        assert_eq!(images.len(), self.views.len(), "one image per view");
+        let viewed: Vec<(Option<Answer>, Vec<u16>)> = self
+            .views
+            .par_iter()
+            .zip(&mut self.responses)
+            .enumerate()
+            .map(|(view, (step, responses))| {
+                let Some(image) = images[view] else {
+                    return (None, Vec::new());
+                };
+                responses.resize(step.layout().n_responses(), 0.0);
+                let found = step.run(image, responses);
+                let answer = (!found.candidates.is_empty()).then(|| Answer {
+                    candidates: found.candidates,
+                    sigma_px: sigma_px.get(view).cloned().flatten(),
+                });
+                (answer, found.levels)
+            })
+            .collect();
+        let (answers, levels): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
+        let start = self.fuse.start(&answers);
+        let pairs: Vec<PairAnswer> = all_pairs(self.views.len())
+            .into_par_iter()
+            .filter(|pair| pair.iter().all(|&view| answers[view].is_some()))
+            .filter_map(|pair| {
+                let evidence = pair.map(|view| {
+                    let layout = self.plans[view].layout();
+                    Responses::new(layout, &self.responses[view], &levels[view])
+                });
+                self.fuse
+                    .pair(pair, &answers, [&evidence[0], &evidence[1]], &start)
+            })
+            .collect();
+        let skeleton = self.skeleton.run(&answers, &pairs);
+        Estimate {
+            answers,
+            start,
+            pairs,
+            skeleton,
+        }
+    }
+}
+
+/// Settings of all steps.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EstimatorSettings {
+    /// Of the single-view step.
+    pub view: ViewSettings,
+    /// Of the fusion step.
+    pub fuse: Settings,
+    /// Part-type tables of pairs `(first, second)` with `first < second`.
+    pub tables: Vec<(usize, usize, TypeTables)>,
+    /// Of the last step.
+    pub skeleton: SkeletonSettings,
+}
+
+/// Prepares a view for a model.
+///
+/// # Errors
+///
+/// [`EstimatorError::TooSmall`].
+pub fn plan(model: &Arc<Model>, camera: &Camera) -> Result<Arc<ViewPlan>, EstimatorError> {
+    let [width, height] = camera.intrinsics.size.map(|it| it as usize);
+    let layout = Layout::new(model, width, height).map_err(|source| EstimatorError::TooSmall {
+        view: camera.name.clone(),
+        source,
+    })?;
+    let layout = Arc::new(layout);
+    Ok(Arc::new(ViewPlan::new(
+        camera.clone(),
+        Arc::clone(model),
+        layout,
+    )))
+}
