@@ -1,0 +1,190 @@
+//! The output folder: files grow beside their final name, and take it when they are whole.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+/// The folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {doing} {}", path.display())]
+pub struct FolderError {
+    /// What was tried.
+    pub doing: &'static str,
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// A folder whose files are replaced whole.
+///
+/// A file `x` is written as `x.part` and renamed at the end, so that an earlier run's result stays
+/// until a new one is complete, and a part that was left over says so by its name.
+#[derive(Debug)]
+pub struct Folder {
+    dir: PathBuf,
+    parts: Vec<String>,
+    resume: bool,
+}
+
+impl Folder {
+    /// Opens a folder, which is made if it is not there.
+    ///
+    /// * `resume`: go on where a killed process stopped, instead of beginning anew.
+    ///
+    /// # Errors
+    ///
+    /// [`FolderError`].
+    pub fn open(dir: &Path, resume: bool) -> Result<Self, FolderError> {
+        fs::create_dir_all(dir).map_err(|source| FolderError {
+            doing: "make the folder",
+            path: dir.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            parts: Vec::new(),
+            resume,
+        })
+    }
+
+    /// Begins a file.
+    ///
+    /// # Errors
+    ///
+    /// [`FolderError`].
+    pub fn file(&mut self, name: &str) -> Result<BufWriter<File>, FolderError> {
+        let path = self.part(name);
+        let file = OpenOptions::new()
+            .create(true)
+            .write(true)
+            .append(self.resume)
+            .truncate(!self.resume)
+            .open(&path);
+        let file = file.map_err(|source| FolderError {
+            doing: "write",
+            path,
+            source,
+        })?;
+        self.parts.push(name.to_owned());
+        Ok(BufWriter::new(file))
+    }
+
+    /// Begins a folder in the folder, empty unless it is resumed.
+    ///
+    /// # Errors
+    ///
+    /// [`FolderError`].
+    pub fn folder(&mut self, name: &str) -> Result<PathBuf, FolderError> {
+        let path = self.part(name);
+        if !self.resume {
+            remove(&path)?;
+        }
+        fs::create_dir_all(&path).map_err(|source| FolderError {
+            doing: "make the folder",
+            path: path.clone(),
+            source,
+        })?;
+        self.parts.push(name.to_owned());
+        Ok(path)
+    }
+
+    /// Where a file is while it grows.
+    pub fn part(&self, name: &str) -> PathBuf {
+        self.dir.join(format!("{name}.part"))
+    }
+
+    /// Gives every file its final name; close them first.
+    ///
+    /// # Errors
+    ///
+    /// The first [`FolderError`]; the other files get their names all the same.
+    pub fn finish(self) -> Result<(), FolderError> {
+        let mut outcome = Ok(());
+        for name in &self.parts {
+            let (from, to) = (self.part(name), self.dir.join(name));
+            // A folder does not take the place of another by renaming.
+            let cleared = if from.is_dir() { remove(&to) } else { Ok(()) };
+            let renamed = cleared.and_then(|()| {
+                fs::rename(&from, &to).map_err(|source| FolderError {
+                    doing: "rename the finished",
+                    path: from,
+                    source,
+                })
+            });
+            outcome = outcome.and(renamed);
+        }
+        outcome
+    }
+}
+
+fn remove(path: &Path) -> Result<(), FolderError> {
+    match fs::remove_dir_all(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => Err(FolderError {
+            doing: "empty",
+            path: path.to_owned(),
+            source,
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    fn write(dir: &Path, resume: bool, text: &str, finish: bool) {
+        let mut folder = Folder::open(dir, resume).unwrap();
+        let mut file = folder.file("a.txt").unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        drop(file);
+        let inner = folder.folder("pictures").unwrap();
+        fs::write(inner.join(format!("{text}.png")), "").unwrap();
+        if finish {
+            folder.finish().unwrap();
+        }
+    }
+
+    #[test]
+    fn a_rerun_replaces_what_is_there() {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), false, "one", true);
+        write(dir.path(), false, "two", true);
+        assert_eq!(fs::read_to_string(dir.path().join("a.txt")).unwrap(), "two");
+        assert!(!dir.path().join("pictures/one.png").exists());
+        assert!(dir.path().join("pictures/two.png").exists());
+    }
+
+    #[test]
+    fn an_earlier_result_stays_until_the_new_one_is_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), false, "one", true);
+        write(dir.path(), false, "two", false);
+        assert_eq!(fs::read_to_string(dir.path().join("a.txt")).unwrap(), "one");
+        assert!(dir.path().join("pictures/one.png").exists());
+        assert!(dir.path().join("a.txt.part").exists());
+    }
+
+    #[test]
+    fn a_killed_writer_goes_on_where_it_stopped() {
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), false, "one", false);
+        write(dir.path(), true, "two", true);
+        assert_eq!(
+            fs::read_to_string(dir.path().join("a.txt")).unwrap(),
+            "onetwo"
+        );
+        assert!(dir.path().join("pictures/one.png").exists());
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("file");
+        fs::write(&file, "").unwrap();
+        let error = Folder::open(&file.join("below"), false).unwrap_err();
+        assert!(error.to_string().contains("below"), "{error}");
+    }
+}

@@ -1,0 +1,58 @@
+//! All messages about one frame.
+
+use fmp::Pose;
+use messages::{FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+
+use crate::Scene;
+
+/// What one view said about one frame; `None` where nothing came.
+#[derive(Debug, Clone, Default)]
+pub struct ViewRecord {
+    /// The frame itself, without its pixels.
+    pub frame: Option<FrameHeader>,
+    /// Its candidates.
+    pub pose: Option<ViewPose>,
+    /// Its expected errors.
+    pub quality: Option<ViewQuality>,
+}
+
+/// What was said about one frame.
+#[derive(Debug, Clone)]
+pub struct FrameRecord {
+    /// The result.
+    pub pose3d: Pose3d,
+    /// The views.
+    pub views: Vec<ViewRecord>,
+    /// The pairs that answered, in order of arrival.
+    pub pairs: Vec<PairPose>,
+}
+
+impl FrameRecord {
+    /// Index of the frame in the footage.
+    pub fn frame(&self) -> u64 {
+        self.pose3d.stamp.frame
+    }
+
+    /// The candidates of a view, best first; none if it had none, or sent what cannot be read.
+    pub(crate) fn candidates(&self, scene: &Scene, view: usize) -> Vec<Pose> {
+        let message = self.views.get(view).and_then(|it| it.pose.as_ref());
+        let read = message
+            .map(|it| wire::candidates_from_message(it, &scene.model, &scene.views[view].layout));
+        match read {
+            Some(Ok(candidates)) => candidates,
+            Some(Err(error)) => {
+                tracing::warn!(view, frame = self.frame(), %error, "unreadable candidates");
+                Vec::new()
+            }
+            None => Vec::new(),
+        }
+    }
+
+    /// The expected errors of a view's parts, pixels of the frame.
+    pub(crate) fn sigma_px(&self, scene: &Scene, view: usize) -> Option<Vec<f32>> {
+        let message = self.views.get(view)?.quality.as_ref()?;
+        wire::sigma_from_message(message, scene.model.n_parts())
+            .ok()
+            .flatten()
+    }
+}

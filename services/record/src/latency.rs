@@ -1,0 +1,344 @@
+//! Where the time goes: computation, waiting and transport, from the stamps in the messages.
+
+use std::collections::BTreeMap;
+
+use hdrhistogram::{CreationError, Histogram};
+use messages::{Status, Timing};
+use serde::Serialize;
+
+use crate::FrameRecord;
+
+/// Longest duration told apart, microseconds: an hour.
+const LONGEST_MICROS: u64 = 3_600_000_000;
+
+/// Percentiles of one duration, milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Percentiles {
+    /// How many were measured.
+    pub count: u64,
+    /// Half are shorter.
+    pub p50_ms: f64,
+    /// 99 of 100 are shorter.
+    pub p99_ms: f64,
+    /// The longest.
+    pub max_ms: f64,
+}
+
+/// What became of the time, over all frames.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Report {
+    /// Computing time of every stage.
+    pub stages: BTreeMap<&'static str, Percentiles>,
+    /// From sent to received, the receiver being free: what the transport costs.
+    pub transport: BTreeMap<&'static str, Percentiles>,
+    /// From sent to received while the receiver was still busy with something earlier.
+    pub waiting: BTreeMap<&'static str, Percentiles>,
+    /// From capture to the result.
+    pub end_to_end: Percentiles,
+    /// Share of the end-to-end time that is not computation on the way that took longest.
+    pub share_not_computation: Option<f64>,
+    /// Share of the end-to-end time that is transport.
+    pub share_transport: Option<f64>,
+    /// Share of the end-to-end time spent waiting for busy processes.
+    pub share_waiting: Option<f64>,
+}
+
+/// Collects durations frame by frame.
+///
+/// A hop is split in two: while the receiver was still busy (its previous message was sent after this
+/// one was) it counts as waiting, what remains as transport. The way of a frame is walked backwards
+/// from the result: the pair that came last, the view whose pose came last.
+#[derive(Debug)]
+pub struct Latency {
+    histograms: BTreeMap<(Kind, &'static str), Histogram<u32>>,
+    /// When every process sent last, by stage and number.
+    sent: BTreeMap<(&'static str, usize), u64>,
+    n_workers: usize,
+    total: Total,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Stage,
+    Transport,
+    Waiting,
+    EndToEnd,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Total {
+    end_to_end: u64,
+    computation: u64,
+    transport: u64,
+    waiting: u64,
+}
+
+const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
+const HOPS: [&str; 3] = ["capture to pose", "pose to fuse", "fuse to triangulate"];
+
+impl Latency {
+    /// Begins.
+    ///
+    /// * `n_workers`: fusion processes, to which pairs are dealt in turn.
+    ///
+    /// # Errors
+    ///
+    /// Those of the histograms, for bounds that are fixed here: none.
+    pub fn new(n_workers: usize) -> Result<Self, CreationError> {
+        let stages = STAGES.map(|it| (Kind::Stage, it));
+        let transport = HOPS.map(|it| (Kind::Transport, it));
+        let waiting = HOPS.map(|it| (Kind::Waiting, it));
+        let mut histograms = BTreeMap::new();
+        for key in stages
+            .into_iter()
+            .chain(transport)
+            .chain(waiting)
+            .chain([(Kind::EndToEnd, "")])
+        {
+            histograms.insert(key, Histogram::new_with_bounds(1, LONGEST_MICROS, 3)?);
+        }
+        Ok(Self {
+            histograms,
+            sent: BTreeMap::new(),
+            n_workers: n_workers.max(1),
+            total: Total::default(),
+        })
+    }
+
+    /// Adds a frame.
+    pub fn add(&mut self, record: &FrameRecord) {
+        for view in &record.views {
+            let timings = [
+                (
+                    "capture",
+                    view.frame
+                        .filter(|it| it.status == Status::OK)
+                        .map(|it| it.timing),
+                ),
+                ("pose", view.pose.map(|it| it.timing)),
+                ("quality", view.quality.map(|it| it.timing)),
+            ];
+            for (stage, timing) in timings {
+                if let Some(timing) = timing {
+                    self.note(Kind::Stage, stage, computation(timing));
+                }
+            }
+        }
+        for pair in &record.pairs {
+            self.note(Kind::Stage, "fuse", computation(pair.timing));
+        }
+        self.note(
+            Kind::Stage,
+            "triangulate",
+            computation(record.pose3d.timing),
+        );
+        if record.pose3d.status == Status::OK {
+            self.walk(record);
+        }
+        self.remember(record);
+    }
+
+    /// The way of a frame, backwards.
+    fn walk(&mut self, record: &FrameRecord) -> Option<()> {
+        let result = record.pose3d.timing;
+        let pair = record
+            .pairs
+            .iter()
+            .max_by_key(|it| it.timing.sent_at_nanos)?;
+        let view = (0..record.views.len())
+            .filter(|it| record.views[*it].pose.is_some())
+            .max_by_key(|it| record.views[*it].pose.map(|it| it.timing.sent_at_nanos))?;
+        let pose = record.views[view].pose?.timing;
+        let frame = record.views[view].frame?.timing;
+        let worker = pair.stamp.view as usize % self.n_workers;
+        // The same worker may have answered for another pair of this frame just before.
+        let same_worker = record.pairs.iter().filter(|it| {
+            it.stamp.view as usize % self.n_workers == worker
+                && it.timing.sent_at_nanos <= pair.timing.received_at_nanos
+        });
+        let busy = same_worker.map(|it| it.timing.sent_at_nanos).max();
+        let busy = busy.max(self.sent.get(&("fuse", worker)).copied());
+        self.hop(
+            HOPS[2],
+            pair.timing,
+            result,
+            self.sent.get(&("triangulate", 0)).copied(),
+        );
+        self.hop(HOPS[1], pose, pair.timing, busy);
+        self.hop(
+            HOPS[0],
+            frame,
+            pose,
+            self.sent.get(&("pose", view)).copied(),
+        );
+        let captured = record
+            .pose3d
+            .stamp
+            .captured_at_nanos
+            .min(frame.received_at_nanos);
+        let end_to_end = result.sent_at_nanos.saturating_sub(captured);
+        self.note(Kind::EndToEnd, "", end_to_end);
+        self.total.end_to_end += end_to_end;
+        self.total.computation += [frame, pose, pair.timing, result]
+            .map(computation)
+            .iter()
+            .sum::<u64>();
+        Some(())
+    }
+
+    fn hop(&mut self, name: &'static str, from: Timing, to: Timing, busy_until: Option<u64>) {
+        let (sent, received) = (from.sent_at_nanos, to.received_at_nanos);
+        let free = busy_until.unwrap_or(0).clamp(sent, received.max(sent));
+        let (waiting, transport) = (free - sent, received.saturating_sub(free));
+        self.note(Kind::Waiting, name, waiting);
+        self.note(Kind::Transport, name, transport);
+        self.total.waiting += waiting;
+        self.total.transport += transport;
+    }
+
+    fn remember(&mut self, record: &FrameRecord) {
+        for (view, it) in record.views.iter().enumerate() {
+            if let Some(pose) = it.pose {
+                self.sent.insert(("pose", view), pose.timing.sent_at_nanos);
+            }
+        }
+        for pair in &record.pairs {
+            let worker = pair.stamp.view as usize % self.n_workers;
+            let last = self.sent.entry(("fuse", worker)).or_default();
+            *last = pair.timing.sent_at_nanos.max(*last);
+        }
+        let sent = record.pose3d.timing.sent_at_nanos;
+        self.sent.insert(("triangulate", 0), sent);
+    }
+
+    fn note(&mut self, kind: Kind, name: &'static str, nanos: u64) {
+        if let Some(histogram) = self.histograms.get_mut(&(kind, name)) {
+            histogram.saturating_record(nanos / 1000);
+        }
+    }
+
+    /// What became of the time so far.
+    pub fn report(&self) -> Report {
+        let of = |kind| {
+            let those = self.histograms.iter().filter(move |it| it.0.0 == kind);
+            those
+                .filter(|it| !it.1.is_empty())
+                .map(|(key, it)| (key.1, percentiles(it)))
+                .collect::<BTreeMap<_, _>>()
+        };
+        let whole = self.total.end_to_end as f64;
+        let share = |nanos: u64| (whole > 0.0).then(|| nanos as f64 / whole);
+        Report {
+            stages: of(Kind::Stage),
+            transport: of(Kind::Transport),
+            waiting: of(Kind::Waiting),
+            end_to_end: of(Kind::EndToEnd).remove("").unwrap_or_default(),
+            share_not_computation: share(self.total.computation).map(|it| 1.0 - it),
+            share_transport: share(self.total.transport),
+            share_waiting: share(self.total.waiting),
+        }
+    }
+}
+
+fn computation(timing: Timing) -> u64 {
+    timing
+        .sent_at_nanos
+        .saturating_sub(timing.received_at_nanos)
+}
+
+fn percentiles(histogram: &Histogram<u32>) -> Percentiles {
+    let ms = |micros: u64| micros as f64 / 1000.0;
+    Percentiles {
+        count: histogram.len(),
+        p50_ms: ms(histogram.value_at_quantile(0.5)),
+        p99_ms: ms(histogram.value_at_quantile(0.99)),
+        max_ms: ms(histogram.max()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::{FrameHeader, PairPose};
+
+    use super::*;
+    use crate::testing::record;
+
+    const MS: u64 = 1_000_000;
+
+    fn timing(received_ms: u64, sent_ms: u64) -> Timing {
+        Timing {
+            received_at_nanos: received_ms * MS,
+            sent_at_nanos: sent_ms * MS,
+        }
+    }
+
+    /// One way: capture 10..20, pose 22..52, fuse 53..73, triangulate 75..80.
+    fn timed(frame: u64, start_ms: u64) -> FrameRecord {
+        let mut it = record(frame);
+        for view in &mut it.views {
+            view.frame = Some(FrameHeader {
+                timing: timing(start_ms + 10, start_ms + 20),
+                ..FrameHeader::default()
+            });
+            if let Some(pose) = &mut view.pose {
+                pose.timing = timing(start_ms + 22, start_ms + 52);
+            }
+        }
+        it.pairs = vec![PairPose {
+            timing: timing(start_ms + 53, start_ms + 73),
+            ..PairPose::default()
+        }];
+        it.pose3d.stamp.captured_at_nanos = (start_ms + 10) * MS;
+        it.pose3d.timing = timing(start_ms + 75, start_ms + 80);
+        it
+    }
+
+    fn near(got: f64, expected: f64) {
+        assert!(
+            (got - expected).abs() < 0.01 * expected.abs() + 1e-9,
+            "{got} {expected}"
+        );
+    }
+
+    #[test]
+    fn computation_and_transport_make_up_the_whole() {
+        let mut latency = Latency::new(1).unwrap();
+        latency.add(&timed(0, 0));
+        let got = latency.report();
+        near(got.end_to_end.p50_ms, 70.0);
+        near(got.stages["pose"].p50_ms, 30.0);
+        near(got.share_not_computation.unwrap(), 5.0 / 70.0);
+        near(got.share_transport.unwrap(), 5.0 / 70.0);
+        assert_eq!(got.share_waiting.unwrap(), 0.0);
+    }
+
+    #[test]
+    fn time_behind_a_busy_process_is_waiting_not_transport() {
+        let mut latency = Latency::new(1).unwrap();
+        latency.add(&timed(0, 0));
+        // The pose process is busy until 52; frame 1 was sent at 30 and taken at 54.
+        let mut second = timed(1, 32);
+        for view in &mut second.views {
+            if let Some(frame) = &mut view.frame {
+                frame.timing = timing(25, 30);
+            }
+        }
+        second.pose3d.stamp.captured_at_nanos = 25 * MS;
+        latency.add(&second);
+        let got = latency.report();
+        near(got.waiting["capture to pose"].max_ms, 22.0);
+        near(got.transport["capture to pose"].max_ms, 2.0);
+    }
+
+    #[test]
+    fn a_frame_without_a_result_has_no_end_to_end_time() {
+        let mut latency = Latency::new(1).unwrap();
+        let mut it = timed(0, 0);
+        it.pose3d.status = Status::TOO_FEW_VIEWS;
+        latency.add(&it);
+        let got = latency.report();
+        assert_eq!(got.end_to_end.count, 0);
+        assert_eq!(got.share_not_computation, None);
+        assert_eq!(got.stages["pose"].count, 2);
+    }
+}

@@ -1,0 +1,147 @@
+//! `pose3d.jsonl` and `pose3d.csv`: joints in the world.
+
+use messages::{Joint3d, Pose3d, Status};
+use serde_json::{Map, Value, json};
+
+use crate::Scene;
+
+/// First line of `pose3d.csv`; one row a joint follows, empty where there is no position.
+pub(crate) const CSV_HEADER: &str = "frame,time_s,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
+cov_yy_m2,cov_yz_m2,cov_zz_m2,reprojection_px,views,status";
+
+/// The joints of a message with their names, as many as both sides know.
+pub(crate) fn joints<'a>(
+    scene: &'a Scene,
+    pose: &'a Pose3d,
+) -> impl Iterator<Item = (&'static str, &'a Joint3d)> {
+    let n = pose.n_joints as usize;
+    scene
+        .joints
+        .joints
+        .iter()
+        .map(|it| it.name)
+        .zip(pose.joints.iter().take(n))
+}
+
+/// Whether a joint has a position that can be written down.
+pub(crate) fn is_placed(joint: &Joint3d) -> bool {
+    joint.status == Status::OK && joint.in_world.iter().all(|it| it.is_finite())
+}
+
+/// One line of `pose3d.jsonl`, without its end.
+pub(crate) fn json_line(scene: &Scene, pose: &Pose3d) -> String {
+    let joints: Map<String, Value> = joints(scene, pose)
+        .map(|(name, it)| (name.to_owned(), joint(scene, it)))
+        .collect();
+    json!({
+        "frame": pose.stamp.frame,
+        "time_s": scene.time_s(pose.stamp.frame),
+        "status": pose.status.reason(),
+        "views_present": scene.names(pose.views_present),
+        "views_used": scene.names(pose.views_used),
+        "pairs": pose.n_pairs,
+        "facing_margin": pose.facing_margin,
+        "joints": joints,
+    })
+    .to_string()
+}
+
+/// Numbers that are none become `null` in JSON, never `NaN`.
+fn joint(scene: &Scene, it: &Joint3d) -> Value {
+    if !is_placed(it) {
+        return json!({ "status": it.status.reason() });
+    }
+    json!({
+        "position_m": it.in_world,
+        "covariance_m2": it.covariance,
+        "reprojection_px": it.reprojection_px,
+        "views": scene.names(it.views_used),
+    })
+}
+
+/// The rows of one frame in `pose3d.csv`, each with its end.
+pub(crate) fn csv_rows(scene: &Scene, pose: &Pose3d) -> String {
+    let frame = pose.stamp.frame;
+    let time = scene
+        .time_s(frame)
+        .map_or(String::new(), |it| format!("{it:.6}"));
+    joints(scene, pose)
+        .map(|(name, it)| {
+            let views = scene.names(it.views_used).join("+");
+            let numbers = if is_placed(it) {
+                let all = it.in_world.iter().chain(&it.covariance);
+                let mut cells: Vec<String> = all.map(|value| cell(*value)).collect();
+                cells.push(cell(it.reprojection_px));
+                cells.join(",")
+            } else {
+                ",".repeat(9)
+            };
+            format!(
+                "{frame},{time},{name},{numbers},{views},{}\n",
+                it.status.reason()
+            )
+        })
+        .collect::<Vec<_>>()
+        .concat()
+}
+
+fn cell(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:.9e}")
+    } else {
+        String::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{pose3d, scene};
+
+    #[test]
+    fn a_line_says_which_views_were_used() {
+        let mut pose = pose3d(7);
+        pose.views_present = 0b11;
+        pose.views_used = 0b10;
+        let line: Value = serde_json::from_str(&json_line(&scene(), &pose)).unwrap();
+        assert_eq!(line["frame"], 7);
+        assert_eq!(line["views_present"], json!(["left", "right"]));
+        assert_eq!(line["views_used"], json!(["right"]));
+        assert_eq!(line["joints"]["head"]["position_m"], json!([1.0, 2.0, 3.0]));
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_never_written_as_one() {
+        let mut pose = pose3d(0);
+        pose.facing_margin = f64::INFINITY;
+        pose.joints[0].reprojection_px = f64::NAN;
+        pose.joints[1].in_world[2] = f64::NAN;
+        let text = json_line(&scene(), &pose);
+        let line: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            line["joints"]["right ankle"]["reprojection_px"],
+            Value::Null
+        );
+        assert_eq!(line["joints"]["right knee"].get("position_m"), None);
+        assert!(!csv_rows(&scene(), &pose).to_lowercase().contains("nan"));
+    }
+
+    #[test]
+    fn every_row_has_as_many_cells_as_the_header() {
+        let mut pose = pose3d(3);
+        pose.joints[4].status = Status::TOO_FEW_VIEWS;
+        let columns = CSV_HEADER.split(',').count();
+        let rows = csv_rows(&scene(), &pose);
+        assert_eq!(rows.lines().count(), 14);
+        for row in rows.lines() {
+            assert_eq!(row.split(',').count(), columns, "{row}");
+        }
+    }
+
+    #[test]
+    fn a_count_beyond_the_joint_set_is_cut() {
+        let mut pose = pose3d(0);
+        pose.n_joints = u32::MAX;
+        assert_eq!(joints(&scene(), &pose).count(), 14);
+    }
+}

@@ -1,0 +1,96 @@
+//! `pose3d.trc` for `OpenSim`: tab separated, metres, y up.
+
+use core::fmt::Write as _;
+
+use messages::Pose3d;
+use nalgebra::Vector3;
+
+use crate::Scene;
+use crate::pose3d::{is_placed, joints};
+
+/// One row, with its end; a missing joint leaves its three cells empty.
+///
+/// * `row`: number of the row, from 1.
+pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
+    let axes = scene.opensim_from_world();
+    let time = scene.time_s(pose.stamp.frame).unwrap_or(0.0);
+    let mut text = format!("{row}\t{time:.6}");
+    for (_, joint) in joints(scene, pose) {
+        if is_placed(joint) {
+            let [x, y, z]: [f64; 3] = (axes * Vector3::from(joint.in_world)).into();
+            // Writing to a string cannot fail.
+            let _infallible = write!(text, "\t{x:.6}\t{y:.6}\t{z:.6}");
+        } else {
+            text.push_str("\t\t\t");
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// The five lines before the rows.
+///
+/// * `n_rows`: rows that follow.
+pub(crate) fn header(scene: &Scene, n_rows: u64) -> String {
+    let rate = scene.frame_rate_hz.unwrap_or(1.0) / scene.frame_step.max(1) as f64;
+    let names: Vec<String> = scene
+        .joints
+        .joints
+        .iter()
+        .map(|it| it.name.replace(' ', "_"))
+        .collect();
+    let n = names.len();
+    let markers = names.join("\t\t\t");
+    let axes: Vec<String> = (1..=n).map(|it| format!("X{it}\tY{it}\tZ{it}")).collect();
+    let axes = axes.join("\t");
+    format!(
+        "PathFileType\t4\t(X/Y/Z)\tpose3d.trc\n\
+         DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n\
+         {rate}\t{rate}\t{n_rows}\t{n}\tm\t{rate}\t1\t{n_rows}\n\
+         Frame#\tTime\t{markers}\t\t\n\
+         \t\t{axes}\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use evaluation::Trc;
+    use messages::Status;
+
+    use super::*;
+    use crate::testing::{pose3d, scene};
+
+    fn written(poses: &[Pose3d]) -> Trc {
+        let scene = scene();
+        let mut text = header(&scene, poses.len() as u64);
+        for (index, pose) in poses.iter().enumerate() {
+            text.push_str(&row(&scene, index as u64 + 1, pose));
+        }
+        Trc::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn what_was_written_reads_back() {
+        let mut moved = pose3d(1);
+        moved.joints[0].in_world = [-0.25, 0.5, 1.75];
+        let got = written(&[pose3d(0), moved]);
+        assert_eq!(got.rate_hz, 30.0);
+        assert_eq!(got.units, "m");
+        assert_eq!(got.markers.len(), 14);
+        assert_eq!(got.markers[0], "right_ankle");
+        assert_eq!(got.frames.len(), 2);
+        // z is up in the scene: (y, z, x).
+        assert_eq!(got.frames[1][0], Some([0.5, 1.75, -0.25]));
+    }
+
+    #[test]
+    fn a_missing_joint_reads_back_as_missing() {
+        let mut pose = pose3d(0);
+        pose.joints[3].status = Status::TOO_FEW_VIEWS;
+        pose.joints[13].in_world[0] = f64::NAN;
+        let got = written(&[pose]);
+        assert_eq!(got.frames[0][3], None);
+        assert_eq!(got.frames[0][13], None);
+        assert!(got.frames[0][4].is_some());
+    }
+}
