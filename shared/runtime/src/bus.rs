@@ -22,7 +22,7 @@ use crate::topic::TopicPlan;
 use crate::{Namespace, NamespaceError, Progress, Stop};
 
 /// How long a sender waits for a receiver without room, unless told otherwise.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 
 /// The deployment's shared memory cannot be reached, or a topic not be created.
 #[derive(Debug, thiserror::Error)]
@@ -104,7 +104,7 @@ impl Bus {
     /// [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`], [`BusError::Name`].
     pub fn open(namespace: &Namespace, process: &str, stop: &Stop) -> Result<Self, BusError> {
         let config = prepare(namespace)?;
-        let name = NodeName::new(process).map_err(|_| BusError::Name {
+        let name = NodeName::new(process).ok().ok_or_else(|| BusError::Name {
             name: process.to_owned(),
         })?;
         let node = NodeBuilder::new()

@@ -258,7 +258,7 @@ mod tests {
         else {
             panic!("must not fit into nothing");
         };
-        assert!(check_room(&topics, needed_bytes).is_ok());
-        assert!(check_room(&topics, needed_bytes - 1).is_err());
+        check_room(&topics, needed_bytes).unwrap();
+        check_room(&topics, needed_bytes - 1).unwrap_err();
     }
 }

@@ -162,11 +162,14 @@ impl Given<'_> {
         expected: &'static str,
     ) -> Result<T, LaunchError> {
         let value = self.text(flag)?;
-        value.parse().map_err(|_| LaunchError::Value {
-            flag,
-            value,
-            expected,
-        })
+        match value.parse() {
+            Ok(parsed) => Ok(parsed),
+            Err(_) => Err(LaunchError::Value {
+                flag,
+                value,
+                expected,
+            }),
+        }
     }
 
     fn delivery(&self) -> Result<Delivery, LaunchError> {

@@ -6,6 +6,8 @@ mod namespace;
 mod topic;
 
 mod bus;
+mod clean;
+mod lock;
 mod memory;
 mod payload;
 mod publisher;
@@ -23,11 +25,13 @@ mod progress;
 mod stop;
 
 pub use bus::{Bus, BusError, Topic};
+pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, health_topic, preflight};
 pub use failure::{ExitKind, Failure, Fault, OrFail};
 pub use health::{Health, HealthError};
 pub use launch::{Launch, LaunchError};
+pub use lock::{DeploymentLock, LockError};
 pub use log::init_logging;
 pub use memory::{MemoryError, free_shared_memory};
 pub use namespace::{Namespace, NamespaceError};

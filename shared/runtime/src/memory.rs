@@ -5,7 +5,7 @@
 )]
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use core::mem::MaybeUninit;
 
@@ -73,7 +73,9 @@ pub(crate) fn populate(prefix: &str, port: u128) -> Result<(), MemoryError> {
     for mapping in maps.lines().filter_map(Mapping::parse) {
         let own = mapping.writable
             && mapping.path.starts_with(&begin)
-            && mapping.path.ends_with(".data")
+            && Path::new(mapping.path)
+                .extension()
+                .is_some_and(|it| it == "data")
             && mapping.path.contains(&name);
         if own {
             reserve(&mapping)?;

@@ -161,8 +161,12 @@ impl Namespace {
             root: self.root.clone(),
         };
         let mut config = Config::default();
-        config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| refused())?;
-        let root = IoxPath::new(self.root.as_os_str().as_encoded_bytes()).map_err(|_| refused())?;
+        config.global.prefix = FileName::new(self.prefix.as_bytes())
+            .ok()
+            .ok_or_else(refused)?;
+        let root = IoxPath::new(self.root.as_os_str().as_encoded_bytes())
+            .ok()
+            .ok_or_else(refused)?;
         config.global.set_root_path(&root);
         Ok(config)
     }

@@ -163,7 +163,7 @@ pub(crate) fn create_messages<E: Message, H: Header>(
     let bad_name = || BusError::Name {
         name: plan.topic().to_owned(),
     };
-    let name = ServiceName::new(plan.topic()).map_err(|_| bad_name())?;
+    let name = ServiceName::new(plan.topic()).ok().ok_or_else(bad_name)?;
     let attributes = attributes(plan).ok_or_else(bad_name)?;
     let limits = plan.limits();
     let attempt = || {
@@ -194,7 +194,7 @@ pub(crate) fn create_messages<E: Message, H: Header>(
 }
 
 pub(crate) fn create_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<WakeUp, BusError> {
-    let service = ServiceName::new(name).map_err(|_| BusError::Name {
+    let service = ServiceName::new(name).ok().ok_or_else(|| BusError::Name {
         name: name.to_owned(),
     })?;
     let attempt = || {
@@ -321,7 +321,7 @@ fn attribute(set: &AttributeSet, key: &str) -> Option<usize> {
 }
 
 fn service_name(topic: &str) -> Result<ServiceName, PortError> {
-    ServiceName::new(topic).map_err(|_| PortError::Name {
+    ServiceName::new(topic).ok().ok_or_else(|| PortError::Name {
         topic: topic.to_owned(),
     })
 }

@@ -208,7 +208,7 @@ impl<E: Message, H: Header> Port<E, H> {
         let topic = || Arc::clone(&self.topic);
         let sample = self.subscriber.receive().map_err(|source| match source {
             IoxReceiveError::ExceedsMaxBorrows => ReceiveError::TooManyHeld { topic: topic() },
-            source => ReceiveError::Transport {
+            source @ IoxReceiveError::ConnectionFailure(_) => ReceiveError::Transport {
                 topic: topic(),
                 source,
             },

@@ -1,0 +1,258 @@
+//! One run of a deployment at a time, beginning and ending with nothing left behind.
+
+use core::time::Duration;
+use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::io::{self, Read as _, Seek as _, Write as _};
+use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
+use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::Instant;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeView as _;
+use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
+
+use crate::bus::prepare;
+use crate::{BusError, ExitKind, Fault, Namespace};
+
+const SHARED_MEMORY: &str = "/dev/shm";
+const LOCK_FILE: &str = "lock";
+/// How long the processes of a killed supervisor are given to end.
+const DYING_LIMIT: Duration = Duration::from_secs(3);
+const DYING_PAUSE: Duration = Duration::from_millis(20);
+
+/// The deployment is not free.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// Another supervisor runs it.
+    #[error("deployment {name:?} is already running (process {pid})")]
+    AlreadyRunning {
+        /// Name of the deployment.
+        name: String,
+        /// Its supervisor.
+        pid: String,
+    },
+    /// Its supervisor is gone, but not all of its processes.
+    #[error("processes of an earlier run of deployment {name:?} are still there: {processes}")]
+    StillAlive {
+        /// Name of the deployment.
+        name: String,
+        /// Names and process ids.
+        processes: String,
+    },
+    /// A file cannot be created, locked or removed.
+    #[error("cannot use {path:?}")]
+    File {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// The directory cannot be prepared for iceoryx2.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
+
+impl Fault for LockError {
+    fn kind(&self) -> ExitKind {
+        ExitKind::Run
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::AlreadyRunning { .. } => {
+                Some("stop it, or run this one under another name with --name".to_owned())
+            }
+            Self::StillAlive { .. } => Some("end them with kill -9".to_owned()),
+            Self::File { .. } | Self::Bus(_) => None,
+        }
+    }
+}
+
+/// The right to run a deployment. When it is dropped, nothing of the deployment is left in its
+/// directory and in `/dev/shm`, unless a process of it is still alive.
+#[derive(Debug)]
+pub struct DeploymentLock {
+    namespace: Namespace,
+    config: Config,
+    _file: File,
+}
+
+impl Namespace {
+    /// Takes the right to run this deployment, and removes what a killed run left behind.
+    ///
+    /// # Errors
+    ///
+    /// [`LockError`].
+    pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
+        let file = lock_file(self)?;
+        let config = self.config().map_err(BusError::from)?;
+        let begin = Instant::now();
+        loop {
+            let alive = alive(&config);
+            if alive.is_empty() {
+                break;
+            }
+            if begin.elapsed() > DYING_LIMIT {
+                return Err(LockError::StillAlive {
+                    name: self.name().to_owned(),
+                    processes: alive.join(", "),
+                });
+            }
+            sleep(DYING_PAUSE);
+        }
+        wipe(self)?;
+        prepare(self)?;
+        Ok(DeploymentLock {
+            namespace: self.clone(),
+            config,
+            _file: file,
+        })
+    }
+}
+
+impl DeploymentLock {
+    /// The deployment.
+    pub fn namespace(&self) -> &Namespace {
+        &self.namespace
+    }
+}
+
+impl Drop for DeploymentLock {
+    fn drop(&mut self) {
+        let alive = alive(&self.config);
+        if !alive.is_empty() {
+            tracing::warn!(?alive, "processes are left: so are their files");
+            return;
+        }
+        // The lock goes last, while it is held, so that nobody else can have begun below it.
+        let removed = wipe(&self.namespace)
+            .and_then(|()| remove(&self.namespace.root().join(LOCK_FILE)))
+            .and_then(|()| match fs::remove_dir(self.namespace.root()) {
+                // The next run has already begun.
+                Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
+                result => result.map_err(|source| LockError::File {
+                    path: self.namespace.root().to_owned(),
+                    source,
+                }),
+            });
+        if let Err(error) = removed {
+            tracing::warn!(%error, "cannot remove the files of the deployment");
+        }
+    }
+}
+
+/// Opens and locks the lock file, which another run may remove at the same time.
+fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
+    let path = namespace.root().join(LOCK_FILE);
+    let failed = |source: io::Error| LockError::File {
+        path: path.clone(),
+        source,
+    };
+    loop {
+        DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(namespace.root())
+            .map_err(failed)?;
+        let opened = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path);
+        let mut file = match opened {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            opened => opened.map_err(failed)?,
+        };
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(Errno::WOULDBLOCK) => {
+                let mut pid = String::new();
+                file.read_to_string(&mut pid).map_err(failed)?;
+                return Err(LockError::AlreadyRunning {
+                    name: namespace.name().to_owned(),
+                    pid,
+                });
+            }
+            Err(error) => return Err(failed(error.into())),
+        }
+        let own = file.metadata().map_err(failed)?.ino();
+        if fs::metadata(&path).is_ok_and(|there| there.ino() == own) {
+            file.set_len(0).map_err(failed)?;
+            file.rewind().map_err(failed)?;
+            write!(file, "{}", std::process::id()).map_err(failed)?;
+            return Ok(file);
+        }
+    }
+}
+
+/// Names and process ids of the processes that are registered and alive.
+fn alive(config: &Config) -> Vec<String> {
+    let mut alive = Vec::new();
+    let listed = Node::<ipc::Service>::list(config, |state| {
+        if let NodeState::Alive(node) = state {
+            alive.push(match node.details() {
+                Some(details) => {
+                    format!("{} ({})", details.name(), details.process_id().value())
+                }
+                None => "a process that begins".to_owned(),
+            });
+        }
+        CallbackProgression::Continue
+    });
+    if let Err(error) = listed {
+        tracing::debug!(?error, "cannot list the processes of the deployment");
+    }
+    alive
+}
+
+/// Removes everything but the lock. Nothing may be alive.
+fn wipe(namespace: &Namespace) -> Result<(), LockError> {
+    for path in entries(namespace.root())? {
+        if path.file_name().is_none_or(|name| name != LOCK_FILE) {
+            remove(&path)?;
+        }
+    }
+    for path in entries(Path::new(SHARED_MEMORY))? {
+        let own = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(|name| name.starts_with(namespace.prefix()));
+        if own {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+fn entries(directory: &Path) -> Result<Vec<PathBuf>, LockError> {
+    let failed = |source| LockError::File {
+        path: directory.to_owned(),
+        source,
+    };
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(directory).map_err(failed)? {
+        paths.push(entry.map_err(failed)?.path());
+    }
+    Ok(paths)
+}
+
+fn remove(path: &Path) -> Result<(), LockError> {
+    let is_directory = fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_dir());
+    let removed = if is_directory {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    };
+    match removed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed.map_err(|source| LockError::File {
+            path: path.to_owned(),
+            source,
+        }),
+    }
+}

@@ -1,0 +1,59 @@
+//! A deployment of its own for every test, which leaves nothing behind.
+#![allow(dead_code, reason = "every test file uses a part of it")]
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use runtime::{Bus, DeploymentLock, Namespace, Stop, Topic, TopicPlan};
+
+/// Dropped in this order: topics before the lock, which removes all files.
+pub(crate) struct Deployment {
+    stop: Stop,
+    _topics: Vec<Topic>,
+    _bus: Bus,
+    lock: DeploymentLock,
+    _base: tempfile::TempDir,
+}
+
+impl Deployment {
+    pub(crate) fn new(plans: &[TopicPlan]) -> Self {
+        let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+        let lock = namespace(base.path()).acquire().unwrap();
+        let stop = Stop::new().unwrap();
+        let bus = Bus::open(lock.namespace(), "supervisor", &stop).unwrap();
+        Self {
+            stop,
+            _topics: bus.create_topics(plans).unwrap(),
+            _bus: bus,
+            lock,
+            _base: base,
+        }
+    }
+
+    pub(crate) fn bus(&self, process: &str) -> Bus {
+        Bus::open(self.lock.namespace(), process, &self.stop).unwrap()
+    }
+
+    pub(crate) fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    pub(crate) fn namespace(&self) -> &Namespace {
+        self.lock.namespace()
+    }
+}
+
+pub(crate) fn namespace(base: &Path) -> Namespace {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let n = COUNT.fetch_add(1, Ordering::Relaxed);
+    Namespace::below(&format!("t{n}"), base).unwrap()
+}
+
+/// Files of a deployment in shared memory.
+pub(crate) fn shared_memory(namespace: &Namespace) -> Vec<String> {
+    std::fs::read_dir("/dev/shm")
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.starts_with(namespace.prefix()))
+        .collect()
+}

@@ -1,0 +1,275 @@
+//! Ports of two or more participants in one process; faults need real processes, see `supervise`.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::time::Duration;
+
+use common::Deployment;
+use messages::{EvidenceHeader, FrameHeader, ViewQuality};
+use runtime::{Bus, Delivery, Limits, PortError, SendError, Stop, TopicPlan, Waiter, Woken};
+
+const SOON: Duration = Duration::from_secs(20);
+
+fn quality(frame: u64) -> ViewQuality {
+    let mut message = ViewQuality::default();
+    message.stamp.frame = frame;
+    message
+}
+
+fn small(delivery: Delivery, buffer: usize) -> TopicPlan {
+    TopicPlan::messages::<ViewQuality>("small".to_owned(), delivery, Limits::new(2, buffer, 2))
+}
+
+fn frames(delivery: Delivery, max_len: usize) -> TopicPlan {
+    let limits = Limits::new(2, 1, 2);
+    TopicPlan::slices::<u8, FrameHeader>("frames".to_owned(), delivery, limits, max_len)
+}
+
+#[test]
+fn a_message_arrives_and_wakes() {
+    let deployment = Deployment::new(&[small(Delivery::Realtime, 4)]);
+    let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
+    let publisher = sender.publisher::<ViewQuality>("small").unwrap();
+    let mut waiter = receiver.waiter();
+    let subscriber = receiver
+        .subscriber::<ViewQuality>("small", &mut waiter)
+        .unwrap();
+    assert_eq!(subscriber.receive().unwrap(), None);
+    assert_eq!(publisher.send(&quality(7)).unwrap(), 1);
+    assert_eq!(waiter.wait(SOON).unwrap(), Woken::Message);
+    assert_eq!(subscriber.receive().unwrap(), Some(quality(7)));
+    assert_eq!(subscriber.receive().unwrap(), None);
+    assert_eq!(waiter.wait(Duration::ZERO).unwrap(), Woken::Time);
+}
+
+#[test]
+fn an_array_is_read_where_it_was_written() {
+    let deployment = Deployment::new(&[frames(Delivery::Realtime, 1000)]);
+    let bus = deployment.bus("both");
+    let mut waiter = bus.waiter();
+    let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
+    let subscriber = bus
+        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
+        .unwrap();
+    for (len, value) in [(1000, 3), (1, 4), (999, 5), (0, 6)] {
+        let mut loan = publisher.loan(len).unwrap();
+        assert_eq!(loan.payload_mut().as_ptr().align_offset(64), 0);
+        loan.payload_mut().fill(value);
+        loan.header_mut().width = len as u32;
+        assert_eq!(loan.send().unwrap(), 1);
+        let sample = subscriber.receive().unwrap().unwrap();
+        assert_eq!(sample.payload(), vec![value; len]);
+        assert_eq!(sample.header().width, len as u32);
+        assert_eq!(sample.payload().as_ptr().align_offset(64), 0);
+    }
+}
+
+#[test]
+fn an_array_that_is_too_long_is_refused_with_the_numbers() {
+    let deployment = Deployment::new(&[frames(Delivery::Realtime, 10)]);
+    let bus = deployment.bus("sender");
+    let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
+    assert_eq!(publisher.max_len(), 10);
+    let error = publisher.loan(11).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "topic \"frames\" carries at most 10 elements, got 11"
+    );
+}
+
+#[test]
+fn a_loan_that_is_dropped_is_seen_by_nobody() {
+    let deployment = Deployment::new(&[frames(Delivery::Realtime, 10)]);
+    let bus = deployment.bus("both");
+    let mut waiter = bus.waiter();
+    let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
+    let subscriber = bus
+        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
+        .unwrap();
+    for _ in 0..100 {
+        drop(publisher.loan(10).unwrap());
+    }
+    assert!(subscriber.receive().unwrap().is_none());
+}
+
+#[test]
+fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
+    let deployment = Deployment::new(&[frames(Delivery::Realtime, 8)]);
+    let bus = deployment.bus("both");
+    let mut waiter = bus.waiter();
+    let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
+    let subscriber = bus
+        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
+        .unwrap();
+    let held = {
+        let mut loan = publisher.loan(8).unwrap();
+        loan.payload_mut().fill(200);
+        loan.send().unwrap();
+        subscriber.receive().unwrap().unwrap()
+    };
+    for value in 0..100 {
+        let mut loan = publisher.loan(8).unwrap();
+        loan.payload_mut().fill(value);
+        loan.send().unwrap();
+    }
+    assert_eq!(subscriber.latest().unwrap().unwrap().payload(), [99; 8]);
+    assert_eq!(held.payload(), [200; 8], "what is held is not overwritten");
+}
+
+#[test]
+fn a_slow_receiver_of_a_lossless_topic_gets_everything_in_order() {
+    const N: u64 = 200;
+    let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
+    let namespace = deployment.namespace().clone();
+    let sender = std::thread::Builder::new()
+        .spawn(move || {
+            let bus = Bus::open(&namespace, "sender", &Stop::new().unwrap()).unwrap();
+            let publisher = bus.publisher::<ViewQuality>("small").unwrap();
+            assert_eq!(publisher.wait_for_subscribers(1, SOON), 1);
+            for frame in 0..N {
+                assert_eq!(publisher.send(&quality(frame)).unwrap(), 1);
+            }
+        })
+        .unwrap();
+    let bus = deployment.bus("receiver");
+    let mut waiter = bus.waiter();
+    let subscriber = bus.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
+    let mut got = Vec::new();
+    while got.len() < N as usize {
+        waiter.wait(SOON).unwrap();
+        while let Some(message) = subscriber.receive().unwrap() {
+            got.push(message.stamp.frame);
+            if got.len() % 50 == 0 {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+        }
+    }
+    assert_eq!(got, (0..N).collect::<Vec<_>>());
+    sender.join().unwrap();
+}
+
+#[test]
+fn a_subscriber_that_was_there_first_counts_once_it_hears_the_publisher() {
+    let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
+    let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
+    let mut waiter = receiver.waiter();
+    let subscriber = receiver
+        .subscriber::<ViewQuality>("small", &mut waiter)
+        .unwrap();
+    let publisher = sender.publisher::<ViewQuality>("small").unwrap();
+    assert_eq!(publisher.n_connected(), 1);
+    assert_eq!(
+        publisher.wait_for_subscribers(1, Duration::from_millis(50)),
+        0
+    );
+    assert_eq!(subscriber.receive().unwrap(), None);
+    assert_eq!(publisher.wait_for_subscribers(1, SOON), 1);
+}
+
+#[test]
+fn a_sender_that_waits_for_room_obeys_a_stop() {
+    let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
+    let (publisher, subscriber, waiter) = blocked(&deployment, Duration::from_mins(10));
+    let stop = deployment.stop().clone();
+    let stopper = std::thread::Builder::new()
+        .spawn(move || {
+            std::thread::sleep(Duration::from_millis(50));
+            stop.request();
+        })
+        .unwrap();
+    let error = publisher.send(&quality(2)).unwrap_err();
+    assert!(error.is_stopped(), "{error}");
+    stopper.join().unwrap();
+    drop((subscriber, waiter));
+}
+
+#[test]
+fn a_sender_gives_up_on_a_receiver_that_never_makes_room() {
+    let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
+    let (publisher, subscriber, waiter) = blocked(&deployment, Duration::from_millis(100));
+    let error = publisher.send(&quality(2)).unwrap_err();
+    assert!(matches!(error, SendError::Stuck { .. }), "{error}");
+    drop((subscriber, waiter));
+}
+
+/// A publisher whose next message has no room.
+fn blocked(
+    deployment: &Deployment,
+    patience: Duration,
+) -> (
+    runtime::Publisher<ViewQuality>,
+    runtime::Subscriber<ViewQuality>,
+    Waiter,
+) {
+    let bus = deployment.bus("both").with_patience(patience);
+    let publisher = bus.publisher::<ViewQuality>("small").unwrap();
+    let mut waiter = bus.waiter();
+    let subscriber = bus.subscriber::<ViewQuality>("small", &mut waiter).unwrap();
+    assert_eq!(publisher.send(&quality(1)).unwrap(), 1);
+    (publisher, subscriber, waiter)
+}
+
+#[test]
+fn a_stop_wakes_whoever_waits() {
+    let deployment = Deployment::new(&[]);
+    let waiter = deployment.bus("waiter").waiter();
+    assert_eq!(waiter.wait(Duration::ZERO).unwrap(), Woken::Time);
+    deployment.stop().request();
+    assert_eq!(waiter.wait(SOON).unwrap(), Woken::Stop);
+    assert_eq!(waiter.wait(SOON).unwrap(), Woken::Stop);
+}
+
+#[test]
+fn another_type_is_refused_by_name() {
+    let deployment = Deployment::new(&[frames(Delivery::Realtime, 8)]);
+    let bus = deployment.bus("wrong");
+    for error in [
+        bus.slice_publisher::<f32, FrameHeader>("frames")
+            .unwrap_err(),
+        bus.slice_publisher::<u8, EvidenceHeader>("frames")
+            .unwrap_err(),
+        bus.publisher::<ViewQuality>("frames").unwrap_err(),
+    ] {
+        assert!(matches!(error, PortError::WrongType { .. }), "{error}");
+        assert!(error.to_string().contains("\"frames\""), "{error}");
+    }
+}
+
+#[test]
+fn a_topic_that_nobody_created_is_refused() {
+    let deployment = Deployment::new(&[]);
+    let error = deployment
+        .bus("lost")
+        .publisher::<ViewQuality>("small")
+        .unwrap_err();
+    assert!(matches!(error, PortError::NoSuchTopic { .. }), "{error}");
+}
+
+#[test]
+fn one_publisher_too_many_is_refused() {
+    let deployment = Deployment::new(&[small(Delivery::Realtime, 1)]);
+    let bus = deployment.bus("greedy");
+    let first = bus.publisher::<ViewQuality>("small").unwrap();
+    let error = bus.publisher::<ViewQuality>("small").unwrap_err();
+    assert!(matches!(error, PortError::Publisher { .. }), "{error}");
+    drop(first);
+    bus.publisher::<ViewQuality>("small").unwrap();
+}
+
+#[test]
+fn two_deployments_do_not_hear_each_other() {
+    let (one, two) = (
+        Deployment::new(&[small(Delivery::Realtime, 4)]),
+        Deployment::new(&[small(Delivery::Realtime, 4)]),
+    );
+    let (bus_one, bus_two) = (one.bus("same"), two.bus("same"));
+    let mut waiter = bus_two.waiter();
+    let publisher = bus_one.publisher::<ViewQuality>("small").unwrap();
+    let subscriber = bus_two
+        .subscriber::<ViewQuality>("small", &mut waiter)
+        .unwrap();
+    assert_eq!(publisher.send(&quality(1)).unwrap(), 0);
+    assert_eq!(subscriber.receive().unwrap(), None);
+    assert_ne!(one.namespace().prefix(), two.namespace().prefix());
+}
