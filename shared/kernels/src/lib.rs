@@ -5,6 +5,7 @@
 )]
 
 mod correlate;
+mod envelope;
 mod gradient;
 mod hog;
 mod image;
@@ -14,6 +15,7 @@ mod spring;
 mod vote;
 
 pub use correlate::{FeatureMap, FilterBank, Template, correlate_f64};
+pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;

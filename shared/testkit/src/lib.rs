@@ -1,2 +1,4 @@
-//! To be written.
+//! What only tests need.
 #![forbid(unsafe_code)]
+
+pub mod npy;

@@ -1,0 +1,222 @@
+//! The whole single-view method in double precision, written to be read and compared.
+//!
+//! It follows the reference programs stage by stage, down to the order of sums that decides ties.
+//! Some hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
+//! which give the same answers but for rounding; springs are per child type only.
+
+use kernels::{
+    HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce, resize, transform_f64,
+};
+
+use crate::{Edge, Layout, LevelLayout, Model, Placement, Spring, Springs};
+
+/// The image at every level of `layout`.
+///
+/// # Panics
+///
+/// If the layout is another image's.
+pub fn pyramid(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Vec<Planes> {
+    assert_eq!(layout.image_size, [image.width(), image.height()]);
+    let interval = model.spec().interval;
+    let mut images: Vec<Planes> = Vec::with_capacity(layout.levels.len());
+    for (level, it) in layout.levels.iter().enumerate() {
+        let mut out = Planes::default();
+        match level.checked_sub(interval) {
+            None => resize(image, it.image_size[0], it.image_size[1], &mut out),
+            Some(above) => reduce(&images[above], &mut out),
+        }
+        images.push(out);
+    }
+    images
+}
+
+/// The padded features of one level, `rows x cols x N_CHANNELS` of [`LevelLayout::padded`].
+pub fn features(model: &Model, layout: &Layout, image: &Planes) -> Vec<f64> {
+    let shape = HogShape {
+        cell_px: model.spec().cell_px,
+        pad: layout.pad.map(|it| it + 1),
+    };
+    hog_f64(image, shape)
+}
+
+/// The response map of every filter on one level, each `rows x cols`.
+pub fn responses(model: &Model, level: &LevelLayout, features: &[f64]) -> Vec<Vec<f64>> {
+    let respond = |filter: &crate::Filter| {
+        let template = Template {
+            rows: filter.rows,
+            cols: filter.cols,
+            weights: &filter.weights,
+        };
+        correlate_f64(template, level.padded, features, [level.rows, level.cols])
+    };
+    model.spec().filters.iter().map(respond).collect()
+}
+
+/// What a child contributes to its parent, for one type of the parent; every map is `rows x cols`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vote {
+    /// The best contribution.
+    pub score: Vec<f64>,
+    /// The child that makes it.
+    pub child: Vec<Placement>,
+}
+
+/// The votes of a child for every type of its parent.
+///
+/// * `scores`: of the child, one map per type, its own children's votes included.
+///
+/// # Panics
+///
+/// If the springs are per pair of types.
+pub fn votes(edge: &Edge, scores: &[Vec<f64>], size: [usize; 2]) -> Vec<Vote> {
+    let Springs::PerChildType(springs) = &edge.springs else {
+        panic_on_pairs();
+    };
+    let transformed: Vec<_> = scores
+        .iter()
+        .zip(springs)
+        .map(|(scores, &Spring { w, anchor })| {
+            transform_f64(scores, size, &kernels::Spring { w, anchor })
+        })
+        .collect();
+    let of_parent_type = |bias: &Vec<f64>| {
+        let mut vote = Vote {
+            score: vec![f64::NEG_INFINITY; size[0] * size[1]],
+            child: vec![Placement::default(); size[0] * size[1]],
+        };
+        for (mixture, (it, bias)) in transformed.iter().zip(bias).enumerate() {
+            for cell in 0..size[0] * size[1] {
+                let score = it.score[cell] + bias;
+                if score > vote.score[cell] {
+                    vote.score[cell] = score;
+                    vote.child[cell] = Placement {
+                        x: it.x[cell] as u16,
+                        y: it.y[cell] as u16,
+                        mixture: mixture as u8,
+                    };
+                }
+            }
+        }
+        vote
+    };
+    edge.bias.iter().map(of_parent_type).collect()
+}
+
+#[expect(
+    clippy::panic,
+    reason = "documented; the released models have no such springs"
+)]
+fn panic_on_pairs() -> ! {
+    panic!("the reference takes one spring per type of the child")
+}
+
+/// The solved tree of one level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    /// Score of the best tree at every cell of the root for every type of the root, bias included.
+    pub root: Vec<Vec<f64>>,
+    /// Per part what it told its parent; empty for the root.
+    pub votes: Vec<Vec<Vote>>,
+}
+
+/// Passes all votes of one level from the leaves to the root.
+///
+/// * `responses`: one map per filter.
+pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solved {
+    let parts = &model.spec().parts;
+    let own = |part: &crate::PartSpec| {
+        let filters = part.filter_of_type.iter();
+        filters.map(|&it| responses[it].clone()).collect::<Vec<_>>()
+    };
+    let mut scores: Vec<_> = parts.iter().map(own).collect();
+    let mut all_votes = vec![Vec::new(); parts.len()];
+    for part in (0..parts.len()).rev() {
+        let Some(edge) = &parts[part].edge else {
+            continue;
+        };
+        let votes = votes(edge, &scores[part], size);
+        for (scores, vote) in scores[edge.parent].iter_mut().zip(&votes) {
+            for (score, vote) in scores.iter_mut().zip(&vote.score) {
+                *score += vote;
+            }
+        }
+        all_votes[part] = votes;
+    }
+    let mut root = scores.swap_remove(0);
+    for score in root.iter_mut().flatten() {
+        *score += model.spec().root_bias;
+    }
+    Solved {
+        root,
+        votes: all_votes,
+    }
+}
+
+/// A pose in double precision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferencePose {
+    /// Value of the maximised energy.
+    pub score: f64,
+    /// Level of the pyramid, from 0.
+    pub level: usize,
+    /// One placement per part.
+    pub parts: Vec<Placement>,
+}
+
+impl Solved {
+    /// The best score of the root, its cell and its type; first cell, then first type.
+    pub fn best(&self) -> (f64, usize, usize) {
+        let n_cells = self.root.first().map_or(0, Vec::len);
+        let mut best = (f64::NEG_INFINITY, 0, 0);
+        for cell in 0..n_cells {
+            for (mixture, scores) in self.root.iter().enumerate() {
+                if scores[cell] > best.0 {
+                    best = (scores[cell], cell, mixture);
+                }
+            }
+        }
+        best
+    }
+
+    /// The tree that hangs on the root of the given type at the given cell.
+    pub fn backtrack(
+        &self,
+        model: &Model,
+        cols: usize,
+        cell: usize,
+        mixture: usize,
+    ) -> Vec<Placement> {
+        let mut parts = vec![Placement {
+            x: (cell % cols) as u16,
+            y: (cell / cols) as u16,
+            mixture: mixture as u8,
+        }];
+        for (part, votes) in self.votes.iter().enumerate() {
+            if let Some(edge) = &model.spec().parts[part].edge {
+                let parent: Placement = parts[edge.parent];
+                let cell = usize::from(parent.y) * cols + usize::from(parent.x);
+                parts.push(votes[usize::from(parent.mixture)].child[cell]);
+            }
+        }
+        parts
+    }
+}
+
+/// The best pose in the image; ties go to the lower level.
+pub fn best(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Option<ReferencePose> {
+    let mut best: Option<ReferencePose> = None;
+    let images = pyramid(model, layout, image);
+    for (level, (image, it)) in images.iter().zip(&layout.levels).enumerate() {
+        let responses = responses(model, it, &features(model, layout, image));
+        let solved = solve(model, &responses, [it.rows, it.cols]);
+        let (score, cell, mixture) = solved.best();
+        if best.as_ref().is_none_or(|it| score > it.score) {
+            best = Some(ReferencePose {
+                score,
+                level,
+                parts: solved.backtrack(model, it.cols, cell, mixture),
+            });
+        }
+    }
+    best
+}
