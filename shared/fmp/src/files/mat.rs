@@ -184,18 +184,23 @@ impl<'v, 'a> Elements<'v, 'a> {
         self.structs.len()
     }
 
-    fn find(&self, element: usize, name: &str) -> Option<At<'v, 'a>> {
-        let value = self.structs.get(element, name)?;
-        let field = match self.len() {
+    fn path(&self, element: usize, name: &str) -> String {
+        match self.len() {
             1 => format!("{}.{name}", self.field),
             _ => format!("{}({}).{name}", self.field, element + 1),
-        };
-        Some(At { field, value })
+        }
+    }
+
+    fn find(&self, element: usize, name: &str) -> Option<At<'v, 'a>> {
+        Some(At {
+            value: self.structs.get(element, name)?,
+            field: self.path(element, name),
+        })
     }
 
     fn get(&self, element: usize, name: &str) -> Result<At<'v, 'a>, MatError> {
         self.find(element, name).ok_or_else(|| MatError::Missing {
-            field: format!("{}({}).{name}", self.field, element + 1),
+            field: self.path(element, name),
         })
     }
 }
@@ -372,3 +377,6 @@ fn times(sizes: &[usize]) -> String {
     let sizes: Vec<String> = sizes.iter().map(ToString::to_string).collect();
     sizes.join("x")
 }
+
+#[cfg(test)]
+mod tests;

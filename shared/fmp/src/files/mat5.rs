@@ -443,3 +443,15 @@ impl<'a> Bytes<'a> {
         Ok(data)
     }
 }
+
+/// The numbers of an array that is stored like this.
+#[cfg(test)]
+pub(super) fn one_number(storage: u32, bytes: &[u8]) -> Vec<f64> {
+    let sizes = vec![1, 1];
+    Numbers {
+        sizes,
+        storage,
+        bytes,
+    }
+    .values()
+}

@@ -1,19 +1,25 @@
 //! Model files: the two released formats and Parallax's own.
 
 pub mod mat;
+pub mod own;
 pub mod text;
 
 mod mat5;
+mod payload;
 #[cfg(test)]
 pub(crate) mod planted;
 mod released;
+mod summary;
 mod tokens;
 
-use std::fs;
-use std::io;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::process;
 
 pub use mat5::ContainerError;
+pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
 pub use tokens::Place;
 
 use crate::{Model, ModelError, ModelSpec};
@@ -69,6 +75,14 @@ pub enum ModelFileError {
         /// What is wrong with it.
         source: mat::MatError,
     },
+    /// A file of Parallax, but damaged; or none could be made.
+    #[error("{} is not a sound model file", path.display())]
+    Own {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: own::OwnError,
+    },
     /// The file can be read, but its model makes no sense.
     #[error("the model in {} was refused", path.display())]
     Model {
@@ -80,6 +94,8 @@ pub enum ModelFileError {
 }
 
 /// Reads a model file of any of the formats, told by its first bytes.
+///
+/// A released model takes the file's name without its ending for its own.
 ///
 /// # Errors
 ///
@@ -102,9 +118,47 @@ pub fn read(path: &Path) -> Result<Model, ModelFileError> {
     })
 }
 
+/// Writes a model as Parallax's own file.
+///
+/// The file is complete or is not there: it is written beside its place, flushed to the disk, and
+/// put into its place in one step.
+///
+/// # Errors
+///
+/// [`ModelFileError::Io`] and [`ModelFileError::Own`].
+pub fn write(path: &Path, model: &Model) -> Result<(), ModelFileError> {
+    let bytes = own::encode(model).map_err(|source| ModelFileError::Own {
+        path: path.to_owned(),
+        source,
+    })?;
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", process::id()));
+    let beside = path.with_file_name(name);
+    let written = write_and_sync(&beside, &bytes).and_then(|()| fs::rename(&beside, path));
+    written.map_err(|source| {
+        // The error that is reported came first; one of the removal could add nothing to it.
+        drop(fs::remove_file(&beside));
+        ModelFileError::Io {
+            path: path.to_owned(),
+            doing: "write",
+            source,
+        }
+    })
+}
+
+fn write_and_sync(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
 fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     let path = path.to_owned();
     let stem = path.file_stem().map(|it| it.to_string_lossy().into_owned());
+    if bytes.starts_with(&own::MAGIC) {
+        return own::decode(bytes).map_err(|source| ModelFileError::Own { path, source });
+    }
     let mut spec = if bytes.starts_with(b"MATLAB ") {
         mat::parse(bytes).map_err(|source| ModelFileError::Mat { path, source })?
     } else if bytes.trim_ascii_start().starts_with(b"partsNbr") {
@@ -116,4 +170,101 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
     };
     spec.name = stem.unwrap_or_default();
     Ok(spec)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said_of(name: &str, bytes: &[u8]) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        match read(&path) {
+            Ok(model) => format!("fine: {}", model.spec().name),
+            Err(error) => error
+                .to_string()
+                .replace(&dir.path().display().to_string(), "dir"),
+        }
+    }
+
+    #[test]
+    fn every_format_is_told_by_its_beginning() {
+        let spec = planted::three_parts();
+        let text = planted::as_text(&spec);
+        assert_eq!(said_of("he.dat", text.as_bytes()), "fine: he");
+        let mat = planted::mat::file("model", &planted::mat::model(&spec), true);
+        assert_eq!(said_of("parse.final.txt", &mat), "fine: parse.final");
+        let own = own::encode(&Model::new(spec).unwrap()).unwrap();
+        assert_eq!(said_of("other.mat", &own), "fine: unnamed");
+    }
+
+    #[test]
+    fn what_is_no_model_is_refused_by_name() {
+        let expected = "dir/m is not a model: it begins with \"\\u{89}PNG\", expected `PLXMODEL` (Parallax), \
+                        `MATLAB 5.0` (Yang & Ramanan) or `partsNbr` (the authors' text)";
+        assert_eq!(
+            said_of("m", b"\x89PNG").replace('\u{fffd}', "\\u{89}"),
+            expected
+        );
+        assert!(said_of("m", b"").contains("it begins with \"\""));
+    }
+
+    #[test]
+    fn an_absent_model_says_where_models_come_from() {
+        let error = read(Path::new("no/such.plx")).unwrap_err();
+        assert!(matches!(error, ModelFileError::Absent { .. }));
+        assert!(
+            error
+                .to_string()
+                .starts_with("there is no model file no/such.plx: ")
+        );
+        assert!(error.to_string().contains("parallax model import"));
+    }
+
+    #[test]
+    fn a_folder_is_no_model() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = read(dir.path()).unwrap_err();
+        assert!(matches!(error, ModelFileError::Io { doing: "read", .. }));
+    }
+
+    #[test]
+    fn a_model_that_makes_no_sense_is_refused() {
+        let mut spec = planted::three_parts();
+        spec.interval = 65;
+        let expected = "the model in dir/m was refused";
+        assert_eq!(said_of("m", planted::as_text(&spec).as_bytes()), expected);
+    }
+
+    #[test]
+    fn damage_is_told_with_the_name_of_the_file() {
+        let expected = "the model file dir/m cannot be read";
+        assert_eq!(said_of("m", b"partsNbr 1 typ"), expected);
+        assert_eq!(said_of("m", b"MATLAB 5.0"), expected);
+        assert_eq!(said_of("m", b"PLXMODEL"), "dir/m is not a sound model file");
+    }
+
+    #[test]
+    fn writing_replaces_the_file_and_leaves_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.plx");
+        for spec in [planted::three_parts(), planted::per_pair()] {
+            let model = Model::new(spec).unwrap();
+            write(&path, &model).unwrap();
+            assert_eq!(read(&path).unwrap(), model);
+        }
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m.plx");
+        fs::create_dir(&path).unwrap();
+        let model = Model::new(planted::three_parts()).unwrap();
+        let error = write(&path, &model).unwrap_err();
+        assert!(matches!(error, ModelFileError::Io { doing: "write", .. }));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
 }

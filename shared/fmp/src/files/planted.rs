@@ -1,5 +1,10 @@
 //! Small models for tests, every number of them told apart.
 
+pub(crate) mod mat;
+mod text;
+
+pub(crate) use text::as_text;
+
 use crate::{Edge, Filter, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 
 /// A root and two arms that mirror each other, two types each, filters of 2x2 cells.
@@ -36,6 +41,26 @@ pub(crate) fn per_pair() -> ModelSpec {
             ]);
         }
     }
+    spec
+}
+
+/// The published models' 26 parts, one type each.
+pub(crate) fn published_tree() -> ModelSpec {
+    let mut spec = three_parts();
+    spec.filters.truncate(1);
+    spec.parts = skeleton::PARENT
+        .iter()
+        .enumerate()
+        .map(|(part_idx, parent)| PartSpec {
+            name: format!("part {}", part_idx + 1),
+            filter_of_type: vec![0],
+            edge: parent.map(|parent| Edge {
+                parent,
+                bias: vec![vec![0.0]],
+                springs: Springs::PerChildType(vec![spring(part_idx)]),
+            }),
+        })
+        .collect();
     spec
 }
 

@@ -62,7 +62,7 @@ impl Released {
             let filter_of_type = part
                 .filter_ids
                 .iter()
-                .map(|&id| self.index(part_idx, "filter", id, self.filters.len()))
+                .map(|&id| index(part_idx, "filter", id, self.filters.len()))
                 .collect::<Result<_, _>>()?;
             let edge = match part.parent {
                 0 => None,
@@ -93,7 +93,7 @@ impl Released {
     fn root_bias(&self) -> Result<f64, ModelError> {
         let root = self.parts.first().ok_or(ModelError::NoParts)?;
         let id = root.bias_ids.first().and_then(|row| row.first());
-        let idx = self.index(0, "bias", id.copied().unwrap_or(0), self.biases.len())?;
+        let idx = index(0, "bias", id.copied().unwrap_or(0), self.biases.len())?;
         Ok(self.biases[idx])
     }
 
@@ -103,11 +103,11 @@ impl Released {
             if id == 0 {
                 return Ok(f64::NEG_INFINITY);
             }
-            let idx = self.index(part, "bias", id, self.biases.len())?;
+            let idx = index(part, "bias", id, self.biases.len())?;
             Ok(self.biases[idx])
         })?;
         let spring = |id| {
-            let idx = self.index(part, "spring", id, self.springs.len())?;
+            let idx = index(part, "spring", id, self.springs.len())?;
             Ok(self.springs[idx])
         };
         let springs = match &own.spring_ids {
@@ -124,23 +124,18 @@ impl Released {
             springs,
         })
     }
+}
 
-    fn index(
-        &self,
-        part: usize,
-        what: &'static str,
-        id: usize,
-        count: usize,
-    ) -> Result<usize, ModelError> {
-        id.checked_sub(1)
-            .filter(|&idx| idx < count)
-            .ok_or(ModelError::Missing {
-                part: part + 1,
-                what,
-                index: id,
-                count,
-            })
-    }
+/// The 0-based index that `id` stands for, if there is such a thing.
+fn index(part: usize, what: &'static str, id: usize, count: usize) -> Result<usize, ModelError> {
+    id.checked_sub(1)
+        .filter(|&idx| idx < count)
+        .ok_or(ModelError::Missing {
+            part: part + 1,
+            what,
+            index: id,
+            count,
+        })
 }
 
 /// A filter from its values as the files hold them: row fastest, channel slowest.

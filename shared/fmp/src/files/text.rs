@@ -352,3 +352,6 @@ fn largest_filter(it: &mut Tokens<'_>, filters: &[Filter]) -> Result<(), TextErr
         [("rows", maxsize[0], rows), ("cols", maxsize[1], cols)],
     )
 }
+
+#[cfg(test)]
+mod tests;

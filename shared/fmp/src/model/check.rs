@@ -256,6 +256,11 @@ mod tests {
     use super::*;
     use crate::files::planted;
 
+    /// One change to a good model.
+    type Change = fn(&mut ModelSpec);
+    /// One number put into a good model.
+    type ChangeTo = fn(&mut ModelSpec, f64);
+
     /// Makes one change to a good model and gives what is said of it.
     fn said_of(change: impl FnOnce(&mut ModelSpec)) -> String {
         let mut spec = planted::three_parts();
@@ -280,7 +285,7 @@ mod tests {
     #[test]
     fn the_planted_models_are_accepted() {
         assert_eq!(said_of(|_| ()), "fine");
-        assert!(Model::new(planted::per_pair()).is_ok());
+        Model::new(planted::per_pair()).unwrap();
     }
 
     #[test]
@@ -290,7 +295,7 @@ mod tests {
 
     #[test]
     fn refuses_counts_beyond_the_limits() {
-        let cases: [(&str, fn(&mut ModelSpec)); 10] = [
+        let cases: [(&str, Change); 10] = [
             (
                 "number of parts of the model is 65, expected 1 to 64",
                 |it| {
@@ -308,22 +313,22 @@ mod tests {
                 it.parts[1].filter_of_type = vec![0; 33];
             }),
             ("interval of the model is 0, expected 1 to 64", |it| {
-                it.interval = 0
+                it.interval = 0;
             }),
             ("interval of the model is 65, expected 1 to 64", |it| {
-                it.interval = 65
+                it.interval = 65;
             }),
             ("cell size of the model is 1, expected 2 to 64", |it| {
-                it.cell_px = 1
+                it.cell_px = 1;
             }),
             ("cell size of the model is 65, expected 2 to 64", |it| {
-                it.cell_px = 65
+                it.cell_px = 65;
             }),
             ("height of filter 3 is 17, expected 1 to 16", |it| {
-                it.filters[2].rows = 17
+                it.filters[2].rows = 17;
             }),
             ("width of filter 3 is 0, expected 1 to 16", |it| {
-                it.filters[2].cols = 0
+                it.filters[2].cols = 0;
             }),
         ];
         for (expected, change) in cases {
@@ -372,7 +377,7 @@ mod tests {
 
     #[test]
     fn refuses_arrays_of_another_size() {
-        let cases: [(&str, fn(&mut ModelSpec)); 6] = [
+        let cases: [(&str, Change); 6] = [
             ("bias of part 2 has 1 entries, expected 2", |it| {
                 edge(it, 1).bias.pop();
             }),
@@ -392,7 +397,7 @@ mod tests {
                 it.filters[0].weights.pop();
             }),
             ("mirror of the model has 2 entries, expected 3", |it| {
-                it.mirror = Some(vec![0, 1])
+                it.mirror = Some(vec![0, 1]);
             }),
         ];
         for (expected, change) in cases {
@@ -403,31 +408,20 @@ mod tests {
     #[test]
     fn refuses_numbers_that_are_not_finite_or_overflow_single_precision() {
         for bad in [f64::NAN, f64::INFINITY, -2e9] {
-            let changes: [(&str, Box<dyn Fn(&mut ModelSpec)>); 5] = [
-                (
-                    "root bias of the model",
-                    Box::new(move |it| it.root_bias = bad),
-                ),
-                (
-                    "threshold of the model",
-                    Box::new(move |it| it.threshold = bad),
-                ),
-                (
-                    "weight of filter 2",
-                    Box::new(move |it| it.filters[1].weights[9] = bad),
-                ),
-                (
-                    "bias of part 3",
-                    Box::new(move |it| edge(it, 2).bias[1][0] = bad),
-                ),
-                (
-                    "slope of a spring of part 2",
-                    Box::new(move |it| spring(it).w[3] = bad),
-                ),
+            let changes: [(&str, ChangeTo); 5] = [
+                ("root bias of the model", |it, bad| it.root_bias = bad),
+                ("threshold of the model", |it, bad| it.threshold = bad),
+                ("weight of filter 2", |it, bad| {
+                    it.filters[1].weights[9] = bad;
+                }),
+                ("bias of part 3", |it, bad| edge(it, 2).bias[1][0] = bad),
+                ("slope of a spring of part 2", |it, bad| {
+                    spring(it).w[3] = bad;
+                }),
             ];
             for (what, change) in changes {
                 let expected = format!("{what} is {bad}, expected -1e9 to 1e9");
-                assert_eq!(said_of(change), expected);
+                assert_eq!(said_of(|it| change(it, bad)), expected);
             }
         }
     }

@@ -1,0 +1,198 @@
+//! Writes a model as a MATLAB level 5 file of release 1.3 or 1.4.
+
+use std::io::Write as _;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+use crate::{ModelSpec, N_CHANNELS, PartSpec, Springs};
+
+/// A value to be written.
+#[derive(Clone)]
+pub(crate) enum Mat {
+    /// Sizes, and numbers row fastest.
+    Numbers(Vec<usize>, Vec<f64>),
+    /// One row of structs: the fields' names, and all values element by element.
+    Structs(Vec<&'static str>, Vec<Self>),
+    /// One row of cells.
+    Cell(Vec<Self>),
+}
+
+/// The bytes of a file with one variable.
+pub(crate) fn file(name: &str, value: &Mat, compressed: bool) -> Vec<u8> {
+    let variable = matrix(name, value);
+    if compressed {
+        compressed_file(&variable)
+    } else {
+        [header(), variable].concat()
+    }
+}
+
+/// The bytes of a file whose one variable inflates to `variable`.
+pub(crate) fn compressed_file(variable: &[u8]) -> Vec<u8> {
+    let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
+    deflated.write_all(variable).unwrap();
+    let deflated = deflated.finish().unwrap();
+    let tag = [15, deflated.len() as u32].map(u32::to_le_bytes).concat();
+    [header(), tag, deflated].concat()
+}
+
+fn header() -> Vec<u8> {
+    let mut bytes = b"MATLAB 5.0 MAT-file, planted".to_vec();
+    bytes.resize(124, b' ');
+    bytes.extend([0, 1, b'I', b'M']);
+    bytes
+}
+
+/// The `model` struct: release 1.4 (springs per pair, 0 where one never occurs) or 1.3.
+pub(crate) fn model(spec: &ModelSpec) -> Mat {
+    let (mut biases, mut springs) = (vec![spec.root_bias], Vec::new());
+    let components = spec
+        .parts
+        .iter()
+        .flat_map(|part| component(part, &mut biases, &mut springs))
+        .collect();
+    let parents = spec.parts.iter().map(parent_id).collect();
+    let filters = spec.filters.iter().flat_map(|it| {
+        let weight = move |at: usize| {
+            let (row, col) = (at % it.rows, at / it.rows % it.cols);
+            it.weights[(row * it.cols + col) * N_CHANNELS + at / it.rows / it.cols]
+        };
+        let values = (0..it.weights.len()).map(weight).collect();
+        [
+            Mat::Numbers(vec![it.rows, it.cols, N_CHANNELS], values),
+            number(1.0),
+        ]
+    });
+    let [rows, cols] = [spec.filters[0].rows, spec.filters[0].cols];
+    let biases = biases.into_iter().flat_map(|it| [number(it), number(1.0)]);
+    let fields = [
+        ("bias", Mat::Structs(vec!["w", "i"], biases.collect())),
+        ("filters", Mat::Structs(vec!["w", "i"], filters.collect())),
+        ("defs", Mat::Structs(vec!["w", "i", "anchor"], springs)),
+        (
+            "components",
+            Mat::Cell(vec![Mat::Structs(
+                vec!["biasid", "filterid", "defid", "parent"],
+                components,
+            )]),
+        ),
+        ("pa", row(parents)),
+        ("maxsize", row(vec![rows as f64, cols as f64])),
+        ("interval", number(spec.interval as f64)),
+        ("sbin", number(spec.cell_px as f64)),
+        ("thresh", number(spec.threshold)),
+    ];
+    let (names, values) = fields.into_iter().unzip();
+    Mat::Structs(names, values)
+}
+
+/// `biasid`, `filterid`, `defid`, `parent` of a part.
+fn component(part: &PartSpec, biases: &mut Vec<f64>, springs: &mut Vec<Mat>) -> [Mat; 4] {
+    let filter_ids = part
+        .filter_of_type
+        .iter()
+        .map(|&it| it as f64 + 1.0)
+        .collect();
+    let Some(edge) = &part.edge else {
+        let nothing = Mat::Numbers(vec![0, 0], vec![]);
+        return [number(1.0), row(filter_ids), nothing, number(0.0)];
+    };
+    let (n_parent, n_own) = (edge.bias.len(), part.filter_of_type.len());
+    let mut bias_ids = vec![0.0; n_parent * n_own];
+    let mut spring_ids = vec![0.0; n_parent * n_own];
+    let mut add_spring = |spring: &crate::Spring| {
+        let anchor = [spring.anchor[0] + 1, spring.anchor[1] + 1, 0].map(f64::from);
+        springs.extend([row(spring.w.to_vec()), number(1.0), row(anchor.to_vec())]);
+        (springs.len() / 3) as f64
+    };
+    for own in 0..n_own {
+        for parent in 0..n_parent {
+            let at = own * n_parent + parent;
+            if edge.bias[parent][own].is_finite() {
+                biases.push(edge.bias[parent][own]);
+                bias_ids[at] = biases.len() as f64;
+            }
+            if let Springs::PerTypePair(all) = &edge.springs {
+                spring_ids[at] = all[parent][own].as_ref().map_or(0.0, &mut add_spring);
+            }
+        }
+    }
+    let spring_ids = match &edge.springs {
+        Springs::PerChildType(all) => row(all.iter().map(add_spring).collect()),
+        Springs::PerTypePair(_) => Mat::Numbers(vec![n_parent, n_own], spring_ids),
+    };
+    let bias_ids = Mat::Numbers(vec![n_parent, n_own], bias_ids);
+    [
+        bias_ids,
+        row(filter_ids),
+        spring_ids,
+        number(parent_id(part)),
+    ]
+}
+
+fn parent_id(part: &PartSpec) -> f64 {
+    part.edge
+        .as_ref()
+        .map_or(0.0, |edge| edge.parent as f64 + 1.0)
+}
+
+/// A scalar.
+pub(crate) fn number(value: f64) -> Mat {
+    row(vec![value])
+}
+
+/// A row vector.
+pub(crate) fn row(values: Vec<f64>) -> Mat {
+    Mat::Numbers(vec![1, values.len()], values)
+}
+
+fn matrix(name: &str, value: &Mat) -> Vec<u8> {
+    let (class, sizes) = match value {
+        Mat::Cell(values) => (1, vec![1, values.len()]),
+        Mat::Structs(fields, values) => (2, vec![1, values.len() / fields.len()]),
+        Mat::Numbers(sizes, _) => (6, sizes.clone()),
+    };
+    let sizes: Vec<u8> = sizes
+        .iter()
+        .flat_map(|&it| (it as i32).to_le_bytes())
+        .collect();
+    let mut body = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
+    body.extend(element(5, &sizes));
+    body.extend(element(1, name.as_bytes()));
+    match value {
+        Mat::Cell(values) => body.extend(values.iter().flat_map(|it| matrix("", it))),
+        Mat::Structs(fields, values) => {
+            body.extend(element(5, &32_i32.to_le_bytes()));
+            let padded = |it: &&str| format!("{it:\0<32}").into_bytes();
+            body.extend(element(
+                1,
+                &fields.iter().flat_map(padded).collect::<Vec<_>>(),
+            ));
+            body.extend(values.iter().flat_map(|it| matrix("", it)));
+        }
+        Mat::Numbers(_, values) if values.iter().all(|&it| f64::from(it as u8) == it) => {
+            // MATLAB stores numbers in the narrowest type that holds them.
+            let bytes: Vec<u8> = values.iter().map(|&it| it as u8).collect();
+            body.extend(element(2, &bytes));
+        }
+        Mat::Numbers(_, values) => {
+            let bytes: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
+            body.extend(element(9, &bytes));
+        }
+    }
+    element(14, &body)
+}
+
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    if (1..=4).contains(&data.len()) {
+        let mut bytes = (kind | (data.len() as u32) << 16).to_le_bytes().to_vec();
+        bytes.extend(data);
+        bytes.resize(8, 0);
+        return bytes;
+    }
+    let mut bytes = [kind, data.len() as u32].map(u32::to_le_bytes).concat();
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
