@@ -27,8 +27,8 @@ pub fn hog_f64(image: &Planes, shape: HogShape) -> Vec<f64> {
         for x in 0..cols.saturating_sub(2) {
             let norms = [
                 norm(y + 1, x + 1),
-                norm(y + 1, x),
                 norm(y, x + 1),
+                norm(y + 1, x),
                 norm(y, x),
             ];
             let at = (y + shape.pad[0]) * map_cols + x + shape.pad[1];

@@ -93,7 +93,7 @@ fn body(image: &Planes, shape: HogShape, workspace: &mut HogWorkspace, out: &mut
         for (x, (cell, histogram)) in line.iter_mut().zip(histograms).enumerate() {
             normalise(
                 histogram,
-                [below[x + 1], below[x], above[x + 1], above[x]],
+                [below[x + 1], above[x + 1], below[x], above[x]],
                 cell,
             );
         }
