@@ -11,7 +11,7 @@ use std::process::Command;
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
-    &["geometry", "kernels", "messages", "footage"],
+    &["geometry", "kernels", "messages", "footage", "join"],
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation"],

@@ -10,9 +10,9 @@ pub struct Camera {
     pub name: String,
     /// A video, an image, a folder of images, or a glob such as `frames/*.png`.
     pub source: String,
-    /// Where the source's top-left pixel lies on the calibrated sensor, `[x, y]` pixels.
-    #[serde(default)]
-    pub source_offset_px: [i32; 2],
+    /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
+    /// that lacks rows or columns of it. Without it the sizes must be equal.
+    pub source_offset_px: Option<[u32; 2]>,
 }
 
 /// What happens when a stage is slower than its input.

@@ -7,15 +7,19 @@
 
 mod error;
 mod evidence;
+mod pair;
 mod pose;
 mod quality;
+mod skeleton;
 
 pub use error::WireError;
 pub use evidence::{evidence_from_message, levels_to_message};
+pub use pair::{pair_from_message, pair_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, pose_from_message, pose_to_message,
 };
 pub use quality::{sigma_from_message, sigma_to_message};
+pub use skeleton::{check_pose3d, skeleton_to_message};
 
 #[cfg(test)]
 mod testing;

@@ -1,9 +1,14 @@
 //! A tiny model, its layout, and poses on it.
 
+use std::sync::Arc;
+
 use fmp::{
     Edge, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose, Spring, Springs,
 };
+use geometry::{Camera, Intrinsics, Lens};
 use messages::{MAX_PARTS, PoseMessage};
+use multiview::ViewPlan;
+use nalgebra::Isometry3;
 use proptest::prelude::*;
 
 /// Three parts in a chain with one, two and three types.
@@ -83,4 +88,28 @@ pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
             message
         },
     )
+}
+
+/// Two views of [`layout`]'s size.
+pub(crate) fn plans() -> Vec<Arc<ViewPlan>> {
+    let camera = |x: f64| Camera {
+        name: format!("at {x}"),
+        intrinsics: Intrinsics {
+            fx: 80.0,
+            fy: 80.0,
+            cx: 39.5,
+            cy: 29.5,
+            size: [80, 60],
+            lens: Lens::default(),
+        },
+        camera_from_world: Isometry3::translation(x, 0.0, 3.0),
+    };
+    let model = Arc::new(model());
+    let layout = Arc::new(layout());
+    [0.0, 1.0]
+        .map(|x| {
+            let plan = ViewPlan::new(camera(x), Arc::clone(&model), Arc::clone(&layout));
+            Arc::new(plan)
+        })
+        .into()
 }
