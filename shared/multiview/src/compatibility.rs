@@ -1,20 +1,473 @@
-//! Part-type tables (stub of the coordinator so that multiview compiles: replace freely, keep `value`).
+//! How well the types of a part in two views go together, as learned from training images.
 
-/// A table `[part][type in first][type in second]`.
+use nalgebra::{DMatrix, DVector};
+
+/// A number for every part and pair of types, `[part][type in first view][type in second view]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compatibility {
-    values: Vec<Vec<Vec<f64>>>,
+    values: Vec<DMatrix<f64>>,
+    n_unseen: usize,
 }
 
 /// Why a table was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("refused")]
-pub struct CompatibilityError;
+pub enum CompatibilityError {
+    /// More or fewer rows than the model has types.
+    #[error("the table has {got} rows, expected {expected}: one per part and type")]
+    Rows {
+        /// Rows found.
+        got: usize,
+        /// Types of all parts.
+        expected: usize,
+    },
+    /// A row has another length than the part has types.
+    #[error("line {line}: {got} columns, expected {expected}: the part, and one per type")]
+    Columns {
+        /// Line, from 1.
+        line: usize,
+        /// Columns found.
+        got: usize,
+        /// Columns expected.
+        expected: usize,
+    },
+    /// The parts are not in order.
+    #[error("line {line}, column 1: part `{got}`, expected {expected}")]
+    Part {
+        /// Line, from 1.
+        line: usize,
+        /// What stands there.
+        got: String,
+        /// 1-based part.
+        expected: usize,
+    },
+    /// A field is no probability, and not all of its row is NaN.
+    #[error("line {line}, column {column}: `{got}` is not a probability from 0 to 1")]
+    Probability {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What stands there.
+        got: String,
+    },
+    /// A row is no distribution.
+    #[error("line {line}: the probabilities sum to {sum}, expected 1")]
+    Sum {
+        /// Line, from 1.
+        line: usize,
+        /// Their sum.
+        sum: f64,
+    },
+    /// Two tables are about different models.
+    #[error("the two tables have {first:?} and {second:?} types per part")]
+    Shape {
+        /// Types of every part in the one table.
+        first: Vec<usize>,
+        /// In the other.
+        second: Vec<usize>,
+    },
+}
 
 impl Compatibility {
-    /// The entry of a part for a pair of types (row: first-named view; column: second-named view);
-    /// 0 where nothing is known.
+    /// Reads a table in the authors' form: conditional probabilities, without a header.
+    ///
+    /// One line per part and type of the *first*-named view (parts in order, types within them), with
+    /// the 1-based part and then `p(type in second view | type in first view)` for every type of the
+    /// second view, separated by commas. A type of the first view that the training never saw has a
+    /// line of NaN or of zeros: nothing is known of it, so it is read as zeros, which add nothing to
+    /// any score, and counted by [`Self::n_unseen`].
+    ///
+    /// * `n_types`: number of types of every part.
+    ///
+    /// # Errors
+    ///
+    /// [`CompatibilityError`], naming line and column.
+    pub fn parse(text: &str, n_types: &[usize]) -> Result<Self, CompatibilityError> {
+        let lines = text.lines().enumerate();
+        let rows: Vec<(usize, &str)> = lines
+            .map(|(idx, line)| (idx + 1, line.trim()))
+            .filter(|(_, line)| !line.is_empty())
+            .collect();
+        let expected: usize = n_types.iter().sum();
+        if rows.len() != expected {
+            return Err(CompatibilityError::Rows {
+                got: rows.len(),
+                expected,
+            });
+        }
+        let mut rows = rows.into_iter();
+        let mut table = Self {
+            values: Vec::with_capacity(n_types.len()),
+            n_unseen: 0,
+        };
+        for (part_idx, &n) in n_types.iter().enumerate() {
+            let mut values = DMatrix::zeros(n, n);
+            for (first, (line, row)) in rows.by_ref().take(n).enumerate() {
+                match parse_row(line, row, part_idx + 1, n)? {
+                    Some(row) => values.row_mut(first).copy_from_slice(&row),
+                    None => table.n_unseen += 1,
+                }
+            }
+            table.values.push(values);
+        }
+        Ok(table)
+    }
+
+    /// Finds `p(type in first view, type in second view)` from the conditionals of both directions.
+    ///
+    /// With `R = p(b | a)` and `Q = p(a | b)` the marginal `p(a)` satisfies `p(a) = p(a) R Q`: it is
+    /// the stationary distribution of the chain that goes from a type of the first view to one of the
+    /// second and back. Then `p(b) = p(a) R`, and both `p(a) R` and `p(b) Q` are the joint; if the
+    /// tables contradict each other, they are two joints with the same marginals, and the result is
+    /// their mean. Types never seen get 0.
+    ///
+    /// Where the types fall into groups that never meet, the tables do not tell how frequent the
+    /// groups are; every group then counts as often as it has types in the first view.
+    ///
+    /// * `second_given_first`: `p(b | a)`, `[part][a][b]`; `first_given_second`: `p(a | b)`,
+    ///   `[part][b][a]`, as [`Self::parse`] reads them from the two files of a pair.
+    /// * Returns the joint, which sums to 1 for every part that was seen, and the largest total
+    ///   variation distance between a part's two joints: 0 where the tables agree, at most 1.
+    ///
+    /// # Errors
+    ///
+    /// [`CompatibilityError::Shape`]
+    pub fn joint_from_conditionals(
+        second_given_first: &Self,
+        first_given_second: &Self,
+    ) -> Result<(Self, f64), CompatibilityError> {
+        let [first, second] = [second_given_first, first_given_second].map(Self::n_types);
+        if first != second {
+            return Err(CompatibilityError::Shape { first, second });
+        }
+        let mut disagreement = 0.0_f64;
+        let pairs = second_given_first.values.iter();
+        let values = pairs
+            .zip(&first_given_second.values)
+            .map(|(second, first)| {
+                let [one, other] = joints(second, first);
+                disagreement = disagreement.max((&one - &other).abs().sum() / 2.0);
+                (one + other) / 2.0
+            })
+            .collect();
+        Ok((Self::of(values), disagreement))
+    }
+
+    /// The entry of a part for a pair of types; 0 where nothing is known.
+    ///
+    /// # Panics
+    ///
+    /// If the part or one of the types is not in the table.
     pub fn value(&self, part: usize, first: usize, second: usize) -> f64 {
-        self.values[part][first][second]
+        self.values[part][(first, second)]
+    }
+
+    /// Number of types of every part.
+    pub fn n_types(&self) -> Vec<usize> {
+        self.values.iter().map(DMatrix::nrows).collect()
+    }
+
+    /// Number of parts' types of the first view of which nothing is known.
+    pub fn n_unseen(&self) -> usize {
+        self.n_unseen
+    }
+
+    /// The table with its views exchanged.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        Self::of(self.values.iter().map(DMatrix::transpose).collect())
+    }
+
+    /// `p(type in second view | type in first view)` of a joint table.
+    #[must_use]
+    pub fn conditional(&self) -> Self {
+        let normalised = |it: &DMatrix<f64>| normalise_rows(it.clone());
+        Self::of(self.values.iter().map(normalised).collect())
+    }
+
+    fn of(values: Vec<DMatrix<f64>>) -> Self {
+        let unseen = |it: &DMatrix<f64>| it.row_iter().filter(|row| row.sum() <= 0.0).count();
+        Self {
+            n_unseen: values.iter().map(unseen).sum(),
+            values,
+        }
+    }
+}
+
+/// Most by which rounding to five digits may move the sum of a row.
+const ROUNDING: f64 = 1e-3;
+
+/// Reads one row; `None` if nothing is known of its type.
+fn parse_row(
+    line: usize,
+    row: &str,
+    part: usize,
+    n_types: usize,
+) -> Result<Option<Vec<f64>>, CompatibilityError> {
+    let fields: Vec<&str> = row.split(',').map(str::trim).collect();
+    if fields.len() != n_types + 1 {
+        return Err(CompatibilityError::Columns {
+            line,
+            got: fields.len(),
+            expected: n_types + 1,
+        });
+    }
+    if fields[0].parse() != Ok(part) {
+        return Err(CompatibilityError::Part {
+            line,
+            got: shortened(fields[0]),
+            expected: part,
+        });
+    }
+    let probabilities = &fields[1..];
+    if probabilities
+        .iter()
+        .all(|it| it.eq_ignore_ascii_case("nan"))
+    {
+        return Ok(None);
+    }
+    let mut values = Vec::with_capacity(n_types);
+    for (idx, field) in probabilities.iter().enumerate() {
+        match field.parse() {
+            Ok(value) if (0.0..=1.0).contains(&value) => values.push(value),
+            _ => {
+                return Err(CompatibilityError::Probability {
+                    line,
+                    column: idx + 2,
+                    got: shortened(field),
+                });
+            }
+        }
+    }
+    let sum: f64 = values.iter().sum();
+    if sum == 0.0 {
+        return Ok(None);
+    }
+    if (sum - 1.0).abs() > ROUNDING {
+        return Err(CompatibilityError::Sum { line, sum });
+    }
+    Ok(Some(values))
+}
+
+fn shortened(field: &str) -> String {
+    field.chars().take(24).collect()
+}
+
+/// The joint `[a, b]` twice: from `second = p(b | a)`, and from `first = p(a | b)`.
+fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
+    let (second, first) = without_unseen(second.clone(), first.clone());
+    let n = second.nrows();
+    let seen = DVector::from_fn(n, |a, _| f64::from(second.row(a).sum() > 0.0));
+    if seen.sum() == 0.0 {
+        return [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+    }
+    // Half of every step stays, so that the chain cannot oscillate; squared, it takes 2^64 steps.
+    let mut steps = normalise_rows((&second * &first + DMatrix::identity(n, n)) / 2.0);
+    for _ in 0..64 {
+        steps = normalise_rows(&steps * &steps);
+    }
+    let of_first = steps.tr_mul(&(&seen / seen.sum()));
+    let of_second = second.tr_mul(&of_first);
+    [
+        DMatrix::from_diagonal(&of_first) * second,
+        (DMatrix::from_diagonal(&of_second) * first).transpose(),
+    ]
+}
+
+/// Makes the tables agree on which types were seen, and every row of those a distribution.
+fn without_unseen(
+    mut second: DMatrix<f64>,
+    mut first: DMatrix<f64>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    // Each round removes a type of either view, or none is left to be removed.
+    for _ in 0..2 * second.nrows() {
+        clear_unseen(&first, &mut second);
+        clear_unseen(&second, &mut first);
+    }
+    (normalise_rows(second), normalise_rows(first))
+}
+
+/// Clears every column of `to` whose row in `from` is empty.
+fn clear_unseen(from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
+    for (idx, row) in from.row_iter().enumerate() {
+        if row.sum() <= 0.0 {
+            to.column_mut(idx).fill(0.0);
+        }
+    }
+}
+
+/// Scales every row to sum 1; a row of zeros stays.
+fn normalise_rows(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
+    for mut row in matrix.row_iter_mut() {
+        let sum = row.sum();
+        if sum > 0.0 {
+            row /= sum;
+        }
+    }
+    matrix
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn table(rows: &[[f64; 2]; 2]) -> Compatibility {
+        Compatibility::of(vec![DMatrix::from_fn(2, 2, |row, col| rows[row][col])])
+    }
+
+    /// Joints of one part with 4 types, of which the last was never seen in the first view.
+    fn joint() -> impl Strategy<Value = Compatibility> {
+        prop::collection::vec(0.01..1.0, 16).prop_map(|mut cells| {
+            cells[12..].fill(0.0);
+            let sum: f64 = cells.iter().sum();
+            Compatibility::of(vec![DMatrix::from_row_slice(4, 4, &cells) / sum])
+        })
+    }
+
+    fn largest_difference(a: &Compatibility, b: &Compatibility) -> f64 {
+        (&a.values[0] - &b.values[0]).abs().max()
+    }
+
+    proptest! {
+        #[test]
+        fn a_planted_joint_is_found_from_its_conditionals(planted in joint()) {
+            let conditionals = [planted.conditional(), planted.transposed().conditional()];
+            let (found, disagreement) =
+                Compatibility::joint_from_conditionals(&conditionals[0], &conditionals[1]).unwrap();
+            prop_assert!(largest_difference(&found, &planted) < 1e-9);
+            prop_assert!(disagreement < 1e-9);
+            prop_assert_eq!(found.n_unseen(), 1);
+        }
+
+        #[test]
+        fn exchanging_the_views_transposes_the_joint(one in joint(), other in joint()) {
+            // Two tables that contradict each other.
+            let (second, first) = (one.conditional(), other.transposed().conditional());
+            let (joint, there) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
+            let (exchanged, back) = Compatibility::joint_from_conditionals(&first, &second).unwrap();
+            prop_assert!(largest_difference(&joint, &exchanged.transposed()) < 1e-9);
+            prop_assert!((there - back).abs() < 1e-9);
+            prop_assert!((joint.values[0].sum() - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn tables_that_contradict_each_other_are_told() {
+        let alike = table(&[[1.0, 0.0], [0.0, 1.0]]);
+        let exchanged = table(&[[0.0, 1.0], [1.0, 0.0]]);
+        let (joint, disagreement) =
+            Compatibility::joint_from_conditionals(&alike, &exchanged).unwrap();
+        assert!((disagreement - 1.0).abs() < 1e-12);
+        assert!(largest_difference(&joint, &table(&[[0.25, 0.25], [0.25, 0.25]])) < 1e-12);
+    }
+
+    #[test]
+    fn groups_that_never_meet_count_by_their_types() {
+        let apart = table(&[[1.0, 0.0], [0.0, 1.0]]);
+        let (joint, disagreement) = Compatibility::joint_from_conditionals(&apart, &apart).unwrap();
+        assert!(largest_difference(&joint, &table(&[[0.5, 0.0], [0.0, 0.5]])) < 1e-12);
+        assert!(disagreement < 1e-12);
+    }
+
+    #[test]
+    fn a_type_that_only_one_table_has_seen_counts_as_unseen() {
+        let second = table(&[[0.5, 0.5], [0.0, 1.0]]);
+        let first = table(&[[1.0, 0.0], [0.0, 0.0]]);
+        let (joint, _) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
+        assert!(largest_difference(&joint, &table(&[[1.0, 0.0], [0.0, 0.0]])) < 1e-12);
+        let nothing = table(&[[0.0; 2]; 2]);
+        let (joint, disagreement) =
+            Compatibility::joint_from_conditionals(&second, &nothing).unwrap();
+        assert_eq!((joint, disagreement), (nothing, 0.0));
+    }
+
+    #[test]
+    fn tables_of_different_models_are_refused() {
+        let small = table(&[[1.0, 0.0], [0.0, 1.0]]);
+        let large = Compatibility::of(vec![DMatrix::identity(3, 3)]);
+        let error = Compatibility::joint_from_conditionals(&small, &large).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the two tables have [2] and [3] types per part"
+        );
+    }
+
+    const TEXT: &str = "1,0.25,0.75\n1,NaN,NaN\n2,0,0\n2,0.33333,0.66667\n";
+
+    fn said_of(text: &str) -> String {
+        match Compatibility::parse(text, &[2, 2]) {
+            Ok(table) => format!("fine: {} unseen", table.n_unseen()),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn rows_are_types_of_the_first_view() {
+        let table = Compatibility::parse(TEXT, &[2, 2]).unwrap();
+        assert_eq!(table.value(0, 0, 1), 0.75);
+        assert_eq!(table.value(1, 1, 0), 0.33333);
+    }
+
+    #[test]
+    fn a_type_never_seen_adds_nothing_and_is_counted() {
+        let table = Compatibility::parse(TEXT, &[2, 2]).unwrap();
+        assert_eq!([table.value(0, 1, 0), table.value(1, 0, 1)], [0.0, 0.0]);
+        assert_eq!(table.n_unseen(), 2);
+    }
+
+    #[test]
+    fn names_the_line_and_the_column_of_what_is_wrong() {
+        let cases = [
+            (
+                "0.75",
+                "0.8",
+                "line 1: the probabilities sum to 1.05, expected 1",
+            ),
+            (
+                "0.75",
+                "1.2",
+                "line 1, column 3: `1.2` is not a probability from 0 to 1",
+            ),
+            (
+                "0.75",
+                "NaN",
+                "line 1, column 3: `NaN` is not a probability from 0 to 1",
+            ),
+            (
+                "0.75",
+                "-0.1",
+                "line 1, column 3: `-0.1` is not a probability from 0 to 1",
+            ),
+            (
+                "0.25",
+                "",
+                "line 1, column 2: `` is not a probability from 0 to 1",
+            ),
+            ("2,0,0", "3,0,0", "line 3, column 1: part `3`, expected 2"),
+            (
+                "2,0,0",
+                "2,0,0,0",
+                "line 3: 4 columns, expected 3: the part, and one per type",
+            ),
+            (
+                "2,0,0\n",
+                "",
+                "the table has 3 rows, expected 4: one per part and type",
+            ),
+        ];
+        for (from, to, expected) in cases {
+            assert_eq!(said_of(&TEXT.replace(from, to)), expected);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_changed_table_never_panics(at in 0..TEXT.len(), to in "[0-9a-zN.,\\n-]{0,8}") {
+            let mut text = TEXT.to_owned();
+            text.replace_range(at..(at + 3).min(TEXT.len()), &to);
+            let _outcome = said_of(&text);
+        }
     }
 }
