@@ -16,6 +16,7 @@ use iceoryx2::service::builder::event::EventCreateError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 
+use crate::log::adopt_transport_log;
 use crate::payload::{Header, Message};
 use crate::service::{self, PortError};
 use crate::topic::TopicPlan;
@@ -236,6 +237,7 @@ impl Seed {
 
 /// Makes the directory of a deployment and points iceoryx2 to it.
 pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
+    adopt_transport_log();
     let config = namespace.config()?;
     let path = namespace.config_file();
     let directory = |source| BusError::Directory {

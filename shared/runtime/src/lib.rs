@@ -15,6 +15,7 @@ mod service;
 mod subscriber;
 mod waiter;
 
+mod child;
 mod clock;
 mod failure;
 mod health;
@@ -25,6 +26,7 @@ mod progress;
 mod stop;
 
 pub use bus::{Bus, BusError, Topic};
+pub use child::{Child, wait_for_any};
 pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, health_topic, preflight};

@@ -26,14 +26,20 @@ pub fn init_logging(process: &str, level: Level) {
             process: Arc::from(process),
         })
         .try_init();
+    adopt_transport_log();
     if set.is_ok() {
-        set_logger(&FromTransport);
         set_log_level(match level {
             Level::TRACE => LogLevel::Trace,
             Level::DEBUG => LogLevel::Debug,
             _ => LogLevel::Error,
         });
     }
+}
+
+/// Has iceoryx2 log through `tracing` instead of to standard error.
+pub(crate) fn adopt_transport_log() {
+    // False if it has been done before.
+    set_logger(&FromTransport);
 }
 
 /// `2026-01-31T12:00:00.000000Z WARN pose-2: message key=value`.

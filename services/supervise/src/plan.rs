@@ -1,0 +1,135 @@
+//! What is to be run, and with how much patience.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use runtime::{Delivery, Namespace, TopicPlan};
+use tracing::Level;
+
+/// A deployment, as the supervisor sees it.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The program that becomes any of the services: `executable service <service> <args>`.
+    pub executable: PathBuf,
+    /// Where the deployment lives.
+    pub namespace: Namespace,
+    /// The run; goes into the stamp of every message.
+    pub session: u64,
+    /// What happens when a receiver is slower than its sender.
+    pub delivery: Delivery,
+    /// All topics, those of the processes' signs of life included.
+    pub topics: Vec<TopicPlan>,
+    /// All processes, consumers first: a sender waits for its receivers anyway, but so it need not.
+    pub processes: Vec<ProcessSpec>,
+    /// How much patience there is.
+    pub policy: Policy,
+    /// The least important events that services log.
+    pub log: Level,
+}
+
+/// One process.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProcessSpec {
+    /// Its unique name in the deployment, for example `pose-2`.
+    pub name: String,
+    /// Which service it is, for example `pose`.
+    pub service: String,
+    /// Its own arguments; what every service needs to know is added.
+    pub args: Vec<OsString>,
+    /// What becomes of the run without it.
+    pub role: Role,
+}
+
+/// What becomes of the run when a process has been given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// The run fails.
+    Essential,
+    /// The run goes on, degraded, as long as one process of the same service is left.
+    Redundant,
+    /// The run goes on, degraded.
+    Optional,
+}
+
+/// How much patience there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Policy {
+    /// Pause before the first restart; it doubles with each further one in the window.
+    pub first_pause: Duration,
+    /// Longest pause before a restart.
+    pub longest_pause: Duration,
+    /// Restarts within the window after which a process is given up.
+    pub max_restarts: usize,
+    /// How long a restart counts.
+    pub restart_window: Duration,
+    /// How long a process may take until its main loop turns for the first time.
+    pub startup_limit: Duration,
+    /// How long the main loop of a process may stand still.
+    pub hang_limit: Duration,
+    /// How long processes may take to end when they are asked to.
+    pub grace: Duration,
+    /// How often what the dead left is cleaned up where no death was noticed.
+    pub clean_period: Duration,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Self {
+            first_pause: Duration::from_millis(100),
+            longest_pause: Duration::from_secs(5),
+            max_restarts: 5,
+            restart_window: Duration::from_mins(1),
+            startup_limit: Duration::from_mins(1),
+            hang_limit: Duration::from_secs(20),
+            grace: Duration::from_secs(5),
+            clean_period: Duration::from_millis(250),
+        }
+    }
+}
+
+impl Policy {
+    /// The pause before the next restart, or none if the process is to be given up.
+    ///
+    /// * `recent`: restarts within the window.
+    pub(crate) fn pause(&self, recent: usize) -> Option<Duration> {
+        if recent >= self.max_restarts {
+            return None;
+        }
+        let factor = 1_u32.checked_shl(recent as u32).unwrap_or(u32::MAX);
+        let pause = self.first_pause.saturating_mul(factor);
+        Some(pause.min(self.longest_pause))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+
+    use super::Policy;
+
+    #[test]
+    fn pauses_double_up_to_the_longest_and_then_end() {
+        let policy = Policy {
+            max_restarts: 8,
+            ..Policy::default()
+        };
+        let millis: Vec<_> = (0..9)
+            .map(|recent| policy.pause(recent).map(|it| it.as_millis()))
+            .collect();
+        let expected = [100, 200, 400, 800, 1600, 3200, 5000, 5000].map(Some);
+        assert_eq!(millis[..8], expected);
+        assert_eq!(millis[8], None);
+    }
+
+    #[test]
+    fn many_restarts_do_not_overflow() {
+        let policy = Policy {
+            max_restarts: usize::MAX,
+            ..Policy::default()
+        };
+        for recent in [31, 32, 33, 1000] {
+            assert_eq!(policy.pause(recent), Some(Duration::from_secs(5)));
+        }
+    }
+}

@@ -1,0 +1,382 @@
+//! The loop that starts, watches, restarts and stops.
+
+use core::time::Duration;
+use std::io;
+use std::time::Instant;
+
+use messages::{Health, topic};
+use runtime::{
+    Bus, BusError, Child, Cleaner, ExitKind, Fault, Launch, LockError, PortError, PreflightError,
+    Stop, preflight, wait_for_any,
+};
+
+use crate::watch::{Life, Sequel, Watch, death_of};
+use crate::{Death, Event, Outcome, Plan, Role};
+
+/// Longest sleep of the supervisor: how late a hang or a due restart may be noticed.
+const TURN: Duration = Duration::from_millis(50);
+/// A turn that took this long means that the supervisor itself was stopped, and saw no signs of life.
+const ASLEEP: Duration = Duration::from_secs(2);
+
+/// The run failed.
+#[derive(Debug, thiserror::Error)]
+pub enum SuperviseError {
+    /// The deployment is not free.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// There is no room for it.
+    #[error(transparent)]
+    Preflight(#[from] PreflightError),
+    /// Its topics cannot be created.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A sign of life cannot be subscribed to.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// A process says that what it was given is wrong.
+    #[error("{process} cannot work: {message}")]
+    Unusable {
+        /// Its name.
+        process: String,
+        /// Its exit status.
+        kind: ExitKind,
+        /// What it wrote.
+        message: String,
+    },
+    /// A process that the run cannot do without failed too often.
+    #[error("{process} {death}, and was given up after {restarts} restarts\n{message}")]
+    GivenUp {
+        /// Its name.
+        process: String,
+        /// How it ended last.
+        death: Death,
+        /// How often it had been restarted.
+        restarts: u32,
+        /// What it wrote at last.
+        message: String,
+    },
+    /// The system cannot tell about children.
+    #[error("cannot watch the processes")]
+    Watch(#[source] io::Error),
+}
+
+impl Fault for SuperviseError {
+    fn kind(&self) -> ExitKind {
+        match self {
+            Self::Lock(error) => error.kind(),
+            Self::Preflight(error) => error.kind(),
+            Self::Bus(error) => error.kind(),
+            Self::Port(error) => error.kind(),
+            Self::Unusable { kind, .. } => *kind,
+            Self::GivenUp { .. } | Self::Watch(_) => ExitKind::Run,
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Lock(error) => error.hint(),
+            Self::Preflight(error) => error.hint(),
+            Self::Bus(_)
+            | Self::Port(_)
+            | Self::Unusable { .. }
+            | Self::GivenUp { .. }
+            | Self::Watch(_) => None,
+        }
+    }
+}
+
+/// Runs a deployment until all its processes are done, `stop` is requested, or it fails.
+///
+/// A process is done when it ends with status 0, or says in its signs of life that it has finished;
+/// the latter is asked to end once all are done, so that its last message stays there for a
+/// receiver that had to be restarted.
+///
+/// However it ends, no process, no file and no shared memory of the deployment is left. Call it from
+/// a thread that lives as long as the run: its children end with it.
+///
+/// * `on_event`: is told what happens, and must not take long.
+///
+/// # Errors
+///
+/// [`SuperviseError`].
+pub fn run(
+    plan: &Plan,
+    stop: &Stop,
+    on_event: &mut dyn FnMut(Event<'_>),
+) -> Result<Outcome, SuperviseError> {
+    runtime::raise_file_limit();
+    // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
+    let _lock = plan.namespace.acquire()?;
+    preflight(&plan.topics)?;
+    let bus = Bus::open(&plan.namespace, "supervisor", stop)?;
+    let _topics = bus.create_topics(&plan.topics)?;
+    let mut waiter = bus.waiter();
+    let now = Instant::now();
+    let mut watches = Vec::new();
+    for spec in &plan.processes {
+        let signs = bus.subscriber::<Health>(&topic::health(&spec.name), &mut waiter)?;
+        watches.push(Watch::new(spec.clone(), signs, now));
+    }
+    let mut supervisor = Supervisor {
+        plan,
+        stop,
+        bus: &bus,
+        watches,
+        cleaner: Cleaner::default(),
+        cleaned: now,
+        on_event,
+    };
+    let result = supervisor.watch();
+    supervisor.shut_down();
+    result?;
+    Ok(Outcome {
+        processes: supervisor.watches.iter().map(Watch::outcome).collect(),
+        interrupted: stop.is_requested(),
+    })
+}
+
+struct Supervisor<'a> {
+    plan: &'a Plan,
+    stop: &'a Stop,
+    bus: &'a Bus,
+    watches: Vec<Watch>,
+    cleaner: Cleaner,
+    cleaned: Instant,
+    on_event: &'a mut dyn FnMut(Event<'_>),
+}
+
+impl Supervisor<'_> {
+    fn watch(&mut self) -> Result<(), SuperviseError> {
+        let mut last_turn = Instant::now();
+        while !self.stop.is_requested() {
+            let now = Instant::now();
+            if now.saturating_duration_since(last_turn) > ASLEEP {
+                self.watches.iter_mut().for_each(|watch| watch.forgive(now));
+            }
+            last_turn = now;
+            for index in 0..self.watches.len() {
+                self.start_if_due(index, now)?;
+                self.listen(index, now);
+                self.reap(index, now)?;
+            }
+            if self.is_done(now) {
+                break;
+            }
+            if now.saturating_duration_since(self.cleaned) > self.plan.policy.clean_period {
+                self.clean(now);
+            }
+            self.sleep(TURN, Some(self.stop))?;
+        }
+        Ok(())
+    }
+
+    fn sleep(&self, longest: Duration, stop: Option<&Stop>) -> Result<(), SuperviseError> {
+        let children: Vec<&Child> = self.watches.iter().filter_map(Watch::child).collect();
+        wait_for_any(&children, stop, longest).map_err(SuperviseError::Watch)
+    }
+
+    fn start_if_due(&mut self, index: usize, now: Instant) -> Result<(), SuperviseError> {
+        let watch = &mut self.watches[index];
+        let Life::Due(at) = watch.life else {
+            return Ok(());
+        };
+        if now < at {
+            return Ok(());
+        }
+        let launch = Launch {
+            namespace: self.plan.namespace.clone(),
+            process: watch.spec.name.clone(),
+            session: self.plan.session,
+            epoch: watch.epoch,
+            delivery: self.plan.delivery,
+            supervisor: Some(std::process::id()),
+            log: self.plan.log,
+        };
+        let mut args = vec!["service".into(), watch.spec.service.clone().into()];
+        args.extend(launch.to_args());
+        args.extend(watch.spec.args.iter().cloned());
+        match Child::start(&self.plan.executable, &args) {
+            Ok(child) => {
+                (self.on_event)(Event::Started {
+                    process: &watch.spec.name,
+                    pid: child.pid(),
+                    epoch: watch.epoch,
+                });
+                watch.begin(child, now);
+                Ok(())
+            }
+            Err(error) => {
+                watch.note_line(&format!(
+                    "error: {}: {error}",
+                    self.plan.executable.display()
+                ));
+                self.died(index, Death::NotStarted, now)
+            }
+        }
+    }
+
+    /// Takes in what a process says: lines and signs of life.
+    fn listen(&mut self, index: usize, now: Instant) {
+        let watch = &mut self.watches[index];
+        if let Life::Running(child) = &mut watch.life {
+            match child.read_lines() {
+                Ok(lines) => {
+                    for text in &lines {
+                        watch.note_line(text);
+                        (self.on_event)(Event::Line {
+                            process: &watch.spec.name,
+                            text,
+                        });
+                    }
+                }
+                Err(error) => {
+                    tracing::warn!(process = watch.spec.name, %error, "cannot read its output");
+                }
+            }
+        }
+        match watch.signs.latest() {
+            Ok(Some(health)) => {
+                if watch.note_health(&health, now) {
+                    (self.on_event)(Event::Health {
+                        process: &watch.spec.name,
+                        health: &health,
+                    });
+                }
+            }
+            Ok(None) => {}
+            Err(error) => {
+                tracing::warn!(process = watch.spec.name, %error, "cannot hear its signs of life");
+            }
+        }
+    }
+
+    /// Notices the end of a process, and ends one that hangs.
+    fn reap(&mut self, index: usize, now: Instant) -> Result<(), SuperviseError> {
+        let watch = &mut self.watches[index];
+        let overdue = watch.overdue(&self.plan.policy, now);
+        let Life::Running(child) = &mut watch.life else {
+            return Ok(());
+        };
+        if let Some(death) = overdue {
+            child.kill();
+            return self.died(index, death, now);
+        }
+        let Some(status) = child.try_wait().map_err(SuperviseError::Watch)? else {
+            return Ok(());
+        };
+        // What it said last.
+        self.listen(index, now);
+        if let Some(death) = death_of(status) {
+            return self.died(index, death, now);
+        }
+        let watch = &mut self.watches[index];
+        watch.end(false);
+        (self.on_event)(Event::Finished {
+            process: &watch.spec.name,
+        });
+        Ok(())
+    }
+
+    fn died(&mut self, index: usize, death: Death, now: Instant) -> Result<(), SuperviseError> {
+        let watch = &mut self.watches[index];
+        let process = watch.spec.name.as_str();
+        (self.on_event)(Event::Died { process, death });
+        // Dropping the child waits for its end, without which it could not be cleaned up after.
+        match watch.die(death, &self.plan.policy, now) {
+            Sequel::Restart(pause) => {
+                let process = watch.spec.name.as_str();
+                (self.on_event)(Event::Restarting { process, pause });
+            }
+            Sequel::GiveUp => {
+                (self.on_event)(Event::GivenUp {
+                    process: &watch.spec.name,
+                    restarts: watch.epoch,
+                });
+                self.check_needed(index, death)?;
+            }
+            Sequel::Fail(kind) => {
+                return Err(SuperviseError::Unusable {
+                    process: watch.spec.name.clone(),
+                    kind,
+                    message: watch.message(),
+                });
+            }
+        }
+        self.clean(now);
+        Ok(())
+    }
+
+    /// Whether the run can go on without a process.
+    fn check_needed(&self, index: usize, death: Death) -> Result<(), SuperviseError> {
+        let watch = &self.watches[index];
+        let needed = match watch.spec.role {
+            Role::Essential => true,
+            Role::Optional => false,
+            Role::Redundant => self
+                .watches
+                .iter()
+                .filter(|other| other.spec.service == watch.spec.service)
+                .all(Watch::is_given_up),
+        };
+        if !needed {
+            return Ok(());
+        }
+        Err(SuperviseError::GivenUp {
+            process: watch.spec.name.clone(),
+            death,
+            restarts: watch.epoch,
+            message: watch.message(),
+        })
+    }
+
+    fn is_done(&self, now: Instant) -> bool {
+        let done = |watch: &Watch| watch.is_finished() || watch.is_given_up();
+        let any_finished = self.watches.iter().any(Watch::is_finished);
+        self.watches
+            .iter()
+            .all(|watch| done(watch) || (any_finished && watch.is_stranded(&self.plan.policy, now)))
+    }
+
+    fn clean(&mut self, now: Instant) {
+        self.cleaned = now;
+        let cleaned = self.cleaner.clean(self.bus);
+        if cleaned > 0 {
+            tracing::debug!(cleaned, "cleaned up after the dead");
+        }
+    }
+
+    /// Asks all processes to end, and ends those that do not.
+    fn shut_down(&mut self) {
+        (self.on_event)(Event::Stopping);
+        self.watches
+            .iter()
+            .filter_map(Watch::child)
+            .for_each(Child::terminate);
+        let begin = Instant::now();
+        while self.watches.iter().any(|watch| watch.child().is_some()) {
+            let now = Instant::now();
+            let patient = now.saturating_duration_since(begin) < self.plan.policy.grace;
+            for index in 0..self.watches.len() {
+                self.listen(index, now);
+                self.part(index, patient);
+            }
+            if let Err(error) = self.sleep(TURN, None) {
+                tracing::warn!(%error, "cannot wait for the processes to end");
+            }
+        }
+        self.clean(Instant::now());
+    }
+
+    /// Lets go of a process that has ended, or is out of time.
+    fn part(&mut self, index: usize, patient: bool) {
+        let watch = &mut self.watches[index];
+        let Life::Running(child) = &mut watch.life else {
+            return;
+        };
+        if matches!(child.try_wait(), Ok(None)) && patient {
+            return;
+        }
+        self.listen(index, Instant::now());
+        self.watches[index].end(true);
+    }
+}

@@ -1,0 +1,250 @@
+//! One process under watch: its life, its signs of life, and its restarts.
+
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::os::unix::process::ExitStatusExt as _;
+use std::process::ExitStatus;
+use std::time::Instant;
+
+use messages::Health;
+use runtime::{Child, ExitKind, Subscriber};
+
+use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
+
+/// Lines of output that are kept to explain a death.
+const KEPT_LINES: usize = 40;
+
+/// A process under watch.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    pub(crate) spec: ProcessSpec,
+    pub(crate) signs: Subscriber<Health>,
+    pub(crate) life: Life,
+    pub(crate) epoch: u32,
+    /// When it was restarted, within the window.
+    restarts: VecDeque<Instant>,
+    output: VecDeque<String>,
+    /// What earlier lives did.
+    past: Counts,
+    /// The last sign of this life.
+    current: Option<Health>,
+    /// The last sign of any life.
+    last: Option<Health>,
+    /// When the main loop last turned.
+    turned: Change,
+    /// When it last took something in.
+    received: Change,
+}
+
+/// Where a process is in its life.
+#[derive(Debug)]
+pub(crate) enum Life {
+    /// It runs.
+    Running(Child),
+    /// It will be started.
+    Due(Instant),
+    /// It ended as it should.
+    Ended(State),
+    /// It will not be started again.
+    GivenUp,
+}
+
+/// A counter, and when it last changed.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    count: u64,
+    at: Instant,
+}
+
+impl Change {
+    fn new(now: Instant) -> Self {
+        Self { count: 0, at: now }
+    }
+
+    fn note(&mut self, count: u64, now: Instant) {
+        if count != self.count {
+            *self = Self { count, at: now };
+        }
+    }
+}
+
+/// What is to follow a death.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sequel {
+    /// Another life, after a pause.
+    Restart(Duration),
+    /// Nothing: it failed too often.
+    GiveUp,
+    /// The end of the run: the fault is in what it was given.
+    Fail(ExitKind),
+}
+
+impl Watch {
+    /// A process that is to be started at once.
+    pub(crate) fn new(spec: ProcessSpec, signs: Subscriber<Health>, now: Instant) -> Self {
+        Self {
+            spec,
+            signs,
+            life: Life::Due(now),
+            epoch: 0,
+            restarts: VecDeque::new(),
+            output: VecDeque::new(),
+            past: Counts::default(),
+            current: None,
+            last: None,
+            turned: Change::new(now),
+            received: Change::new(now),
+        }
+    }
+
+    /// Begins a life.
+    pub(crate) fn begin(&mut self, child: Child, now: Instant) {
+        self.life = Life::Running(child);
+        self.output.clear();
+        self.turned = Change::new(now);
+        self.received = Change::new(now);
+    }
+
+    pub(crate) fn child(&self) -> Option<&Child> {
+        match &self.life {
+            Life::Running(child) => Some(child),
+            Life::Due(_) | Life::Ended(_) | Life::GivenUp => None,
+        }
+    }
+
+    /// Keeps a line of output.
+    pub(crate) fn note_line(&mut self, line: &str) {
+        if self.output.len() == KEPT_LINES {
+            self.output.pop_front();
+        }
+        self.output.push_back(line.to_owned());
+    }
+
+    /// Takes note of a sign of life. Those of earlier lives are ignored.
+    pub(crate) fn note_health(&mut self, health: &Health, now: Instant) -> bool {
+        if health.epoch != self.epoch {
+            return false;
+        }
+        self.turned.note(health.n_loops, now);
+        self.received.note(health.n_received, now);
+        self.current = Some(*health);
+        self.last = self.current;
+        true
+    }
+
+    /// Counts the time from now on: the supervisor itself has been asleep.
+    pub(crate) fn forgive(&mut self, now: Instant) {
+        self.turned.at = now;
+        self.received.at = now;
+    }
+
+    /// Whether the process should be killed, and as what.
+    pub(crate) fn overdue(&self, policy: &Policy, now: Instant) -> Option<Death> {
+        self.child()?;
+        let still = now.saturating_duration_since(self.turned.at);
+        if self.turned.count == 0 {
+            (still > policy.startup_limit).then_some(Death::NeverBegan { waited: still })
+        } else {
+            (still > policy.hang_limit).then_some(Death::Hung { still })
+        }
+    }
+
+    /// Ends a life, and says what is to follow.
+    pub(crate) fn die(&mut self, death: Death, policy: &Policy, now: Instant) -> Sequel {
+        self.past = self.past.and(self.current.take().as_ref());
+        if let Death::Exit { status } = death
+            && let Some(kind) = ExitKind::of_status(status).filter(|kind| kind.is_permanent())
+        {
+            self.life = Life::GivenUp;
+            return Sequel::Fail(kind);
+        }
+        while let Some(&first) = self.restarts.front()
+            && now.saturating_duration_since(first) > policy.restart_window
+        {
+            self.restarts.pop_front();
+        }
+        let Some(pause) = policy.pause(self.restarts.len()) else {
+            self.life = Life::GivenUp;
+            return Sequel::GiveUp;
+        };
+        self.restarts.push_back(now);
+        self.epoch += 1;
+        self.life = Life::Due(now + pause);
+        Sequel::Restart(pause)
+    }
+
+    /// Ends a life that ended well.
+    ///
+    /// * `asked`: whether it was asked to end.
+    pub(crate) fn end(&mut self, asked: bool) {
+        let done = !asked || self.says_finished();
+        self.life = Life::Ended(if done {
+            State::Finished
+        } else {
+            State::Stopped
+        });
+    }
+
+    /// Whether it has seen the end of the footage and passed it on.
+    pub(crate) fn is_finished(&self) -> bool {
+        match self.life {
+            Life::Ended(_) => true,
+            Life::Running(_) => self.says_finished(),
+            Life::Due(_) | Life::GivenUp => false,
+        }
+    }
+
+    /// Whether it waits for messages that will never come: it was restarted, and has taken nothing
+    /// in for long. Only of meaning where all others are done.
+    pub(crate) fn is_stranded(&self, policy: &Policy, now: Instant) -> bool {
+        self.epoch > 0
+            && self.child().is_some()
+            && now.saturating_duration_since(self.received.at) > policy.hang_limit
+    }
+
+    fn says_finished(&self) -> bool {
+        self.current.is_some_and(|health| health.finished != 0)
+    }
+
+    pub(crate) fn is_given_up(&self) -> bool {
+        matches!(self.life, Life::GivenUp)
+    }
+
+    /// What it wrote about its end: from the last `error:` on, or the last lines.
+    pub(crate) fn message(&self) -> String {
+        let begin = self
+            .output
+            .iter()
+            .rposition(|line| line.starts_with("error:"))
+            .unwrap_or(self.output.len().saturating_sub(3));
+        let lines: Vec<&str> = self.output.iter().skip(begin).map(String::as_str).collect();
+        lines.join("\n")
+    }
+
+    pub(crate) fn outcome(&self) -> ProcessOutcome {
+        let state = match self.life {
+            Life::GivenUp => State::GivenUp,
+            Life::Ended(state) => state,
+            Life::Due(_) => State::Stopped,
+            Life::Running(_) => State::Running,
+        };
+        ProcessOutcome {
+            name: self.spec.name.clone(),
+            service: self.spec.service.clone(),
+            state,
+            restarts: self.epoch,
+            counts: self.past.and(self.current.as_ref()),
+            last: self.last,
+        }
+    }
+}
+
+/// How a process ended, from what the system says; none if it ended as it should.
+pub(crate) fn death_of(status: ExitStatus) -> Option<Death> {
+    match (status.code(), status.signal()) {
+        (Some(0), _) => None,
+        (Some(status), _) => Some(Death::Exit { status }),
+        (None, Some(number)) => Some(Death::Signal { number }),
+        (None, None) => Some(Death::Exit { status: -1 }),
+    }
+}

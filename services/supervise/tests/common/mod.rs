@@ -1,0 +1,215 @@
+//! Runs a deployment of dummies under the supervisor and notes what happens.
+#![allow(dead_code, reason = "every test file uses a part of it")]
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+use messages::FrameHeader;
+use runtime::{Delivery, Limits, Namespace, Stop, TopicPlan, health_topic};
+use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
+use tracing::Level;
+
+/// A run that takes longer has got stuck.
+const WATCHDOG: Duration = Duration::from_mins(2);
+
+/// What happened, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Seen {
+    Started(String, u32, u32),
+    Line(String, String),
+    Finished(String),
+    Died(String, Death),
+    Restarting(String, Duration),
+    GivenUp(String, u32),
+    Stopping,
+}
+
+/// A deployment in a place of its own.
+pub(crate) struct Case {
+    pub(crate) plan: Plan,
+    base: tempfile::TempDir,
+}
+
+/// What a run came to.
+pub(crate) struct Run {
+    pub(crate) seen: Vec<Seen>,
+    pub(crate) result: Result<Outcome, SuperviseError>,
+}
+
+impl Case {
+    /// * `processes`: name, behaviour, role.
+    pub(crate) fn new(delivery: Delivery, processes: &[(&str, &str, Role)]) -> Self {
+        let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+        let frames = TopicPlan::slices::<u8, FrameHeader>(
+            "data".to_owned(),
+            delivery,
+            Limits::new(2, 1, 1),
+            100_000,
+        );
+        let specs = processes
+            .iter()
+            .map(|&(name, behaviour, role)| ProcessSpec {
+                name: name.to_owned(),
+                service: "dummy".to_owned(),
+                args: behaviour.split(' ').map(Into::into).collect(),
+                role,
+            });
+        let health = processes.iter().map(|&(name, _, _)| health_topic(name));
+        let plan = Plan {
+            executable: env!("CARGO_BIN_EXE_supervise-dummy").into(),
+            namespace: Namespace::below("t", base.path()).unwrap(),
+            session: 42,
+            delivery,
+            topics: [frames].into_iter().chain(health).collect(),
+            processes: specs.collect(),
+            policy: Policy {
+                first_pause: Duration::from_millis(20),
+                hang_limit: Duration::from_secs(3),
+                grace: Duration::from_secs(10),
+                ..Policy::default()
+            },
+            log: Level::WARN,
+        };
+        Self { plan, base }
+    }
+
+    /// Runs to the end. `react` is told everything, and may stop the run.
+    pub(crate) fn run(&self, mut react: impl FnMut(&Seen, &Stop)) -> Run {
+        let stop = Stop::new().unwrap();
+        let watchdog = Watchdog::new(&stop);
+        let mut seen = Vec::new();
+        let result = supervise::run(&self.plan, &stop, &mut |event| {
+            if let Some(event) = note(&event) {
+                react(&event, &stop);
+                seen.push(event);
+            }
+        });
+        assert!(!watchdog.barked(), "stuck: {seen:#?}");
+        self.assert_nothing_left();
+        Run { seen, result }
+    }
+
+    fn assert_nothing_left(&self) {
+        let prefix = self.plan.namespace.prefix();
+        let left: Vec<_> = std::fs::read_dir("/dev/shm")
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .filter(|name| name.starts_with(prefix))
+            .collect();
+        assert_eq!(left, Vec::<String>::new(), "left in shared memory");
+        assert!(!self.plan.namespace.root().exists(), "left in the root");
+        let left = std::fs::read_dir(self.base.path()).unwrap().count();
+        assert_eq!(left, 0, "left beside the root");
+    }
+}
+
+impl Drop for Case {
+    /// Removes what a failed test left.
+    fn drop(&mut self) {
+        drop(self.plan.namespace.acquire());
+    }
+}
+
+impl Run {
+    pub(crate) fn outcome(&self) -> &Outcome {
+        self.result.as_ref().unwrap()
+    }
+
+    /// Frames that a receiver got, with the epoch of their sender.
+    pub(crate) fn got(&self, receiver: &str) -> Vec<(u32, u64)> {
+        self.lines(receiver)
+            .filter_map(|line| {
+                let (epoch, frame) = line.strip_prefix("got ")?.split_once(' ')?;
+                Some((epoch.parse().unwrap(), frame.parse().unwrap()))
+            })
+            .collect()
+    }
+
+    pub(crate) fn lines<'a>(&'a self, process: &'a str) -> impl Iterator<Item = &'a str> {
+        self.seen.iter().filter_map(move |event| match event {
+            Seen::Line(name, text) if name == process => Some(text.as_str()),
+            _ => None,
+        })
+    }
+
+    pub(crate) fn deaths(&self, process: &str) -> Vec<Death> {
+        let of = |event: &Seen| match event {
+            Seen::Died(name, death) if name == process => Some(*death),
+            _ => None,
+        };
+        self.seen.iter().filter_map(of).collect()
+    }
+
+    pub(crate) fn pids(&self, process: &str) -> Vec<u32> {
+        let of = |event: &Seen| match event {
+            Seen::Started(name, pid, _) if name == process => Some(*pid),
+            _ => None,
+        };
+        self.seen.iter().filter_map(of).collect()
+    }
+}
+
+/// Sends a signal.
+pub(crate) fn kill(signal: &str, pid: u32) {
+    let status = Command::new("sh")
+        .args(["-c", &format!("kill {signal} {pid}")])
+        .status();
+    assert!(status.unwrap().success(), "kill {signal} {pid}");
+}
+
+/// Whether a process runs: it is there, and not a zombie.
+pub(crate) fn is_alive(pid: u32) -> bool {
+    let line = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
+    line.is_ok_and(|it| !it.is_empty())
+}
+
+fn note(event: &Event<'_>) -> Option<Seen> {
+    Some(match event {
+        Event::Started {
+            process,
+            pid,
+            epoch,
+        } => Seen::Started((*process).to_owned(), *pid, *epoch),
+        Event::Line { process, text } => Seen::Line((*process).to_owned(), (*text).to_owned()),
+        Event::Finished { process } => Seen::Finished((*process).to_owned()),
+        Event::Died { process, death } => Seen::Died((*process).to_owned(), *death),
+        Event::Restarting { process, pause } => Seen::Restarting((*process).to_owned(), *pause),
+        Event::GivenUp { process, restarts } => Seen::GivenUp((*process).to_owned(), *restarts),
+        Event::Stopping => Seen::Stopping,
+        Event::Health { .. } => return None,
+    })
+}
+
+/// Stops a run that has got stuck.
+struct Watchdog {
+    barked: Arc<AtomicBool>,
+    _over: mpsc::SyncSender<()>,
+}
+
+impl Watchdog {
+    fn new(stop: &Stop) -> Self {
+        let barked = Arc::new(AtomicBool::new(false));
+        let (over, is_over) = mpsc::sync_channel(0);
+        let (bark, stop) = (Arc::clone(&barked), stop.clone());
+        std::thread::Builder::new()
+            .name("watchdog".to_owned())
+            .spawn(move || {
+                if is_over.recv_timeout(WATCHDOG) == Err(mpsc::RecvTimeoutError::Timeout) {
+                    bark.store(true, Ordering::Release);
+                    stop.request();
+                }
+            })
+            .unwrap();
+        Self {
+            barked,
+            _over: over,
+        }
+    }
+
+    fn barked(&self) -> bool {
+        self.barked.load(Ordering::Acquire)
+    }
+}

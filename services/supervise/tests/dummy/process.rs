@@ -1,0 +1,205 @@
+//! A process that behaves well or badly, as its first argument says.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::process::{Command, ExitCode};
+
+use messages::{FrameHeader, Status, ViewQuality};
+use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, Woken, run_service};
+
+/// What all of them talk about.
+const TOPIC: &str = "data";
+const SOON: Duration = Duration::from_millis(50);
+
+fn main() -> ExitCode {
+    let args = std::env::args_os().skip(2); // `service dummy`
+    let (launch, rest) = match Launch::from_args(args.skip(1)) {
+        Ok(parsed) => parsed,
+        Err(error) => return Failure::from(error).exit(),
+    };
+    let rest: Vec<String> = rest.iter().filter_map(text).collect();
+    let number = |index: usize| rest.get(index).and_then(|it| it.parse().ok()).unwrap_or(0);
+    run_service(launch, |service| match rest.first().map(String::as_str) {
+        Some("send") => send(service, number(1), number(2), number(3) as usize),
+        Some("receive") => receive(service, number(1), false),
+        Some("die-at-end") => receive(service, 0, service.epoch() == 0),
+        Some("hold") => hold(service),
+        Some("die-in-loan") => die_in_loan(service),
+        Some("hang-once") => hang_once(service),
+        Some("fail") => Err(failure(number(1))),
+        #[expect(clippy::panic, reason = "it is what the test is about")]
+        Some("panic") => panic!("on purpose"),
+        Some("wrong-type") => wrong_type(service),
+        Some("stubborn") => stubborn(service),
+        Some("orphan") => orphan(service),
+        _ => idle(service),
+    })
+}
+
+fn text(arg: &OsString) -> Option<String> {
+    arg.to_str().map(str::to_owned)
+}
+
+/// The supervisor hands on what is written.
+fn say(text: &str) -> Result<(), Failure> {
+    use std::io::Write as _;
+    writeln!(std::io::stdout().lock(), "{text}").or_fail(ExitKind::Run)
+}
+
+fn failure(status: u64) -> Failure {
+    let kind = ExitKind::of_status(status as i32).unwrap_or(ExitKind::Run);
+    Failure::new(kind, "model.bin: byte 17 is wrong").with_hint("take another")
+}
+
+/// Sends `n` frames, then the end, and then the end again and again.
+fn send(service: &Service, n: u64, pause: u64, subscribers: usize) -> Result<(), Failure> {
+    let publisher = service.bus().slice_publisher::<u8, FrameHeader>(TOPIC)?;
+    let waiter = service.bus().waiter();
+    service.health().set_total(n);
+    publisher.wait_for_subscribers(subscribers, Duration::from_mins(1));
+    let mut frame = 0;
+    while waiter.wait(Duration::from_millis(pause))? != Woken::Stop {
+        let mut loan = publisher.loan(publisher.max_len())?;
+        loan.payload_mut().fill(frame as u8);
+        let header = loan.header_mut();
+        header.stamp.frame = frame;
+        header.stamp.session = service.session();
+        header.stamp.epoch = service.epoch();
+        if frame == n {
+            header.status = Status::END;
+            service.health().finished();
+            loan.send()?;
+            waiter.wait(SOON)?;
+        } else {
+            loan.send()?;
+            service.health().sent(frame);
+            frame += 1;
+            if frame % 16 == 0 {
+                say(&format!("sent {frame}"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Receives until the end, and says what it got.
+///
+/// * `dies`: whether it is killed when it hears the end.
+fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let subscriber = service
+        .bus()
+        .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
+    while waiter.wait(SOON)? != Woken::Stop {
+        while let Some(sample) = subscriber.receive()? {
+            let header = sample.header();
+            let value = header.stamp.frame as u8;
+            if sample.payload().iter().any(|&it| it != value) {
+                say("torn")?;
+            }
+            if header.status == Status::END {
+                if dies {
+                    die()?;
+                }
+                service.health().finished();
+                continue;
+            }
+            service.health().received(1);
+            say(&format!(
+                "got {} {}",
+                header.stamp.epoch, header.stamp.frame
+            ))?;
+            std::thread::sleep(Duration::from_millis(pause));
+        }
+    }
+    Ok(())
+}
+
+/// Subscribes and never reads.
+fn hold(service: &Service) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let subscriber = service
+        .bus()
+        .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
+    // Connected, as one that dies in the middle of its work is.
+    while subscriber.receive()?.is_none() {
+        waiter.wait(SOON)?;
+    }
+    say("holding")?;
+    idle(service)
+}
+
+/// The first time it is killed in the middle of writing; then it sends three frames and is done.
+fn die_in_loan(service: &Service) -> Result<(), Failure> {
+    if service.epoch() > 0 {
+        return send(service, 3, 0, 1);
+    }
+    let publisher = service.bus().slice_publisher::<u8, FrameHeader>(TOPIC)?;
+    publisher.wait_for_subscribers(1, Duration::from_mins(1));
+    for frame in 0..2 {
+        let mut loan = publisher.loan(publisher.max_len())?;
+        loan.payload_mut().fill(frame as u8);
+        loan.header_mut().stamp.frame = frame;
+        loan.send()?;
+        // One at a time, so that none replaces the other.
+        std::thread::sleep(SOON);
+    }
+    let mut loan = publisher.loan(publisher.max_len())?;
+    loan.header_mut().stamp.frame = 99;
+    let half = loan.payload_mut().len() / 2;
+    loan.payload_mut()[..half].fill(0xaa);
+    die()
+}
+
+fn die() -> Result<(), Failure> {
+    let script = format!("kill -9 {}", std::process::id());
+    Command::new("sh")
+        .args(["-c", &script])
+        .status()
+        .or_fail(ExitKind::Run)?;
+    Err(Failure::new(ExitKind::Run, "survived kill -9"))
+}
+
+/// The first time its main loop turns once and then stands still.
+fn hang_once(service: &Service) -> Result<(), Failure> {
+    service.progress().tick();
+    while service.epoch() == 0 {
+        std::thread::sleep(SOON);
+    }
+    idle(service)
+}
+
+/// Is done at once, and waits to be told to end.
+fn idle(service: &Service) -> Result<(), Failure> {
+    let waiter = service.bus().waiter();
+    service.health().finished();
+    while waiter.wait(SOON)? != Woken::Stop {}
+    Ok(())
+}
+
+fn wrong_type(service: &Service) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    service
+        .bus()
+        .subscriber::<ViewQuality>(TOPIC, &mut waiter)?;
+    Ok(())
+}
+
+/// Does not end when it is asked to.
+fn stubborn(service: &Service) -> Result<(), Failure> {
+    service.health().finished();
+    loop {
+        service.progress().tick();
+        std::thread::sleep(SOON);
+    }
+}
+
+/// Starts a process of its own and leaves it.
+fn orphan(service: &Service) -> Result<(), Failure> {
+    let child = Command::new("sleep")
+        .arg("600")
+        .spawn()
+        .or_fail(ExitKind::Run)?;
+    say(&format!("child {}", child.id()))?;
+    idle(service)
+}

@@ -1,0 +1,258 @@
+//! Deployments whose processes are killed, stopped, or fail.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use core::time::Duration;
+use std::cell::Cell;
+
+use common::{Case, Run, Seen, is_alive, kill};
+use runtime::{Delivery, ExitKind, Fault as _};
+use supervise::{Death, Role, State, SuperviseError};
+
+const KILLED: Death = Death::Signal { number: 9 };
+
+/// Kills a process when it is told something for the first time.
+fn kill_once<'a>(
+    process: &'a str,
+    signal: &'a str,
+    when: impl Fn(&Seen) -> bool + 'a,
+) -> impl FnMut(&Seen, &runtime::Stop) + 'a {
+    let pid = Cell::new(None);
+    let done = Cell::new(false);
+    move |event, _| {
+        if let Seen::Started(name, started, 0) = event
+            && name == process
+        {
+            pid.set(Some(*started));
+        }
+        if !done.get() && when(event) {
+            done.set(true);
+            kill(signal, pid.get().unwrap());
+        }
+    }
+}
+
+fn is_line(event: &Seen, process: &str, text: &str) -> bool {
+    matches!(event, Seen::Line(name, line) if name == process && line == text)
+}
+
+/// Whether the sink tells of a frame from a life of its sender.
+fn heard_from(event: &Seen, epoch: u32) -> bool {
+    let begin = format!("got {epoch} ");
+    matches!(event, Seen::Line(name, line) if name == "sink" && line.starts_with(&begin))
+}
+
+fn state_of(run: &Run, process: &str) -> State {
+    let outcome = run.outcome();
+    outcome
+        .processes
+        .iter()
+        .find(|it| it.name == process)
+        .unwrap()
+        .state
+}
+
+#[test]
+fn a_sender_that_waits_for_a_killed_receiver_goes_on() {
+    let mut case = Case::new(
+        Delivery::Lossless,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("dam", "hold", Role::Optional),
+            ("source", "send 50 0 2", Role::Essential),
+        ],
+    );
+    case.plan.policy.max_restarts = 0;
+    // The sink has what the sender could send before the dam stopped it.
+    let run = case.run(kill_once("dam", "-9", |event| {
+        is_line(event, "dam", "holding")
+    }));
+    assert_eq!(run.deaths("dam"), [KILLED]);
+    let expected: Vec<_> = (0..50).map(|frame| (0, frame)).collect();
+    assert_eq!(run.got("sink"), expected);
+    assert_eq!(state_of(&run, "dam"), State::GivenUp);
+    assert_eq!(state_of(&run, "source"), State::Finished);
+    assert!(run.outcome().is_degraded());
+}
+
+#[test]
+fn what_a_killed_sender_was_writing_is_never_seen_and_its_successor_is_heard() {
+    let case = Case::new(
+        Delivery::Lossless,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("source", "die-in-loan", Role::Essential),
+        ],
+    );
+    let run = case.run(|_, _| {});
+    assert_eq!(run.deaths("source"), [KILLED]);
+    assert_eq!(run.got("sink"), [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]);
+    assert!(run.lines("sink").all(|line| line != "torn"));
+    assert_eq!(run.outcome().processes[1].restarts, 1);
+}
+
+#[test]
+fn a_killed_sender_comes_back_and_the_others_go_on() {
+    let case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("source", "send 1000000 1 1", Role::Redundant),
+        ],
+    );
+    let mut kill = kill_once("source", "-9", |event| is_line(event, "source", "sent 32"));
+    let run = case.run(|event, stop| {
+        kill(event, stop);
+        if heard_from(event, 1) {
+            stop.request();
+        }
+    });
+    assert_eq!(run.deaths("source"), [KILLED]);
+    assert!(run.deaths("sink").is_empty());
+    assert_eq!(run.pids("sink").len(), 1);
+    assert_eq!(run.pids("source").len(), 2);
+}
+
+#[test]
+fn a_receiver_that_is_killed_at_the_very_end_comes_back_and_hears_the_end() {
+    for delivery in [Delivery::Realtime, Delivery::Lossless] {
+        let case = Case::new(
+            delivery,
+            &[
+                ("sink", "die-at-end", Role::Essential),
+                ("source", "send 20 1 1", Role::Essential),
+            ],
+        );
+        let run = case.run(|_, _| {});
+        assert_eq!(run.deaths("sink"), [KILLED]);
+        assert_eq!(state_of(&run, "sink"), State::Finished);
+        assert!(!run.outcome().is_degraded());
+    }
+}
+
+#[test]
+fn a_stopped_process_looks_alive_but_is_found_out() {
+    let case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("source", "send 1000000 1 1", Role::Essential),
+        ],
+    );
+    // Late enough for it to have given a sign of life.
+    let mut freeze = kill_once("source", "-STOP", |event| {
+        is_line(event, "source", "sent 512")
+    });
+    let run = case.run(|event, stop| {
+        freeze(event, stop);
+        if heard_from(event, 1) {
+            stop.request();
+        }
+    });
+    let deaths = run.deaths("source");
+    assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
+    assert!(!is_alive(run.pids("source")[0]));
+}
+
+#[test]
+fn a_main_loop_that_stands_still_is_found_out() {
+    let case = Case::new(
+        Delivery::Realtime,
+        &[("knot", "hang-once", Role::Essential)],
+    );
+    let run = case.run(|_, _| {});
+    let deaths = run.deaths("knot");
+    assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
+    assert_eq!(state_of(&run, "knot"), State::Finished);
+}
+
+#[test]
+fn a_crash_loop_is_given_up_after_longer_and_longer_pauses() {
+    let mut case = Case::new(Delivery::Realtime, &[("wreck", "panic", Role::Essential)]);
+    case.plan.policy.max_restarts = 3;
+    let run = case.run(|_, _| {});
+    let pauses: Vec<_> = run
+        .seen
+        .iter()
+        .filter_map(|event| match event {
+            Seen::Restarting(_, pause) => Some(pause.as_millis()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(pauses, [20, 40, 80]);
+    assert_eq!(run.deaths("wreck"), [Death::Exit { status: 1 }; 4]);
+    let error = run.result.unwrap_err();
+    assert_eq!(error.kind(), ExitKind::Run);
+    assert!(
+        matches!(error, SuperviseError::GivenUp { restarts: 3, .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("on purpose"), "{error}");
+}
+
+#[test]
+fn a_recorder_that_keeps_dying_does_not_stop_the_run() {
+    let mut case = Case::new(
+        Delivery::Lossless,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("record", "fail 1", Role::Optional),
+            ("source", "send 50 1 1", Role::Essential),
+        ],
+    );
+    case.plan.policy.max_restarts = 2;
+    let run = case.run(|_, _| {});
+    assert_eq!(run.got("sink").len(), 50);
+    assert_eq!(state_of(&run, "record"), State::GivenUp);
+    assert!(run.outcome().is_degraded());
+}
+
+#[test]
+fn a_run_goes_on_with_the_views_that_are_left() {
+    let mut case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("view-0", "fail 1", Role::Redundant),
+            ("view-1", "idle", Role::Redundant),
+        ],
+    );
+    case.plan.policy.max_restarts = 1;
+    let run = case.run(|_, _| {});
+    assert_eq!(state_of(&run, "view-0"), State::GivenUp);
+    assert_eq!(state_of(&run, "view-1"), State::Finished);
+}
+
+#[test]
+fn a_run_without_any_view_left_fails() {
+    let mut case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("view-0", "fail 1", Role::Redundant),
+            ("view-1", "fail 1", Role::Redundant),
+        ],
+    );
+    case.plan.policy.max_restarts = 1;
+    let error = case.run(|_, _| {}).result.unwrap_err();
+    assert!(matches!(error, SuperviseError::GivenUp { .. }), "{error}");
+}
+
+#[test]
+fn a_process_that_never_begins_is_killed() {
+    let mut case = Case::new(Delivery::Realtime, &[("mute", "idle", Role::Essential)]);
+    // A program that runs but gives no sign of life.
+    case.plan.executable = "/bin/sleep".into();
+    case.plan.policy.startup_limit = Duration::from_millis(200);
+    case.plan.policy.max_restarts = 0;
+    let script = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let path = script.path().join("mute");
+    std::fs::write(&path, "#!/bin/sh\nexec sleep 600\n").unwrap();
+    let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o700);
+    std::fs::set_permissions(&path, permissions).unwrap();
+    case.plan.executable = path;
+    let error = case.run(|_, _| {}).result.unwrap_err();
+    let SuperviseError::GivenUp { death, .. } = &error else {
+        panic!("{error}");
+    };
+    assert!(matches!(death, Death::NeverBegan { .. }), "{error}");
+}

@@ -1,0 +1,241 @@
+//! Processes that a supervisor starts and watches.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::io::{self, PipeReader, Read as _};
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+use std::process::{Command, ExitStatus, Stdio};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::{Errno, ioctl_fionbio};
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, kill_process_group, pidfd_open};
+
+use crate::Stop;
+
+const READ_BYTES: usize = 4096;
+
+/// A process that this one has started. Dropping it kills it.
+///
+/// The kernel ends it when the *thread* that started it ends (see
+/// [`Launch::supervisor`](crate::Launch)), so that thread must be the one which supervises.
+#[derive(Debug)]
+pub struct Child {
+    process: std::process::Child,
+    pidfd: OwnedFd,
+    output: Option<PipeReader>,
+    /// What came since the last end of a line.
+    partial: Vec<u8>,
+}
+
+impl Child {
+    /// Starts a process with its output in a pipe and without input, out of reach of the terminal's
+    /// signals.
+    ///
+    /// # Errors
+    ///
+    /// The executable cannot be run, or the system has no room for another process.
+    pub fn start(executable: &Path, args: &[OsString]) -> io::Result<Self> {
+        let (output, writer) = io::pipe()?;
+        ioctl_fionbio(&output, true)?;
+        let child = Command::new(executable)
+            .args(args)
+            .stdin(Stdio::null())
+            .stdout(writer.try_clone()?)
+            .stderr(writer)
+            .process_group(0)
+            .spawn()?;
+        let pidfd = pidfd_open(Pid::from_child(&child), PidfdFlags::empty())?;
+        Ok(Self {
+            process: child,
+            pidfd,
+            output: Some(output),
+            partial: Vec::new(),
+        })
+    }
+
+    /// Its process id.
+    pub fn pid(&self) -> u32 {
+        self.process.id()
+    }
+
+    /// The lines it has written since the last call; with the end of its output the rest as well.
+    ///
+    /// # Errors
+    ///
+    /// The pipe cannot be read.
+    pub fn read_lines(&mut self) -> io::Result<Vec<String>> {
+        let mut ended = false;
+        if let Some(output) = &mut self.output {
+            let mut bytes = [0; READ_BYTES];
+            loop {
+                match output.read(&mut bytes) {
+                    Ok(0) => {
+                        ended = true;
+                        break;
+                    }
+                    Ok(n) => self.partial.extend(bytes.iter().take(n)),
+                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        if ended {
+            self.output = None;
+        }
+        let whole = match self.partial.iter().rposition(|&byte| byte == b'\n') {
+            Some(last) => self.partial.drain(..=last).collect(),
+            None => Vec::new(),
+        };
+        let rest = if self.output.is_none() {
+            std::mem::take(&mut self.partial)
+        } else {
+            Vec::new()
+        };
+        let text = [whole, rest].concat();
+        Ok(String::from_utf8_lossy(&text)
+            .lines()
+            .map(str::to_owned)
+            .collect())
+    }
+
+    /// How it ended, if it has. Processes that it started and left behind are ended then.
+    ///
+    /// # Errors
+    ///
+    /// The system has forgotten it.
+    pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
+        let mut fds = [PollFd::from_borrowed_fd(self.pidfd.as_fd(), PollFlags::IN)];
+        let ended = poll(&mut fds, Some(&Timespec::default()))? > 0;
+        if ended {
+            // Before it is reaped, for as long as its id is certainly not another's.
+            self.kill();
+        }
+        self.process.try_wait()
+    }
+
+    /// Asks it to end.
+    pub fn terminate(&self) {
+        if let Err(error) = kill_process(Pid::from_child(&self.process), Signal::TERM) {
+            tracing::debug!(%error, pid = self.pid(), "cannot signal");
+        }
+    }
+
+    /// Ends it, and whatever it has started.
+    pub fn kill(&self) {
+        if let Err(error) = kill_process_group(Pid::from_child(&self.process), Signal::KILL) {
+            tracing::debug!(%error, pid = self.pid(), "cannot kill");
+        }
+    }
+}
+
+impl Drop for Child {
+    fn drop(&mut self) {
+        if let Ok(None) = self.try_wait() {
+            self.kill();
+            if let Err(error) = self.process.wait() {
+                tracing::debug!(%error, pid = self.pid(), "cannot wait for the end");
+            }
+        }
+    }
+}
+
+/// Sleeps until a child ends or writes something, `stop` is requested, or `timeout` has passed.
+///
+/// # Errors
+///
+/// The system cannot wait for that many children.
+pub fn wait_for_any(children: &[&Child], stop: Option<&Stop>, timeout: Duration) -> io::Result<()> {
+    let mut fds = Vec::new();
+    for child in children {
+        fds.push(PollFd::from_borrowed_fd(child.pidfd.as_fd(), PollFlags::IN));
+        if let Some(output) = &child.output {
+            fds.push(PollFd::from_borrowed_fd(output.as_fd(), PollFlags::IN));
+        }
+    }
+    if let Some(stop) = stop {
+        fds.push(PollFd::from_borrowed_fd(stop.as_fd(), PollFlags::IN));
+    }
+    let timeout = Timespec {
+        tv_sec: timeout.as_secs() as i64,
+        tv_nsec: i64::from(timeout.subsec_nanos()),
+    };
+    match poll(&mut fds, Some(&timeout)) {
+        Ok(_) | Err(Errno::INTR) => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::time::Duration;
+    use std::ffi::OsString;
+    use std::path::Path;
+    use std::process::ExitStatus;
+
+    use super::{Child, wait_for_any};
+
+    fn shell(script: &str) -> Child {
+        Child::start(Path::new("/bin/sh"), &["-c", script].map(OsString::from)).unwrap()
+    }
+
+    fn run(child: &mut Child) -> (Vec<String>, ExitStatus) {
+        let mut lines = Vec::new();
+        loop {
+            wait_for_any(&[&*child], None, Duration::from_secs(10)).unwrap();
+            let status = child.try_wait().unwrap();
+            lines.extend(child.read_lines().unwrap());
+            if let Some(status) = status {
+                return (lines, status);
+            }
+        }
+    }
+
+    #[test]
+    fn hears_both_outputs_line_by_line_to_the_last() {
+        let mut child = shell("echo one; echo two >&2; printf three");
+        let (lines, status) = run(&mut child);
+        assert_eq!(lines, ["one", "two", "three"]);
+        assert!(status.success());
+    }
+
+    #[test]
+    fn does_not_answer_with_half_a_line() {
+        let mut child = shell("printf half; exec sleep 600");
+        wait_for_any(&[&child], None, Duration::from_secs(10)).unwrap();
+        assert_eq!(child.read_lines().unwrap(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn tells_a_signal_from_an_exit() {
+        use std::os::unix::process::ExitStatusExt as _;
+        let (_, status) = run(&mut shell("exit 4"));
+        assert_eq!(status.code(), Some(4));
+        let mut child = shell("exec sleep 600");
+        child.kill();
+        let (_, status) = run(&mut child);
+        assert_eq!(status.signal(), Some(9));
+    }
+
+    #[test]
+    fn what_a_child_leaves_behind_ends_with_it() {
+        let mut child = shell("sleep 600 & echo $!; kill -9 $$");
+        let (lines, status) = run(&mut child);
+        assert!(!status.success());
+        let orphan = format!("/proc/{}/cmdline", lines[0]);
+        while std::fs::read(&orphan).is_ok_and(|line| !line.is_empty()) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    #[test]
+    fn a_child_that_is_dropped_is_gone() {
+        let child = shell("exec sleep 600");
+        let proc = format!("/proc/{}", child.pid());
+        assert!(Path::new(&proc).exists());
+        drop(child);
+        assert!(!Path::new(&proc).exists());
+    }
+}
