@@ -1,0 +1,109 @@
+//! The exact area mean, for maps that keep rows and columns.
+
+use super::Fill;
+use crate::Size;
+
+/// Which source pixels one output coordinate covers, and how much of each.
+#[derive(Debug, Clone, PartialEq)]
+struct Cover {
+    first: usize,
+    weights: Vec<f32>,
+}
+
+/// Row and column covers; a pixel is the sum over both, divided by the area.
+#[derive(Debug, Clone)]
+pub(super) struct Area {
+    columns: Vec<Cover>,
+    rows: Vec<Cover>,
+    area: f32,
+    /// One source row: the weighted sum of the rows that an output row covers.
+    sums: Vec<f32>,
+}
+
+impl Area {
+    /// * `axes`: factor and shift of x, factor and shift of y; factors of at least 1 in size.
+    pub(super) fn new(source: Size, output: Size, axes: [[f64; 2]; 2], fill: Fill) -> Self {
+        let [x_axis, y_axis] = axes;
+        let cover = |n_output: usize, axis: [f64; 2], n_source: usize| {
+            (0..n_output)
+                .map(|at| Cover::new(axis[0] * at as f64 + axis[1], axis[0].abs(), n_source, fill))
+                .collect()
+        };
+        Self {
+            columns: cover(output.width, x_axis, source.width),
+            rows: cover(output.height, y_axis, source.height),
+            area: (x_axis[0] * y_axis[0]).abs() as f32,
+            sums: vec![0.0; source.width * 3],
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn apply(&mut self, source: &[u8], out: &mut [u8]) {
+        let stride = self.sums.len();
+        let out_rows = out.chunks_exact_mut(self.columns.len() * 3);
+        for (cover, out_row) in self.rows.iter().zip(out_rows) {
+            self.sums.fill(0.0);
+            let rows = source[cover.first * stride..].chunks_exact(stride);
+            for (&weight, row) in cover.weights.iter().zip(rows) {
+                for (sum, &value) in self.sums.iter_mut().zip(row) {
+                    *sum += weight * f32::from(value);
+                }
+            }
+            for (cover, pixel) in self.columns.iter().zip(out_row.as_chunks_mut().0) {
+                *pixel = cover.mean(&self.sums, self.area);
+            }
+        }
+    }
+}
+
+impl Cover {
+    /// * `centre`: where the output coordinate falls in the source; `width`: how much it covers.
+    fn new(centre: f64, width: f64, n_source: usize, fill: Fill) -> Self {
+        // Edges, in units where source pixel `i` covers `[i, i + 1]`.
+        let low = centre + 0.5 - width / 2.0;
+        let high = low + width;
+        let last = n_source as f64 - 1.0;
+        let [first, end] = match fill {
+            Fill::Black => [low.floor().max(0.0), high.ceil().min(last + 1.0)],
+            Fill::Replicate => [
+                low.floor().clamp(0.0, last),
+                high.ceil().clamp(1.0, last + 1.0),
+            ],
+        };
+        let (first, end) = (first.min(last) as usize, end.max(0.0) as usize);
+        let weights = (first..end)
+            .map(|pixel| {
+                let mut sides = [pixel as f64, pixel as f64 + 1.0];
+                if fill == Fill::Replicate {
+                    // The pixels of the border reach out for ever.
+                    sides[0] = if pixel == 0 {
+                        f64::NEG_INFINITY
+                    } else {
+                        sides[0]
+                    };
+                    sides[1] = if pixel + 1 == n_source {
+                        f64::INFINITY
+                    } else {
+                        sides[1]
+                    };
+                }
+                (high.min(sides[1]) - low.max(sides[0])).max(0.0) as f32
+            })
+            .collect();
+        Self { first, weights }
+    }
+
+    #[inline(always)]
+    fn mean(&self, sums: &[f32], area: f32) -> [u8; 3] {
+        let mut total = [0.0; 3];
+        let pixels = sums[self.first * 3..].as_chunks::<3>().0;
+        for (weight, pixel) in self.weights.iter().zip(pixels) {
+            for (total, value) in total.iter_mut().zip(pixel) {
+                *total += weight * value;
+            }
+        }
+        // A sum of integers is exact below 2^24, and its quotient correctly rounded: integer factors
+        // give the true mean.
+        total.map(|it| (it / area + 0.5) as u8)
+    }
+}

@@ -1,0 +1,281 @@
+//! What a warp must do to images whose result is known.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use footage::{Affine, Fill, Size, Warp, WarpError, resize_map};
+use proptest::prelude::*;
+
+/// An image whose pixels are given by a function of their place.
+fn image(size: Size, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Vec<u8> {
+    let places = (0..size.height).flat_map(|y| (0..size.width).map(move |x| (x, y)));
+    places.flat_map(|(x, y)| pixel(x, y)).collect()
+}
+
+fn noise(size: Size) -> Vec<u8> {
+    image(size, |x, y| {
+        let mixed = (x as u32 * 7919 + y as u32 * 104_729).wrapping_mul(2_654_435_761);
+        [(mixed >> 24) as u8, (mixed >> 16) as u8, (mixed >> 8) as u8]
+    })
+}
+
+fn warp(source: Size, rgb: &[u8], output: Size, map: &Affine, fill: Fill) -> Vec<u8> {
+    let mut out = vec![99; output.rgb_bytes()];
+    Warp::new(source, output, map, fill)
+        .unwrap()
+        .apply(rgb, &mut out);
+    out
+}
+
+/// Turns by `degrees` and shrinks by `scale`, about the centres of both images.
+fn turn(source: Size, output: Size, degrees: f64, scale: f64) -> Affine {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let centre = |it: usize| (it as f64 - 1.0) / 2.0;
+    let linear = [[scale * cos, -scale * sin], [scale * sin, scale * cos]];
+    let [cx, cy] = [centre(output.width), centre(output.height)];
+    let towards = [centre(source.width), centre(source.height)];
+    std::array::from_fn(|i| {
+        let [a, b] = linear[i];
+        [a, b, towards[i] - a * cx - b * cy]
+    })
+}
+
+fn at(rgb: &[u8], size: Size, x: usize, y: usize) -> [u8; 3] {
+    rgb[(y * size.width + x) * 3..][..3].try_into().unwrap()
+}
+
+#[test]
+fn the_identity_copies() {
+    let size = Size::new(13, 7);
+    let map = resize_map(size, size);
+    assert_eq!(map, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    assert_eq!(
+        warp(size, &noise(size), size, &map, Fill::Black),
+        noise(size)
+    );
+}
+
+#[test]
+fn a_shift_by_whole_pixels_moves_and_fills() {
+    let size = Size::new(13, 7);
+    let source = noise(size);
+    let map = [[1.0, 0.0, 3.0], [0.0, 1.0, -2.0]];
+    for (fill, outside) in [(Fill::Black, None), (Fill::Replicate, Some(()))] {
+        let out = warp(size, &source, size, &map, fill);
+        for (x, y) in (0..size.width).flat_map(|x| (0..size.height).map(move |y| (x, y))) {
+            let (u, v) = (x as i64 + 3, y as i64 - 2);
+            let nearest = at(
+                &source,
+                size,
+                u.clamp(0, 12) as usize,
+                v.clamp(0, 6) as usize,
+            );
+            let is_there = (0..13).contains(&u) && (0..7).contains(&v);
+            let expect = if is_there || outside.is_some() {
+                nearest
+            } else {
+                [0; 3]
+            };
+            assert_eq!(at(&out, size, x, y), expect, "{fill:?} at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn half_the_size_is_the_mean_of_four_rounded_half_up() {
+    let (source, output) = (Size::new(20, 12), Size::new(10, 6));
+    let rgb = noise(source);
+    let out = warp(
+        source,
+        &rgb,
+        output,
+        &resize_map(source, output),
+        Fill::Black,
+    );
+    let expect = image(output, |x, y| {
+        std::array::from_fn(|channel| {
+            let value = |i, j| u32::from(at(&rgb, source, 2 * x + i, 2 * y + j)[channel]);
+            ((value(0, 0) + value(1, 0) + value(0, 1) + value(1, 1) + 2) / 4) as u8
+        })
+    });
+    assert_eq!(out, expect);
+}
+
+#[test]
+fn a_quarter_turn_permutes_pixels() {
+    let (source, output) = (Size::new(9, 14), Size::new(14, 9));
+    let rgb = noise(source);
+    // Output (x, y) shows source (8 - y, x): turned counter-clockwise.
+    let map = [[0.0, -1.0, 8.0], [1.0, 0.0, 0.0]];
+    let out = warp(source, &rgb, output, &map, Fill::Black);
+    assert_eq!(out, image(output, |x, y| at(&rgb, source, 8 - y, x)));
+}
+
+#[test]
+fn a_mirror_mirrors() {
+    let size = Size::new(9, 5);
+    let rgb = noise(size);
+    let map = [[-1.0, 0.0, 8.0], [0.0, 1.0, 0.0]];
+    let out = warp(size, &rgb, size, &map, Fill::Black);
+    assert_eq!(out, image(size, |x, y| at(&rgb, size, 8 - x, y)));
+}
+
+#[test]
+fn a_turned_and_shrunk_image_is_the_mean_of_the_turned_one() {
+    // Turn at full size by hand (bilinear, in f64), then average 4 x 4.
+    let (source, output) = (Size::new(96, 96), Size::new(16, 16));
+    let rgb = noise(source);
+    let map = turn(source, output, 28.0, 4.0);
+    let out = warp(source, &rgb, output, &map, Fill::Black);
+    let bilinear = |u: f64, v: f64, channel: usize| {
+        let (x, y) = (u.floor(), v.floor());
+        let value = |i: f64, j: f64| {
+            f64::from(at(&rgb, source, (x + i) as usize, (y + j) as usize)[channel])
+                * (1.0 - (u - x - i).abs())
+                * (1.0 - (v - y - j).abs())
+        };
+        value(0.0, 0.0) + value(1.0, 0.0) + value(0.0, 1.0) + value(1.0, 1.0)
+    };
+    let mut worst = 0.0_f64;
+    for (x, y) in (0..16).flat_map(|x| (0..16).map(move |y| (x, y))) {
+        for channel in 0..3 {
+            let mean = (0..16)
+                .map(|sample| {
+                    let offset = |it: i32| (f64::from(it) + 0.5) / 4.0 - 0.5;
+                    let (p, q) = (x as f64 + offset(sample % 4), y as f64 + offset(sample / 4));
+                    let [u, v] = map.map(|[a, b, t]| a * p + b * q + t);
+                    bilinear(u, v, channel)
+                })
+                .sum::<f64>()
+                / 16.0;
+            worst = worst.max((f64::from(at(&out, output, x, y)[channel]) - mean).abs());
+        }
+    }
+    // Half a level by rounding the value; the rest by rounding the position to 1/32 pixel in noise.
+    assert!(worst < 2.0, "{worst} grey levels");
+}
+
+#[test]
+fn pixels_outside_are_black_or_the_nearest() {
+    let (source, output) = (Size::new(40, 40), Size::new(40, 40));
+    let rgb = vec![200; source.rgb_bytes()];
+    let map = turn(source, output, 30.0, 1.5);
+    let black = warp(source, &rgb, output, &map, Fill::Black);
+    assert_eq!(at(&black, output, 0, 0), [0; 3]);
+    assert_eq!(at(&black, output, 20, 20), [200; 3]);
+    let replicated = warp(source, &rgb, output, &map, Fill::Replicate);
+    assert!(replicated.iter().all(|&it| it == 200));
+}
+
+#[test]
+fn refuses_what_it_cannot_map() {
+    let size = Size::new(8, 8);
+    let refusal =
+        |source, output, map: Affine| Warp::new(source, output, &map, Fill::Black).unwrap_err();
+    let identity = resize_map(size, size);
+    assert!(matches!(
+        refusal(Size::new(0, 8), size, identity),
+        WarpError::Empty { .. }
+    ));
+    assert!(matches!(
+        refusal(size, Size::new(8, 0), identity),
+        WarpError::Empty { .. }
+    ));
+    for bad in [f64::NAN, f64::INFINITY, 1e9] {
+        let map = [[1.0, 0.0, bad], [0.0, 1.0, 0.0]];
+        assert!(
+            matches!(refusal(size, size, map), WarpError::BadMap { .. }),
+            "{bad}"
+        );
+    }
+    let flat = [[1.0, 2.0, 0.0], [2.0, 4.0, 0.0]];
+    assert!(matches!(
+        refusal(size, size, flat),
+        WarpError::BadMap { .. }
+    ));
+    let tiny = resize_map(Size::new(1000, 8), Size::new(10, 8));
+    assert!(matches!(
+        refusal(size, size, tiny),
+        WarpError::ShrinksTooMuch { .. }
+    ));
+}
+
+proptest! {
+    #[test]
+    fn a_constant_image_stays_constant(
+        value: u8, degrees in -180.0..180.0, scale in 0.3..9.0, keeps_rows: bool,
+    ) {
+        let (source, output) = (Size::new(50, 40), Size::new(12, 14));
+        let degrees = if keeps_rows { 0.0 } else { degrees };
+        let map = turn(source, output, degrees, scale);
+        let rgb = vec![value; source.rgb_bytes()];
+        let out = warp(source, &rgb, output, &map, Fill::Replicate);
+        // The area mean divides by an area that is rounded to f32, which no grey level notices.
+        prop_assert!(out.iter().all(|&it| it == value));
+    }
+
+    #[test]
+    fn any_shrinking_resize_is_the_area_mean(
+        width in 1_usize..40, height in 1_usize..30, shrunk_x in 0.05..1.0, shrunk_y in 0.05..1.0,
+    ) {
+        let source = Size::new(width, height);
+        let shrunk = |side: usize, by: f64| ((side as f64 * by).round() as usize).max(1);
+        let output = Size::new(shrunk(width, shrunk_x), shrunk(height, shrunk_y));
+        let rgb = noise(source);
+        let out = warp(source, &rgb, output, &resize_map(source, output), Fill::Black);
+        let share = |pixel: usize, at: usize, n_source: usize, n_output: usize| {
+            let step = n_source as f64 / n_output as f64;
+            let (low, high) = (at as f64 * step, (at as f64 + 1.0) * step);
+            (high.min(pixel as f64 + 1.0) - low.max(pixel as f64)).max(0.0) / step
+        };
+        for (x, y) in (0..output.width).flat_map(|x| (0..output.height).map(move |y| (x, y))) {
+            for channel in 0..3 {
+                let mut mean = 0.0;
+                for (i, j) in (0..width).flat_map(|i| (0..height).map(move |j| (i, j))) {
+                    mean += share(i, x, width, output.width)
+                        * share(j, y, height, output.height)
+                        * f64::from(at(&rgb, source, i, j)[channel]);
+                }
+                let found = f64::from(at(&out, output, x, y)[channel]);
+                prop_assert!((found - mean).abs() <= 0.5 + 1e-3, "{found} for {mean}");
+            }
+        }
+    }
+
+    /// Red is the column and green the row, so the output shows the map itself.
+    #[test]
+    fn a_ramp_shows_the_affine_map(
+        degrees in -180.0..180.0, scale in 0.4..6.0, dx in -3.0..3.0, dy in -3.0..3.0,
+    ) {
+        ramp_shows(degrees, scale, [dx, dy])?;
+    }
+}
+
+#[test]
+fn a_ramp_shows_the_map_of_a_rolled_camera() {
+    ramp_shows(28.0, 4.0, [0.0, 0.0]).unwrap();
+}
+
+fn ramp_shows(degrees: f64, scale: f64, shift: [f64; 2]) -> Result<(), TestCaseError> {
+    let (source, output) = (Size::new(200, 160), Size::new(25, 20));
+    let rgb = image(source, |x, y| [x as u8, y as u8, 255 - x as u8]);
+    let mut map = turn(source, output, degrees, scale);
+    map[0][2] += shift[0];
+    map[1][2] += shift[1];
+    let out = warp(source, &rgb, output, &map, Fill::Black);
+    for (x, y) in (0..output.width).flat_map(|x| (0..output.height).map(move |y| (x, y))) {
+        let [u, v] = map.map(|[a, b, t]| a * x as f64 + b * y as f64 + t);
+        let margin = scale + 1.0;
+        if u < margin || v < margin || u > 199.0 - margin || v > 159.0 - margin {
+            continue;
+        }
+        let found = at(&out, output, x, y).map(f64::from);
+        for (found, expect) in found.into_iter().zip([u, v, 255.0 - u]) {
+            // Half a grey level, and half a phase (phases are 1/16 pixel above scale 4).
+            prop_assert!(
+                (found - expect).abs() < 0.5 + 0.04,
+                "{found} for {expect} at {x}, {y}"
+            );
+        }
+    }
+    Ok(())
+}
