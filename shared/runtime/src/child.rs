@@ -27,6 +27,8 @@ pub struct Child {
     output: Option<PipeReader>,
     /// What came since the last end of a line.
     partial: Vec<u8>,
+    /// Whether it has ended, and nothing more will come.
+    ended: bool,
 }
 
 impl Child {
@@ -52,6 +54,7 @@ impl Child {
             pidfd,
             output: Some(output),
             partial: Vec::new(),
+            ended: false,
         })
     }
 
@@ -60,19 +63,19 @@ impl Child {
         self.process.id()
     }
 
-    /// The lines it has written since the last call; with the end of its output the rest as well.
+    /// The lines it has written since the last call; after its end the rest as well.
     ///
     /// # Errors
     ///
     /// The pipe cannot be read.
     pub fn read_lines(&mut self) -> io::Result<Vec<String>> {
-        let mut ended = false;
+        let mut closed = false;
         if let Some(output) = &mut self.output {
             let mut bytes = [0; READ_BYTES];
             loop {
                 match output.read(&mut bytes) {
                     Ok(0) => {
-                        ended = true;
+                        closed = true;
                         break;
                     }
                     Ok(n) => self.partial.extend(bytes.iter().take(n)),
@@ -82,14 +85,14 @@ impl Child {
                 }
             }
         }
-        if ended {
+        if closed {
             self.output = None;
         }
         let whole = match self.partial.iter().rposition(|&byte| byte == b'\n') {
             Some(last) => self.partial.drain(..=last).collect(),
             None => Vec::new(),
         };
-        let rest = if self.output.is_none() {
+        let rest = if closed || self.ended {
             std::mem::take(&mut self.partial)
         } else {
             Vec::new()
@@ -113,7 +116,9 @@ impl Child {
             // Before it is reaped, for as long as its id is certainly not another's.
             self.kill();
         }
-        self.process.try_wait()
+        let status = self.process.try_wait()?;
+        self.ended = status.is_some();
+        Ok(status)
     }
 
     /// Asks it to end.
