@@ -168,3 +168,6 @@ fn normalise(in_camera: &Point3<f64>) -> Option<Point2<f64>> {
 fn finite(pixel: Point2<f64>) -> Option<Point2<f64>> {
     pixel.coords.iter().all(|c| c.is_finite()).then_some(pixel)
 }
+
+#[cfg(test)]
+mod tests;

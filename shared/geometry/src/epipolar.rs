@@ -8,13 +8,19 @@ mod curve;
 
 pub use curve::epipolar_curve;
 
+/// Cameras nearer to each other than this, in metres, stand in one place.
+const SAME_PLACE: f64 = 1e-9;
+
 /// The fundamental matrix that takes an ideal pixel of A to its line in the ideal pixels of B.
 ///
 /// `F = K_b⁻ᵀ [t]ₓ R K_a⁻¹` with `R`, `t` = B from A (Hartley & Zisserman, 2nd ed., §9.2), scaled to
-/// a Frobenius norm of 1. It is the zero matrix if both cameras stand in one place: then no view says
-/// anything about the other, and [`epipolar_line`] returns `None`.
+/// a Frobenius norm of 1. It is the zero matrix if both cameras stand in one place (to a nanometre):
+/// then no view says anything about the other, and [`epipolar_line`] returns `None`.
 pub fn fundamental(a: &Camera, b: &Camera) -> Matrix3<f64> {
     let b_from_a = b.camera_from_world * a.camera_from_world.inverse();
+    if b_from_a.translation.vector.norm() < SAME_PLACE {
+        return Matrix3::zeros();
+    }
     let rotation = b_from_a.rotation.to_rotation_matrix();
     let essential = b_from_a.translation.vector.cross_matrix() * rotation.matrix();
     let fundamental = inverse_calibration(b).transpose() * essential * inverse_calibration(a);
@@ -67,3 +73,6 @@ pub fn symmetric_distance(
         point_line_distance(&line_in_b, in_b),
     ])
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,10 +1,69 @@
 //! Calibration files: read and write rigs in the formats of other programs and in our own.
+//!
+//! Every format has a module with `parse`, on text, so that no file is needed to test it; the
+//! functions here do the reading and writing. The internal form is always metres, world-to-camera,
+//! pixels from the centre of the top-left one.
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::UnitVector3;
 
-use crate::{Rig, RigError};
+use crate::Rig;
+
+mod detect;
+mod error;
+mod numbers;
+mod toml_fields;
+
+pub mod humaneva;
+pub mod opencv;
+pub mod own;
+pub mod pose2sim;
+pub mod qualisys;
+pub mod umpm;
+
+mod check;
+
+pub use check::{CameraError, EpipolarReport, Finding, PairError, Severity, check, epipolar_check};
+pub use detect::detect;
+pub use error::{ParseError, RigFileError, UnwritableRig};
+
+#[cfg(test)]
+mod tests;
+
+/// The largest calibration file that is read, in bytes.
+const LARGEST_FILE: u64 = 16 << 20;
+
+/// A kind of calibration file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Our own TOML: [`own`].
+    Own,
+    /// TOML of Pose2Sim, anipose, Caliscope and `FreeMoCap`: [`pose2sim`].
+    Pose2Sim,
+    /// XML of Qualisys: [`qualisys`].
+    Qualisys,
+    /// YAML of `OpenCV` and `EasyMocap`: [`opencv`].
+    OpenCv,
+    /// `.cal` of `HumanEva`: [`humaneva`].
+    HumanEva,
+    /// `.ini` of UMPM: [`umpm`].
+    Umpm,
+}
+
+impl Format {
+    /// Its name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Own => "Parallax rig",
+            Self::Pose2Sim => "Pose2Sim calibration",
+            Self::Qualisys => "Qualisys calibration",
+            Self::OpenCv => "OpenCV storage",
+            Self::HumanEva => "HumanEva .cal",
+            Self::Umpm => "UMPM .ini",
+        }
+    }
+}
 
 /// The unit of lengths in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,10 +76,21 @@ pub enum Unit {
     Millimetres,
 }
 
+impl Unit {
+    /// How many of it make a metre.
+    pub fn per_metre(self) -> f64 {
+        match self {
+            Self::Metres => 1.0,
+            Self::Centimetres => 100.0,
+            Self::Millimetres => 1000.0,
+        }
+    }
+}
+
 /// What a file may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Unit of lengths, where it is not the format's own.
+    /// Unit of lengths, where it is not the format's own. Our own format is always in metres.
     pub unit: Option<Unit>,
     /// Direction against gravity, where the file does not say.
     pub up: Option<UnitVector3<f64>>,
@@ -28,44 +98,187 @@ pub struct ReadOptions {
     pub size: Option<[u32; 2]>,
 }
 
-/// Why a calibration file could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum RigFileError {
-    /// The file could not be read.
-    #[error("cannot read {path}", path = .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The cameras make no rig.
-    #[error("{path}: no usable rig", path = .path.display())]
-    Rig {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: RigError,
-    },
-}
-
 /// Reads a calibration file of any known format.
 ///
 /// # Errors
 ///
-/// See [`RigFileError`]; every one names the file.
+/// See [`RigFileError`]; every one names the file, and below it the field.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Rig, RigFileError> {
     read_many(&[path], options)
 }
 
-/// Reads several files, each with one or more cameras, as one rig.
+/// Reads several files as one rig: one file for each camera, or the pair of `EasyMocap`.
+///
+/// The cameras keep the order of the files. A file of one camera that does not name it is named by
+/// its stem: `C1.cal` is camera `C1`.
 ///
 /// # Errors
 ///
-/// As [`read`].
+/// As [`read`]; also where the formats differ, or two cameras have one name.
 pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileError> {
-    let path = paths
-        .first()
-        .map_or_else(PathBuf::new, |path| path.to_path_buf());
-    Rig::new(Vec::new(), options.up, "").map_err(|source| RigFileError::Rig { path, source })
+    let mut documents = Vec::new();
+    for path in paths {
+        let text = read_text(path)?;
+        let format = detect(path, &text);
+        let format = format.ok_or_else(|| RigFileError::UnknownFormat {
+            path: path.to_path_buf(),
+        })?;
+        documents.push(Document {
+            path: path.to_path_buf(),
+            format,
+            text,
+        });
+    }
+    let Some(first) = documents.first() else {
+        return Err(RigFileError::NoFiles);
+    };
+    if let Some(other) = documents.iter().find(|other| other.format != first.format) {
+        return Err(RigFileError::Mixed {
+            path: other.path.clone(),
+            format: other.format.name(),
+            first: first.format.name(),
+        });
+    }
+    combine(&documents, first, options)
+}
+
+/// Writes a rig.
+///
+/// `HumanEva` and UMPM files hold one camera each: `path` is then a folder that exists, and the files are
+/// named after the cameras. The Qualisys format is only read.
+///
+/// # Errors
+///
+/// [`RigFileError::Unwritable`] where the format has no words for the rig, [`RigFileError::Write`]
+/// where the file cannot be written.
+pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError> {
+    let unwritable = |source| RigFileError::Unwritable {
+        path: path.to_path_buf(),
+        source,
+    };
+    let single = |text: Result<String, UnwritableRig>| Ok(vec![(path.to_path_buf(), text?)]);
+    let each = |extension: &str, text: fn(&crate::Camera) -> Result<String, UnwritableRig>| {
+        let file = |camera: &crate::Camera| {
+            error::check_file_name(camera)?;
+            Ok((
+                path.join(format!("{}.{extension}", camera.name)),
+                text(camera)?,
+            ))
+        };
+        rig.cameras().iter().map(file).collect()
+    };
+    let files: Result<Vec<(PathBuf, String)>, UnwritableRig> = match format {
+        Format::Own => single(Ok(own::write(rig))),
+        Format::Pose2Sim => single(pose2sim::write(rig)),
+        Format::OpenCv => single(opencv::write(rig)),
+        Format::HumanEva => each("cal", humaneva::write),
+        Format::Umpm => each("ini", umpm::write),
+        Format::Qualisys => Err(UnwritableRig::ReadOnly {
+            format: format.name(),
+        }),
+    };
+    for (path, text) in files.map_err(unwritable)? {
+        std::fs::write(&path, text).map_err(|source| RigFileError::Write { path, source })?;
+    }
+    Ok(())
+}
+
+struct Document {
+    path: PathBuf,
+    format: Format,
+    text: String,
+}
+
+impl Document {
+    fn stem(&self) -> String {
+        self.path
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    }
+
+    fn parse(&self, options: &ReadOptions) -> Result<Rig, RigFileError> {
+        let rig = match self.format {
+            Format::Own => own::parse(&self.text, options),
+            Format::Pose2Sim => pose2sim::parse(&self.text, options),
+            Format::Qualisys => qualisys::parse(&self.text, options),
+            Format::OpenCv => opencv::parse(&[(&self.stem(), &self.text)], options),
+            Format::HumanEva => humaneva::parse(&self.stem(), &self.text, options),
+            Format::Umpm => umpm::parse(&self.stem(), &self.text, options),
+        };
+        rig.map_err(|source| self.error(source))
+    }
+
+    fn error(&self, source: ParseError) -> RigFileError {
+        RigFileError::Parse {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, RigFileError> {
+    let failed = |source| RigFileError::Read {
+        path: path.to_path_buf(),
+        source,
+    };
+    let bytes = std::fs::metadata(path).map_err(failed)?.len();
+    if bytes > LARGEST_FILE {
+        return Err(RigFileError::TooLarge {
+            path: path.to_path_buf(),
+            bytes,
+            limit: LARGEST_FILE,
+        });
+    }
+    std::fs::read_to_string(path).map_err(failed)
+}
+
+fn combine(
+    documents: &[Document],
+    first: &Document,
+    options: &ReadOptions,
+) -> Result<Rig, RigFileError> {
+    let source = documents
+        .iter()
+        .map(|document| {
+            document
+                .path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+        })
+        .collect::<Vec<_>>()
+        .join(", ");
+    if first.format == Format::OpenCv {
+        // One camera may be spread over several of these files.
+        let stems: Vec<String> = documents.iter().map(Document::stem).collect();
+        let texts = documents
+            .iter()
+            .zip(&stems)
+            .map(|(d, stem)| (stem.as_str(), d.text.as_str()));
+        let rig = opencv::parse(&texts.collect::<Vec<_>>(), options);
+        let rig = rig.map_err(|source| first.error(source))?;
+        return rebuild(rig.cameras().to_vec(), rig.up_in_world(), &source, first);
+    }
+    let mut cameras = Vec::new();
+    let mut up = None;
+    let mut written = None;
+    for document in documents {
+        let rig = document.parse(options)?;
+        up = up.or(rig.up_in_world());
+        written = Some(rig.source().to_owned()).filter(|source| !source.is_empty());
+        cameras.extend_from_slice(rig.cameras());
+    }
+    let source = written.filter(|_| documents.len() == 1).unwrap_or(source);
+    rebuild(cameras, up, &source, first)
+}
+
+fn rebuild(
+    cameras: Vec<crate::Camera>,
+    up: Option<UnitVector3<f64>>,
+    source: &str,
+    first: &Document,
+) -> Result<Rig, RigFileError> {
+    Rig::new(cameras, up, source).map_err(|error| first.error(ParseError::Rig(error)))
 }

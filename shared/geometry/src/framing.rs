@@ -1,13 +1,19 @@
 //! From the frame that a source delivers to the frame that the pipeline sees.
 
-use crate::{Camera, Rig};
+use nalgebra::{Matrix2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
+
+use crate::{Camera, Lens, Rig};
+
+/// The widest and highest output, in pixels.
+const LARGEST: f64 = 32768.0;
 
 /// How large the output is to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutSize {
-    /// Exactly this width and height, in pixels; the whole calibrated image fits in, centred.
+    /// Exactly this width and height, in pixels. The whole calibrated image fits in, centred, in its
+    /// own aspect; what is over is padding.
     Exact([u32; 2]),
-    /// The calibrated size times this factor, rounded to whole pixels.
+    /// The calibrated size times this factor, rounded to whole pixels (which crops or pads less than a pixel).
     Scale(f64),
 }
 
@@ -22,23 +28,57 @@ pub enum FramingError {
         /// Width and height of the calibrated image.
         calibrated: [u32; 2],
     },
+    /// The source, moved by its offset, does not lie inside the calibrated image.
+    #[error("a source of {}x{} px at offset ({}, {}) leaves the {}x{} px for which the camera is calibrated", .source_size[0], .source_size[1], .offset_px[0], .offset_px[1], .calibrated[0], .calibrated[1])]
+    SourceOffset {
+        /// Width and height of the source's frames.
+        source_size: [u32; 2],
+        /// Calibrated pixel of the source's top-left pixel.
+        offset_px: [u32; 2],
+        /// Width and height of the calibrated image.
+        calibrated: [u32; 2],
+    },
+    /// An output without pixels, or with far too many.
+    #[error("an output of {width} x {height} px is not between 1 and {LARGEST} px")]
+    OutSize {
+        /// Width asked for, before rounding.
+        width: f64,
+        /// Height asked for, before rounding.
+        height: f64,
+    },
+    /// The roll is not a number.
+    #[error("roll of {roll} rad is not a finite number")]
+    Roll {
+        /// The angle.
+        roll: f64,
+    },
 }
 
 /// How a source's frame becomes the pipeline's frame: rotation, resize, crop and pad.
+///
+/// Without roll the calibrated image is scaled uniformly: pixel edges fall on pixel edges, so
+/// `u_out = (u + 0.5) s - 0.5` where the sizes divide. With roll the image also turns about its
+/// principal point, and differing focal lengths become one: `f_out = s √(fx fy)`. Either way
+/// [`camera`](Self::camera) sees the world exactly as the warped picture shows it, lens included;
+/// pixels whose source lies outside of it are for the caller to fill.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Framing {
     camera: Camera,
     source_from_output: [[f64; 3]; 2],
-    out_size: [u32; 2],
     roll: f64,
 }
 
 impl Framing {
     /// Plans the frame.
     ///
+    /// * `source_size`: width and height of the source's frames, in pixels.
+    /// * `source_offset_px`: the calibrated pixel of the source's top-left pixel, for a source that
+    ///   lacks rows or columns of the calibrated image. `None`: the sizes must be equal.
+    /// * `roll`: turns the picture by this angle, radians, clockwise as seen; see [`upright_roll`].
+    ///
     /// # Errors
     ///
-    /// See [`FramingError`].
+    /// One [`FramingError`] for each argument; a source of another size is never guessed at.
     pub fn new(
         camera: &Camera,
         source_size: [u32; 2],
@@ -46,29 +86,63 @@ impl Framing {
         out_size: OutSize,
         roll: f64,
     ) -> Result<Self, FramingError> {
-        let (_, _) = (source_offset_px, out_size);
-        let _ = source_size;
+        let offset = source_offset(camera.intrinsics.size, source_size, source_offset_px)?;
+        if !roll.is_finite() {
+            return Err(FramingError::Roll { roll });
+        }
+        let inside = &camera.intrinsics;
+        let (size, scale) = output(inside.size, out_size)?;
+        let full = Vector2::from(inside.size.map(f64::from));
+        let out = Vector2::from(size.map(f64::from));
+        let half = Vector2::repeat(0.5);
+        let centre = Vector2::new(inside.cx, inside.cy);
+        let out_centre = (centre + half - full / 2.0) * scale + out / 2.0 - half;
+
+        let (focal, linear, constant);
+        if roll == 0.0 {
+            focal = Vector2::new(inside.fx, inside.fy) * scale;
+            linear = Matrix2::from_diagonal_element(1.0 / scale);
+            // Free of the principal point, so that a plain copy is the identity to the last bit.
+            constant = (half - out / 2.0) / scale + full / 2.0 - half;
+        } else {
+            focal = Vector2::repeat((inside.fx * inside.fy).sqrt() * scale);
+            let calibrated_focal = Matrix2::from_diagonal(&Vector2::new(inside.fx, inside.fy));
+            linear = calibrated_focal * Rotation2::new(-roll).matrix() / focal.x;
+            constant = centre - linear * out_centre;
+        }
+        let constant = constant - offset;
+
+        let mut framed = camera.clone();
+        framed.intrinsics.size = size;
+        [framed.intrinsics.fx, framed.intrinsics.fy] = focal.into();
+        [framed.intrinsics.cx, framed.intrinsics.cy] = out_centre.into();
+        if roll != 0.0 {
+            framed.intrinsics.lens = Lens::new(inside.lens.model().rotated(roll));
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+            framed.camera_from_world = turn * camera.camera_from_world;
+        }
+        let row = |r: usize| [linear[(r, 0)], linear[(r, 1)], constant[r]];
         Ok(Self {
-            camera: camera.clone(),
-            source_from_output: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            out_size: source_size,
+            camera: framed,
+            source_from_output: [row(0), row(1)],
             roll,
         })
     }
 
-    /// Where an output pixel lies in the source: `u_src = m[0][0] u + m[0][1] v + m[0][2]`, alike for v; pixel centres.
+    /// Where an output pixel (u, v) lies in the source: `m[0][0] u + m[0][1] v + m[0][2]` is its
+    /// column and `m[1]` its row; both count from the centre of the top-left pixel.
     pub fn source_from_output(&self) -> [[f64; 3]; 2] {
         self.source_from_output
     }
 
-    /// The camera that takes the output image.
+    /// The camera that takes the output image, of the output's size.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
     /// Width and height of the output, in pixels.
     pub fn out_size(&self) -> [u32; 2] {
-        self.out_size
+        self.camera.intrinsics.size
     }
 
     /// The angle by which the picture is turned, radians, clockwise as seen.
@@ -77,8 +151,74 @@ impl Framing {
     }
 }
 
-/// The angle (radians, clockwise as seen) that makes the world's up point up in the middle of the rig.
-pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
-    let _ = camera;
-    rig.up_in_world().map(|_| 0.0)
+fn source_offset(
+    calibrated: [u32; 2],
+    source_size: [u32; 2],
+    offset: Option<[u32; 2]>,
+) -> Result<Vector2<f64>, FramingError> {
+    let Some(offset_px) = offset else {
+        if source_size == calibrated {
+            return Ok(Vector2::zeros());
+        }
+        return Err(FramingError::SourceSize {
+            source_size,
+            calibrated,
+        });
+    };
+    let ends = [0, 1].map(|i| u64::from(source_size[i]) + u64::from(offset_px[i]));
+    if source_size.contains(&0) || (0..2).any(|i| ends[i] > u64::from(calibrated[i])) {
+        return Err(FramingError::SourceOffset {
+            source_size,
+            offset_px,
+            calibrated,
+        });
+    }
+    Ok(Vector2::from(offset_px.map(f64::from)))
 }
+
+/// Size and scale of the output.
+fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), FramingError> {
+    let full = calibrated.map(f64::from);
+    let [width, height] = match wanted {
+        OutSize::Exact(size) => size.map(f64::from),
+        OutSize::Scale(scale) => full.map(|extent| extent * scale),
+    };
+    let rounded = [width, height].map(f64::round);
+    if !rounded
+        .iter()
+        .all(|extent| (1.0..=LARGEST).contains(extent))
+    {
+        return Err(FramingError::OutSize { width, height });
+    }
+    let scale = match wanted {
+        OutSize::Exact(_) => (width / full[0]).min(height / full[1]),
+        OutSize::Scale(scale) => scale,
+    };
+    Ok((rounded.map(|extent| extent as u32), scale))
+}
+
+/// The roll that makes the world's up point up in the picture, in the middle of the rig.
+///
+/// The direction from half a metre below to half a metre above the rig's focus is projected with the
+/// lens; [`Framing`] with the returned angle shows it vertical. Where the focus is not in view, a
+/// point on the camera's own axis stands in. Radians in (-π, π], clockwise as seen.
+///
+/// `None` if the rig does not say which way is up, or the camera looks straight up or down.
+pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
+    let up = rig.up_in_world()?.into_inner();
+    let on_axis = camera.centre_in_world() + camera.axis_in_world().into_inner() * 4.0;
+    let towards = |middle: Point3<f64>| {
+        let [low, high] = [-0.5, 0.5].map(|metres| camera.project(&(middle + up * metres)));
+        let inside = &camera.intrinsics;
+        Some(inside.normalised(&high?) - inside.normalised(&low?))
+    };
+    let direction = rig.focus().and_then(towards).or_else(|| towards(on_axis))?;
+    if direction.norm() < 1e-6 {
+        return None;
+    }
+    // Up in the picture is (0, -1): turn by the angle from `direction` to it.
+    Some((-direction.x).atan2(-direction.y))
+}
+
+#[cfg(test)]
+mod tests;

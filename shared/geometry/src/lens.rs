@@ -82,8 +82,8 @@ impl Lens {
         &self,
         point: &Point2<f64>,
     ) -> Option<(Point2<f64>, Matrix2<f64>)> {
-        // Negated so that NaN is refused too.
-        if !(point.coords.norm() <= self.max_radius) {
+        // NaN is in no range.
+        if !(0.0..=self.max_radius).contains(&point.coords.norm()) {
             return None;
         }
         let (distorted, jacobian) = self.model.distort(point.coords);
@@ -201,3 +201,6 @@ fn fisheye(k: &[f64; 4], angle: f64) -> (f64, f64) {
     let slope = 1.0 + s * (3.0 * k[0] + s * (5.0 * k[1] + s * (7.0 * k[2] + s * 9.0 * k[3])));
     (angle * factor, slope)
 }
+
+#[cfg(test)]
+mod tests;

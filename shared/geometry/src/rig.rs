@@ -209,47 +209,75 @@ impl Rig {
 }
 
 fn check_camera(camera: &Camera) -> Result<(), RigError> {
+    check_finite(camera)?;
+    check_image(camera)?;
+    let rotation = camera.camera_from_world.rotation.to_rotation_matrix();
+    rotation_from_matrix(rotation.matrix()).map_err(|source| {
+        let camera = camera.name.clone();
+        RigError::Rotation { camera, source }
+    })?;
+    Ok(())
+}
+
+fn check_finite(camera: &Camera) -> Result<(), RigError> {
+    let Intrinsics {
+        fx,
+        fy,
+        cx,
+        cy,
+        lens,
+        ..
+    } = camera.intrinsics;
+    let Isometry3 {
+        rotation,
+        translation,
+    } = camera.camera_from_world;
+    let labelled = |label| move |value| (label, value);
+    let numbers = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)];
+    let mut numbers = numbers
+        .into_iter()
+        .chain(
+            lens.model()
+                .coefficients()
+                .map(labelled("a lens coefficient")),
+        )
+        .chain(
+            rotation
+                .coords
+                .iter()
+                .copied()
+                .map(labelled("a number of the rotation")),
+        )
+        .chain(
+            translation
+                .vector
+                .iter()
+                .copied()
+                .map(labelled("a number of the translation")),
+        );
+    match numbers.find(|(_, value)| !value.is_finite()) {
+        Some((quantity, value)) => {
+            let camera = camera.name.clone();
+            Err(RigError::NotFinite {
+                camera,
+                quantity,
+                value,
+            })
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_image(camera: &Camera) -> Result<(), RigError> {
     let Intrinsics {
         fx,
         fy,
         cx,
         cy,
         size,
-        lens,
+        ..
     } = camera.intrinsics;
     let name = || camera.name.clone();
-    let Isometry3 {
-        rotation,
-        translation,
-    } = camera.camera_from_world;
-    let numbers = [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)]
-        .into_iter()
-        .chain(
-            lens.model()
-                .coefficients()
-                .map(|c| ("a lens coefficient", c)),
-        )
-        .chain(
-            rotation
-                .coords
-                .iter()
-                .map(|&c| ("a number of the rotation", c)),
-        )
-        .chain(
-            translation
-                .vector
-                .iter()
-                .map(|&c| ("a number of the translation", c)),
-        );
-    for (quantity, value) in numbers {
-        if !value.is_finite() {
-            return Err(RigError::NotFinite {
-                camera: name(),
-                quantity,
-                value,
-            });
-        }
-    }
     if size.contains(&0) {
         return Err(RigError::EmptyImage {
             camera: name(),
@@ -273,11 +301,8 @@ fn check_camera(camera: &Camera) -> Result<(), RigError> {
             });
         }
     }
-    rotation_from_matrix(rotation.to_rotation_matrix().matrix()).map_err(|source| {
-        RigError::Rotation {
-            camera: name(),
-            source,
-        }
-    })?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

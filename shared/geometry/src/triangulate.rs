@@ -4,6 +4,16 @@ use nalgebra::{Matrix3, Point2, Point3};
 
 use crate::Camera;
 
+mod views;
+
+mod linear;
+
+mod refine;
+
+mod subset;
+
+use views::Views;
+
 /// The most observations of one point: as many as `views_used` has bits.
 pub const MAX_VIEWS: usize = 32;
 
@@ -98,6 +108,12 @@ pub enum TriangulateError {
         /// The largest residual accepted.
         limit_px: f64,
     },
+    /// The point lies where the lens of a view has no image.
+    #[error("the point is outside the valid range of the lens of view {view}")]
+    OutsideLens {
+        /// Which observation.
+        view: usize,
+    },
     /// The refinement left the numbers.
     #[error("refinement diverged after {iterations} iterations")]
     Diverged {
@@ -117,21 +133,62 @@ pub struct Triangulated {
     pub reprojection_px: f64,
     /// Bit i is set if observation i was used.
     pub views_used: u32,
-    /// Reprojection error of each observation, in pixels, used or not; NaN where the point has no image or no observation is.
+    /// Reprojection error of each observation, in pixels, used or not; NaN where the view does not
+    /// show the point, and beyond the last observation.
     pub residuals_px: [f64; MAX_VIEWS],
 }
 
-/// Triangulates one point.
+impl Triangulated {
+    /// Whether an observation was used, by its position in the list.
+    pub fn uses(&self, view: usize) -> bool {
+        view < MAX_VIEWS && self.views_used & (1 << view) != 0
+    }
+}
+
+/// Triangulates one point: linearly on undistorted rays, then by least reprojection error.
+///
+/// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors
+/// `e` with the Cauchy loss `ρ(s) = c² ln(1 + s / c²)`, c = `loss_px`, whose width shrinks from the
+/// worst error of the start down to c, so that one wild view does not decide where it ends. If a view
+/// ends further off than `max_reprojection_px`, every view is left out in turn, the subset whose worst
+/// error is least is kept, and so on down to `min_views`.
+///
+/// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`: as good as the `sigma_px` given.
+/// The answer depends on nothing but the arguments and their order; nothing is allocated.
+/// An observation that no ray of its camera reaches (beyond the lens's valid range) is not used.
 ///
 /// # Errors
 ///
-/// See [`TriangulateError`].
+/// See [`TriangulateError`]; a point is never returned behind a view that it uses.
 pub fn triangulate(
     observations: &[Observation<'_>],
     settings: &Settings,
 ) -> Result<Triangulated, TriangulateError> {
-    Err(TriangulateError::TooFewViews {
-        views: observations.len(),
-        needed: settings.min_views,
+    let views = Views::new(observations)?;
+    let needed = settings.min_views.max(2);
+    let all = views.usable();
+    if all.count() < needed {
+        return Err(TriangulateError::TooFewViews {
+            views: all.count(),
+            needed,
+        });
+    }
+    let (used, fit) = subset::search(&views, all, settings)?;
+    let covariance = fit.normal.cholesky().map(|factor| factor.inverse());
+    let covariance = covariance.filter(|c| c.iter().all(|entry| entry.is_finite()));
+    let Some(covariance) = covariance else {
+        return Err(TriangulateError::Diverged {
+            iterations: fit.iterations,
+        });
+    };
+    Ok(Triangulated {
+        in_world: fit.in_world,
+        covariance,
+        reprojection_px: fit.rms_px,
+        views_used: used.bits(),
+        residuals_px: views.residuals(&fit.in_world),
     })
 }
+
+#[cfg(test)]
+mod tests;

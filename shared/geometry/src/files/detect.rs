@@ -1,0 +1,46 @@
+//! Which format a calibration file is of.
+
+use std::path::Path;
+
+use super::{Format, own, pose2sim};
+
+/// Tells the format by content, and by extension where the content is only numbers.
+///
+/// `None` for anything that no reader would take.
+pub fn detect(path: &Path, text: &str) -> Option<Format> {
+    let extension = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_ascii_lowercase();
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    match extension.as_str() {
+        "cal" => return Some(Format::HumanEva),
+        "ini" => return Some(Format::Umpm),
+        "yml" | "yaml" => return Some(Format::OpenCv),
+        _ => {}
+    }
+    if start.starts_with("%YAML") {
+        return Some(Format::OpenCv);
+    }
+    if start.starts_with('<') {
+        return start.contains("<camera").then_some(Format::Qualisys);
+    }
+    if extension == "toml" {
+        return Some(if own::is_own(text) {
+            Format::Own
+        } else {
+            Format::Pose2Sim
+        });
+    }
+    match start
+        .split_whitespace()
+        .map(str::parse::<f64>)
+        .collect::<Result<Vec<_>, _>>()
+    {
+        Ok(numbers) if numbers.len() == 22 => Some(Format::HumanEva),
+        Ok(numbers) if numbers.len() == 19 => Some(Format::Umpm),
+        _ if own::is_own(text) => Some(Format::Own),
+        _ => pose2sim::is_pose2sim(text).then_some(Format::Pose2Sim),
+    }
+}

@@ -1,0 +1,167 @@
+//! Why a calibration file could not be read or written.
+
+use std::path::PathBuf;
+
+use crate::{Camera, NotARotation, RigError};
+
+/// Why a calibration file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum RigFileError {
+    /// No file was given.
+    #[error("no calibration file was given")]
+    NoFiles,
+    /// The file could not be read.
+    #[error("cannot read {path}", path = .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no calibration.
+    #[error("{path} is too large for a calibration: {bytes} bytes, limit {limit}", path = .path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The largest size that is read.
+        limit: u64,
+    },
+    /// Neither content nor extension tell what the file is.
+    #[error("{path} is no calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini)", path = .path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Files of several formats cannot make one rig.
+    #[error("{path} is a {format} file, but the first one is a {first} file", path = .path.display())]
+    Mixed {
+        /// The file that differs.
+        path: PathBuf,
+        /// Its format.
+        format: &'static str,
+        /// Format of the first file.
+        first: &'static str,
+    },
+    /// The content is wrong.
+    #[error("{path}", path = .path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: ParseError,
+    },
+    /// The format has no words for the rig.
+    #[error("cannot write {path}", path = .path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// What it has no words for.
+        source: UnwritableRig,
+    },
+    /// The file could not be written.
+    #[error("cannot write {path}", path = .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// What is wrong with the text of a calibration file. Fields are named as in the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ParseError {
+    /// The text is not of its format.
+    #[error("not valid {format}")]
+    Syntax {
+        /// Name of the format.
+        format: &'static str,
+        /// What its parser says, with line and column.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A field that must be there is not.
+    #[error("{field} is missing")]
+    Missing {
+        /// The field.
+        field: String,
+    },
+    /// A field holds something else than it should.
+    #[error("{field}: expected {expected}, found {found}")]
+    Shape {
+        /// The field.
+        field: String,
+        /// What it should hold.
+        expected: &'static str,
+        /// What it holds.
+        found: String,
+    },
+    /// A number that the format cannot mean, or that is not supported.
+    #[error("{field} is {value}, but {requirement}")]
+    Value {
+        /// The field.
+        field: String,
+        /// The number.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// Nine numbers that are no rotation.
+    #[error("{field}")]
+    Rotation {
+        /// The field.
+        field: String,
+        /// How far they are from one.
+        source: NotARotation,
+    },
+    /// The file has no camera.
+    #[error("no camera found: {expected}")]
+    NoCameras {
+        /// What a camera would look like.
+        expected: &'static str,
+    },
+    /// The cameras make no rig.
+    #[error("the cameras make no rig")]
+    Rig(#[source] RigError),
+}
+
+/// What a format has no words for.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UnwritableRig {
+    /// We only read this format.
+    #[error("{format} files are only read")]
+    ReadOnly {
+        /// The format.
+        format: &'static str,
+    },
+    /// The lens is of another kind.
+    #[error("camera {camera:?}: a {format} file cannot describe its lens ({lens})")]
+    Lens {
+        /// Name of the camera.
+        camera: String,
+        /// The format.
+        format: &'static str,
+        /// The lens, for people.
+        lens: String,
+    },
+    /// The name cannot be a file's, or a key's.
+    #[error("camera {camera:?}: the name cannot be written in a {format} file")]
+    Name {
+        /// Name of the camera.
+        camera: String,
+        /// The format.
+        format: &'static str,
+    },
+}
+
+/// Refuses names that would leave the folder.
+pub(super) fn check_file_name(camera: &Camera) -> Result<(), UnwritableRig> {
+    if camera.name.contains(['/', '\\', '\0']) || camera.name.starts_with('.') {
+        return Err(UnwritableRig::Name {
+            camera: camera.name.clone(),
+            format: "one-camera",
+        });
+    }
+    Ok(())
+}

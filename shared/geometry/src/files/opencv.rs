@@ -1,0 +1,218 @@
+//! YAML storage of `OpenCV`, and the pair `intri.yml` + `extri.yml` of `EasyMocap`.
+//!
+//! One camera in a file: `camera_matrix`, `distortion_coefficients`, `image_width`, `image_height`, `R`
+//! (matrix or Rodrigues) and `T`. Several, after `EasyMocap`: a list `names`, and for each name `K_n`,
+//! `dist_n`, `Rot_n` (or `R_n`, Rodrigues), `T_n`; sizes as `W_n`, `H_n`, which `EasyMocap` itself may
+//! leave out: then [`ReadOptions::size`] must say. Metres, unless [`ReadOptions::unit`] says otherwise.
+
+use nalgebra::UnitQuaternion;
+
+use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers};
+use crate::{Camera, LensModel, Rig};
+
+mod storage;
+
+use storage::Storage;
+
+/// Reads cameras from one or more files, each with the name that a camera gets which has none.
+///
+/// Files after `EasyMocap` are read as one; every other file is a camera.
+///
+/// # Errors
+///
+/// See [`ParseError`].
+pub fn parse(files: &[(&str, &str)], options: &ReadOptions) -> Result<Rig, ParseError> {
+    let mut shared = Storage::default();
+    let mut cameras = Vec::new();
+    for (name, text) in files {
+        let storage = Storage::parse(text)?;
+        if storage.names().is_some() || storage.has_suffixed() {
+            shared.extend(storage);
+        } else {
+            cameras.push(camera(name, &storage, &single(), options)?);
+        }
+    }
+    for name in shared.camera_names()? {
+        cameras.push(camera(&name, &shared, &suffixed(&name), options)?);
+    }
+    if cameras.is_empty() {
+        return Err(ParseError::NoCameras {
+            expected: "camera_matrix, or names and K_<name>",
+        });
+    }
+    Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
+}
+
+/// What the entries of a camera may be called.
+struct Keys {
+    matrix: Vec<String>,
+    distortion: Vec<String>,
+    fisheye: String,
+    width: Vec<String>,
+    height: Vec<String>,
+    rotation: Vec<String>,
+    translation: Vec<String>,
+}
+
+fn single() -> Keys {
+    let keys = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+    Keys {
+        matrix: keys(&["camera_matrix", "cameraMatrix", "K"]),
+        distortion: keys(&["distortion_coefficients", "distCoeffs", "dist", "D"]),
+        fisheye: "fisheye".to_owned(),
+        width: keys(&["image_width", "width"]),
+        height: keys(&["image_height", "height"]),
+        rotation: keys(&["R", "rotation", "Rot", "rvec"]),
+        translation: keys(&["T", "translation", "tvec"]),
+    }
+}
+
+fn suffixed(name: &str) -> Keys {
+    let keys = |stems: &[&str]| stems.iter().map(|stem| format!("{stem}_{name}")).collect();
+    Keys {
+        matrix: keys(&["K"]),
+        distortion: keys(&["dist", "D"]),
+        fisheye: format!("fisheye_{name}"),
+        width: keys(&["W"]),
+        height: keys(&["H"]),
+        rotation: keys(&["Rot", "R"]),
+        translation: keys(&["T"]),
+    }
+}
+
+fn camera(
+    name: &str,
+    storage: &Storage,
+    keys: &Keys,
+    options: &ReadOptions,
+) -> Result<Camera, ParseError> {
+    let (matrix_key, k) = storage.numbers(&keys.matrix)?;
+    let k: [f64; 9] = sized(matrix_key, k, "9 numbers")?;
+    let lens = match storage.find(&keys.distortion) {
+        None => LensModel::Pinhole,
+        Some((key, entry)) => {
+            let fisheye = storage
+                .number(&keys.fisheye)?
+                .is_some_and(|flag| flag != 0.0);
+            numbers::lens(key, &entry.numbers(key)?, fisheye)?
+        }
+    };
+    let size = size(storage, keys, options)?;
+    let intrinsics = numbers::intrinsics(matrix_key, &numbers::matrix_of_nine(&k), size, lens)?;
+    let rotation = rotation(storage, keys)?;
+    let (key, translation) = storage.numbers(&keys.translation)?;
+    let translation = sized(key, translation, "3 numbers")?;
+    let unit = options.unit.unwrap_or(Unit::Metres);
+    let camera_from_world = numbers::pose(key, rotation, translation, unit)?;
+    Ok(Camera {
+        name: name.to_owned(),
+        intrinsics,
+        camera_from_world,
+    })
+}
+
+fn size(storage: &Storage, keys: &Keys, options: &ReadOptions) -> Result<[u32; 2], ParseError> {
+    let side = |names: &[String]| {
+        let Some((key, entry)) = storage.find(names) else {
+            return Ok(None);
+        };
+        numbers::pixels(key, entry.number(key)?).map(Some)
+    };
+    match (side(&keys.width)?, side(&keys.height)?, options.size) {
+        (Some(width), Some(height), _) => Ok([width, height]),
+        (None, None, Some(size)) => Ok(size),
+        (None, ..) => Err(ParseError::Missing {
+            field: keys.width.join(" or "),
+        }),
+        (_, None, _) => Err(ParseError::Missing {
+            field: keys.height.join(" or "),
+        }),
+    }
+}
+
+fn rotation(storage: &Storage, keys: &Keys) -> Result<UnitQuaternion<f64>, ParseError> {
+    let (key, list) = storage.numbers(&keys.rotation)?;
+    if let Ok(nine) = <[f64; 9]>::try_from(list.as_slice()) {
+        return numbers::rotation(key, &numbers::matrix_of_nine(&nine));
+    }
+    numbers::rodrigues(key, sized(key, list, "a rotation of 9 numbers, or of 3")?)
+}
+
+fn sized<const N: usize>(
+    key: &str,
+    list: Vec<f64>,
+    expected: &'static str,
+) -> Result<[f64; N], ParseError> {
+    list.try_into().map_err(|list: Vec<f64>| ParseError::Shape {
+        field: key.to_owned(),
+        expected,
+        found: format!("{} numbers", list.len()),
+    })
+}
+
+/// Writes all cameras into one storage with the names of `EasyMocap`, in metres.
+///
+/// What the rig says about up and source is lost.
+///
+/// # Errors
+///
+/// [`UnwritableRig::Name`] for a name with other characters than letters, digits, `_` and `-`, of
+/// which keys are made.
+pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
+    let mut lines = vec![
+        "%YAML:1.0".to_owned(),
+        "---".to_owned(),
+        "names:".to_owned(),
+    ];
+    for camera in rig.cameras() {
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+        if !camera.name.bytes().all(plain) {
+            return Err(UnwritableRig::Name {
+                camera: camera.name.clone(),
+                format: "OpenCV",
+            });
+        }
+        lines.push(format!("   - \"{}\"", camera.name));
+    }
+    for camera in rig.cameras() {
+        let name = &camera.name;
+        let inside = &camera.intrinsics;
+        let pose = &camera.camera_from_world;
+        let (coefficients, fisheye) = numbers::distortion(inside.lens.model());
+        let k = numbers::rows(&inside.matrix());
+        let rotation = numbers::rows(pose.rotation.to_rotation_matrix().matrix());
+        lines.extend([
+            format!("W_{name}: {}", inside.size[0]),
+            format!("H_{name}: {}", inside.size[1]),
+            matrix(&format!("K_{name}"), 3, 3, k.as_flattened()),
+            matrix(
+                &format!("dist_{name}"),
+                1,
+                coefficients.len(),
+                &coefficients,
+            ),
+            format!("fisheye_{name}: {}", u8::from(fisheye)),
+            matrix(
+                &format!("R_{name}"),
+                3,
+                1,
+                pose.rotation.scaled_axis().as_slice(),
+            ),
+            matrix(&format!("Rot_{name}"), 3, 3, rotation.as_flattened()),
+            matrix(
+                &format!("T_{name}"),
+                3,
+                1,
+                pose.translation.vector.as_slice(),
+            ),
+        ]);
+    }
+    Ok(lines.join("\n") + "\n")
+}
+
+fn matrix(key: &str, rows: usize, columns: usize, data: &[f64]) -> String {
+    let data = numbers::joined(data, ", ");
+    format!(
+        "{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]"
+    )
+}

@@ -1,0 +1,1 @@
+//! Every format writes what it reads, and refuses what it cannot read.
