@@ -2,5 +2,8 @@
 #![forbid(unsafe_code)]
 
 mod config;
+mod place;
+mod service;
 
 pub use config::{Camera, Config, Mode, Pace};
+pub use service::{Job, run};

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use multiview::{EnergyKind, Settings};
 use serde::{Deserialize, Serialize};
+use viewquality::TrainingErrors;
 
 /// The energy that ties the views together, and its optimiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,8 +20,8 @@ pub struct Config {
     pub max_distance_cells: Option<f64>,
     /// Part-type tables, a pair of views each.
     pub compatibility: Vec<Compatibility>,
-    /// Expected error above which a part is switched off, pixels, one per part.
-    pub tau_px: Vec<f32>,
+    /// Expected error above which a part is switched off.
+    pub tau: Tau,
     /// Decide for every view whether it sees the person from behind.
     pub facing: bool,
     /// Fusion processes; the pairs are dealt to them in turn.
@@ -40,12 +42,40 @@ impl Default for Config {
             beta: 0.03,
             max_distance_cells: None,
             compatibility: Vec::new(),
-            tau_px: Vec::new(),
+            tau: Tau::Named(TauName::None),
             facing: true,
             workers: 1,
             max_iterations: 12,
             epsilon_px: 0.1,
             pairs: Vec::new(),
+        }
+    }
+}
+
+impl Config {
+    /// The settings of the optimiser.
+    ///
+    /// * `n_candidates`: most candidates that a view offers.
+    /// * `frame_scale`: pixels of the frame per pixel of the footage, in which `tau` is given.
+    pub fn settings(&self, n_candidates: usize, frame_scale: f32) -> Settings {
+        let scaled = |px: Vec<f32>| px.into_iter().map(|it| it * frame_scale).collect();
+        let (energy, defaults) = match self.energy {
+            Energy::Paper => (EnergyKind::Paper, Settings::default()),
+            Energy::Released => (EnergyKind::Released, Settings::released()),
+        };
+        Settings {
+            energy,
+            alpha: self.alpha.unwrap_or(defaults.alpha),
+            beta: self.beta,
+            max_distance_cells: self
+                .max_distance_cells
+                .unwrap_or(defaults.max_distance_cells),
+            max_iterations: self.max_iterations,
+            epsilon_px: self.epsilon_px,
+            tau_px: scaled(self.tau.px()),
+            rescue_px: scaled(self.tau.rescue_px()),
+            facing: self.facing,
+            n_candidates,
         }
     }
 }
@@ -61,6 +91,59 @@ pub enum Energy {
     Released,
 }
 
+/// Thresholds of the expected error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected \"none\", \"humaneva\", \"umpm\", or one number per part"
+)]
+pub enum Tau {
+    /// Thresholds that are known by name.
+    Named(TauName),
+    /// Pixels of the footage, one per part.
+    Given(Vec<f32>),
+}
+
+/// Thresholds that are known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TauName {
+    /// No part is ever switched off.
+    None,
+    /// Those of the authors' program for `HumanEva`: median training error plus inaccuracy.
+    HumanEva,
+    /// Those of the authors' program for UMPM.
+    Umpm,
+}
+
+impl Tau {
+    fn training(&self) -> Option<TrainingErrors> {
+        match self {
+            Self::Named(TauName::HumanEva) => Some(TrainingErrors::HUMANEVA),
+            Self::Named(TauName::Umpm) => Some(TrainingErrors::UMPM),
+            Self::Named(TauName::None) | Self::Given(_) => None,
+        }
+    }
+
+    /// The thresholds, pixels of the footage; empty if there are none.
+    pub fn px(&self) -> Vec<f32> {
+        match (self, self.training()) {
+            (Self::Given(px), _) => px.clone(),
+            (_, Some(errors)) => viewquality::Tau::median_and_inaccuracy(&errors)
+                .px()
+                .to_vec(),
+            (Self::Named(_), None) => Vec::new(),
+        }
+    }
+
+    /// The median training errors, by which the released energy takes one of two switched-off views
+    /// back; empty if they are not known.
+    fn rescue_px(&self) -> Vec<f32> {
+        self.training()
+            .map_or_else(Vec::new, |it| it.median_px.to_vec())
+    }
+}
+
 /// The part-type tables of one pair of views.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,4 +153,27 @@ pub struct Compatibility {
     /// `[first with respect to second, second with respect to first]`: rows are the types of the
     /// first-named view of each.
     pub files: [PathBuf; 2],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_the_optimiser() {
+        let expected = Settings::default();
+        assert_eq!(
+            Config::default().settings(expected.n_candidates, 1.0),
+            expected
+        );
+    }
+
+    #[test]
+    fn the_released_energy_has_its_own_weight() {
+        let config = Config {
+            energy: Energy::Released,
+            ..Config::default()
+        };
+        assert_eq!(config.settings(1, 1.0).alpha, Settings::released().alpha);
+    }
 }

@@ -2,5 +2,8 @@
 #![forbid(unsafe_code)]
 
 mod config;
+mod evidence;
+mod service;
 
-pub use config::{Compatibility, Config, Energy};
+pub use config::{Compatibility, Config, Energy, Tau, TauName};
+pub use service::{Job, run};

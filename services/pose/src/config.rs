@@ -1,5 +1,6 @@
 //! Section `[pose]` of a deployment file.
 
+use pipeline::{EvidenceWindow, ViewSettings};
 use serde::{Deserialize, Serialize};
 
 /// The single-view solver, and what it hands on.
@@ -27,6 +28,20 @@ impl Default for Config {
     }
 }
 
+impl Config {
+    /// The settings of the single-view step.
+    pub fn settings(&self) -> ViewSettings {
+        ViewSettings {
+            window: match self.evidence_window {
+                Window::All(All::All) => EvidenceWindow::All,
+                Window::Levels(reach) => EvidenceWindow::Around(reach),
+            },
+            n_candidates: self.candidates,
+            min_separation: self.min_separation,
+        }
+    }
+}
+
 /// Levels of the pyramid around those of the candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number of levels, or \"all\"")]
@@ -43,4 +58,14 @@ pub enum Window {
 pub enum All {
     /// Everything.
     All,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_the_step() {
+        assert_eq!(Config::default().settings(), ViewSettings::default());
+    }
 }

@@ -2,5 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod config;
+mod service;
 
 pub use config::Config;
+pub use service::{Job, run};

@@ -16,7 +16,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             joints: "parse14".to_owned(),
-            loss_px: 8.0,
+            loss_px: geometry::Settings::default().loss_px,
         }
     }
 }

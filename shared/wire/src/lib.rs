@@ -19,7 +19,7 @@ pub use pose::{
     candidates_from_message, candidates_to_message, pose_from_message, pose_to_message,
 };
 pub use quality::{sigma_from_message, sigma_to_message};
-pub use skeleton::{check_pose3d, skeleton_to_message};
+pub use skeleton::{check_pose3d, end_of_results, skeleton_to_message};
 
 #[cfg(test)]
 mod testing;

@@ -38,6 +38,14 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     Ok(message)
 }
 
+/// The message after the last result.
+pub fn end_of_results(session: u64) -> Pose3d {
+    let mut message = empty();
+    message.stamp.session = session;
+    message.status = Status::END;
+    message
+}
+
 /// Checks the counts of a result against the receiver's rig and joint set.
 ///
 /// # Errors

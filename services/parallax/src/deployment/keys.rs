@@ -121,8 +121,8 @@ const KEYS: &[(&str, &str)] = &[
         "part-type tables: views = [a, b], files = [a wrt b, b wrt a]",
     ),
     (
-        "fuse.tau_px",
-        "expected error above which a part is switched off, one per part; never if empty",
+        "fuse.tau",
+        "expected error that switches a part off: none, humaneva, umpm, or one per part, pixels of the footage",
     ),
     (
         "fuse.facing",

@@ -118,8 +118,8 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
     if let Some(cells) = it.max_distance_cells {
         positive("fuse.max_distance_cells", cells)?;
     }
-    for tau in &it.tau_px {
-        not_negative("fuse.tau_px", f64::from(*tau))?;
+    for tau in it.tau.px() {
+        not_negative("fuse.tau", f64::from(tau))?;
     }
     let tables = it
         .compatibility

@@ -1,0 +1,240 @@
+//! The loop: wait until a frame is due, decode, warp into shared memory, send.
+
+use core::time::Duration;
+
+use footage::{Fill, FrameView, Pacer, Size, Source, SourceSpec, Warp};
+use geometry::Framing;
+use messages::{FrameHeader, Stamp, Status, Timing, topic};
+use runtime::{ExitKind, Failure, OrFail as _, Service, SlicePublisher, Waiter, Woken, now_nanos};
+
+use crate::place::Place;
+use crate::{Mode, Pace};
+
+/// What one camera's process has to do.
+#[derive(Debug)]
+pub struct Job {
+    /// The view.
+    pub view: usize,
+    /// The footage.
+    pub source: SourceSpec,
+    /// From the footage to the frames of the pipeline.
+    pub framing: Framing,
+    /// Whether frames may be dropped.
+    pub mode: Mode,
+    /// How fast frames are handed out.
+    pub pace: Pace,
+    /// Processes that take the frames.
+    pub n_consumers: usize,
+    /// How long they are waited for.
+    pub patience: Duration,
+}
+
+/// Footage may begin only when every process is there; with a clock running, this much later.
+const LEAD_NANOS: u64 = 2_000_000_000;
+
+/// Sends the footage of one view, then its end.
+///
+/// A frame that cannot be read, and all after it, are sent as [`Status::NO_FRAME`].
+///
+/// # Errors
+///
+/// [`ExitKind::Input`] if the footage cannot be opened, and what the transport says.
+pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
+    let mut source = Source::open(&job.source).or_fail(ExitKind::Input)?;
+    let n_frames = source.info().n_frames;
+    service.health().set_total(n_frames);
+    let mut camera = Camera::open(service, job, &source)?;
+    let mut at = camera.go_on(&mut source)?;
+    while !service.stop().is_requested() {
+        at += camera.wait_until_due(&mut source, at)?;
+        if service.stop().is_requested() {
+            break;
+        }
+        let asked_at = now_nanos();
+        match source.next_frame() {
+            Ok(Some(frame)) => camera.send_frame(&frame, asked_at)?,
+            Ok(None) => return camera.end(),
+            Err(error) => {
+                tracing::error!(view = job.view, %error, "no more frames of this view");
+                let from = job.source.start + at * job.source.step;
+                camera.send_missing(from, n_frames.saturating_sub(at))?;
+                return camera.end();
+            }
+        }
+        at += 1;
+        camera.note(at);
+    }
+    Ok(())
+}
+
+struct Camera<'a> {
+    service: &'a Service,
+    job: &'a Job,
+    publisher: SlicePublisher<u8, FrameHeader>,
+    warp: Warp,
+    pacer: Pacer,
+    waiter: Waiter,
+    place: Place,
+    n_dropped: u64,
+    /// Fewer than the job's consumers once some have been waited for in vain.
+    n_expected: usize,
+}
+
+impl<'a> Camera<'a> {
+    fn open(service: &'a Service, job: &'a Job, source: &Source) -> Result<Self, Failure> {
+        let publisher = service.bus().slice_publisher(&topic::frame(job.view))?;
+        let [width, height] = job.framing.out_size().map(|it| it as usize);
+        // What lies beside a picture that was turned is nothing; beside one that was not, its border
+        // goes on, as it did for the program that results are compared with.
+        let fill = if job.framing.roll() == 0.0 {
+            Fill::Replicate
+        } else {
+            Fill::Black
+        };
+        let map = job.framing.source_from_output();
+        let output = Size::new(width, height);
+        let warp = Warp::new(source.info().size, output, &map, fill).or_fail(ExitKind::Input)?;
+        let pacer = match (job.pace, source.info().frame_rate_hz) {
+            (Pace::Realtime, Some(rate)) => Pacer::realtime(service.session() + LEAD_NANOS, rate),
+            _ => Pacer::as_fast_as_possible(),
+        };
+        let place = format!("capture-{}.place", job.view);
+        Ok(Self {
+            service,
+            job,
+            publisher,
+            warp,
+            pacer,
+            waiter: service.bus().waiter(),
+            place: Place::new(service.bus().namespace().root().join(place)),
+            n_dropped: 0,
+            n_expected: job.n_consumers,
+        })
+    }
+
+    /// Waits for the consumers, then passes over what an earlier life of this process has sent.
+    fn go_on(&mut self, source: &mut Source) -> Result<u64, Failure> {
+        let n = self
+            .publisher
+            .wait_for_subscribers(self.n_expected, self.job.patience);
+        if n < self.n_expected {
+            tracing::warn!(
+                n,
+                expected = self.n_expected,
+                "beginning without all receivers"
+            );
+            self.n_expected = n;
+        }
+        if self.service.epoch() == 0 || self.job.mode == Mode::Realtime {
+            return Ok(0);
+        }
+        source.skip(self.place.sent()).or_fail(ExitKind::Input)
+    }
+
+    /// Waits until frame `at` is due; with a clock that drops frames, passes over those that are past.
+    ///
+    /// Returns how many were passed over.
+    fn wait_until_due(&mut self, source: &mut Source, at: u64) -> Result<u64, Failure> {
+        while self.pacer.wait_nanos(at, now_nanos()) > 0 {
+            let nanos = self.pacer.wait_nanos(at, now_nanos());
+            if self.waiter.wait(Duration::from_nanos(nanos))? == Woken::Stop {
+                return Ok(0);
+            }
+        }
+        let latest = self.pacer.latest_due(now_nanos()).unwrap_or(at);
+        if self.job.mode == Mode::Lossless || latest <= at {
+            return Ok(0);
+        }
+        let n = source.skip(latest - at).or_fail(ExitKind::Input)?;
+        self.n_dropped += n;
+        self.service.health().dropped(n);
+        Ok(n)
+    }
+
+    /// Sends a frame; where nothing may be lost, once more to a receiver that had to be restarted.
+    fn send_frame(&mut self, frame: &FrameView<'_>, asked_at: u64) -> Result<(), Failure> {
+        loop {
+            let [width, height] = self.job.framing.out_size();
+            let mut loan = self.publisher.loan((width * height * 3) as usize)?;
+            self.warp.apply(frame.rgb, loan.payload_mut());
+            *loan.header_mut() = FrameHeader {
+                width,
+                height,
+                ..self.header(frame.index, Status::OK, asked_at)
+            };
+            let n = loan.send()?;
+            if self.job.mode == Mode::Realtime || n >= self.n_expected {
+                break;
+            }
+            let n = self
+                .publisher
+                .wait_for_subscribers(self.n_expected, self.job.patience);
+            if n < self.n_expected || self.service.stop().is_requested() {
+                tracing::warn!(
+                    n,
+                    expected = self.n_expected,
+                    "going on without all receivers"
+                );
+                self.n_expected = n;
+                break;
+            }
+        }
+        self.n_expected = self
+            .n_expected
+            .max(self.publisher.n_connected().min(self.job.n_consumers));
+        self.service.health().sent(frame.index);
+        self.service
+            .health()
+            .computed(Duration::from_nanos(now_nanos() - asked_at));
+        Ok(())
+    }
+
+    fn send_missing(&self, from: u64, n: u64) -> Result<(), Failure> {
+        for k in 0..n {
+            self.send_empty(from + k * self.job.source.step, Status::NO_FRAME)?;
+        }
+        Ok(())
+    }
+
+    fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
+        let mut loan = self.publisher.loan(1)?;
+        loan.payload_mut().fill(0);
+        *loan.header_mut() = self.header(frame, status, now_nanos());
+        loan.send()?;
+        Ok(())
+    }
+
+    fn header(&self, frame: u64, status: Status, asked_at: u64) -> FrameHeader {
+        FrameHeader {
+            stamp: Stamp {
+                session: self.service.session(),
+                frame,
+                captured_at_nanos: asked_at,
+                view: self.job.view as u32,
+                epoch: self.service.epoch(),
+            },
+            timing: Timing {
+                received_at_nanos: asked_at,
+                sent_at_nanos: now_nanos(),
+            },
+            status,
+            n_dropped: self.n_dropped,
+            ..FrameHeader::default()
+        }
+    }
+
+    fn note(&self, n_sent: u64) {
+        if self.job.mode == Mode::Lossless
+            && let Err(error) = self.place.note(n_sent)
+        {
+            tracing::debug!(%error, "cannot note the place in the footage");
+        }
+    }
+
+    fn end(&self) -> Result<(), Failure> {
+        self.send_empty(u64::MAX, Status::END)?;
+        self.service.health().finished();
+        while self.waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
+        Ok(())
+    }
+}

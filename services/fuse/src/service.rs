@@ -1,0 +1,260 @@
+//! The loop: join the views' answers to a frame, solve this worker's pairs on their evidence, send.
+
+use core::time::Duration;
+use std::sync::Arc;
+
+use join::{Joined, Joiner, Push};
+use messages::{PairPose, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
+use multiview::ViewPlan;
+use pipeline::{Answer, FuseStep};
+use runtime::{
+    Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
+    now_nanos,
+};
+
+use crate::evidence::Evidence;
+
+/// What one worker's process has to do.
+#[derive(Debug)]
+pub struct Job {
+    /// The worker.
+    pub worker: usize,
+    /// Its pairs: their index in the deployment, and their views.
+    pub pairs: Vec<(usize, [usize; 2])>,
+    /// The fusion step.
+    pub step: FuseStep,
+    /// The views of the rig.
+    pub plans: Vec<Arc<ViewPlan>>,
+    /// Whether there are processes that send expected errors.
+    pub has_quality: bool,
+    /// Processes that take the answers.
+    pub n_consumers: usize,
+    /// How long a view may be silent.
+    pub patience: Duration,
+}
+
+/// What a view says about a frame.
+#[derive(Debug)]
+enum Word {
+    Pose(Box<ViewPose>),
+    Quality(Box<ViewQuality>),
+}
+
+/// Answers every frame, until the footage of all views ends or it is told to stop.
+///
+/// # Errors
+///
+/// What the transport says.
+pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let mut worker = Worker::open(service, job, &mut waiter)?;
+    worker
+        .publisher
+        .wait_for_subscribers(job.n_consumers, job.patience);
+    loop {
+        if waiter.wait(Duration::from_millis(20))? == Woken::Stop {
+            return Ok(());
+        }
+        worker.listen()?;
+        while let Some(joined) = worker.next_frame() {
+            worker.answer(&joined)?;
+            if service.stop().is_requested() {
+                return Ok(());
+            }
+            worker.listen()?;
+        }
+        if worker.joiner.is_over(now_nanos()) {
+            return worker.end(&waiter);
+        }
+    }
+}
+
+struct Worker<'a> {
+    service: &'a Service,
+    job: &'a Job,
+    poses: Vec<Subscriber<ViewPose>>,
+    qualities: Vec<Subscriber<ViewQuality>>,
+    /// By view; only those that a pair of this worker needs.
+    evidence: Vec<Option<Evidence>>,
+    publisher: Publisher<PairPose>,
+    joiner: Joiner<Word>,
+}
+
+impl<'a> Worker<'a> {
+    fn open(service: &'a Service, job: &'a Job, waiter: &mut Waiter) -> Result<Self, Failure> {
+        let bus = service.bus();
+        let n_views = job.plans.len();
+        let (mut poses, mut qualities, mut evidence) = (Vec::new(), Vec::new(), Vec::new());
+        for view in 0..n_views {
+            poses.push(bus.subscriber(&topic::view_pose(view), waiter)?);
+            if job.has_quality {
+                qualities.push(bus.subscriber(&topic::view_quality(view), waiter)?);
+            }
+            let needed = job.pairs.iter().any(|it| it.1.contains(&view));
+            evidence.push(if needed {
+                Some(Evidence::open(service, view, waiter)?)
+            } else {
+                None
+            });
+        }
+        Ok(Self {
+            service,
+            job,
+            joiner: Joiner::new(n_views + qualities.len(), job.patience.as_nanos() as u64),
+            poses,
+            qualities,
+            evidence,
+            publisher: bus.publisher(&topic::pair_pose(job.worker))?,
+        })
+    }
+
+    /// Takes in what has come. Inputs are numbered poses first, then expected errors.
+    fn listen(&mut self) -> Result<(), Failure> {
+        let n_views = self.poses.len();
+        for view in 0..n_views {
+            while let Some(message) = self.poses[view].receive()? {
+                let (stamp, status) = (message.stamp, message.status);
+                self.take(view, stamp, status, Word::Pose(Box::new(message)));
+            }
+        }
+        for view in 0..self.qualities.len() {
+            while let Some(message) = self.qualities[view].receive()? {
+                let (stamp, status) = (message.stamp, message.status);
+                let word = Word::Quality(Box::new(message));
+                self.take(n_views + view, stamp, status, word);
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, input: usize, stamp: Stamp, status: Status, word: Word) {
+        if stamp.session != self.service.session() {
+            return;
+        }
+        if status == Status::END {
+            self.joiner.end(input);
+            return;
+        }
+        self.service.health().received(1);
+        if self.joiner.push(input, stamp.frame, word, now_nanos()) == Push::Late {
+            self.service.health().dropped(1);
+        }
+    }
+
+    fn next_frame(&mut self) -> Option<Joined<Word>> {
+        match self.service.delivery() {
+            Delivery::Lossless => self.joiner.next(now_nanos()),
+            Delivery::Realtime => self.joiner.latest(now_nanos()).map(|(joined, n_passed)| {
+                self.service.health().dropped(n_passed);
+                joined
+            }),
+        }
+    }
+
+    fn answer(&mut self, joined: &Joined<Word>) -> Result<(), Failure> {
+        let Some(stamp) = stamp_of(joined) else {
+            return Ok(());
+        };
+        let answers = self.answers(joined);
+        let present = (0..answers.len()).filter(|it| answers[*it].is_some());
+        let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
+        let start = self.job.step.start(&answers);
+        for &(index, views) in &self.job.pairs {
+            let received_at_nanos = now_nanos();
+            self.service.progress().tick();
+            let answer = if views.iter().all(|&view| answers[view].is_some()) {
+                for view in views {
+                    if let Some(evidence) = &mut self.evidence[view] {
+                        evidence.advance(joined.frame)?;
+                    }
+                }
+                self.evidence_of(views, joined.frame)
+                    .and_then(|[first, second]| {
+                        self.job
+                            .step
+                            .pair(views, &answers, [&first, &second], &start)
+                    })
+            } else {
+                None
+            };
+            let mut message = wire::pair_to_message(views, answer.as_ref(), views_present)
+                .or_fail(ExitKind::Run)?;
+            message.stamp = Stamp {
+                view: index as u32,
+                epoch: self.service.epoch(),
+                ..stamp
+            };
+            message.timing = Timing {
+                received_at_nanos,
+                sent_at_nanos: now_nanos(),
+            };
+            self.publisher.send(&message)?;
+            let health = self.service.health();
+            health.sent(joined.frame);
+            health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
+        }
+        Ok(())
+    }
+
+    fn evidence_of(&self, views: [usize; 2], frame: u64) -> Option<[fmp::Responses<'_>; 2]> {
+        let of = |view: usize| {
+            self.evidence[view]
+                .as_ref()?
+                .of(frame, &self.job.plans[view])
+        };
+        Some([of(views[0])?, of(views[1])?])
+    }
+
+    fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {
+        let n_views = self.poses.len();
+        (0..n_views)
+            .map(|view| {
+                let plan = &self.job.plans[view];
+                let Some(Word::Pose(pose)) = &joined.items[view] else {
+                    return None;
+                };
+                let read = wire::candidates_from_message(pose, plan.model(), plan.layout());
+                let candidates = read
+                    .inspect_err(|error| tracing::warn!(view, %error, "unreadable candidates"))
+                    .ok()
+                    .filter(|it| !it.is_empty())?;
+                let sigma_px = match joined.items.get(n_views + view) {
+                    Some(Some(Word::Quality(quality))) => {
+                        wire::sigma_from_message(quality, plan.model().n_parts())
+                            .inspect_err(|error| tracing::warn!(view, %error, "unreadable errors"))
+                            .ok()
+                            .flatten()
+                    }
+                    _ => None,
+                };
+                Some(Answer {
+                    candidates,
+                    sigma_px,
+                })
+            })
+            .collect()
+    }
+
+    fn end(&self, waiter: &Waiter) -> Result<(), Failure> {
+        self.publisher.send(&PairPose {
+            stamp: Stamp {
+                session: self.service.session(),
+                ..Stamp::default()
+            },
+            status: Status::END,
+            ..PairPose::default()
+        })?;
+        self.service.health().finished();
+        while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
+        Ok(())
+    }
+}
+
+/// The stamp of the view that was captured first.
+fn stamp_of(joined: &Joined<Word>) -> Option<Stamp> {
+    let stamps = joined.items.iter().flatten().map(|it| match it {
+        Word::Pose(it) => it.stamp,
+        Word::Quality(it) => it.stamp,
+    });
+    stamps.min_by_key(|it| it.captured_at_nanos)
+}

@@ -1,0 +1,204 @@
+//! The loop: join the pairs' answers to a frame, settle left and right, triangulate, send.
+
+use core::time::Duration;
+use std::sync::Arc;
+
+use join::{Joined, Joiner, Push};
+use messages::{PairPose, Pose3d, Stamp, Status, Timing, ViewPose, topic};
+use multiview::ViewPlan;
+use pipeline::{Answer, PairAnswer, SkeletonStep};
+use runtime::{
+    ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken, now_nanos,
+};
+
+/// What the process has to do.
+#[derive(Debug)]
+pub struct Job {
+    /// The views of the rig.
+    pub plans: Vec<Arc<ViewPlan>>,
+    /// Number of pairs in the deployment, which are dealt to the workers in turn.
+    pub n_pairs: usize,
+    /// Number of fusion workers.
+    pub n_workers: usize,
+    /// Processes that take the result.
+    pub n_consumers: usize,
+    /// How long a view or a worker may be silent.
+    pub patience: Duration,
+}
+
+/// What is said about a frame: by a view, or by a pair.
+#[derive(Debug)]
+enum Word {
+    Pose(Box<ViewPose>),
+    Pair(Box<PairPose>),
+}
+
+/// Answers every frame, until all inputs end or it is told to stop.
+///
+/// * `step`: remembers the facing of the frame before.
+///
+/// # Errors
+///
+/// What the transport says.
+pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let mut stage = Stage::open(service, job, &mut waiter)?;
+    stage
+        .publisher
+        .wait_for_subscribers(job.n_consumers, job.patience);
+    while waiter.wait(Duration::from_millis(20))? != Woken::Stop {
+        stage.listen()?;
+        while let Some(joined) = stage.joiner.next(now_nanos()) {
+            stage.answer(&joined, &mut step)?;
+        }
+        if stage.joiner.is_over(now_nanos()) {
+            return stage.end(&waiter);
+        }
+    }
+    Ok(())
+}
+
+struct Stage<'a> {
+    service: &'a Service,
+    job: &'a Job,
+    poses: Vec<Subscriber<ViewPose>>,
+    pairs: Vec<Subscriber<PairPose>>,
+    publisher: Publisher<Pose3d>,
+    joiner: Joiner<Word>,
+}
+
+impl<'a> Stage<'a> {
+    fn open(service: &'a Service, job: &'a Job, waiter: &mut Waiter) -> Result<Self, Failure> {
+        let bus = service.bus();
+        let (mut poses, mut pairs) = (Vec::new(), Vec::new());
+        for view in 0..job.plans.len() {
+            poses.push(bus.subscriber(&topic::view_pose(view), waiter)?);
+        }
+        for worker in 0..job.n_workers {
+            pairs.push(bus.subscriber(&topic::pair_pose(worker), waiter)?);
+        }
+        Ok(Self {
+            service,
+            job,
+            joiner: Joiner::new(poses.len() + job.n_pairs, job.patience.as_nanos() as u64),
+            poses,
+            pairs,
+            publisher: bus.publisher(&topic::pose3d())?,
+        })
+    }
+
+    /// Takes in what has come. Inputs are numbered views first, then pairs.
+    fn listen(&mut self) -> Result<(), Failure> {
+        let n_views = self.poses.len();
+        for view in 0..n_views {
+            while let Some(message) = self.poses[view].receive()? {
+                if message.stamp.session != self.service.session() {
+                    continue;
+                }
+                if message.status == Status::END {
+                    self.joiner.end(view);
+                } else {
+                    self.take(view, message.stamp.frame, Word::Pose(Box::new(message)));
+                }
+            }
+        }
+        for worker in 0..self.pairs.len() {
+            while let Some(message) = self.pairs[worker].receive()? {
+                if message.stamp.session != self.service.session() {
+                    continue;
+                }
+                if message.status == Status::END {
+                    let its = (worker..self.job.n_pairs).step_by(self.job.n_workers);
+                    its.for_each(|pair| self.joiner.end(n_views + pair));
+                } else {
+                    let input = n_views + message.stamp.view as usize;
+                    self.take(input, message.stamp.frame, Word::Pair(Box::new(message)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, input: usize, frame: u64, word: Word) {
+        self.service.health().received(1);
+        if self.joiner.push(input, frame, word, now_nanos()) == Push::Late {
+            self.service.health().dropped(1);
+        }
+    }
+
+    fn answer(&self, joined: &Joined<Word>, step: &mut SkeletonStep) -> Result<(), Failure> {
+        let received_at_nanos = now_nanos();
+        let answers = self.answers(joined);
+        let pairs: Vec<PairAnswer> = joined
+            .items
+            .iter()
+            .flatten()
+            .filter_map(|it| match it {
+                Word::Pair(it) => wire::pair_from_message(it, &self.job.plans)
+                    .inspect_err(|error| tracing::warn!(%error, "unreadable pair"))
+                    .ok()
+                    .flatten(),
+                Word::Pose(_) => None,
+            })
+            // A pair may have been found from a view whose own answer did not come.
+            .filter(|it| it.views.iter().all(|&view| answers[view].is_some()))
+            .collect();
+        let present = (0..answers.len()).filter(|it| answers[*it].is_some());
+        let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
+        let skeleton = step.run(&answers, &pairs);
+        let mut message =
+            wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
+        message.stamp = Stamp {
+            session: self.service.session(),
+            frame: joined.frame,
+            captured_at_nanos: captured_at(joined),
+            view: 0,
+            epoch: self.service.epoch(),
+        };
+        message.timing = Timing {
+            received_at_nanos,
+            sent_at_nanos: now_nanos(),
+        };
+        self.publisher.send(&message)?;
+        let health = self.service.health();
+        health.sent(joined.frame);
+        health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
+        Ok(())
+    }
+
+    fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {
+        let views = self.job.plans.iter().zip(&joined.items);
+        views
+            .map(|(plan, item)| {
+                let Some(Word::Pose(pose)) = item else {
+                    return None;
+                };
+                let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())
+                    .inspect_err(|error| tracing::warn!(%error, "unreadable candidates"))
+                    .ok()
+                    .filter(|it| !it.is_empty())?;
+                Some(Answer {
+                    candidates,
+                    sigma_px: None,
+                })
+            })
+            .collect()
+    }
+
+    fn end(&self, waiter: &Waiter) -> Result<(), Failure> {
+        self.publisher
+            .send(&wire::end_of_results(self.service.session()))?;
+        self.service.health().finished();
+        while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
+        Ok(())
+    }
+}
+
+/// When the first view of the frame was captured.
+fn captured_at(joined: &Joined<Word>) -> u64 {
+    let stamps = joined.items.iter().flatten().map(|it| match it {
+        Word::Pose(it) => it.stamp,
+        Word::Pair(it) => it.stamp,
+    });
+    stamps.map(|it| it.captured_at_nanos).min().unwrap_or(0)
+}
