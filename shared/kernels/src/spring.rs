@@ -22,9 +22,22 @@ pub(crate) struct Axis {
     pub(crate) anchor: i32,
 }
 
-/// Cells by which a window is wider than exact arithmetic asks for, so that rounding cannot make a
-/// candidate outside of it tie with the best one inside.
-const SLACK: f64 = 1.0;
+/// Cells by which a window is wider than exact arithmetic asks for; with the excess in
+/// [`spread`](crate::spread), rounding cannot make a candidate outside of it tie with the best inside.
+const SLACK: f64 = 1e-3;
+
+/// Where the children lie that can be best for a parent, on one axis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reach {
+    n: usize,
+    /// Best offset of the child from its parent, cells.
+    centre: f64,
+    /// Square of the distance at which the spring costs all that a score can gain, cells^2.
+    square: f64,
+    /// First and last offset to try while the best offset lies on the grid.
+    first: isize,
+    last: isize,
+}
 
 impl Spring {
     pub(crate) fn x(&self) -> Axis {
@@ -54,23 +67,53 @@ impl Axis {
         -(self.quadratic * d * d + self.linear * d) as f32
     }
 
-    /// The children that can be best for a parent at `p`, out of `n`.
+    /// Where the best child of a parent can lie among `n` in a row.
     ///
     /// * `spread`: largest difference between the scores of any two children. With the best place
     ///   `c` of the spring and `v0` the nearest child to it, a child at `v` loses to `v0` if
     ///   `quadratic ((v - c)^2 - (v0 - c)^2) > spread`; so all winners lie within
-    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. Not finite: all children.
-    #[inline(always)]
-    pub(crate) fn window(self, p: usize, n: usize, spread: f32) -> Range<usize> {
-        if !spread.is_finite() {
-            return 0..n;
+    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. Not finite: anywhere.
+    pub(crate) fn reach(self, n: usize, spread: f32) -> Reach {
+        let centre = f64::from(self.anchor) + self.linear / (2.0 * self.quadratic);
+        let square = f64::from(spread) / self.quadratic;
+        let away = centre.round() - centre;
+        let half = (square + away * away).sqrt() + SLACK;
+        Reach {
+            n,
+            centre,
+            square,
+            first: (centre - half).ceil() as isize,
+            last: (centre + half).floor() as isize,
         }
-        let centre = (p as f64 + f64::from(self.anchor)) + self.linear / (2.0 * self.quadratic);
-        let nearest = centre.round().clamp(0.0, n as f64 - 1.0);
-        let away = nearest - centre;
-        let half = (f64::from(spread) / self.quadratic + away * away).sqrt() + SLACK;
-        let first = (centre - half).ceil().max(0.0) as usize;
-        let end = ((centre + half).floor() + 1.0).max(0.0) as usize;
-        first.min(n)..end.min(n)
+    }
+}
+
+impl Reach {
+    /// The children that can be best for a parent at `p`.
+    #[inline(always)]
+    pub(crate) fn window(&self, p: usize) -> Range<usize> {
+        let n = self.n as isize;
+        let centre = p as f64 + self.centre;
+        let (first, last) = if !self.square.is_finite() {
+            (0, n)
+        } else if centre >= 0.0 && centre <= (n - 1) as f64 {
+            (p as isize + self.first, p as isize + self.last)
+        } else {
+            self.beside_the_grid(centre)
+        };
+        let first = first.clamp(0, n) as usize;
+        first..((last + 1).clamp(0, n) as usize).max(first)
+    }
+
+    /// As above where the best place `centre` lies beside the grid.
+    #[inline(never)]
+    fn beside_the_grid(&self, centre: f64) -> (isize, isize) {
+        let away = if centre < 0.0 {
+            -centre
+        } else {
+            centre - (self.n as f64 - 1.0)
+        };
+        let half = (self.square + away * away).sqrt() + SLACK;
+        ((centre - half).ceil() as isize, (centre + half).floor() as isize)
     }
 }

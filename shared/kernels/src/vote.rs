@@ -145,9 +145,10 @@ impl VoteRule {
     }
 }
 
-/// Largest difference between two scores of a plane.
+/// Largest difference between two scores of a plane, and a little more.
 ///
-/// Infinite if some are minus infinity, NaN if all are: both ask for the whole plane to be searched.
+/// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision can
+/// add to or take from a difference. Infinite if some are minus infinity, NaN if all are: both ask for the whole plane to be searched.
 pub fn spread(grid: Grid, plane: &[f32]) -> f32 {
     let (mut least, mut most) = ([f32::INFINITY; ROW_ALIGN], [f32::NEG_INFINITY; ROW_ALIGN]);
     for row in plane.chunks_exact(grid.stride().max(1)) {
@@ -172,7 +173,8 @@ pub fn spread(grid: Grid, plane: &[f32]) -> f32 {
         }
     }
     let most = most.into_iter().fold(f32::NEG_INFINITY, f32::max);
-    most - least.into_iter().fold(f32::INFINITY, f32::min)
+    let least = least.into_iter().fold(f32::INFINITY, f32::min);
+    (most - least) + 1e-5 * (most.abs() + least.abs())
 }
 
 #[cfg(test)]

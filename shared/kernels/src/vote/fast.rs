@@ -63,16 +63,18 @@ impl Stretch {
         let offsets = |window: &Range<usize>, p: usize| {
             window.start as isize - p as isize..window.end as isize - p as isize
         };
+        let reach = down.reach(grid.rows, spread);
         self.windows.clear();
         self.windows
-            .extend((0..grid.rows).map(|p| down.window(p, grid.rows, spread)));
+            .extend((0..grid.rows).map(|p| reach.window(p)));
         let all = self.windows.iter().enumerate();
         let all = all.map(|(p, window)| offsets(window, p));
         self.down.cover(down, all.fold(NOTHING, union));
+        let reach = along.reach(grid.cols, spread);
         self.runs.clear();
         for first in (0..grid.cols).step_by(ROW_ALIGN) {
             let cells = first..grid.cols.min(first + ROW_ALIGN);
-            let run = cells.map(|p| offsets(&along.window(p, grid.cols, spread), p));
+            let run = cells.map(|p| offsets(&reach.window(p), p));
             self.runs.push(run.fold(NOTHING, union));
         }
         let all = self.runs.iter().cloned().fold(NOTHING, union);

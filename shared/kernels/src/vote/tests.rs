@@ -181,11 +181,11 @@ fn first_by_hand(case: &Case, l: usize, [y, x]: [usize; 2]) -> (usize, usize, us
 fn the_spread_leaves_the_row_padding_out() {
     let grid = Grid { rows: 2, cols: 3 };
     let plane = Case::padded(grid, &[1.0, 4.0, 2.0, -3.0, 0.0, 1.0]);
-    assert_eq!(spread(grid, &plane), 7.0);
+    assert!((7.0..7.001).contains(&spread(grid, &plane)));
     let grid = Grid { rows: 1, cols: 18 };
     let mut row = [1.0; 18];
     (row[5], row[17]) = (9.0, -2.0);
-    assert_eq!(spread(grid, &Case::padded(grid, &row)), 11.0);
+    assert!((11.0..11.001).contains(&spread(grid, &Case::padded(grid, &row))));
 }
 
 #[test]

@@ -91,8 +91,8 @@ fn best_child(
     spread: f32,
     at: [usize; 2],
 ) -> Option<(f32, [usize; 2])> {
-    let rows = spring.y().window(at[0], grid.rows, spread);
-    let cols = spring.x().window(at[1], grid.cols, spread);
+    let rows = spring.y().reach(grid.rows, spread).window(at[0]);
+    let cols = spring.x().reach(grid.cols, spread).window(at[1]);
     let mut best = None;
     let mut most = f32::NEG_INFINITY;
     for x in cols {
