@@ -4,6 +4,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod models;
+
 use std::path::{Path, PathBuf};
 
 /// The folder with data and reference numbers, or `None` (and a line that says so) where it is absent.

@@ -256,8 +256,11 @@ fn filters(it: &mut Tokens<'_>, n_filters: usize) -> Result<Vec<Filter>, TextErr
     const FIELD: &str = "filters_w";
     it.keyword(FIELD)?;
     let mut filters = Vec::with_capacity(n_filters.min(it.at_most()));
-    for _ in 0..n_filters {
+    for filter in 0..n_filters {
         let place = it.place();
+        if it.peek() == Some("filters_i") {
+            agree(FIELD, place, [("number of filters", filter, n_filters)])?;
+        }
         let [rows, cols, _] = sizes(&mut it.clone(), FIELD)?;
         for got in [rows, cols] {
             if !(1..=Model::MAX_FILTER).contains(&got) {

@@ -52,6 +52,11 @@ fn a_header_that_disagrees_with_its_arrays_is_refused() {
             "line 4 (token 8): `bias_w` says rows = 9, expected 8",
         ),
         (
+            "filtersSz 6",
+            "filtersSz 7",
+            "line 8 (token 822): `filters_w` says number of filters = 6, expected 7",
+        ),
+        (
             "filters_w 2 2 32",
             "filters_w 2 2 31",
             "line 7 (token 36): `filters_w` says planes = 31, expected 32",
