@@ -14,9 +14,9 @@ pub(super) struct Probe {
     /// Size as stored: a rotation tag is not applied.
     pub(super) size: Size,
     pub(super) rate_hz: Option<f64>,
-    /// Frames in the stream: exact, from the container or by counting.
+    /// Frames in the stream, from the container or by counting packets.
     pub(super) n_frames: u64,
-    /// Frames that the duration in the header promises, to find files that were cut off.
+    /// Frames that there would be if the file went on to the duration in its header.
     pub(super) n_promised: u64,
     /// Presentation times, seconds after the first frame, where frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
@@ -28,7 +28,7 @@ const ENTRIES: &str = "program_version=version:\
     stream=width,height,nb_frames,avg_frame_rate,r_frame_rate:format=duration";
 
 /// Asks for the first video stream of `path`; reads the whole file (without decoding) only if the
-/// container does not tell the number of frames, or their times are irregular.
+/// container does not tell the number of frames, or that they are equally spaced.
 pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
     let answer = ask(
         path,
@@ -45,26 +45,61 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         });
     }
     let rate_hz = fraction(&stream["avg_frame_rate"]);
-    let nominal_hz = fraction(&stream["r_frame_rate"]);
-    let mut n_frames = number(&stream["nb_frames"]).map_or(0, |it| it as u64);
-    let mut times_s = None;
-    if n_frames == 0 || rate_hz != nominal_hz {
-        let packets = ask(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
-        let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
-        // Packets in front of the first frame that is shown are marked `D`, to be discarded.
-        let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
-        n_frames = shown.len() as u64;
-        times_s = (rate_hz != nominal_hz).then(|| presentation_times(&shown));
-    }
-    let duration_s = number(&answer["format"]["duration"]).unwrap_or(0.0);
-    Ok(Probe {
+    let mut probe = Probe {
         size,
         rate_hz,
-        n_frames,
-        n_promised: n_frames.max((duration_s * rate_hz.unwrap_or(0.0)).round() as u64),
-        times_s,
+        n_frames: number(&stream["nb_frames"]).map_or(0, |it| it as u64),
+        n_promised: 0,
+        times_s: None,
         has_fps_mode: has_fps_mode(answer["program_version"]["version"].as_str().unwrap_or("")),
-    })
+    };
+    if probe.n_frames == 0 || rate_hz != fraction(&stream["r_frame_rate"]) {
+        let packets = ask(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
+        let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
+        probe.count(packets, number(&answer["format"]["duration"]));
+    }
+    probe.n_promised = probe.n_promised.max(probe.n_frames);
+    Ok(probe)
+}
+
+impl Probe {
+    /// Takes numbers and times of the frames from the packets of the stream.
+    fn count(&mut self, packets: &[Value], duration_s: Option<f64>) {
+        // Packets in front of the first frame that is shown are marked `D`, to be discarded.
+        let is_discarded = |it: &Value| it["flags"].as_str().is_some_and(|it| it.contains('D'));
+        let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
+        let mut times_s: Vec<f64> = shown
+            .iter()
+            .filter_map(|it| number(&it["pts_time"]))
+            .collect();
+        times_s.sort_by(f64::total_cmp);
+        let first_s = times_s.first().copied().unwrap_or(0.0);
+        let last_s = times_s.last().copied().unwrap_or(0.0);
+        let n_discarded = (packets.len() - shown.len()) as u64;
+        let n_behind = self
+            .rate_hz
+            .zip(duration_s)
+            .map_or(0.0, |(rate_hz, duration_s)| {
+                ((duration_s - last_s) * rate_hz - 1.0).round()
+            });
+        self.n_promised = if self.n_frames > 0 {
+            self.n_frames.saturating_sub(n_discarded)
+        } else {
+            shown.len() as u64 + n_behind as u64
+        };
+        self.n_frames = shown.len() as u64;
+        times_s.iter_mut().for_each(|it| *it -= first_s);
+        self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
+    }
+
+    /// Whether every frame comes where the rate says: to a quarter of a frame, as some containers round
+    /// times to milliseconds.
+    fn is_regular(&self, times_s: &[f64]) -> bool {
+        self.rate_hz.is_some_and(|rate_hz| {
+            let late = |(k, time_s): (usize, &f64)| (time_s * rate_hz - k as f64).abs();
+            times_s.iter().enumerate().map(late).all(|it| it < 0.25)
+        })
+    }
 }
 
 fn ask(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, FootageError> {
@@ -114,20 +149,6 @@ fn fraction(value: &Value) -> Option<f64> {
     let (numerator, denominator) = value.as_str()?.split_once('/')?;
     let rate = numerator.parse::<f64>().ok()? / denominator.parse::<f64>().ok()?;
     (rate.is_finite() && rate > 0.0).then_some(rate)
-}
-
-fn is_discarded(packet: &Value) -> bool {
-    packet["flags"].as_str().is_some_and(|it| it.contains('D'))
-}
-
-fn presentation_times(packets: &[&Value]) -> Vec<f64> {
-    let mut times: Vec<f64> = packets
-        .iter()
-        .filter_map(|it| number(&it["pts_time"]))
-        .collect();
-    times.sort_by(f64::total_cmp);
-    let first = times.first().copied().unwrap_or(0.0);
-    times.iter().map(|it| it - first).collect()
 }
 
 /// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are taken for new ones.

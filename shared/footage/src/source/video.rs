@@ -88,8 +88,9 @@ impl Video {
     /// Tells a video that is over from one that is cut off.
     ///
     /// Damage is what the decoder complains about *and* what costs frames: many a good video makes it
-    /// complain, and some containers count a frame or two that are never shown. A tenth of the frames
-    /// is missed without a complaint.
+    /// complain, and some containers count a frame or two that are never shown. Without a complaint, a
+    /// tenth of the frames may be missing: it takes the header's duration for that of the pictures
+    /// only in a complaint, because sound may be longer.
     fn check_end(&mut self, is_partial: bool) -> Result<(), FootageError> {
         let message = self.log.finish();
         let status = self.child.wait().map_err(|source| FootageError::Io {
@@ -107,10 +108,10 @@ impl Video {
                 message,
             });
         }
-        let n_expected = self.n_promised.max(self.n_frames);
-        let n_missing = n_expected.saturating_sub(self.n_read);
-        let complains = !message.is_empty() && n_missing > 0;
-        if complains || is_partial || !status.success() || n_missing > n_expected / 10 {
+        let n_expected = self.n_promised;
+        let complains = !message.is_empty() && self.n_read < n_expected;
+        let is_short = self.n_read < self.n_frames - self.n_frames / 10;
+        if complains || is_partial || is_short || !status.success() {
             return Err(FootageError::VideoTruncated {
                 path: self.path.clone(),
                 n_read: self.n_read,
@@ -172,5 +173,48 @@ mod tests {
             ]
         );
         assert!(frame_choice(&SourceSpec::new("x")).is_empty());
+    }
+    /// A second of video, too large for the pipe; `None` without ffmpeg.
+    #[cfg(target_os = "linux")]
+    fn long_video(folder: &Path) -> Option<PathBuf> {
+        let path = folder.join("long.nut");
+        let made = Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
+            .args(["testsrc=size=640x480:duration=1", "-c:v", "rawvideo"])
+            .arg(&path)
+            .status();
+        made.is_ok().then_some(path)
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn dropping_a_video_ends_its_decoder() {
+        let folder = tempfile::tempdir().unwrap();
+        let Some(path) = long_video(folder.path()) else {
+            return;
+        };
+        let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
+        let decoder = PathBuf::from(format!("/proc/{}", video.child.id()));
+        let mut rgb = vec![0; 640 * 480 * 3];
+        assert!(video.read_into(&mut rgb).unwrap());
+        assert!(decoder.exists());
+        drop(video);
+        assert!(!decoder.exists());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_decoder_that_nobody_listens_to_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let Some(path) = long_video(folder.path()) else {
+            return;
+        };
+        let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
+        // What the death of this process would do: the only reader of the pipe goes away.
+        let silent = Command::new("true").stdout(Stdio::piped()).spawn();
+        let (mut silent, unheard) = (silent.unwrap(), &mut video.stdout);
+        drop(std::mem::replace(unheard, silent.stdout.take().unwrap()));
+        assert!(!video.child.wait().unwrap().success());
+        silent.wait().unwrap();
     }
 }

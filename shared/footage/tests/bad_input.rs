@@ -1,0 +1,319 @@
+//! What is wrong with footage is said with the name of the file, and nothing panics.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod clip;
+
+use std::fs;
+use std::path::Path;
+
+use footage::{FootageError, Size, Source, SourceSpec};
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+fn spec(path: &Path) -> SourceSpec {
+    SourceSpec::new(path.to_str().unwrap())
+}
+
+fn refusal(path: &Path) -> FootageError {
+    Source::open(&spec(path)).unwrap_err()
+}
+
+/// Reads to the end or to the first error.
+fn read_all(spec: &SourceSpec) -> Result<u64, FootageError> {
+    let mut source = Source::open(spec)?;
+    let mut n = 0;
+    let outcome = loop {
+        match source.next_frame() {
+            Ok(Some(_)) => n += 1,
+            Ok(None) => break Ok(n),
+            Err(error) => break Err(error),
+        }
+    };
+    assert!(
+        matches!(source.next_frame(), Ok(None)),
+        "after the end there is nothing"
+    );
+    outcome
+}
+
+fn named(error: &FootageError, name: &str) {
+    let text = error.to_string();
+    assert!(text.contains(name), "{text} does not name {name}");
+}
+
+fn images(n: usize) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    clip::write_images(folder.path(), n);
+    folder
+}
+
+#[test]
+fn what_is_not_there() {
+    let folder = images(0);
+    let error = refusal(&folder.path().join("absent.mp4"));
+    assert!(matches!(error, FootageError::NotFound { .. }), "{error}");
+    named(&error, "absent.mp4");
+    for name in ["", "*.png", "im%05d.png"] {
+        let error = refusal(&folder.path().join(name));
+        assert!(matches!(error, FootageError::NoImages { .. }), "{error}");
+        named(&error, name);
+    }
+    let error = refusal(&folder.path().join("a**b[.png"));
+    assert!(matches!(error, FootageError::BadPattern { .. }), "{error}");
+}
+
+#[test]
+fn a_file_of_no_bytes() {
+    let folder = images(2);
+    for name in ["zero.png", "zero.mp4", "zero"] {
+        let path = folder.path().join(name);
+        fs::write(&path, []).unwrap();
+        let error = refusal(&path);
+        assert!(matches!(error, FootageError::Empty { .. }), "{error}");
+        named(&error, name);
+    }
+    fs::write(folder.path().join("im2.png"), []).unwrap();
+    let error = read_all(&spec(&folder.path().join("im*.png"))).unwrap_err();
+    assert!(matches!(error, FootageError::Empty { .. }), "{error}");
+}
+
+#[test]
+fn an_image_that_is_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    for format in ["png", "jpg", "bmp"] {
+        let path = folder.path().join(format!("cut.{format}"));
+        clip::frame(0).save(&path).unwrap();
+        assert_eq!(read_all(&spec(&path)).unwrap(), 1, "{format}");
+        let whole = fs::read(&path).unwrap();
+        for share in [0.2, 0.5, 0.9] {
+            fs::write(&path, &whole[..(whole.len() as f64 * share) as usize]).unwrap();
+            let error = read_all(&spec(&path)).unwrap_err();
+            assert!(
+                matches!(error, FootageError::Image { .. }),
+                "{format} {share} {error}"
+            );
+            named(&error, &format!("cut.{format}"));
+        }
+    }
+}
+
+#[test]
+fn an_image_that_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("text.png");
+    fs::write(&path, "this is a text, whatever its name says").unwrap();
+    let error = refusal(&path);
+    assert!(matches!(error, FootageError::Image { .. }), "{error}");
+    named(&error, "text.png");
+}
+
+#[test]
+fn an_image_of_another_size_in_a_sequence() {
+    let folder = images(4);
+    let odd = image::RgbImage::new(50, 45);
+    odd.save(folder.path().join("im3.png")).unwrap();
+    let error = read_all(&spec(folder.path())).unwrap_err();
+    let FootageError::SizeDiffers {
+        found, expected, ..
+    } = &error
+    else {
+        panic!("{error}");
+    };
+    assert_eq!((*found, *expected), (Size::new(50, 45), clip::SIZE));
+    for part in ["im3.png", "50x45", "67x45", "im1.png"] {
+        named(&error, part);
+    }
+}
+
+#[test]
+fn an_image_that_is_too_small() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dot.png");
+    image::RgbImage::new(1, 1).save(&path).unwrap();
+    assert_eq!(read_all(&spec(&path)).unwrap(), 1);
+    let wanted = SourceSpec {
+        min_side: 40,
+        ..spec(&path)
+    };
+    let error = Source::open(&wanted).unwrap_err();
+    assert!(matches!(error, FootageError::TooSmall { .. }), "{error}");
+    for part in ["dot.png", "1x1", "40"] {
+        named(&error, part);
+    }
+}
+
+#[test]
+fn a_header_that_promises_more_than_there_is_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bomb.bmp");
+    clip::frame(0).save(&path).unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[18..26].copy_from_slice(&[0xff, 0xff, 0, 0, 0xff, 0xff, 0, 0]);
+    fs::write(&path, bytes).unwrap();
+    let error = refusal(&path);
+    assert!(matches!(error, FootageError::Image { .. }), "{error}");
+    named(&error, "bomb.bmp");
+}
+
+#[test]
+fn a_start_behind_the_end() {
+    let folder = images(3);
+    let late = SourceSpec {
+        start: 3,
+        ..spec(folder.path())
+    };
+    let error = Source::open(&late).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            FootageError::StartBeyondEnd {
+                start: 3,
+                n_frames: 3,
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn no_ffmpeg() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("video.mp4");
+    fs::write(&path, "could be a video").unwrap();
+    let without = SourceSpec {
+        ffprobe: "no-such-ffprobe".into(),
+        ..spec(&path)
+    };
+    let error = Source::open(&without).unwrap_err();
+    assert!(
+        matches!(error, FootageError::FfmpegMissing { .. }),
+        "{error}"
+    );
+    for part in [
+        "no-such-ffprobe",
+        "video.mp4",
+        "apt-get install ffmpeg",
+        "PATH",
+    ] {
+        named(&error, part);
+    }
+}
+
+#[test]
+fn ffprobe_without_ffmpeg() {
+    if !clip::has_ffmpeg() {
+        return;
+    }
+    let folder = images(3);
+    let path = clip::encode(folder.path(), "a.mkv", clip::FFV1);
+    let without = SourceSpec {
+        ffmpeg: "no-such-ffmpeg".into(),
+        ..spec(&path)
+    };
+    let error = Source::open(&without).unwrap_err();
+    assert!(
+        matches!(error, FootageError::FfmpegMissing { .. }),
+        "{error}"
+    );
+    named(&error, "no-such-ffmpeg");
+}
+
+#[test]
+fn a_video_that_is_none() {
+    if !clip::has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["text.mp4", "text.txt", "-text.mkv", "noise.avi"] {
+        let path = folder.path().join(name);
+        let noise: Vec<u8> = (0_u32..5000)
+            .map(|it| (it.wrapping_mul(2_654_435_761) >> 24) as u8)
+            .collect();
+        let text = b"this is a text, whatever its name says\n";
+        fs::write(
+            &path,
+            if name.starts_with("noise") {
+                &noise[..]
+            } else {
+                text
+            },
+        )
+        .unwrap();
+        let error = read_all(&spec(&path)).unwrap_err();
+        assert!(
+            matches!(error, FootageError::Video { .. }),
+            "{name}: {error}"
+        );
+        named(&error, name);
+    }
+}
+
+#[test]
+fn a_video_without_pictures() {
+    if !clip::has_ffmpeg() {
+        return;
+    }
+    let folder = images(1);
+    let sound = ["-f", "lavfi", "-i", "sine=duration=0.1", "-map", "1:a"];
+    let path = clip::encode(folder.path(), "sound.wav", &sound);
+    let error = refusal(&path);
+    assert!(matches!(error, FootageError::Video { .. }), "{error}");
+    named(&error, "no video stream");
+}
+
+#[test]
+fn a_video_that_is_cut_off() {
+    if !clip::has_ffmpeg() {
+        return;
+    }
+    let folder = images(12);
+    let early_index: &[&str] = &["-c:v", "png", "-movflags", "faststart"];
+    for (name, options) in [
+        ("cut.mkv", clip::FFV1),
+        ("cut.avi", clip::FFV1),
+        ("cut.mov", early_index),
+    ] {
+        let path = clip::encode(folder.path(), name, options);
+        assert_eq!(read_all(&spec(&path)).unwrap(), 12, "{name}");
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, &whole[..whole.len() * 6 / 10]).unwrap();
+        let error = read_all(&spec(&path)).unwrap_err();
+        let FootageError::VideoTruncated {
+            n_read, n_expected, ..
+        } = &error
+        else {
+            panic!("{name}: {error}");
+        };
+        assert!((4..12).contains(n_read), "{name}: {error}");
+        assert_eq!(*n_expected, 12, "{name}: {error}");
+        named(&error, name);
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_of_an_image_file_are_read_or_refused(
+        seed in 0_usize..3, edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..20),
+        cut in any::<prop::sample::Index>(), noise in prop::collection::vec(any::<u8>(), 1..200),
+        is_noise: bool,
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(["x.png", "x.jpg", "x.bmp"][seed]);
+        clip::frame(1).save(&path).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for (at, value) in edits {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if cut.index(4) == 0 {
+            bytes.truncate(1 + cut.index(bytes.len()));
+        }
+        fs::write(&path, if is_noise { &noise } else { &bytes }).unwrap();
+        // The law: an answer, and no panic.
+        if let Err(error) = read_all(&spec(&path)) {
+            named(&error, "x.");
+        }
+    }
+}
