@@ -1,61 +1,147 @@
 //! The top level of an `OpenCV` storage: names and what is stored under them.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
-use serde::Deserialize;
+use serde::{
+    Deserialize, Deserializer,
+    de::{MapAccess, SeqAccess, Visitor},
+};
 
 use super::ParseError;
 
 /// What is stored under one name.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(untagged)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Entry {
-    /// `!!opencv-matrix`, or anything with the same fields.
-    Matrix {
-        rows: usize,
-        cols: usize,
-        data: Vec<f64>,
-    },
+    Nothing,
     Number(f64),
-    Numbers(Vec<f64>),
-    Rows(Vec<Vec<f64>>),
-    Texts(Vec<String>),
-    Other(serde::de::IgnoredAny),
+    Text(String),
+    List(Vec<Self>),
+    /// A matrix has rows, cols and data.
+    Map(BTreeMap<String, Self>),
 }
 
 impl Entry {
     /// The numbers of a matrix or a list, row by row.
     pub(super) fn numbers(&self, key: &str) -> Result<Vec<f64>, ParseError> {
-        let shape = |found: String| ParseError::Shape {
-            field: key.to_owned(),
-            expected: "a matrix or a list of numbers",
-            found,
-        };
+        let mut numbers = Vec::new();
         match self {
-            Self::Matrix { rows, cols, data } if rows.checked_mul(*cols) == Some(data.len()) => {
-                Ok(data.clone())
+            Self::List(list) => flatten(key, list, &mut numbers)?,
+            Self::Map(map) => {
+                let field = |name: &str| {
+                    let key = format!("{key}.{name}");
+                    map.get(name).ok_or(ParseError::Missing { field: key })
+                };
+                let (rows, columns) = (field("rows")?.number(key)?, field("cols")?.number(key)?);
+                match field("data")? {
+                    Self::List(data) => flatten(key, data, &mut numbers)?,
+                    other => return Err(other.is_not(key, "a list of numbers")),
+                }
+                if rows * columns != numbers.len() as f64 {
+                    return Err(ParseError::Shape {
+                        field: key.to_owned(),
+                        expected: "as many numbers as the matrix has places",
+                        found: format!("{} numbers for {rows} rows of {columns}", numbers.len()),
+                    });
+                }
             }
-            Self::Matrix { rows, cols, data } => Err(shape(format!(
-                "{} numbers for {rows} rows of {cols}",
-                data.len()
-            ))),
-            Self::Numbers(numbers) => Ok(numbers.clone()),
-            Self::Rows(rows) => Ok(rows.concat()),
-            Self::Number(number) => Err(shape(format!("the number {number}"))),
-            Self::Texts(_) | Self::Other(_) => Err(shape("something else".to_owned())),
+            other => return Err(other.is_not(key, "a matrix or a list of numbers")),
         }
+        Ok(numbers)
     }
 
     /// A single number.
     pub(super) fn number(&self, key: &str) -> Result<f64, ParseError> {
         match self {
             Self::Number(number) => Ok(*number),
-            other => Err(ParseError::Shape {
-                field: key.to_owned(),
-                expected: "a number",
-                found: format!("{other:?}"),
-            }),
+            other => Err(other.is_not(key, "a number")),
         }
+    }
+
+    fn is_not(&self, key: &str, expected: &'static str) -> ParseError {
+        let found = match self {
+            Self::Nothing => "nothing".to_owned(),
+            Self::Number(number) => format!("the number {number}"),
+            Self::Text(text) => format!("{text:?}"),
+            Self::List(_) => "a list".to_owned(),
+            Self::Map(_) => "a table".to_owned(),
+        };
+        ParseError::Shape {
+            field: key.to_owned(),
+            expected,
+            found,
+        }
+    }
+}
+
+/// Appends the numbers of a list, and of lists in it, as of the rows of a matrix.
+fn flatten(key: &str, list: &[Entry], into: &mut Vec<f64>) -> Result<(), ParseError> {
+    for entry in list {
+        match entry {
+            Entry::List(inner) => flatten(key, inner, into)?,
+            other => into.push(other.number(key)?),
+        }
+    }
+    Ok(())
+}
+
+impl<'de> Deserialize<'de> for Entry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // Not a derived untagged enum: that would see the tag `!!opencv-matrix` as a map.
+        deserializer.deserialize_any(EntryVisitor)
+    }
+}
+
+struct EntryVisitor;
+
+impl<'de> Visitor<'de> for EntryVisitor {
+    type Value = Entry;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a text, a list or a table")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Entry, E> {
+        Ok(Entry::Number(f64::from(u8::from(value))))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Entry, E> {
+        Ok(Entry::Number(value as f64))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Entry, E> {
+        Ok(Entry::Number(value as f64))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Entry, E> {
+        Ok(Entry::Number(value))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Entry, E> {
+        Ok(Entry::Text(value.to_owned()))
+    }
+
+    fn visit_unit<E>(self) -> Result<Entry, E> {
+        Ok(Entry::Nothing)
+    }
+
+    fn visit_none<E>(self) -> Result<Entry, E> {
+        Ok(Entry::Nothing)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Entry, A::Error> {
+        let mut list = Vec::new();
+        while let Some(entry) = access.next_element()? {
+            list.push(entry);
+        }
+        Ok(Entry::List(list))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Entry, A::Error> {
+        let mut map = BTreeMap::new();
+        while let Some((key, entry)) = access.next_entry()? {
+            map.insert(key, entry);
+        }
+        Ok(Entry::Map(map))
     }
 }
 
@@ -93,21 +179,15 @@ impl Storage {
 
     /// The names of the cameras: the list, or what follows `K_`.
     pub(super) fn camera_names(&self) -> Result<Vec<String>, ParseError> {
+        let keys = self
+            .0
+            .keys()
+            .filter_map(|key| key.strip_prefix("K_"))
+            .map(str::to_owned);
         match self.names() {
-            None => Ok(self
-                .0
-                .keys()
-                .filter_map(|key| key.strip_prefix("K_"))
-                .map(str::to_owned)
-                .collect()),
-            Some(Entry::Texts(names)) => Ok(names.clone()),
-            // An empty list.
-            Some(Entry::Numbers(names)) if names.is_empty() => Ok(Vec::new()),
-            Some(other) => Err(ParseError::Shape {
-                field: "names".to_owned(),
-                expected: "a list of quoted names",
-                found: format!("{other:?}"),
-            }),
+            None => Ok(keys.collect()),
+            Some(Entry::List(names)) => names.iter().map(name).collect(),
+            Some(other) => Err(other.is_not("names", "a list of quoted names")),
         }
     }
 
@@ -132,5 +212,13 @@ impl Storage {
     /// The number under `key`, if it is there.
     pub(super) fn number(&self, key: &str) -> Result<Option<f64>, ParseError> {
         self.0.get(key).map(|entry| entry.number(key)).transpose()
+    }
+}
+
+/// A name of the list; numbers would have lost their leading zeros.
+fn name(entry: &Entry) -> Result<String, ParseError> {
+    match entry {
+        Entry::Text(name) => Ok(name.clone()),
+        other => Err(other.is_not("names", "quoted names")),
     }
 }
