@@ -1,10 +1,14 @@
 //! Deployments whose processes are killed, stopped, or fail.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 mod common;
 
 use core::time::Duration;
 use std::cell::Cell;
+use std::io::{BufRead as _, BufReader};
+use std::os::unix::process::ExitStatusExt as _;
+use std::process::{Command, Stdio};
 
 use common::{Case, Run, Seen, is_alive, kill};
 use runtime::{Delivery, ExitKind, Fault as _};
@@ -255,4 +259,61 @@ fn a_process_that_never_begins_is_killed() {
         panic!("{error}");
     };
     assert!(matches!(death, Death::NeverBegan { .. }), "{error}");
+}
+
+#[test]
+fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
+    let case = Case::new(Delivery::Realtime, &[("only", "idle", Role::Essential)]);
+    let mut supervisor = Command::new(&case.plan.executable)
+        .arg("supervise")
+        .arg(case.base())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(supervisor.stdout.take().unwrap()).lines();
+    let pids: Vec<u32> = (0..2)
+        .map(|_| lines.next().unwrap().unwrap().parse().unwrap())
+        .collect();
+    // Both have begun: their files are there.
+    assert!(pids.iter().all(|&pid| is_alive(pid)), "{pids:?}");
+    supervisor.kill().unwrap();
+    supervisor.wait().unwrap();
+    case.run(|_, _| {}).outcome();
+    assert!(!pids.iter().any(|&pid| is_alive(pid)), "{pids:?}");
+}
+
+#[test]
+fn a_full_shared_memory_is_an_error_with_the_numbers_and_no_sigbus() {
+    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    // A file system of 8 megabytes that only this process sees.
+    let script = format!(
+        "mount -t tmpfs -o size=8m tmpfs /dev/shm || exit 99; exec {} fill {}",
+        env!("CARGO_BIN_EXE_supervise-dummy"),
+        base.path().display()
+    );
+    let unshared = Command::new("unshare")
+        .args(["-m", "sh", "-c", &script])
+        .output();
+    let Ok(output) = unshared else {
+        eprintln!("skipped: unshare is absent");
+        return;
+    };
+    if !matches!(output.status.code(), Some(0..=98)) && output.status.signal().is_none() {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    }
+    let text = String::from_utf8(output.stdout).unwrap();
+    let said: Vec<&str> = text.lines().collect();
+    assert!(output.status.success(), "{:?}: {said:?}", output.status);
+    assert_eq!(said.len(), 2, "{said:?}");
+    assert!(
+        said[0].contains("needs 5") && said[0].contains("8 MB are free"),
+        "{}",
+        said[0]
+    );
+    assert!(
+        said[1].contains("needs 4") && said[1].contains("are free in /dev/shm"),
+        "{}",
+        said[1]
+    );
 }

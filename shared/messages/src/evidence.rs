@@ -4,10 +4,12 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_LEVELS, Stamp, Status, Timing};
 
-/// Travels as the user header of the responses: `[f32]`, laid out as `fmp::Layout` says.
+/// Travels as the user header of the responses: `[f32]`, laid out as `fmp::Layout` says. Its
+/// alignment makes them begin on a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
 #[type_name("EvidenceHeader.v1")]
 #[repr(C)]
+#[repr(align(64))]
 pub struct EvidenceHeader {
     /// Which frame.
     pub stamp: Stamp,

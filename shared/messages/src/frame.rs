@@ -7,9 +7,11 @@ use crate::{Stamp, Status, Timing};
 /// Travels as the user header of the pixels: `[u8]`, RGB, row major, `width * height * 3` bytes.
 ///
 /// The image is what the rest of the pipeline sees: already turned upright, resized and cropped.
+/// The header's alignment makes the pixels begin on a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
 #[type_name("FrameHeader.v1")]
 #[repr(C)]
+#[repr(align(64))]
 pub struct FrameHeader {
     /// Which frame.
     pub stamp: Stamp,
@@ -25,4 +27,6 @@ pub struct FrameHeader {
     pub reserved: u32,
     /// Frames of this view that were due but never sent, since the session began.
     pub n_dropped: u64,
+    /// Keeps the layout free of padding.
+    pub reserved_end: [u64; 7],
 }

@@ -36,7 +36,7 @@ pub const MAX_LEVELS: usize = 96;
 const _: () = {
     assert!(size_of::<Stamp>() == 32);
     assert!(size_of::<Timing>() == 16);
-    assert!(size_of::<FrameHeader>() == 72);
+    assert!(size_of::<FrameHeader>() == 128);
     assert!(size_of::<EvidenceHeader>() == 256);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<ViewPose>() == 1408);

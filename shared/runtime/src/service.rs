@@ -9,8 +9,7 @@ use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
-    Alignment, AttributeSet, AttributeSpecifier, Node, PortFactory as _, SemanticString as _,
-    ServiceName, ipc,
+    AttributeSet, AttributeSpecifier, Node, PortFactory as _, SemanticString as _, ServiceName, ipc,
 };
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::builder::event::{EventCreateError, EventOpenError};
@@ -23,7 +22,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use crate::bus::BusError;
 use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
-use crate::topic::{ALIGNMENT, Delivery, TopicPlan};
+use crate::topic::{Delivery, TopicPlan};
 
 /// How long a service that another process is creating or removing is waited for.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
@@ -170,7 +169,6 @@ pub(crate) fn create_messages<E: Message, H: Header>(
         node.service_builder(&name)
             .publish_subscribe::<[E]>()
             .user_header::<H>()
-            .payload_alignment(alignment())
             .enable_safe_overflow(plan.delivery() == Delivery::Realtime)
             .max_publishers(limits.publishers)
             .max_subscribers(limits.subscribers)
@@ -228,7 +226,6 @@ pub(crate) fn open_messages<E: Message, H: Header>(
         node.service_builder(&name)
             .publish_subscribe::<[E]>()
             .user_header::<H>()
-            .payload_alignment(alignment())
             .open()
     };
     let in_flux = |error: &PublishSubscribeOpenError| {
@@ -324,14 +321,6 @@ fn service_name(topic: &str) -> Result<ServiceName, PortError> {
     ServiceName::new(topic).ok().ok_or_else(|| PortError::Name {
         topic: topic.to_owned(),
     })
-}
-
-#[expect(
-    clippy::expect_used,
-    reason = "the argument is a constant power of two"
-)]
-fn alignment() -> Alignment {
-    Alignment::new(ALIGNMENT).expect("64 is a power of two")
 }
 
 /// Repeats what fails only because another process is in the middle of creating, removing or

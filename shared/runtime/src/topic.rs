@@ -76,6 +76,8 @@ impl TopicPlan {
     /// A topic of arrays with a header, written and read where they lie:
     /// [`Bus::slice_publisher`], [`Bus::slice_subscriber`].
     ///
+    /// The array begins on a cache line, because its header's size is a multiple of one.
+    ///
     /// * `max_len`: longest array, elements.
     pub fn slices<E: Element, H: Header>(
         topic: String,
@@ -83,6 +85,8 @@ impl TopicPlan {
         limits: Limits,
         max_len: usize,
     ) -> Self {
+        // Not by iceoryx2's `payload_alignment`, which would align every element.
+        const { assert!(align_of::<H>() == CACHE_LINE && size_of::<H>().is_multiple_of(CACHE_LINE)) };
         Self {
             topic,
             delivery,
@@ -139,13 +143,12 @@ impl TopicPlan {
     }
 }
 
-/// Alignment of all payloads, bytes: a cache line, and enough for 512-bit loads.
-pub(crate) const ALIGNMENT: usize = 64;
-/// What iceoryx2 puts before the user header.
+/// Bytes of a cache line, and of the widest vector register.
+const CACHE_LINE: usize = 64;
+/// What iceoryx2 puts before the user header, with its alignment.
 const TRANSPORT_HEADER_BYTES: usize = 64;
 
-/// Bytes of one chunk, generously rounded.
+/// Bytes of one chunk.
 fn chunk_bytes(header: usize, payload: usize) -> usize {
-    (TRANSPORT_HEADER_BYTES + header).next_multiple_of(ALIGNMENT)
-        + payload.next_multiple_of(ALIGNMENT)
+    (TRANSPORT_HEADER_BYTES + header + payload).next_multiple_of(CACHE_LINE)
 }

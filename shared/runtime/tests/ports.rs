@@ -3,9 +3,10 @@
 
 mod common;
 
+use std::os::unix::fs::MetadataExt as _;
 use std::time::Duration;
 
-use common::Deployment;
+use common::{Deployment, shared_memory};
 use messages::{EvidenceHeader, FrameHeader, ViewQuality};
 use runtime::{Bus, Delivery, Limits, PortError, SendError, Stop, TopicPlan, Waiter, Woken};
 
@@ -255,6 +256,35 @@ fn one_publisher_too_many_is_refused() {
     assert!(matches!(error, PortError::Publisher { .. }), "{error}");
     drop(first);
     bus.publisher::<ViewQuality>("small").unwrap();
+}
+
+#[test]
+fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
+    let plans = [
+        frames(Delivery::Realtime, 1_000_003),
+        small(Delivery::Lossless, 16),
+    ];
+    for plan in plans {
+        let deployment = Deployment::new(core::slice::from_ref(&plan));
+        let bus = deployment.bus("sender");
+        let slices =
+            (plan.max_len() > 1).then(|| bus.slice_publisher::<u8, FrameHeader>("frames").unwrap());
+        let messages =
+            (plan.max_len() == 1).then(|| bus.publisher::<ViewQuality>("small").unwrap());
+        let pool = shared_memory(deployment.namespace())
+            .into_iter()
+            .find(|name| name.ends_with(".data"))
+            .unwrap();
+        let file = std::fs::metadata(format!("/dev/shm/{pool}")).unwrap();
+        // Besides the chunks, iceoryx2 keeps a list of them in the same file.
+        let (planned, actual) = (plan.pool_bytes(), file.len());
+        assert!(
+            planned <= actual + actual / 8 && actual <= planned + 4096,
+            "{planned} {actual}"
+        );
+        assert!(file.blocks() * 512 >= file.len(), "not reserved");
+        drop((slices, messages));
+    }
 }
 
 #[test]

@@ -92,6 +92,11 @@ impl Case {
         Run { seen, result }
     }
 
+    /// The directory that the deployment's root lies in.
+    pub(crate) fn base(&self) -> &Path {
+        self.base.path()
+    }
+
     fn assert_nothing_left(&self) {
         let prefix = self.plan.namespace.prefix();
         let left: Vec<_> = std::fs::read_dir("/dev/shm")

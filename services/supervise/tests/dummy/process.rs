@@ -1,7 +1,10 @@
 //! A process that behaves well or badly, as its first argument says.
 
+mod alone;
+
 use core::time::Duration;
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use messages::{FrameHeader, Status, ViewQuality};
@@ -12,6 +15,15 @@ const TOPIC: &str = "data";
 const SOON: Duration = Duration::from_millis(50);
 
 fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["supervise", base] => alone::supervise(Path::new(base)),
+        ["fill", base] => alone::fill(Path::new(base)),
+        _ => serve(),
+    }
+}
+
+fn serve() -> ExitCode {
     let args = std::env::args_os().skip(2); // `service dummy`
     let (launch, rest) = match Launch::from_args(args.skip(1)) {
         Ok(parsed) => parsed,

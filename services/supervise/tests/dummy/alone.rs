@@ -1,0 +1,99 @@
+//! Dummies that are no services: a supervisor to be killed, and a process that fills shared memory.
+
+use std::error::Error;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+use messages::FrameHeader;
+use runtime::{
+    Bus, Delivery, Failure, Limits, Namespace, Stop, TopicPlan, health_topic, preflight,
+};
+use supervise::{Event, Plan, Policy, ProcessSpec, Role};
+use tracing::Level;
+
+/// Supervises two idle processes, and says their process ids once they have begun.
+pub(crate) fn supervise(base: &Path) -> ExitCode {
+    match try_supervise(base) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.exit(),
+    }
+}
+
+fn try_supervise(base: &Path) -> Result<(), Failure> {
+    let names = ["one", "two"];
+    let processes = names.map(|name| ProcessSpec {
+        name: name.to_owned(),
+        service: "dummy".to_owned(),
+        args: vec!["hang-once".into()],
+        role: Role::Essential,
+    });
+    let plan = Plan {
+        executable: "/proc/self/exe".into(),
+        namespace: Namespace::below("t", base)?,
+        session: 1,
+        delivery: Delivery::Realtime,
+        topics: names.map(health_topic).to_vec(),
+        processes: processes.to_vec(),
+        policy: Policy::default(),
+        log: Level::WARN,
+    };
+    let mut begun: Vec<String> = Vec::new();
+    supervise::run(&plan, &endless(), &mut |event| {
+        if let Event::Health { process, health } = event
+            && !begun.iter().any(|it| it == process)
+        {
+            begun.push(process.to_owned());
+            say(&health.pid.to_string());
+        }
+    })?;
+    Ok(())
+}
+
+#[expect(clippy::expect_used, reason = "a test fails by panicking")]
+fn endless() -> Stop {
+    Stop::new().expect("two file descriptors")
+}
+
+/// Asks for 50 megabytes where there are 8, first politely and then by force.
+pub(crate) fn fill(base: &Path) -> ExitCode {
+    let plan = TopicPlan::slices::<u8, FrameHeader>(
+        "data".to_owned(),
+        Delivery::Realtime,
+        Limits::new(3, 1, 1),
+        7_000_000,
+    );
+    let preflight = preflight(core::slice::from_ref(&plan));
+    say(&preflight.map_or_else(|error| chain(&error), |()| "it fits".to_owned()));
+    match force(base, &plan) {
+        Ok(text) => {
+            say(&text);
+            ExitCode::SUCCESS
+        }
+        Err(failure) => failure.exit(),
+    }
+}
+
+fn force(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
+    let lock = Namespace::below("t", base)?.acquire()?;
+    let bus = Bus::open(lock.namespace(), "greedy", &endless())?;
+    let topics = bus.create_topics(core::slice::from_ref(plan))?;
+    let said = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
+        Ok(_) => "it fits".to_owned(),
+        Err(error) => chain(&error),
+    };
+    drop(topics);
+    Ok(said)
+}
+
+fn chain(error: &dyn Error) -> String {
+    match error.source() {
+        Some(cause) => format!("{error}: {}", chain(cause)),
+        None => error.to_string(),
+    }
+}
+
+#[expect(clippy::expect_used, reason = "a test fails by panicking")]
+fn say(text: &str) {
+    writeln!(std::io::stdout().lock(), "{text}").expect("somebody listens");
+}
