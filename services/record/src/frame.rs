@@ -14,6 +14,17 @@ pub struct ViewRecord {
     pub pose: Option<ViewPose>,
     /// Its expected errors.
     pub quality: Option<ViewQuality>,
+    /// Its pixels, if they are to be drawn on.
+    pub picture: Option<Picture>,
+}
+
+/// A frame's pixels, copied for drawing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Width and height, pixels.
+    pub size: [usize; 2],
+    /// RGB, row major.
+    pub rgb: Vec<u8>,
 }
 
 /// What was said about one frame.

@@ -11,6 +11,7 @@ mod scene;
 mod frame;
 
 mod latency;
+mod overlay;
 mod pose2d;
 mod pose3d;
 mod trc;
@@ -19,12 +20,17 @@ mod folder;
 
 mod output;
 
+mod gather;
+
+mod service;
+
 pub use config::Config;
 pub use folder::{Folder, FolderError};
-pub use frame::{FrameRecord, ViewRecord};
-pub use latency::Latency;
-pub use output::Output;
+pub use frame::{FrameRecord, Picture, ViewRecord};
+pub use latency::{Latency, Percentiles, Report};
+pub use output::{Output, OutputError, Summary};
 pub use scene::{Scene, View};
+pub use service::{Job, run};
 
 #[cfg(test)]
 mod testing;

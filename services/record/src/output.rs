@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
+use std::path::PathBuf;
 
 use messages::Status;
 use serde::Serialize;
@@ -9,7 +10,9 @@ use serde_json::{Value, json};
 
 use crate::latency::Report;
 use crate::pose3d::{is_placed, joints};
-use crate::{Config, Folder, FolderError, FrameRecord, Latency, Scene, pose2d, pose3d, trc};
+use crate::{
+    Config, Folder, FolderError, FrameRecord, Latency, Scene, overlay, pose2d, pose3d, trc,
+};
 
 /// What was seen and what was missed, over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -45,6 +48,8 @@ pub struct Output {
     pose3d_csv: BufWriter<File>,
     pose2d_jsonl: BufWriter<File>,
     trc_rows: Option<BufWriter<File>>,
+    overlays: Option<PathBuf>,
+    epipolar_part: usize,
     latency: Latency,
     summary: Summary,
     views_used: Vec<u64>,
@@ -92,12 +97,19 @@ impl Output {
         } else {
             None
         };
+        let overlays = if config.overlay_every > 0 {
+            Some(folder.folder("overlays")?)
+        } else {
+            None
+        };
         let n_views = scene.views.len();
         Ok(Self {
             pose3d_jsonl: folder.file("pose3d.jsonl")?,
             pose2d_jsonl: folder.file("pose2d.jsonl")?,
             pose3d_csv,
             trc_rows,
+            overlays,
+            epipolar_part: config.epipolar_part.saturating_sub(1),
             latency: Latency::new(n_workers)?,
             summary: Summary::default(),
             views_used: vec![0; n_views],
@@ -127,11 +139,28 @@ impl Output {
         for outcome in outcomes {
             self.note(outcome);
         }
+        for view in 0..self.views_used.len() {
+            let outcome = self.draw(record, view);
+            self.note(outcome);
+        }
     }
 
-    /// Counts a result that came but could not be written in time.
-    pub fn missed(&mut self) {
-        self.summary.frames_not_recorded += 1;
+    fn draw(&self, record: &FrameRecord, view: usize) -> io::Result<()> {
+        let Some(folder) = &self.overlays else {
+            return Ok(());
+        };
+        let Some(canvas) = overlay::draw(&self.scene, record, view, self.epipolar_part) else {
+            return Ok(());
+        };
+        let folder = folder.join(&self.scene.views[view].name);
+        fs::create_dir_all(&folder)?;
+        let file = folder.join(format!("{:06}.png", record.frame()));
+        canvas.save_png(&file).map_err(io::Error::other)
+    }
+
+    /// Counts results that came but could not be written in time.
+    pub fn missed(&mut self, n: u64) {
+        self.summary.frames_not_recorded += n;
     }
 
     /// The scene that messages are read with.
@@ -269,12 +298,12 @@ mod tests {
     use super::*;
     use crate::testing::{record, scene};
 
-    fn written(records: &[FrameRecord]) -> (tempfile::TempDir, Summary) {
+    fn written(records: Vec<FrameRecord>) -> (tempfile::TempDir, Summary) {
         let dir = tempfile::tempdir().unwrap();
         let folder = Folder::open(dir.path(), false).unwrap();
         let mut output = Output::begin(scene(), &Config::default(), 1, folder, false).unwrap();
         for record in records {
-            output.frame(record);
+            output.frame(&record);
         }
         let summary = output.finish().unwrap();
         (dir, summary)
@@ -286,7 +315,7 @@ mod tests {
 
     #[test]
     fn all_files_are_there_at_the_end_and_no_part() {
-        let (dir, _) = written(&[record(0), record(2)]);
+        let (dir, _) = written(vec![record(0), record(2)]);
         let mut names: Vec<String> = fs::read_dir(dir.path())
             .unwrap()
             .map(|it| it.unwrap().file_name().into_string().unwrap())
@@ -294,6 +323,7 @@ mod tests {
         names.sort();
         let expected = [
             "latency.json",
+            "overlays",
             "pose2d.jsonl",
             "pose3d.csv",
             "pose3d.jsonl",
@@ -313,7 +343,7 @@ mod tests {
         let mut last = record(8);
         last.pose3d.views_present = 0b01;
         // Every second frame is used: 0, 2, (4, 6), 8.
-        let (_, summary) = written(&[record(0), record(2), last]);
+        let (_, summary) = written(vec![record(0), record(2), last]);
         assert_eq!(summary.frames, 3);
         assert_eq!(summary.frames_missed, 2);
         assert_eq!(summary.frames_with_views_missing, 1);

@@ -60,11 +60,11 @@ mod tests {
     use super::*;
     use crate::testing::{pose3d, scene};
 
-    fn written(poses: &[Pose3d]) -> Trc {
+    fn written(poses: Vec<Pose3d>) -> Trc {
         let scene = scene();
         let mut text = header(&scene, poses.len() as u64);
-        for (index, pose) in poses.iter().enumerate() {
-            text.push_str(&row(&scene, index as u64 + 1, pose));
+        for (index, pose) in poses.into_iter().enumerate() {
+            text.push_str(&row(&scene, index as u64 + 1, &pose));
         }
         Trc::parse(&text).unwrap()
     }
@@ -73,7 +73,7 @@ mod tests {
     fn what_was_written_reads_back() {
         let mut moved = pose3d(1);
         moved.joints[0].in_world = [-0.25, 0.5, 1.75];
-        let got = written(&[pose3d(0), moved]);
+        let got = written(vec![pose3d(0), moved]);
         assert_eq!(got.rate_hz, 30.0);
         assert_eq!(got.units, "m");
         assert_eq!(got.markers.len(), 14);
@@ -88,7 +88,7 @@ mod tests {
         let mut pose = pose3d(0);
         pose.joints[3].status = Status::TOO_FEW_VIEWS;
         pose.joints[13].in_world[0] = f64::NAN;
-        let got = written(&[pose]);
+        let got = written(vec![pose]);
         assert_eq!(got.frames[0][3], None);
         assert_eq!(got.frames[0][13], None);
         assert!(got.frames[0][4].is_some());

@@ -1,0 +1,162 @@
+//! Pictures of a view: the view's own answer, the fused one, and one part's epipolar lines.
+
+use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs};
+use geometry::epipolar::epipolar_curve;
+use messages::{FusedView, MAX_PARTS, Status};
+use nalgebra::Point2;
+
+use crate::{FrameRecord, Scene};
+
+/// Points of one epipolar line.
+const N_POINTS: usize = 64;
+
+/// Draws a view that has a picture.
+///
+/// * `part`: the part whose epipolar lines are drawn, from 0.
+pub(crate) fn draw(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+    part: usize,
+) -> Option<Canvas> {
+    let picture = record.views.get(view)?.picture.as_ref()?;
+    let size = Size::new(picture.size[0], picture.size[1]);
+    if picture.rgb.len() != size.rgb_bytes() {
+        return None;
+    }
+    let mut canvas = Canvas::from_rgb(size, &picture.rgb);
+    draw_lines(&mut canvas, scene, record, view, part);
+    draw_single(&mut canvas, scene, record, view);
+    let fused = fused(record, view);
+    if let Some(fused) = fused {
+        let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
+        if let Some(joints) = joints_of(scene, parts) {
+            draw_limbs(&mut canvas, &joints, &limbs(scene));
+        }
+        if let Some(at) = parts.get(part) {
+            canvas.ring(*at, 5.0, 1.5, ACCENT);
+        }
+    }
+    let facing = match fused.map(|it| it.exchanged) {
+        Some(1) => ", from behind",
+        _ => "",
+    };
+    let text = format!("{} {}{facing}", scene.views[view].name, record.frame());
+    canvas.text([2.0, 2.0], &text, CENTRE);
+    Some(canvas)
+}
+
+fn fused(record: &FrameRecord, view: usize) -> Option<&FusedView> {
+    let n_views = record.pose3d.n_views as usize;
+    let it = record.pose3d.views.get(view).filter(|_| view < n_views)?;
+    let n_parts = (it.n_parts as usize).min(MAX_PARTS);
+    let finite = it.centres_px[..n_parts]
+        .iter()
+        .flatten()
+        .all(|value| value.is_finite());
+    (it.status == Status::OK && finite).then_some(it)
+}
+
+fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
+    let candidates = record.candidates(scene, view);
+    let Some(best) = candidates.first() else {
+        return;
+    };
+    let centres = best.centres(&scene.model, &scene.views[view].layout);
+    if let Some(joints) = joints_of(scene, &centres) {
+        for &(from, to) in scene.joints.limbs {
+            canvas.line(joints[from], joints[to], 1.0, FAINT);
+        }
+    }
+    for centre in centres {
+        canvas.disc(centre, 1.2, FAINT);
+    }
+}
+
+/// Where the part's point in every other view may lie in this one.
+fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
+    let to = scene.views[view].framing.camera();
+    for other in (0..scene.views.len()).filter(|it| *it != view) {
+        let Some(fused) = fused(record, other) else {
+            continue;
+        };
+        if part >= fused.n_parts as usize {
+            continue;
+        }
+        let point = Point2::from(fused.centres_px[part]);
+        let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
+        let curve: Vec<[f64; 2]> = curve.iter().map(|it| [it.x, it.y]).collect();
+        canvas.polyline(&curve, 1.0, ACCENT);
+    }
+}
+
+/// The joints of a pose; none if the model has other parts than the joint set is made of.
+fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let n_parts = scene.joints.joints.iter().flat_map(|it| it.parts).max()? + 1;
+    (parts.len() >= n_parts).then(|| scene.joints.from_parts(parts))
+}
+
+fn limbs(scene: &Scene) -> Vec<Limb> {
+    let side = |joint: usize| match scene.joints.joints[joint].parts {
+        [one] if skeleton::PART_NAMES[*one].starts_with("right") => Side::Right,
+        [one] if skeleton::PART_NAMES[*one].starts_with("left") => Side::Left,
+        _ => Side::Centre,
+    };
+    let limbs = scene.joints.limbs.iter();
+    limbs
+        .map(|&(from, to)| Limb {
+            from,
+            to,
+            side: if side(from) == Side::Centre {
+                side(to)
+            } else {
+                side(from)
+            },
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Picture;
+    use crate::testing::{record, scene};
+
+    fn with_picture() -> FrameRecord {
+        let mut it = record(0);
+        it.views[0].picture = Some(Picture {
+            size: [80, 60],
+            rgb: vec![0; 80 * 60 * 3],
+        });
+        it
+    }
+
+    #[test]
+    fn a_view_without_a_picture_is_not_drawn() {
+        assert!(draw(&scene(), &with_picture(), 1, 0).is_none());
+    }
+
+    #[test]
+    fn a_picture_of_another_size_than_it_says_is_not_drawn() {
+        let mut it = with_picture();
+        if let Some(picture) = &mut it.views[0].picture {
+            picture.rgb.pop();
+        }
+        assert!(draw(&scene(), &it, 0, 0).is_none());
+    }
+
+    #[test]
+    fn something_is_drawn() {
+        let canvas = draw(&scene(), &with_picture(), 0, 0).unwrap();
+        assert!(canvas.rgb().iter().any(|it| *it > 0));
+    }
+
+    #[test]
+    fn limbs_are_coloured_by_the_side_of_the_body() {
+        let limbs = limbs(&scene());
+        // Right ankle to right knee; left hip to neck; neck to head.
+        assert_eq!(limbs[0].side, Side::Right);
+        assert_eq!(limbs[5].side, Side::Left);
+        assert_eq!(limbs[13].side, Side::Centre);
+    }
+}

@@ -1,0 +1,236 @@
+//! The loop: take everything in at once, and write it on a thread of its own.
+//!
+//! Whoever sends may wait for its receivers, so this process never lets them wait: it copies what
+//! comes and hands it on. If the disk cannot keep up, the newest results are missed and counted.
+
+use core::time::Duration;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::{Builder, JoinHandle};
+
+use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality, topic};
+use runtime::{
+    ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Subscriber, Waiter, Woken,
+};
+
+use crate::gather::Gather;
+use crate::{Config, Folder, FrameRecord, Output, OutputError, Picture, Scene};
+
+/// Results that may wait to be written.
+const QUEUE: usize = 256;
+
+/// What the process has to do.
+#[derive(Debug)]
+pub struct Job {
+    /// What the numbers in messages mean.
+    pub scene: Scene,
+    /// What to leave behind.
+    pub config: Config,
+    /// Where.
+    pub output: PathBuf,
+    /// First frame of the footage that is used.
+    pub start_frame: u64,
+    /// Number of fusion workers.
+    pub n_workers: usize,
+    /// Whether there are processes that send expected errors.
+    pub has_quality: bool,
+}
+
+/// Writes what is published, until the footage ends or it is told to stop.
+///
+/// # Errors
+///
+/// [`ExitKind::Input`] if the output folder cannot be used, and what the transport says.
+pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
+    let mut waiter = service.bus().waiter();
+    let n_views = job.scene.views.len();
+    let n_joints = job.scene.joints.joints.len();
+    let ports = Ports::open(service, &job, &mut waiter)?;
+    let writer = Writer::start(job, service.epoch() > 0)?;
+    let mut gather = Gather::new(n_views);
+    let mut is_over = false;
+    while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
+        ports.listen(service, &mut gather, &writer)?;
+        // The result last: what it was made of has been taken in by then.
+        while let Some(pose3d) = ports.pose3d.receive()? {
+            if pose3d.stamp.session != service.session() {
+                continue;
+            }
+            if pose3d.status == Status::END {
+                is_over = true;
+                break;
+            }
+            service.health().received(1);
+            if let Err(error) = wire::check_pose3d(&pose3d, n_views, n_joints) {
+                tracing::warn!(%error, "unreadable result");
+                continue;
+            }
+            ports.listen(service, &mut gather, &writer)?;
+            if writer.write(gather.result(&pose3d)) {
+                service.health().sent(pose3d.stamp.frame);
+            } else {
+                service.health().dropped(1);
+            }
+        }
+    }
+    writer.finish(service)?;
+    service.health().finished();
+    while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
+    Ok(())
+}
+
+struct Ports {
+    frames: Vec<SliceSubscriber<u8, FrameHeader>>,
+    poses: Vec<Subscriber<ViewPose>>,
+    qualities: Vec<Subscriber<ViewQuality>>,
+    pairs: Vec<Subscriber<PairPose>>,
+    pose3d: Subscriber<Pose3d>,
+}
+
+impl Ports {
+    fn open(service: &Service, job: &Job, waiter: &mut Waiter) -> Result<Self, Failure> {
+        let bus = service.bus();
+        let views = 0..job.scene.views.len();
+        let with_quality = if job.has_quality { views.clone() } else { 0..0 };
+        Ok(Self {
+            frames: views
+                .clone()
+                .map(|it| bus.slice_subscriber(&topic::frame(it), waiter))
+                .collect::<Result<_, _>>()?,
+            poses: views
+                .map(|it| bus.subscriber(&topic::view_pose(it), waiter))
+                .collect::<Result<_, _>>()?,
+            qualities: with_quality
+                .map(|it| bus.subscriber(&topic::view_quality(it), waiter))
+                .collect::<Result<_, _>>()?,
+            pairs: (0..job.n_workers)
+                .map(|it| bus.subscriber(&topic::pair_pose(it), waiter))
+                .collect::<Result<_, _>>()?,
+            pose3d: bus.subscriber(&topic::pose3d(), waiter)?,
+        })
+    }
+
+    /// Takes in all that has come, but for results.
+    fn listen(
+        &self,
+        service: &Service,
+        gather: &mut Gather,
+        writer: &Writer,
+    ) -> Result<(), Failure> {
+        let session = service.session();
+        for (view, frames) in self.frames.iter().enumerate() {
+            while let Some(sample) = frames.receive()? {
+                let header = *sample.header();
+                if header.stamp.session == session && header.status != Status::END {
+                    let size = [header.width as usize, header.height as usize];
+                    let wanted = header.status == Status::OK && writer.draws(header.stamp.frame);
+                    let picture = wanted.then(|| Picture {
+                        size,
+                        rgb: sample.payload().to_vec(),
+                    });
+                    gather.frame(view, &header, picture);
+                }
+            }
+        }
+        for (view, poses) in self.poses.iter().enumerate() {
+            while let Some(pose) = poses.receive()? {
+                if pose.stamp.session == session && pose.status != Status::END {
+                    gather.pose(view, &pose);
+                }
+            }
+        }
+        for (view, qualities) in self.qualities.iter().enumerate() {
+            while let Some(quality) = qualities.receive()? {
+                if quality.stamp.session == session && quality.status != Status::END {
+                    gather.quality(view, &quality);
+                }
+            }
+        }
+        for pairs in &self.pairs {
+            while let Some(pair) = pairs.receive()? {
+                if pair.stamp.session == session && pair.status != Status::END {
+                    gather.pair(&pair);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The thread that writes, and the queue before it.
+struct Writer {
+    queue: SyncSender<FrameRecord>,
+    thread: JoinHandle<Result<(), OutputError>>,
+    n_missed: Arc<AtomicU64>,
+    overlay_every: u64,
+    start_frame: u64,
+    frame_step: u64,
+}
+
+impl Writer {
+    fn start(job: Job, resume: bool) -> Result<Self, Failure> {
+        let folder = Folder::open(&job.output, resume).or_fail(ExitKind::Input)?;
+        let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
+        let output = Output::begin(job.scene, &job.config, job.n_workers, folder, resume);
+        let output = output.or_fail(ExitKind::Input)?;
+        let (queue, records) = sync_channel(QUEUE);
+        let n_missed = Arc::new(AtomicU64::new(0));
+        let missed = Arc::clone(&n_missed);
+        let thread = Builder::new()
+            .name("writer".to_owned())
+            .spawn(move || write_all(output, &records, &missed))
+            .or_fail(ExitKind::Run)?;
+        Ok(Self {
+            queue,
+            thread,
+            n_missed,
+            overlay_every,
+            start_frame: job.start_frame,
+            frame_step: frame_step.max(1),
+        })
+    }
+
+    /// Whether the pixels of a frame are needed.
+    fn draws(&self, frame: u64) -> bool {
+        let nth = frame.saturating_sub(self.start_frame) / self.frame_step;
+        self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)
+    }
+
+    /// Hands a record on; `false` if it was missed, because too many wait already.
+    fn write(&self, record: FrameRecord) -> bool {
+        match self.queue.try_send(record) {
+            Ok(()) => true,
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
+                self.n_missed.fetch_add(1, Ordering::Relaxed);
+                false
+            }
+        }
+    }
+
+    /// Waits until everything is written.
+    fn finish(self, service: &Service) -> Result<(), Failure> {
+        drop(self.queue);
+        while !self.thread.is_finished() {
+            service.progress().tick();
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        match self.thread.join() {
+            Ok(outcome) => outcome.or_fail(ExitKind::Run),
+            Err(_) => Err(Failure::new(ExitKind::Run, "the writing thread panicked")),
+        }
+    }
+}
+
+fn write_all(
+    mut output: Output,
+    records: &Receiver<FrameRecord>,
+    n_missed: &AtomicU64,
+) -> Result<(), OutputError> {
+    while let Ok(record) = records.recv() {
+        output.frame(&record);
+    }
+    output.missed(n_missed.load(Ordering::Relaxed));
+    output.finish().map(|_| ())
+}
