@@ -273,7 +273,11 @@ fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
             (plan.max_len() == 1).then(|| bus.publisher::<ViewQuality>("small").unwrap());
         let pool = shared_memory(deployment.namespace())
             .into_iter()
-            .find(|name| name.ends_with(".data"))
+            .find(|name| {
+                std::path::Path::new(name)
+                    .extension()
+                    .is_some_and(|it| it == "data")
+            })
             .unwrap();
         let file = std::fs::metadata(format!("/dev/shm/{pool}")).unwrap();
         // Besides the chunks, iceoryx2 keeps a list of them in the same file.
