@@ -6,17 +6,20 @@
 #![forbid(unsafe_code)]
 
 mod error;
-mod pacer;
 mod size;
 mod source;
 mod spec;
+
 mod warp;
+
+mod pacer;
 
 mod overlay;
 
 pub use error::FootageError;
 pub use overlay::{
-    CENTRE, Canvas, Colour, LEFT, Limb, OverlayError, RIGHT, Side, Tile, compose, draw_limbs,
+    ACCENT, CENTRE, Canvas, Colour, FAINT, LEFT, Limb, OverlayError, RIGHT, Side, TEXT_HEIGHT,
+    Tile, compose, draw_limbs, text_width,
 };
 pub use pacer::Pacer;
 pub use size::Size;

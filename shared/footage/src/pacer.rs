@@ -67,3 +67,53 @@ impl Pacer {
         Some(k)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn as_fast_as_possible_never_waits_and_misses_nothing() {
+        let pacer = Pacer::as_fast_as_possible();
+        assert_eq!(pacer.due_nanos(1_000_000), 0);
+        assert_eq!(pacer.wait_nanos(1_000_000, 5), 0);
+        assert_eq!(pacer.latest_due(u64::MAX), None);
+    }
+
+    #[test]
+    fn frames_are_due_at_the_rate() {
+        let pacer = Pacer::realtime(1_000, 50.0);
+        assert_eq!(pacer.due_nanos(0), 1_000);
+        assert_eq!(pacer.due_nanos(3), 60_001_000);
+        assert_eq!(pacer.wait_nanos(3, 60_000_000), 1_000);
+        assert_eq!(pacer.wait_nanos(3, 70_000_000), 0);
+    }
+
+    #[test]
+    fn nothing_is_due_before_the_start() {
+        let pacer = Pacer::realtime(1_000, 50.0);
+        assert_eq!(pacer.latest_due(999), None);
+        assert_eq!(pacer.latest_due(1_000), Some(0));
+    }
+
+    #[test]
+    fn a_day_of_a_broken_rate_does_not_drift() {
+        let pacer = Pacer::realtime(0, 60_000.0 / 1001.0);
+        // 60 000 frames take 1001 seconds.
+        assert_eq!(pacer.due_nanos(60_000 * 86), 1001 * 86 * 1_000_000_000);
+    }
+
+    proptest! {
+        #[test]
+        fn the_latest_frame_is_due_and_the_next_is_not(
+            start in 0_u64..1 << 60, rate_hz in 0.1..2000.0, elapsed in 0_u64..1 << 47,
+        ) {
+            let pacer = Pacer::realtime(start, rate_hz);
+            let k = pacer.latest_due(start + elapsed).unwrap();
+            prop_assert!(pacer.due_nanos(k) <= start + elapsed);
+            prop_assert!(start + elapsed < pacer.due_nanos(k + 1));
+        }
+    }
+}

@@ -88,7 +88,9 @@ impl Probe {
             shown.len() as u64 + n_behind as u64
         };
         self.n_frames = shown.len() as u64;
-        times_s.iter_mut().for_each(|it| *it -= first_s);
+        for time_s in &mut times_s {
+            *time_s -= first_s;
+        }
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 

@@ -1,6 +1,6 @@
 //! A video, decoded by the `ffmpeg` executable at the other end of a pipe.
 
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 

@@ -1,4 +1,8 @@
 //! The exact area mean, for maps that keep rows and columns.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined is compiled for the instruction set at hand"
+)]
 
 use super::Fill;
 use crate::Size;
@@ -15,7 +19,7 @@ struct Cover {
 pub(super) struct Area {
     columns: Vec<Cover>,
     rows: Vec<Cover>,
-    area: f32,
+    divisor: f32,
     /// One source row: the weighted sum of the rows that an output row covers.
     sums: Vec<f32>,
 }
@@ -32,7 +36,7 @@ impl Area {
         Self {
             columns: cover(output.width, x_axis, source.width),
             rows: cover(output.height, y_axis, source.height),
-            area: (x_axis[0] * y_axis[0]).abs() as f32,
+            divisor: (x_axis[0] * y_axis[0]).abs() as f32,
             sums: vec![0.0; source.width * 3],
         }
     }
@@ -50,7 +54,7 @@ impl Area {
                 }
             }
             for (cover, pixel) in self.columns.iter().zip(out_row.as_chunks_mut().0) {
-                *pixel = cover.mean(&self.sums, self.area);
+                *pixel = cover.mean(&self.sums, self.divisor);
             }
         }
     }

@@ -1,0 +1,212 @@
+//! A picture, and the shapes that can be drawn on it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder as _};
+
+use super::Colour;
+use crate::Size;
+
+/// Why a picture cannot be saved.
+#[derive(Debug, thiserror::Error)]
+pub enum OverlayError {
+    /// The file cannot be written.
+    #[error("cannot write {}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The picture cannot be encoded: it has no pixel.
+    #[error("cannot encode {}", path.display())]
+    Encode {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+}
+
+/// A picture to draw on. Points are `[x, y]` pixels, the centre of the top-left pixel at `(0, 0)`.
+///
+/// Edges are smoothed: a pixel takes as much of a colour as the shape covers of it. What lies outside
+/// of the picture is cut off, and a shape with a coordinate that is not finite is left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Canvas {
+    size: Size,
+    rgb: Vec<u8>,
+}
+
+impl Canvas {
+    /// A picture of one colour.
+    pub fn new(size: Size, colour: Colour) -> Self {
+        Self {
+            size,
+            rgb: colour.repeat(size.width * size.height),
+        }
+    }
+
+    /// A copy of an image.
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` is not `width * height * 3` bytes.
+    pub fn from_rgb(size: Size, rgb: &[u8]) -> Self {
+        assert_eq!(rgb.len(), size.rgb_bytes(), "the image is {size}");
+        Self {
+            size,
+            rgb: rgb.to_vec(),
+        }
+    }
+
+    /// Its size.
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// Its pixels, RGB, row major.
+    pub fn rgb(&self) -> &[u8] {
+        &self.rgb
+    }
+
+    /// A line between two points with round ends, `width` pixels wide.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) {
+        let ([x1, y1], [x2, y2]) = (from, to);
+        let reach = width / 2.0 + 1.0;
+        let corners = [x1.min(x2), y1.min(y2), x1.max(x2), y1.max(y2)];
+        let [dx, dy] = [x2 - x1, y2 - y1];
+        let length_squared = dx * dx + dy * dy;
+        self.paint(grown(corners, reach), colour, |x, y| {
+            let along = if length_squared > 0.0 {
+                (((x - x1) * dx + (y - y1) * dy) / length_squared).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            let distance = (x - x1 - along * dx).hypot(y - y1 - along * dy);
+            width / 2.0 + 0.5 - distance
+        });
+    }
+
+    /// Lines from point to point, for curves.
+    pub fn polyline(&mut self, points: &[[f64; 2]], width: f64, colour: Colour) {
+        for ends in points.windows(2) {
+            self.line(ends[0], ends[1], width, colour);
+        }
+    }
+
+    /// A filled circle.
+    pub fn disc(&mut self, [cx, cy]: [f64; 2], radius: f64, colour: Colour) {
+        let corners = grown([cx, cy, cx, cy], radius + 1.0);
+        self.paint(corners, colour, |x, y| {
+            radius + 0.5 - (x - cx).hypot(y - cy)
+        });
+    }
+
+    /// The outline of a circle, a line `width` pixels wide along the radius.
+    pub fn ring(&mut self, [cx, cy]: [f64; 2], radius: f64, width: f64, colour: Colour) {
+        let corners = grown([cx, cy, cx, cy], radius + width / 2.0 + 1.0);
+        self.paint(corners, colour, |x, y| {
+            width / 2.0 + 0.5 - ((x - cx).hypot(y - cy) - radius).abs()
+        });
+    }
+
+    /// The outline of a box `[x1, y1, x2, y2]`.
+    pub fn frame(&mut self, [x1, y1, x2, y2]: [f64; 4], width: f64, colour: Colour) {
+        let corners = [[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]];
+        self.polyline(&corners, width, colour);
+    }
+
+    /// A filled box `[x1, y1, x2, y2]` from corner to corner.
+    ///
+    /// * `opacity`: from 0, nothing is seen, to 1, nothing is seen through.
+    pub fn filled_box(&mut self, corners: [f64; 4], opacity: f64, colour: Colour) {
+        let [x1, y1, x2, y2] = corners;
+        let cover = |at: f64, low: f64, high: f64| {
+            ((at + 0.5).min(high) - (at - 0.5).max(low)).clamp(0.0, 1.0)
+        };
+        self.paint(grown(corners, 1.0), colour, |x, y| {
+            opacity * cover(x, x1, x2) * cover(y, y1, y2)
+        });
+    }
+
+    /// Puts a picture down with its top-left pixel at column `x`, row `y`, which must leave room for it.
+    pub(super) fn put(&mut self, picture: &Self, [x, y]: [usize; 2]) {
+        let rows = picture.rgb.chunks_exact(picture.size.width * 3);
+        for (row, from) in rows.enumerate() {
+            let at = ((y + row) * self.size.width + x) * 3;
+            self.rgb[at..at + from.len()].copy_from_slice(from);
+        }
+    }
+
+    /// Mixes a colour into the pixels of a box `[x1, y1, x2, y2]`, as much as `cover` says of each.
+    pub(super) fn paint(
+        &mut self,
+        corners: [f64; 4],
+        colour: Colour,
+        cover: impl Fn(f64, f64) -> f64,
+    ) {
+        if !corners.iter().all(|it| it.is_finite()) {
+            return;
+        }
+        let [x1, y1, x2, y2] = corners;
+        let range = |low: f64, high: f64, n: usize| {
+            low.max(0.0) as usize..(high.ceil() + 1.0).clamp(0.0, n as f64) as usize
+        };
+        for y in range(y1, y2, self.size.height) {
+            for x in range(x1, x2, self.size.width) {
+                let cover = cover(x as f64, y as f64).min(1.0);
+                // Not a number, where distances overflow, covers nothing.
+                if cover > 0.0 {
+                    let at = (y * self.size.width + x) * 3;
+                    blend(&mut self.rgb[at..at + 3], colour, cover);
+                }
+            }
+        }
+    }
+
+    /// Writes a PNG. Who reads `path` sees the old file or the new one, never a part: it is written
+    /// beside it (`.part`) and renamed.
+    ///
+    /// # Errors
+    ///
+    /// [`OverlayError`], with nothing left behind.
+    pub fn save_png(&self, path: &Path) -> Result<(), OverlayError> {
+        let mut png = Vec::new();
+        PngEncoder::new(&mut png)
+            .write_image(
+                &self.rgb,
+                self.size.width as u32,
+                self.size.height as u32,
+                ExtendedColorType::Rgb8,
+            )
+            .map_err(|source| OverlayError::Encode {
+                path: path.to_path_buf(),
+                source,
+            })?;
+        let part = path.with_extension("png.part");
+        let written = fs::write(&part, png).and_then(|()| fs::rename(&part, path));
+        written.map_err(|source| {
+            // Whether there is something to remove or not, the error is the one above.
+            fs::remove_file(&part).ok();
+            OverlayError::Io {
+                path: path.to_path_buf(),
+                source,
+            }
+        })
+    }
+}
+
+fn grown([x1, y1, x2, y2]: [f64; 4], by: f64) -> [f64; 4] {
+    [x1 - by, y1 - by, x2 + by, y2 + by]
+}
+
+fn blend(pixel: &mut [u8], colour: Colour, cover: f64) {
+    for (old, new) in pixel.iter_mut().zip(colour) {
+        let mixed = f64::from(*old) + cover * (f64::from(new) - f64::from(*old));
+        *old = mixed.round() as u8;
+    }
+}

@@ -1,0 +1,51 @@
+//! Text of one size, smoothed.
+
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+
+use super::{Canvas, Colour, SHADOW};
+
+const SIZE: RasterHeight = RasterHeight::Size16;
+const WEIGHT: FontWeight = FontWeight::Regular;
+
+/// Height of a line of text, pixels.
+pub const TEXT_HEIGHT: usize = 16;
+
+/// Width of a line of text, pixels.
+pub fn text_width(text: &str) -> usize {
+    text.chars().count() * get_raster_width(WEIGHT, SIZE)
+}
+
+impl Canvas {
+    /// One line of text with a dark edge, its top-left corner at `at`; what is not ASCII becomes a
+    /// question mark.
+    pub fn text(&mut self, [left, top]: [f64; 2], text: &str, colour: Colour) {
+        let at = [left.round(), top.round()];
+        for dy in [-1.0, 0.0, 1.0] {
+            for dx in [-1.0, 0.0, 1.0] {
+                self.glyphs([at[0] + dx, at[1] + dy], text, SHADOW);
+            }
+        }
+        self.glyphs(at, text, colour);
+    }
+
+    fn glyphs(&mut self, [mut left, top]: [f64; 2], text: &str, colour: Colour) {
+        let advance = get_raster_width(WEIGHT, SIZE) as f64;
+        for character in text.chars() {
+            let glyph =
+                get_raster(character, WEIGHT, SIZE).or_else(|| get_raster('?', WEIGHT, SIZE));
+            let corners = [
+                left,
+                top,
+                left + advance - 1.0,
+                top + TEXT_HEIGHT as f64 - 1.0,
+            ];
+            self.paint(corners, colour, |x, y| {
+                // The glyph has no pixel at a column or row below 0, which wraps to a large one.
+                let (column, row) = ((x - left) as i64 as usize, (y - top) as i64 as usize);
+                let pixel = glyph.and_then(|it| it.pixel(column, row));
+                f64::from(pixel.unwrap_or(0)) / 255.0
+            });
+            left += advance;
+        }
+    }
+}
