@@ -82,8 +82,8 @@ impl Axis {
             n,
             centre,
             square,
-            first: (centre - half).ceil() as isize,
-            last: (centre + half).floor() as isize,
+            first: (centre - half).ceil().max(-(n as f64)) as isize,
+            last: (centre + half).floor().min(n as f64) as isize,
         }
     }
 }
@@ -108,12 +108,57 @@ impl Reach {
     /// As above where the best place `centre` lies beside the grid.
     #[inline(never)]
     fn beside_the_grid(&self, centre: f64) -> (isize, isize) {
-        let away = if centre < 0.0 {
-            -centre
-        } else {
-            centre - (self.n as f64 - 1.0)
-        };
+        let nearest = centre.clamp(0.0, self.n as f64 - 1.0);
+        let away = nearest - centre;
         let half = (self.square + away * away).sqrt() + SLACK;
-        ((centre - half).ceil() as isize, (centre + half).floor() as isize)
+        let first = (centre - half).ceil().clamp(0.0, nearest);
+        let last = (centre + half).floor().clamp(nearest, self.n as f64 - 1.0);
+        (first as isize, last as isize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn no_child_outside_of_the_window_can_win(
+            (n, p) in (1..60_usize).prop_flat_map(|n| (Just(n), 0..n)),
+            (quadratic, linear) in (0.005..0.5, -0.5..0.5),
+            anchor in -70..70_i32,
+            spread in 0.0..3.0_f32,
+        ) {
+            let axis = Axis { quadratic, linear, anchor };
+            let window = axis.reach(n, spread).window(p);
+            prop_assert!(!window.is_empty() && window.end <= n);
+            let score = |v: usize| axis.score(v as isize - p as isize);
+            let most = window.clone().map(score).fold(f32::NEG_INFINITY, f32::max);
+            for v in (0..n).filter(|v| !window.contains(v)) {
+                prop_assert!(score(v) + spread < most + 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn extreme_springs_keep_the_window_on_the_grid() {
+        for (quadratic, linear, anchor) in [(1e-9, 1e9, 1000), (1e-9, 0.0, 0), (1e9, -1e9, -1000)] {
+            let axis = Axis {
+                quadratic,
+                linear,
+                anchor,
+            };
+            for spread in [0.0, 1.0, f32::MAX, f32::INFINITY, f32::NAN] {
+                for p in 0..5 {
+                    let window = axis.reach(5, spread).window(p);
+                    assert!(
+                        !window.is_empty() && window.end <= 5,
+                        "{axis:?} {spread} {window:?}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -65,8 +65,7 @@ impl Stretch {
         };
         let reach = down.reach(grid.rows, spread);
         self.windows.clear();
-        self.windows
-            .extend((0..grid.rows).map(|p| reach.window(p)));
+        self.windows.extend((0..grid.rows).map(|p| reach.window(p)));
         let all = self.windows.iter().enumerate();
         let all = all.map(|(p, window)| offsets(window, p));
         self.down.cover(down, all.fold(NOTHING, union));

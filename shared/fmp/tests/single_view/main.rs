@@ -1,0 +1,7 @@
+//! The public face of the detector, on made-up evidence and on planted images.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+mod images;
+mod solver;
