@@ -2,7 +2,7 @@
 //!
 //! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewAnswer`], what a
 //! view brings; [`choose_start`], which candidate of every view is the person; [`estimate_pair`], the
-//! optimiser; [`decide_facing`] and [`average`], from the pairs back to one pose per view.
+//! optimiser; [`rank_facing`], [`FacingFilter`] and [`average`], from the pairs back to one pose per view.
 #![forbid(unsafe_code)]
 
 mod settings;
@@ -25,7 +25,10 @@ mod compatibility;
 pub use anatomy::anatomical_evidence;
 pub use average::{FusedPose, anatomical, average};
 pub use compatibility::{Compatibility, CompatibilityError};
-pub use facing::{Facing, PairEnergies, decide_facing};
+pub use facing::{
+    Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
+    rank_facing,
+};
 pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair};
 pub use settings::{EnergyKind, Settings, TypeTables};
 pub use start::{Start, choose_start};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use geometry::{Camera, Observation, TriangulateError, Triangulated};
 use multiview::{
-    FusedPose, PairEnergies, PairEstimate, ViewPlan, anatomical, anatomical_evidence, average,
-    decide_facing,
+    Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose, PairEnergies,
+    PairEstimate, ViewPlan, anatomical, anatomical_evidence, average, is_exchanged, rank_facing,
 };
 use nalgebra::{Point2, Point3, UnitVector3};
 use skeleton::{JointSet, PARSE14};
@@ -23,8 +23,13 @@ pub struct SkeletonSettings {
     pub sigma_cells: f64,
     /// Decide which views see the person from behind.
     pub facing: bool,
-    /// Energies of two assignments of facing that count as a tie, which the previous frame breaks.
-    pub facing_tie: f64,
+    /// How facing is followed over time.
+    pub facing_filter: FacingSettings,
+    /// Weight of the agreement of all views in the decision about facing: score per squared cell of
+    /// distance between a part and its reprojection, the all-views form of the geometric term.
+    pub agreement: f64,
+    /// Distance beyond which disagreement counts no more, cells.
+    pub max_distance_cells: f64,
 }
 
 impl Default for SkeletonSettings {
@@ -34,7 +39,9 @@ impl Default for SkeletonSettings {
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
             facing: true,
-            facing_tie: 0.05,
+            facing_filter: FacingSettings::default(),
+            agreement: 0.01,
+            max_distance_cells: 3.0,
         }
     }
 }
@@ -71,19 +78,11 @@ pub struct SkeletonStep {
     plans: Vec<Arc<ViewPlan>>,
     up_in_world: Option<UnitVector3<f64>>,
     settings: SkeletonSettings,
-    memory: Memory,
+    filter: FacingFilter,
 }
 
-/// What one frame tells the next.
-#[derive(Debug, Clone, Default, PartialEq)]
-struct Memory {
-    exchanged: Option<Vec<bool>>,
-    /// Evidence so far that the labels of `exchanged` are anatomically right, fading.
-    evidence: f64,
-}
-
-/// Share of the anatomical evidence that one frame passes on to the next.
-const EVIDENCE_KEPT: f64 = 0.95;
+/// Assignments of facing that are compared with all views at once.
+const N_HYPOTHESES: usize = 16;
 
 impl SkeletonStep {
     /// Prepares the step for the views of a rig, in the rig's order.
@@ -96,7 +95,7 @@ impl SkeletonStep {
             plans,
             up_in_world,
             settings,
-            memory: Memory::default(),
+            filter: FacingFilter::default(),
         }
     }
 
@@ -107,12 +106,13 @@ impl SkeletonStep {
     pub fn run(&mut self, answers: &[Option<Answer>], pairs: &[PairAnswer]) -> Skeleton {
         let mut pairs: Vec<&PairAnswer> = pairs.iter().collect();
         pairs.sort_by_key(|it| it.views);
-        let (mut exchanged, facing_margin) = self.relative_facing(&pairs);
-        if self.settings.facing && self.can_exchange() {
-            self.settle_sides(answers, &pairs, &mut exchanged);
-        }
-        let views = self.fuse(answers, &pairs, &exchanged);
-        let joints = self.triangulate(&views, self.settings.joints);
+        let (exchanged, facing_margin) = if self.settings.facing && self.can_exchange() {
+            self.decide_facing(answers, &pairs)
+        } else {
+            (0, f64::INFINITY)
+        };
+        let views = self.fuse(answers, &pairs, exchanged);
+        let joints = self.triangulate(&views, |centres| self.settings.joints.from_parts(centres));
         Skeleton {
             joints,
             views,
@@ -129,8 +129,12 @@ impl SkeletonStep {
         self.plans.first().is_some_and(has_sides)
     }
 
-    /// Which views are exchanged with respect to each other.
-    fn relative_facing(&self, pairs: &[&PairAnswer]) -> (Vec<bool>, f64) {
+    /// Which views see the person from behind, and by what margin.
+    fn decide_facing(
+        &mut self,
+        answers: &[Option<Answer>],
+        pairs: &[&PairAnswer],
+    ) -> (Exchanges, f64) {
         let energies: Vec<PairEnergies> = pairs
             .iter()
             .filter_map(|it| match &it.hypotheses[..] {
@@ -141,61 +145,73 @@ impl SkeletonStep {
                 _ => None,
             })
             .collect();
-        let previous = self.memory.exchanged.as_deref();
-        let facing = decide_facing(
-            self.plans.len(),
-            &energies,
-            previous,
-            self.settings.facing_tie,
-        );
-        (facing.exchanged, facing.margin)
+        let hypotheses: Vec<FacingHypothesis> =
+            rank_facing(self.plans.len(), &energies, N_HYPOTHESES)
+                .into_iter()
+                .map(|(exchanges, energy)| {
+                    let views = self.fuse(answers, pairs, exchanges);
+                    let parts = self.triangulate(&views, <[_]>::to_vec);
+                    let joints: Vec<Option<Point3<f64>>> = PARSE14
+                        .joints
+                        .iter()
+                        .map(|it| parts[it.parts[0]].as_ref().ok().map(|it| it.in_world))
+                        .collect();
+                    FacingHypothesis {
+                        exchanges,
+                        energy: energy + self.agreement(&views, &parts),
+                        anatomy: anatomical_evidence(&joints, self.up_in_world),
+                    }
+                })
+                .collect();
+        let present = answers.iter().enumerate().fold(0, |mask, (view, it)| {
+            mask | Exchanges::from(it.is_some()) << view
+        });
+        let facing = self
+            .filter
+            .decide(&self.settings.facing_filter, &hypotheses, present);
+        (facing.exchanges, facing.margin)
     }
 
-    /// Chooses between `exchanged` and its complement: as in the previous frame, unless the
-    /// anatomical evidence of all frames so far speaks against it.
-    fn settle_sides(
-        &mut self,
-        answers: &[Option<Answer>],
-        pairs: &[&PairAnswer],
-        exchanged: &mut [bool],
-    ) {
-        let flip = |exchanged: &mut [bool]| exchanged.iter_mut().for_each(|it| *it = !*it);
-        if let Some(previous) = &self.memory.exchanged {
-            let changed = previous
-                .iter()
-                .zip(exchanged.iter())
-                .filter(|(a, b)| a != b)
-                .count();
-            if 2 * changed > exchanged.len() {
-                flip(exchanged);
+    /// The geometric term over all views at once: how far every part is from its reprojection.
+    fn agreement(
+        &self,
+        views: &[Option<FusedView>],
+        parts: &[Result<Triangulated, TriangulateError>],
+    ) -> f64 {
+        let cap = self.settings.max_distance_cells.powi(2);
+        let of_view = |residual_px: f64, view: &FusedView| {
+            let cells = residual_px / view.cell_px;
+            // A view that does not show the point disagrees as much as one can.
+            if cells.is_nan() {
+                cap
+            } else {
+                (cells * cells).min(cap)
             }
-        }
-        let views = self.fuse(answers, pairs, exchanged);
-        let joints: Vec<Option<Point3<f64>>> = self
-            .triangulate(&views, &PARSE14)
-            .into_iter()
-            .map(|it| it.ok().map(|it| it.in_world))
-            .collect();
-        let evidence = anatomical_evidence(&joints, self.up_in_world);
-        self.memory.evidence = EVIDENCE_KEPT * self.memory.evidence + evidence;
-        if self.memory.evidence < 0.0 {
-            flip(exchanged);
-            self.memory.evidence = -self.memory.evidence;
-        }
-        self.memory.exchanged = Some(exchanged.to_vec());
+        };
+        let of_part = |part: &Result<Triangulated, TriangulateError>| -> f64 {
+            let seen = views.iter().enumerate();
+            let seen = seen.filter_map(|(view, it)| Some((view, it.as_ref()?)));
+            match part {
+                Ok(it) => seen
+                    .map(|(view, of)| of_view(it.residuals_px[view], of))
+                    .sum(),
+                Err(_) => seen.count() as f64 * cap,
+            }
+        };
+        -self.settings.agreement * parts.iter().map(of_part).sum::<f64>()
     }
 
     fn fuse(
         &self,
         answers: &[Option<Answer>],
         pairs: &[&PairAnswer],
-        exchanged: &[bool],
+        exchanged: Exchanges,
     ) -> Vec<Option<FusedView>> {
         (0..self.plans.len())
             .map(|view| {
                 let best = answers[view].as_ref()?.candidates.first()?;
                 let plan = &self.plans[view];
-                let mirror = exchanged[view]
+                let mirror = is_exchanged(exchanged, view)
                     .then(|| plan.model().spec().mirror.as_deref())
                     .flatten();
                 let found: Vec<(f64, &fmp::Pose)> = pairs
@@ -223,7 +239,7 @@ impl SkeletonStep {
                 };
                 Some(FusedView {
                     pose,
-                    exchanged: exchanged[view],
+                    exchanged: is_exchanged(exchanged, view),
                     cell_px,
                     single_score: f64::from(best.score),
                 })
@@ -234,7 +250,7 @@ impl SkeletonStep {
     fn triangulate(
         &self,
         views: &[Option<FusedView>],
-        joints: &JointSet,
+        points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
     ) -> Vec<Result<Triangulated, TriangulateError>> {
         let seen: Vec<(usize, &Camera, f64, Vec<[f64; 2]>)> = views
             .iter()
@@ -242,17 +258,18 @@ impl SkeletonStep {
             .filter_map(|(view, it)| {
                 let it = it.as_ref()?;
                 let sigma = it.cell_px * self.settings.sigma_cells;
-                let joints = joints.from_parts(&it.pose.centres_px);
-                Some((view, self.plans[view].camera(), sigma, joints))
+                let points = points(&it.pose.centres_px);
+                Some((view, self.plans[view].camera(), sigma, points))
             })
             .collect();
-        (0..joints.joints.len())
-            .map(|joint| {
+        let n_points = seen.iter().map(|it| it.3.len()).max().unwrap_or(0);
+        (0..n_points)
+            .map(|point| {
                 let observations: Vec<Observation<'_>> = seen
                     .iter()
-                    .map(|(_, camera, sigma_px, joints)| Observation {
+                    .map(|(_, camera, sigma_px, points)| Observation {
                         camera,
-                        point_px: Point2::from(joints[joint]),
+                        point_px: Point2::from(points[point]),
                         sigma_px: *sigma_px,
                     })
                     .collect();
@@ -279,8 +296,9 @@ fn by_view(mut found: Triangulated, views: &[usize]) -> Triangulated {
 }
 
 /// The hypothesis of a pair that agrees with the joint decision.
-fn chosen<'a>(pair: &'a PairAnswer, exchanged: &[bool]) -> Option<&'a PairEstimate> {
-    let opposite = exchanged[pair.views[0]] != exchanged[pair.views[1]];
+fn chosen(pair: &PairAnswer, exchanged: Exchanges) -> Option<&PairEstimate> {
+    let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
+    let opposite = first != second;
     pair.hypotheses
         .iter()
         .find(|it| it.start.exchanged == opposite)
