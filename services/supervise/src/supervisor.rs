@@ -165,9 +165,21 @@ impl Supervisor<'_> {
             if now.saturating_duration_since(self.cleaned) > self.plan.policy.clean_period {
                 self.clean(now);
             }
-            self.sleep(TURN, Some(self.stop))?;
+            self.sleep(self.until_due(), Some(self.stop))?;
         }
         Ok(())
+    }
+
+    /// How long the next restart leaves to sleep.
+    fn until_due(&self) -> Duration {
+        let now = Instant::now();
+        self.watches
+            .iter()
+            .filter_map(|watch| match watch.life {
+                Life::Due(at) => Some(at.saturating_duration_since(now)),
+                Life::Running(_) | Life::Ended(_) | Life::GivenUp => None,
+            })
+            .fold(TURN, Duration::min)
     }
 
     fn sleep(&self, longest: Duration, stop: Option<&Stop>) -> Result<(), SuperviseError> {

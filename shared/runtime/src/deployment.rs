@@ -107,7 +107,7 @@ impl DeploymentPlan {
                 view.evidence_values,
             ));
             // Poses and expected errors: quality, triangulate, fusion and the recorders.
-            let small = self.small(2 + view.n_workers + self.n_recorders);
+            let small = self.small(2 + self.n_workers + self.n_recorders);
             topics.push(TopicPlan::messages::<ViewPose>(
                 topic::view_pose(index),
                 self.delivery,

@@ -1,0 +1,50 @@
+//! From `kill -9` of a sender to the first message of its successor at a receiver that went on, with
+//! no pause before the restart (a deployment waits 100 ms).
+#![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
+#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Case, Seen, kill};
+use runtime::Delivery;
+use supervise::Role;
+
+const ROUNDS: u32 = 30;
+
+fn main() {
+    let mut case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("source", "send 1000000 1 1", Role::Essential),
+        ],
+    );
+    case.plan.policy.first_pause = Duration::ZERO;
+    case.plan.policy.max_restarts = usize::MAX;
+    let (mut pid, mut killed) = (0, None);
+    let mut millis = Vec::new();
+    case.run(|event, stop| match event {
+        Seen::Started(name, started, _) if name == "source" => pid = *started,
+        Seen::Line(name, line) if name == "source" && line == "sent 64" => {
+            killed = Some(Instant::now());
+            kill("-9", pid);
+        }
+        Seen::Line(name, line) if name == "sink" => {
+            let begin = format!("got {} ", millis.len() + 1);
+            if let Some(at) = killed.filter(|_| line.starts_with(&begin)) {
+                millis.push(at.elapsed().as_millis());
+                killed = None;
+            }
+            if millis.len() == ROUNDS as usize {
+                stop.request();
+            }
+        }
+        _ => {}
+    });
+    millis.sort_unstable();
+    let (median, longest) = (millis[millis.len() / 2], millis[millis.len() - 1]);
+    println!("kill to first message: median {median} ms, longest {longest} ms of {ROUNDS}");
+}
