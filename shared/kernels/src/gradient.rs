@@ -75,7 +75,7 @@ impl GradientRow {
         for x in 0..n - 2 {
             let (along, down) = (right[x] - left[x], below[x] - above[x]);
             let length = along * along + down * down;
-            let longer = always | (length > squared[x]);
+            let longer = always || length > squared[x];
             squared[x] = if longer { length } else { squared[x] };
             dx[x] = if longer { along } else { dx[x] };
             dy[x] = if longer { down } else { dy[x] };

@@ -78,6 +78,7 @@ mod tests {
             got: 17,
         };
         assert_eq!(got, want);
-        assert!(Rgb8View::new(usize::MAX, usize::MAX, &[]).is_err());
+        let huge = Rgb8View::new(usize::MAX, usize::MAX, &[]).unwrap_err();
+        assert_eq!(huge.expected, usize::MAX);
     }
 }

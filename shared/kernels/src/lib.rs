@@ -3,6 +3,10 @@
     unsafe_code,
     reason = "SIMD dispatch, loads and stores; every block states why it is sound"
 )]
+#![expect(
+    clippy::inline_always,
+    reason = "a body takes on the instruction set of the function that it is inlined into"
+)]
 
 mod correlate;
 mod envelope;
@@ -21,4 +25,4 @@ pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
 pub use planes::{Planes, reduce, reduced, resize};
 pub use spring::Spring;
-pub use vote::{Found, Grid, ROW_ALIGN, VoteRule, VoteWorkspace, spread};
+pub use vote::{ChildScores, Found, Grid, ROW_ALIGN, VoteRule, VoteWorkspace, spread};

@@ -47,6 +47,17 @@ impl Grid {
     }
 }
 
+/// The scores of a child, votes of its own children included.
+#[derive(Debug, Clone, Copy)]
+pub struct ChildScores<'a> {
+    /// Size of the planes.
+    pub grid: Grid,
+    /// One plane per type; no NaN.
+    pub planes: &'a [f32],
+    /// [`spread`] of every plane.
+    pub spreads: &'a [f32],
+}
+
 /// How a child votes: which springs it may hang on, and what each pair of types is worth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoteRule {
@@ -92,8 +103,6 @@ impl VoteRule {
     /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
     /// where `s(p, v)` adds the vertical part of the spring first, then the horizontal one.
     ///
-    /// * `child`: one plane per child type; no NaN.
-    /// * `spreads`: of the child's planes, from [`spread`].
     /// * `parent`: one plane per parent type.
     ///
     /// # Panics
@@ -102,12 +111,12 @@ impl VoteRule {
     pub fn cast(
         &self,
         isa: Isa,
-        grid: Grid,
-        (child, spreads): (&[f32], &[f32]),
+        child: ChildScores<'_>,
         parent: &mut [f32],
         workspace: &mut VoteWorkspace,
     ) {
-        self.check(grid, child, spreads);
+        self.check(child);
+        let grid = child.grid;
         assert_eq!(
             parent.len(),
             self.choices.len() * grid.plane(),
@@ -117,28 +126,29 @@ impl VoteRule {
             return;
         }
         match isa.0 {
-            Kind::Portable => fast::cast(self, grid, (child, spreads), parent, workspace),
+            Kind::Portable => fast::cast(self, child, parent, workspace),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: an `Isa` of this kind only exists where AVX2 and FMA were detected.
             Kind::Avx2 => unsafe {
-                fast::avx2(self, grid, (child, spreads), parent, workspace);
+                fast::avx2(self, child, parent, workspace);
             },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: an `Isa` of this kind only exists where AVX-512 F and VL were detected.
             Kind::Avx512 => unsafe {
-                fast::avx512(self, grid, (child, spreads), parent, workspace);
+                fast::avx512(self, child, parent, workspace);
             },
         }
     }
 
-    fn check(&self, grid: Grid, child: &[f32], spreads: &[f32]) {
+    fn check(&self, child: ChildScores<'_>) {
+        let size = child.grid.plane();
         assert_eq!(
-            child.len(),
-            self.n_child_types * grid.plane(),
+            child.planes.len(),
+            self.n_child_types * size,
             "child planes"
         );
         assert_eq!(
-            spreads.len(),
+            child.spreads.len(),
             self.n_child_types,
             "one spread per child plane"
         );

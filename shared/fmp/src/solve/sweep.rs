@@ -1,6 +1,6 @@
 //! All votes on one level, from the leaves to the root, and the way back.
 
-use kernels::{Grid, VoteWorkspace, spread};
+use kernels::{ChildScores, Grid, VoteWorkspace, spread};
 
 use super::{Extra, Root, Solver};
 use crate::{Model, Placement, Pose, Responses};
@@ -28,6 +28,53 @@ pub(super) struct Sweep<'a> {
     workspace: &'a Workspace,
 }
 
+/// What there is to solve on a level.
+#[derive(Clone, Copy)]
+struct Problem<'a> {
+    model: &'a Model,
+    evidence: &'a Responses<'a>,
+    extra: Option<&'a dyn Extra>,
+    level: usize,
+    grid: Grid,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        model: &'a Model,
+        evidence: &'a Responses<'a>,
+        extra: Option<&'a dyn Extra>,
+        level: u16,
+    ) -> Self {
+        let level = usize::from(level);
+        let it = &evidence.layout().levels[level];
+        Self {
+            model,
+            evidence,
+            extra,
+            level,
+            grid: Grid {
+                rows: it.rows,
+                cols: it.cols,
+            },
+        }
+    }
+
+    fn responses(&self, part: usize, mixture: usize) -> &'a [f32] {
+        let filter = self.model.spec().parts[part].filter_of_type[mixture];
+        self.evidence.map(self.level, filter)
+    }
+
+    /// The part's position term, `rows x cols`, if it has one.
+    fn position_term<'b>(&self, part: usize, buffer: &'b mut Vec<f32>) -> Option<&'b [f32]> {
+        let extra = self.extra?;
+        buffer.clear();
+        buffer.resize(self.grid.rows * self.grid.cols, 0.0);
+        extra
+            .add_position(part, self.level, buffer)
+            .then_some(buffer)
+    }
+}
+
 impl<'a> Sweep<'a> {
     pub(super) fn run(
         solver: &'a Solver,
@@ -37,21 +84,18 @@ impl<'a> Sweep<'a> {
         workspace: &'a mut Workspace,
     ) -> Self {
         let model = &*solver.model;
-        let it = &evidence.layout().levels[usize::from(level)];
-        let grid = Grid {
-            rows: it.rows,
-            cols: it.cols,
-        };
+        let problem = Problem::new(model, evidence, extra, level);
+        let grid = problem.grid;
         let n_planes = first_plane(model, model.n_parts());
         workspace.planes.resize(n_planes * grid.plane(), 0.0);
         workspace.spreads.resize(n_planes, 0.0);
         workspace.begun.clear();
         workspace.begun.resize(model.n_parts(), false);
         for part in (0..model.n_parts()).rev() {
-            workspace.begin(model, part, evidence, (level, grid), extra);
+            workspace.begin(&problem, part);
             let edge = model.spec().parts[part].edge.as_ref();
             if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
-                workspace.begin(model, edge.parent, evidence, (level, grid), extra);
+                workspace.begin(&problem, edge.parent);
                 let planes = first_plane(model, part)..first_plane(model, part + 1);
                 let (before, child) = workspace.planes.split_at_mut(planes.start * grid.plane());
                 let child = &child[..planes.len() * grid.plane()];
@@ -62,15 +106,14 @@ impl<'a> Sweep<'a> {
                 {
                     *to = spread(grid, plane);
                 }
+                let child = ChildScores {
+                    grid,
+                    planes: child,
+                    spreads,
+                };
                 let first = first_plane(model, edge.parent) * grid.plane();
                 let parent = &mut before[first..][..model.n_types(edge.parent) * grid.plane()];
-                rule.cast(
-                    solver.isa,
-                    grid,
-                    (child, spreads),
-                    parent,
-                    &mut workspace.votes,
-                );
+                rule.cast(solver.isa, child, parent, &mut workspace.votes);
             }
         }
         Self {
@@ -124,9 +167,13 @@ impl<'a> Sweep<'a> {
             let edge = model.spec().parts[part].edge.as_ref()?;
             let parent: Placement = parts[edge.parent];
             let planes = first_plane(model, part)..first_plane(model, part + 1);
+            let child = ChildScores {
+                grid: self.grid,
+                planes: self.planes(part),
+                spreads: &self.workspace.spreads[planes],
+            };
             let found = self.solver.rules[part].as_ref()?.trace(
-                self.grid,
-                (self.planes(part), &self.workspace.spreads[planes]),
+                child,
                 usize::from(parent.mixture),
                 [usize::from(parent.y), usize::from(parent.x)],
             )?;
@@ -148,24 +195,17 @@ impl<'a> Sweep<'a> {
 
 impl Workspace {
     /// Writes the part's own score, unless that has been done on this level.
-    fn begin(
-        &mut self,
-        model: &Model,
-        part: usize,
-        evidence: &Responses<'_>,
-        (level, grid): (u16, Grid),
-        extra: Option<&dyn Extra>,
-    ) {
+    fn begin(&mut self, problem: &Problem<'_>, part: usize) {
         if std::mem::replace(&mut self.begun[part], true) {
             return;
         }
-        let level = usize::from(level);
-        let term = position_term(part, level, grid, extra, &mut self.term);
+        let (model, grid) = (problem.model, problem.grid);
+        let term = problem.position_term(part, &mut self.term);
         let first = first_plane(model, part) * grid.plane();
-        let planes = self.planes[first..].chunks_exact_mut(grid.plane());
+        let planes = self.planes[first..].chunks_exact_mut(grid.plane().max(1));
         for (mixture, plane) in planes.take(model.n_types(part)).enumerate() {
-            let map = evidence.map(level, model.spec().parts[part].filter_of_type[mixture]);
-            let constant = extra.map(|it| it.of_type(part, mixture));
+            let map = problem.responses(part, mixture);
+            let constant = problem.extra.map(|it| it.of_type(part, mixture));
             let lines = plane.chunks_exact_mut(grid.stride());
             for (y, (line, map)) in lines.zip(map.chunks_exact(grid.cols)).enumerate() {
                 let (line, padding) = line.split_at_mut(grid.cols);
@@ -194,12 +234,8 @@ pub(super) fn score(
     extra: Option<&dyn Extra>,
 ) -> f32 {
     let model = &*solver.model;
-    let level = usize::from(pose.level);
-    let it = &evidence.layout().levels[level];
-    let grid = Grid {
-        rows: it.rows,
-        cols: it.cols,
-    };
+    let problem = Problem::new(model, evidence, extra, pose.level);
+    let grid = problem.grid;
     assert_eq!(pose.parts.len(), model.n_parts(), "a pose of this model");
     let mut buffer = Vec::new();
     let mut own = |part: usize| {
@@ -209,9 +245,9 @@ pub(super) fn score(
             "a placement on the level"
         );
         let cell = usize::from(at.y) * grid.cols + usize::from(at.x);
-        let map = evidence.map(level, model.spec().parts[part].filter_of_type[mixture]);
-        let term = position_term(part, level, grid, extra, &mut buffer);
-        let score = term.map_or(map[cell], |term| map[cell] + term[cell]);
+        let response = problem.responses(part, mixture)[cell];
+        let term = problem.position_term(part, &mut buffer);
+        let score = term.map_or(response, |term| response + term[cell]);
         extra.map_or(score, |it| score + it.of_type(part, mixture))
     };
     let mut scores: Vec<f32> = (0..model.n_parts()).map(&mut own).collect();
@@ -226,20 +262,6 @@ pub(super) fn score(
         }
     }
     scores[0] + model.spec().root_bias as f32
-}
-
-/// The part's position term, `rows x cols`, if it has one.
-fn position_term<'b>(
-    part: usize,
-    level: usize,
-    grid: Grid,
-    extra: Option<&dyn Extra>,
-    buffer: &'b mut Vec<f32>,
-) -> Option<&'b [f32]> {
-    let extra = extra?;
-    buffer.clear();
-    buffer.resize(grid.rows * grid.cols, 0.0);
-    extra.add_position(part, level, buffer).then_some(buffer)
 }
 
 /// Number of planes before those of `part`.

@@ -1,5 +1,7 @@
 //! The solver against every pose that there is, on trees small enough to try them all.
 
+use std::sync::Arc;
+
 use fmp::{CandidateSettings, Extra, Model, Placement, Pose, Responses, Solver, Springs};
 use proptest::prelude::*;
 
@@ -75,7 +77,7 @@ proptest! {
         let evidence = evidence.view();
         let other = OtherView(seed);
         let extra = fused.then_some(&other as &dyn Extra);
-        let solver = Solver::new(model.clone());
+        let solver = Solver::new(Arc::clone(&model));
         let best = solver.best(&evidence, extra).unwrap();
         let mut highest = f32::NEG_INFINITY;
         for (level, size) in sizes.iter().enumerate() {
@@ -104,9 +106,9 @@ proptest! {
             solver.candidates(&evidence, &settings),
             solver.distinct(&evidence, 4, 0.5),
         );
-        let want = answers(&Solver::new(model.clone()));
+        let want = answers(&Solver::new(Arc::clone(&model)));
         for isa in kernels::Isa::available() {
-            let solver = Solver::on(isa, model.clone());
+            let solver = Solver::on(isa, Arc::clone(&model));
             for threads in [1, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 prop_assert_eq!(&pool.install(|| answers(&solver)), &want);
@@ -120,7 +122,7 @@ proptest! {
         let model = tree(&mut noise, 3);
         let evidence = Evidence::new(&mut noise, &model, &[[8, 9], [6, 5]]);
         let evidence = evidence.view();
-        let solver = Solver::new(model.clone());
+        let solver = Solver::new(Arc::clone(&model));
         let best = solver.best(&evidence, None).unwrap();
         let threshold = best.score - 1.0;
         let settings = CandidateSettings { threshold, overlap, max };
@@ -155,7 +157,7 @@ proptest! {
         let model = tree(&mut noise, 3);
         let evidence = Evidence::new(&mut noise, &model, &[[12, 9], [6, 5]]);
         let evidence = evidence.view();
-        let solver = Solver::new(model.clone());
+        let solver = Solver::new(Arc::clone(&model));
         let poses = solver.distinct(&evidence, 4, separation);
         prop_assert_eq!(&poses[0], &solver.best(&evidence, None).unwrap());
         prop_assert!(poses.len() <= 4 && poses.is_sorted_by(|a, b| a.score >= b.score));

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Grid, ROW_ALIGN, VoteRule};
+use super::{ChildScores, Grid, ROW_ALIGN, VoteRule};
 use crate::spring::Axis;
 
 /// Buffers of [`VoteRule::cast`], used again from call to call.
@@ -55,8 +55,6 @@ fn union(a: Range<isize>, b: Range<isize>) -> Range<isize> {
     a.start.min(b.start)..a.end.max(b.end)
 }
 
-const NOTHING: Range<isize> = isize::MAX..isize::MIN;
-
 impl Stretch {
     fn prepare(&mut self, grid: Grid, (down, along): (Axis, Axis), spread: f32) {
         self.impossible = spread.is_nan();
@@ -68,16 +66,16 @@ impl Stretch {
         self.windows.extend((0..grid.rows).map(|p| reach.window(p)));
         let all = self.windows.iter().enumerate();
         let all = all.map(|(p, window)| offsets(window, p));
-        self.down.cover(down, all.fold(NOTHING, union));
+        self.down.cover(down, all.reduce(union).unwrap_or(0..0));
         let reach = along.reach(grid.cols, spread);
         self.runs.clear();
         for first in (0..grid.cols).step_by(ROW_ALIGN) {
             let cells = first..grid.cols.min(first + ROW_ALIGN);
             let run = cells.map(|p| offsets(&reach.window(p), p));
-            self.runs.push(run.fold(NOTHING, union));
+            self.runs.push(run.reduce(union).unwrap_or(0..0));
         }
-        let all = self.runs.iter().cloned().fold(NOTHING, union);
-        self.along.cover(along, all);
+        let all = self.runs.iter().cloned().reduce(union);
+        self.along.cover(along, all.unwrap_or(0..0));
     }
 }
 
@@ -85,34 +83,32 @@ impl Stretch {
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn avx2(
     rule: &VoteRule,
-    grid: Grid,
-    child: (&[f32], &[f32]),
+    child: ChildScores<'_>,
     parent: &mut [f32],
     workspace: &mut VoteWorkspace,
 ) {
-    cast(rule, grid, child, parent, workspace);
+    cast(rule, child, parent, workspace);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
 pub(super) fn avx512(
     rule: &VoteRule,
-    grid: Grid,
-    child: (&[f32], &[f32]),
+    child: ChildScores<'_>,
     parent: &mut [f32],
     workspace: &mut VoteWorkspace,
 ) {
-    cast(rule, grid, child, parent, workspace);
+    cast(rule, child, parent, workspace);
 }
 
 #[inline(always)]
 pub(super) fn cast(
     rule: &VoteRule,
-    grid: Grid,
-    (child, spreads): (&[f32], &[f32]),
+    child: ChildScores<'_>,
     parent: &mut [f32],
     workspace: &mut VoteWorkspace,
 ) {
+    let grid = child.grid;
     let stride = grid.stride();
     let VoteWorkspace {
         stretches,
@@ -122,7 +118,7 @@ pub(super) fn cast(
     stretches.resize_with(rule.springs.len(), Stretch::default);
     for (stretch, (plane, spring)) in stretches.iter_mut().zip(&rule.springs) {
         stretch.plane = *plane;
-        stretch.prepare(grid, (spring.y(), spring.x()), spreads[*plane]);
+        stretch.prepare(grid, (spring.y(), spring.x()), child.spreads[*plane]);
     }
     // A run tries all offsets at which one of its cells has a candidate, so the others look at
     // most one run past the ends of the row.
@@ -133,7 +129,7 @@ pub(super) fn cast(
     for y in 0..grid.rows {
         for (stretch, out) in stretches.iter().zip(transformed.chunks_exact_mut(stride)) {
             if !stretch.impossible {
-                let plane = &child[stretch.plane * grid.plane()..][..grid.plane()];
+                let plane = &child.planes[stretch.plane * grid.plane()..][..grid.plane()];
                 stretch_down(stretch, (plane, stride), y, &mut row[ROW_ALIGN..]);
                 stretch_along(stretch, row, out);
             }

@@ -20,11 +20,19 @@ impl Case {
         planes.map(|it| spread(self.grid, it)).collect()
     }
 
+    fn scores<'a>(&'a self, spreads: &'a [f32]) -> ChildScores<'a> {
+        ChildScores {
+            grid: self.grid,
+            planes: &self.child,
+            spreads,
+        }
+    }
+
     fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> Vec<f32> {
         let mut parent = self.parent.clone();
-        let child = (self.child.as_slice(), self.spreads());
+        let spreads = self.spreads();
         self.rule
-            .cast(isa, self.grid, (child.0, &child.1), &mut parent, workspace);
+            .cast(isa, self.scores(&spreads), &mut parent, workspace);
         parent
     }
 
@@ -135,7 +143,7 @@ proptest! {
         for l in 0..case.rule.choices.len() {
             for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| (y, x))) {
                 let at = l * grid.plane() + grid.at(y, x);
-                let found = case.rule.trace(grid, (&case.child, &spreads), l, [y, x]);
+                let found = case.rule.trace(case.scores(&spreads), l, [y, x]);
                 let vote = found.map_or(f32::NEG_INFINITY, |it| it.score);
                 prop_assert_eq!(case.parent[at] + vote, after[at]);
                 let Some(found) = found else { continue };
@@ -200,13 +208,12 @@ fn an_impossible_child_makes_its_parent_impossible() {
     let mut parent = Case::padded(grid, &[1.0; 6]);
     let spreads = [spread(grid, &child)];
     let mut workspace = VoteWorkspace::default();
-    rule.cast(
-        Isa::best(),
+    let scores = ChildScores {
         grid,
-        (&child, &spreads),
-        &mut parent,
-        &mut workspace,
-    );
+        planes: &child,
+        spreads: &spreads,
+    };
+    rule.cast(Isa::best(), scores, &mut parent, &mut workspace);
     assert!(parent.iter().all(|&it| it == f32::NEG_INFINITY));
-    assert_eq!(rule.trace(grid, (&child, &spreads), 0, [1, 1]), None);
+    assert_eq!(rule.trace(scores, 0, [1, 1]), None);
 }

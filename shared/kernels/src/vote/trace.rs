@@ -1,6 +1,6 @@
 //! Where a vote came from: the arguments of the maxima, looked up for one cell when they are asked for.
 
-use super::{Grid, VoteRule};
+use super::{ChildScores, Grid, VoteRule};
 use crate::spring::Spring;
 
 /// The child that a vote came from.
@@ -23,7 +23,7 @@ impl VoteRule {
     /// bit. Ties go to the first choice, then to the first column, then to the first row, as in the
     /// reference programs. `None` if every child is impossible.
     ///
-    /// * `child`, `spreads`: as for [`cast`](Self::cast).
+    /// * `child`: as for [`cast`](Self::cast).
     /// * `at`: `[row, column]` of the parent.
     ///
     /// # Panics
@@ -31,18 +31,19 @@ impl VoteRule {
     /// If the lengths disagree or `parent_type` or `at` is out of range.
     pub fn trace(
         &self,
-        grid: Grid,
-        (child, spreads): (&[f32], &[f32]),
+        child: ChildScores<'_>,
         parent_type: usize,
         at: [usize; 2],
     ) -> Option<Found> {
-        self.check(grid, child, spreads);
+        self.check(child);
+        let grid = child.grid;
         assert!(at[0] < grid.rows && at[1] < grid.cols, "a cell of the grid");
         let mut best: Option<Found> = None;
         for &(spring, bias) in &self.choices[parent_type] {
             let (child_type, spring) = &self.springs[spring];
-            let plane = &child[child_type * grid.plane()..][..grid.plane()];
-            let Some((score, [y, x])) = best_child(grid, plane, spring, spreads[*child_type], at)
+            let plane = &child.planes[child_type * grid.plane()..][..grid.plane()];
+            let Some((score, [y, x])) =
+                best_child(grid, plane, spring, child.spreads[*child_type], at)
             else {
                 continue;
             };
