@@ -1,5 +1,10 @@
 //! Calibration files of others, read; and rigs measured against what their cameras saw.
 
+#![expect(
+    clippy::print_stdout,
+    reason = "the numbers measured are for people to read"
+)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -33,6 +38,9 @@ const OPENPOSE: [(&str, usize); 21] = [
     ("LElbow", 7),
     ("LWrist", 9),
 ];
+
+/// Where each marker of a person was seen.
+type Person = [Option<Point2<f64>>; 21];
 
 fn balancing() -> Option<PathBuf> {
     Some(shared_dir()?.join("data/pose2sim_balancing"))
@@ -84,7 +92,7 @@ fn reference(folder: &Path) -> Vec<[Point3<f64>; 21]> {
 }
 
 /// The keypoints of every person that OpenPose found, `None` where it is not sure.
-fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<[Option<Point2<f64>>; 21]> {
+fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<Person> {
     let path = folder.join(format!("openpose/{camera}_json/{camera}.{frame:04}.json"));
     let file: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
     let people = file["people"].as_array().unwrap();
@@ -100,11 +108,7 @@ fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<[Option<Point2<f
         .collect()
 }
 
-fn errors(
-    camera: &Camera,
-    truth: &[Point3<f64>; 21],
-    seen: &[Option<Point2<f64>>; 21],
-) -> Vec<f64> {
+fn errors(camera: &Camera, truth: &[Point3<f64>; 21], seen: &Person) -> Vec<f64> {
     let pairs = truth.iter().zip(seen);
     pairs
         .filter_map(|(point, seen)| Some((camera.project(point)? - (*seen)?).norm()))
@@ -112,14 +116,10 @@ fn errors(
 }
 
 /// For each frame and camera the person nearest to the reference, which passes over the bystander.
-fn balancer(
-    folder: &Path,
-    rig: &Rig,
-    truth: &[[Point3<f64>; 21]],
-) -> Vec<Vec<[Option<Point2<f64>>; 21]>> {
+fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Person>> {
     let nearest = |frame: usize, camera: &Camera| {
         let people = detections(folder, &camera.name, frame).into_iter();
-        let away = |person: &[Option<Point2<f64>>; 21]| {
+        let away = |person: &Person| {
             let errors = errors(camera, &truth[frame], person);
             if errors.len() < 5 {
                 f64::INFINITY
@@ -403,9 +403,10 @@ fn caliscope_reads_and_measures_its_board() {
 }
 
 type Corner = (u32, Point2<f64>);
+type Views = Vec<Option<Point2<f64>>>;
 
 /// What each camera saw of each corner at each instant, and the instant and place of the corner on the board.
-fn board_corners(path: &Path) -> (Vec<Vec<Option<Point2<f64>>>>, Vec<Corner>) {
+fn board_corners(path: &Path) -> (Vec<Views>, Vec<Corner>) {
     let mut corners = std::collections::BTreeMap::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {
         let row: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
