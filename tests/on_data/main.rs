@@ -5,6 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod calibration;
+mod footage;
 mod models;
 
 use std::path::{Path, PathBuf};
