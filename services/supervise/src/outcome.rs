@@ -12,9 +12,13 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether a process was given up on the way.
+    /// Whether a process was given up on the way, or was not done when all others were.
     pub fn is_degraded(&self) -> bool {
-        self.processes.iter().any(|it| it.state == State::GivenUp)
+        self.processes.iter().any(|it| match it.state {
+            State::GivenUp => true,
+            State::Stopped => !self.interrupted,
+            State::Running | State::Finished => false,
+        })
     }
 }
 

@@ -65,7 +65,8 @@ pub struct Policy {
     pub restart_window: Duration,
     /// How long a process may take until its main loop turns for the first time.
     pub startup_limit: Duration,
-    /// How long the main loop of a process may stand still.
+    /// How long the main loop of a process may stand still; and, once some processes are done and
+    /// others had to be restarted or given up, how long the rest may take nothing in.
     pub hang_limit: Duration,
     /// How long processes may take to end when they are asked to.
     pub grace: Duration,

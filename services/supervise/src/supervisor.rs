@@ -341,12 +341,17 @@ impl Supervisor<'_> {
         })
     }
 
+    /// Whether all processes are done, or those that are not wait in vain: where one was given up or
+    /// had to be restarted, others may never hear of the end.
     fn is_done(&self, now: Instant) -> bool {
-        let done = |watch: &Watch| watch.is_finished() || watch.is_given_up();
-        let any_finished = self.watches.iter().any(Watch::is_finished);
-        self.watches
-            .iter()
-            .all(|watch| done(watch) || (any_finished && watch.is_stranded(&self.plan.policy, now)))
+        let trouble = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
+        let in_vain =
+            self.watches.iter().any(trouble) && self.watches.iter().any(Watch::is_finished);
+        self.watches.iter().all(|watch| {
+            watch.is_finished()
+                || watch.is_given_up()
+                || (in_vain && watch.is_idle(&self.plan.policy, now))
+        })
     }
 
     fn clean(&mut self, now: Instant) {

@@ -194,12 +194,10 @@ impl Watch {
         }
     }
 
-    /// Whether it waits for messages that will never come: it was restarted, and has taken nothing
-    /// in for long. Only of meaning where all others are done.
-    pub(crate) fn is_stranded(&self, policy: &Policy, now: Instant) -> bool {
-        self.epoch > 0
-            && self.child().is_some()
-            && now.saturating_duration_since(self.received.at) > policy.hang_limit
+    /// Whether it runs but has taken nothing in for so long that nothing more will come.
+    pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
+        let still = now.saturating_duration_since(self.received.at);
+        self.child().is_some() && still > policy.hang_limit
     }
 
     fn says_finished(&self) -> bool {

@@ -228,6 +228,38 @@ fn a_run_goes_on_with_the_views_that_are_left() {
 }
 
 #[test]
+fn who_waits_in_vain_for_a_view_that_was_given_up_does_not_hold_up_the_end() {
+    let mut case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("source", "fail 1", Role::Redundant),
+            ("other-view", "idle", Role::Redundant),
+        ],
+    );
+    case.plan.policy.max_restarts = 1;
+    let run = case.run(|_, _| {});
+    assert_eq!(state_of(&run, "source"), State::GivenUp);
+    assert_eq!(state_of(&run, "sink"), State::Stopped);
+}
+
+#[test]
+fn who_missed_the_end_while_it_was_restarted_does_not_hold_up_the_end() {
+    let case = Case::new(
+        Delivery::Realtime,
+        &[
+            ("sink", "die-at-end", Role::Essential),
+            ("source", "send-and-leave 20 1 1", Role::Essential),
+        ],
+    );
+    let run = case.run(|_, _| {});
+    assert_eq!(run.deaths("sink"), [KILLED]);
+    assert_eq!(state_of(&run, "source"), State::Finished);
+    assert_eq!(state_of(&run, "sink"), State::Stopped);
+    assert!(run.outcome().is_degraded() && !run.outcome().interrupted);
+}
+
+#[test]
 fn a_run_without_any_view_left_fails() {
     let mut case = Case::new(
         Delivery::Realtime,

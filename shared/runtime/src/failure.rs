@@ -211,3 +211,44 @@ impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrFail<T> for Result<T, E> {
         self.map_err(|error| Failure::new(kind, error))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{ExitKind, Failure};
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("cannot read model.bin")]
+    struct Outer(#[source] std::io::Error);
+
+    #[test]
+    fn a_report_tells_what_why_and_what_to_try() {
+        let failure = Failure::new(
+            ExitKind::Input,
+            Outer(std::io::Error::other("no such disk")),
+        )
+        .with_hint("look elsewhere");
+        let mut text = Vec::new();
+        failure.report(&mut text).unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "error: cannot read model.bin\n  cause: no such disk\n  hint: look elsewhere\n"
+        );
+    }
+
+    #[test]
+    fn every_kind_has_a_status_of_its_own() {
+        for kind in ExitKind::ALL {
+            assert_eq!(ExitKind::of_status(i32::from(kind.status())), Some(kind));
+        }
+        for status in [0, 8, 101, 134] {
+            assert_eq!(ExitKind::of_status(status), None);
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_the_input_stays_wrong() {
+        let permanent = ExitKind::ALL.map(|kind| (kind.status(), kind.is_permanent()));
+        let statuses = permanent.iter().filter(|it| it.1).map(|it| it.0);
+        assert_eq!(statuses.collect::<Vec<_>>(), [2, 3, 4, 5]);
+    }
+}

@@ -65,8 +65,13 @@ impl Service {
 /// The process ends with its supervisor, and a panic ends it with a logged line instead of going
 /// any further. Call it from the main thread, once.
 ///
-/// * `body`: the service. It returns soon after [`Service::stop`] is requested. It may return once
-///   it has seen the end of the footage and passed it on; then what it sent stays readable.
+/// How a service ends well: when it has passed on the end of the footage it calls
+/// [`Health::finished`], and then, several times a second, sends the end again until it is told to
+/// stop. So a receiver that had to be restarted hears of the end as well; the supervisor stops all
+/// once all have finished.
+///
+/// * `body`: the service. It returns soon after [`Service::stop`] is requested, and gives a
+///   [`Failure`] whose kind tells the supervisor whether to try again ([`ExitKind::is_permanent`]).
 pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> ExitCode {
     init_logging(&launch.process, launch.log);
     log_panics();

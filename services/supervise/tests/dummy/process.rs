@@ -32,7 +32,8 @@ fn serve() -> ExitCode {
     let rest: Vec<String> = rest.iter().filter_map(text).collect();
     let number = |index: usize| rest.get(index).and_then(|it| it.parse().ok()).unwrap_or(0);
     run_service(launch, |service| match rest.first().map(String::as_str) {
-        Some("send") => send(service, number(1), number(2), number(3) as usize),
+        Some("send") => send(service, number(1), number(2), number(3) as usize, false),
+        Some("send-and-leave") => send(service, number(1), number(2), number(3) as usize, true),
         Some("receive") => receive(service, number(1), false),
         Some("die-at-end") => receive(service, 0, service.epoch() == 0),
         Some("hold") => hold(service),
@@ -64,7 +65,15 @@ fn failure(status: u64) -> Failure {
 }
 
 /// Sends `n` frames, then the end, and then the end again and again.
-fn send(service: &Service, n: u64, pause: u64, subscribers: usize) -> Result<(), Failure> {
+///
+/// * `leaves`: whether it ends after the first end.
+fn send(
+    service: &Service,
+    n: u64,
+    pause: u64,
+    subscribers: usize,
+    leaves: bool,
+) -> Result<(), Failure> {
     let publisher = service.bus().slice_publisher::<u8, FrameHeader>(TOPIC)?;
     let waiter = service.bus().waiter();
     service.health().set_total(n);
@@ -79,8 +88,11 @@ fn send(service: &Service, n: u64, pause: u64, subscribers: usize) -> Result<(),
         header.stamp.epoch = service.epoch();
         if frame == n {
             header.status = Status::END;
-            service.health().finished();
             loan.send()?;
+            if leaves {
+                return Ok(());
+            }
+            service.health().finished();
             waiter.wait(SOON)?;
         } else {
             loan.send()?;
@@ -144,7 +156,7 @@ fn hold(service: &Service) -> Result<(), Failure> {
 /// The first time it is killed in the middle of writing; then it sends three frames and is done.
 fn die_in_loan(service: &Service) -> Result<(), Failure> {
     if service.epoch() > 0 {
-        return send(service, 3, 0, 1);
+        return send(service, 3, 0, 1, false);
     }
     let publisher = service.bus().slice_publisher::<u8, FrameHeader>(TOPIC)?;
     publisher.wait_for_subscribers(1, Duration::from_mins(1));
