@@ -1,9 +1,10 @@
 //! The command line, as `--help` shows it.
 
 use clap::{ArgAction, Args, Parser, Subcommand};
+use tracing::Level;
 
 use crate::commands::{calib, config, detect, fuse_frame, model, run, service};
-use crate::failure::EXIT_CODES;
+use crate::exit::EXIT_CODES;
 
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
@@ -54,6 +55,19 @@ pub(crate) struct Globals {
     /// Say more; twice says everything.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
+}
+
+impl Globals {
+    /// The least important events that are logged.
+    pub(crate) fn level(self) -> Level {
+        match (self.quiet, self.verbose) {
+            (true, _) => Level::ERROR,
+            (false, 0) => Level::WARN,
+            (false, 1) => Level::INFO,
+            (false, 2) => Level::DEBUG,
+            (false, _) => Level::TRACE,
+        }
+    }
 }
 
 /// What to do.

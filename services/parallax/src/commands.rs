@@ -10,11 +10,15 @@ pub(crate) mod service;
 
 use std::process::ExitCode;
 
+use runtime::{Failure, init_logging};
+
 use crate::cli::{Cli, Command};
-use crate::failure::Failure;
 
 /// Does what the command line asks for.
 pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
+    if !matches!(cli.command, Command::Service(_)) {
+        init_logging("parallax", cli.globals.level());
+    }
     match cli.command {
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
@@ -22,6 +26,6 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Model(it) => model::run(&it),
         Command::Calib(it) => calib::run(&it),
         Command::Config(it) => config::run(&it),
-        Command::Service(it) => service::run(&it, cli.globals),
+        Command::Service(it) => service::run(&it),
     }
 }

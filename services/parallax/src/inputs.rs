@@ -1,24 +1,129 @@
 //! The files that a deployment names: read before anything is started.
 
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use fmp::Model;
+use footage::{Source, SourceSpec};
+use geometry::Rig;
+use geometry::files::{ReadOptions, RigFileError};
+use multiview::{Compatibility, TypeTables};
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde::{Deserialize, Serialize};
+use viewquality::Table;
 
 use crate::deployment::Deployment;
-use crate::failure::{Failing as _, Failure, Kind};
 
 /// Reads the model, of whichever format.
 pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
-    fmp::files::read(path).map(Arc::new).failing(Kind::Input)
+    fmp::files::read(path)
+        .map(Arc::new)
+        .or_fail(ExitKind::Input)
 }
 
-/// Reads what the deployment names, and says what it is.
+/// Reads the calibration, of whichever format.
+pub(crate) fn rig(path: &Path, options: &ReadOptions) -> Result<Rig, Failure> {
+    geometry::files::read(path, options).map_err(|error| match error {
+        RigFileError::Read { .. } | RigFileError::NoFiles => Failure::new(ExitKind::Input, error)
+            .with_hint(
+                "a rig file says where the cameras stand; `parallax calib convert` makes one of \
+                 other programs' calibrations",
+            ),
+        _ => Failure::new(ExitKind::Calibration, error),
+    })
+}
+
+/// What is known of a camera's footage before it is read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Footage {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Frames that will be used.
+    pub n_frames: u64,
+    /// Frames used per second of the scene, where known.
+    pub frame_rate_hz: Option<f64>,
+}
+
+/// What of a camera's footage is to be used.
+pub(crate) fn source(camera: &capture::Camera, config: &capture::Config) -> SourceSpec {
+    SourceSpec {
+        start: config.start_frame,
+        step: config.frame_step,
+        count: config.n_frames,
+        frame_rate_hz: config.frame_rate_hz,
+        ..SourceSpec::new(camera.source.clone())
+    }
+}
+
+/// Looks at the footage of every camera.
+pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> {
+    deployment
+        .cameras
+        .iter()
+        .map(|camera| {
+            let opened = Source::open(&source(camera, &deployment.capture));
+            let opened = opened.or_fail(ExitKind::Input).map_err(|failure| {
+                failure.with_hint(format!(
+                    "the `source` of camera {:?} is a video, an image, a folder of images or a glob; \
+                     relative paths are relative to the deployment file",
+                    camera.name
+                ))
+            })?;
+            let info = opened.info();
+            Ok(Footage {
+                size: [info.size.width as u32, info.size.height as u32],
+                n_frames: info.n_frames,
+                frame_rate_hz: info.frame_rate_hz,
+            })
+        })
+        .collect()
+}
+
+/// Reads the part-type tables of a pair: `first wrt second` and `second wrt first`.
+pub(crate) fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
+    let n_types: Vec<usize> = (0..model.n_parts())
+        .map(|part| model.n_types(part))
+        .collect();
+    let read = |file: &Path| -> Result<Compatibility, Failure> {
+        let text = text(file)?;
+        let table = Compatibility::parse(&text, &n_types);
+        table.map_err(|error| in_file(file, &error))
+    };
+    let [first, second] = [read(files[0])?, read(files[1])?];
+    let (joint, contradiction) = Compatibility::joint_from_conditionals(&first, &second)
+        .map_err(|error| in_file(files[1], &error))?;
+    tracing::debug!(contradiction, "part-type tables of both directions");
+    Ok(TypeTables {
+        conditional: [Arc::new(first), Arc::new(second)],
+        joint: Arc::new(joint),
+    })
+}
+
+/// Reads a table of expected errors.
+pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
+    Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
+}
+
+/// Reads a text file, and names it if that fails.
+pub(crate) fn text(file: &Path) -> Result<String, Failure> {
+    fs::read_to_string(file).map_err(|error| in_file(file, &error))
+}
+
+/// An input that is wrong: the file, then what is wrong with it.
+pub(crate) fn in_file(file: &Path, error: &dyn std::error::Error) -> Failure {
+    Failure::new(ExitKind::Input, format!("{}: {error}", file.display()))
+}
+
+/// Reads everything that the deployment names, and says what it is.
 pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
-    let model = model(&deployment.model)?;
+    let resolved = crate::plan::Resolved::new(deployment)?;
+    let prepared = crate::prepare::Prepared::new(&resolved)?;
+    let n_frames = resolved.n_frames();
     Ok(format!(
-        "{} cameras, a model of {} parts",
-        deployment.cameras.len(),
-        model.n_parts()
+        "{} views, {} pairs, {n_frames} frames, a model of {} parts",
+        prepared.views.len(),
+        prepared.pairs.len(),
+        prepared.model.n_parts()
     ))
 }

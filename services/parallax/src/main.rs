@@ -4,9 +4,12 @@
 mod cli;
 mod commands;
 mod deployment;
-mod failure;
+mod exit;
 mod inputs;
 mod output;
+mod plan;
+mod prepare;
+mod summary;
 
 use std::process::ExitCode;
 
@@ -14,9 +17,8 @@ use clap::Parser as _;
 
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
-    output::start_log(&cli.globals);
     match commands::run(cli) {
         Ok(code) => code,
-        Err(failure) => failure.report(),
+        Err(failure) => failure.exit(),
     }
 }

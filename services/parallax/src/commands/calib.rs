@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Subcommand;
-
-use crate::failure::Failure;
+use runtime::Failure;
 
 /// What to do with a calibration.
 #[derive(Debug, Subcommand)]

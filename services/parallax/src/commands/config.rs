@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
+use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
 use crate::deployment::{Entry, Loaded};
-use crate::failure::{Failing as _, Failure, Kind};
+
 use crate::{inputs, output};
 
 /// What to do with a deployment file.
@@ -45,7 +46,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(file) => Loaded::read(file, &arguments.set)?,
         None => Loaded::defaults(&arguments.set)?,
     };
-    let entries = loaded.entries().failing(Kind::Run)?;
+    let entries = loaded.entries().or_fail(ExitKind::Run)?;
     if arguments.json {
         output::json(&json!({ "schema_version": 1, "file": arguments.file, "keys": entries }))?;
     } else {
@@ -80,7 +81,7 @@ fn check(arguments: &Arguments) -> Result<ExitCode, Failure> {
         .file
         .as_ref()
         .ok_or("config check needs a deployment file")
-        .failing(Kind::Usage)?;
+        .or_fail(ExitKind::Usage)?;
     let loaded = Loaded::read(file, &arguments.set)?;
     let report = inputs::check(&loaded.deployment)?;
     if arguments.json {

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-
-use crate::failure::Failure;
+use runtime::Failure;
 
 /// Which images, and how.
 #[derive(Debug, Args)]

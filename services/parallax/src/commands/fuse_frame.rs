@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-
-use crate::failure::Failure;
+use runtime::Failure;
 
 /// Which energy ties two views together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 use fmp::{Model, Springs};
+use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
-use crate::failure::Failure;
 use crate::{inputs, output};
 
 /// What to do with a model.
@@ -39,8 +39,10 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-fn import(file: &Path, _out: &Path) -> Result<ExitCode, Failure> {
-    let _model = inputs::model(file)?;
+fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {
+    let model = inputs::model(file)?;
+    fmp::files::write(out, &model).or_fail(ExitKind::Input)?;
+    output::message(format_args!("wrote {}", out.display()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,12 +1,19 @@
 //! `parallax service`: become one process of a deployment.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
+use geometry::files::ReadOptions;
+use pipeline::{FuseStep, SkeletonStep, ViewStep};
+use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
+use viewquality::{Predictor, Selection};
 
-use crate::cli::Globals;
-use crate::failure::Failure;
+use crate::inputs;
+use crate::plan::{Dealing, Resolved};
+use crate::prepare::{self, Prepared};
 
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -30,21 +37,180 @@ pub(crate) enum Name {
 pub(crate) struct Arguments {
     /// Which process to become.
     name: Name,
-    /// The deployment file, resolved: absolute paths, every value.
+    /// What the supervisor says: --plan, --index, and about the deployment.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    rest: Vec<OsString>,
+}
+
+/// The service's own arguments.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true)]
+struct Own {
+    /// The resolved deployment.
     #[arg(long)]
-    deployment: PathBuf,
+    plan: PathBuf,
     /// View or worker, from 0.
     #[arg(long, default_value_t = 0)]
     index: usize,
-    /// Run of the deployment.
-    #[arg(long)]
-    session: u64,
-    /// How often this process has been restarted.
-    #[arg(long, default_value_t = 0)]
-    epoch: u32,
 }
 
 /// Becomes the process.
-pub(crate) fn run(_arguments: &Arguments, _globals: Globals) -> Result<ExitCode, Failure> {
-    Ok(ExitCode::SUCCESS)
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let (launch, rest) = Launch::from_args(arguments.rest.iter().cloned())?;
+    let own = Own::try_parse_from(rest).or_fail(ExitKind::Usage)?;
+    let name = arguments.name;
+    Ok(run_service(launch, |service| {
+        become_it(service, name, &own)
+    }))
+}
+
+fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
+    let resolved = Resolved::read(&own.plan)?;
+    let n_views = resolved.deployment.cameras.len();
+    let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
+    if per_view && own.index >= n_views {
+        let message = format!("there is no view {}, only {n_views}", own.index);
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let n_threads = if name == Name::Pose {
+        resolved.deployment.pose.threads
+    } else {
+        1
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .build_global()
+        .or_fail(ExitKind::Run)?;
+    match name {
+        Name::Capture => capture(service, &resolved, own.index),
+        Name::Pose => pose(service, &resolved, own.index),
+        Name::Quality => quality(service, &resolved, own.index),
+        Name::Fuse => fuse(service, &resolved, own.index),
+        Name::Triangulate => triangulate(service, &resolved),
+        Name::Record => record(service, &resolved),
+    }
+}
+
+fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
+    let deployment = &resolved.deployment;
+    let rig = inputs::rig(&deployment.rig, &ReadOptions::default())?;
+    let job = capture::Job {
+        view,
+        source: inputs::source(&deployment.cameras[view], &deployment.capture),
+        framing: prepare::framing(resolved, &rig, view)?,
+        mode: deployment.capture.mode,
+        pace: deployment.capture.pace,
+        n_consumers: 2, // pose and record
+        patience: resolved.patience(),
+    };
+    capture::run(service, &job)
+}
+
+fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let layout = Arc::new(prepared.views[view].plan.layout().clone());
+    let job = pose::Job {
+        view,
+        step: ViewStep::new(prepared.model, layout, prepared.settings.view),
+        // The workers, triangulate, record, and quality if there is one.
+        n_pose_consumers: dealing.n_workers + 2 + usize::from(resolved.has_quality()),
+        n_evidence_consumers: dealing.readers_of(view),
+        patience: resolved.patience(),
+    };
+    pose::run(service, &job)
+}
+
+fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let deployment = &resolved.deployment;
+    let config = &deployment.quality;
+    let file = config.table.as_ref().ok_or("there is no quality.table");
+    let file = file.or_fail(ExitKind::Config)?;
+    let table = inputs::quality_table(file, prepared.model.n_parts())?;
+    let selection = Selection {
+        subject: config.subject.clone().unwrap_or_default(),
+        action: config.action.clone().unwrap_or_default(),
+        frame_offset: config.frame_offset,
+        ..Selection::default()
+    };
+    let predictor = Predictor::from_table(&table, selection, &deployment.cameras[view].name);
+    let n_workers = Dealing::new(&prepared.pairs, deployment.fuse.workers).n_workers;
+    let job = quality::Job {
+        view,
+        predictor: predictor.map_err(|error| inputs::in_file(file, &error))?,
+        frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
+        n_consumers: n_workers + 1, // and record
+        patience: resolved.patience(),
+    };
+    quality::run(service, &job)
+}
+
+fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let plans = prepared.plans();
+    let job = fuse::Job {
+        worker,
+        pairs: dealing.of(worker),
+        step: FuseStep::new(
+            prepared.model,
+            prepared.settings.fuse,
+            plans.clone(),
+            prepared.settings.tables,
+        ),
+        plans,
+        has_quality: resolved.has_quality(),
+        n_consumers: 2, // triangulate and record
+        patience: resolved.patience(),
+    };
+    fuse::run(service, &job)
+}
+
+fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let plans = prepared.plans();
+    let step = SkeletonStep::new(
+        plans.clone(),
+        prepared.up_in_world,
+        prepared.settings.skeleton,
+    );
+    let job = triangulate::Job {
+        plans,
+        n_pairs: dealing.pairs.len(),
+        n_workers: dealing.n_workers,
+        n_consumers: 1, // record
+        // A pair that waits for a view takes this long itself.
+        patience: 2 * resolved.patience(),
+    };
+    triangulate::run(service, &job, step)
+}
+
+fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let deployment = &resolved.deployment;
+    let dealing = Dealing::new(&prepared.pairs, deployment.fuse.workers);
+    let views = prepared.views.iter().map(|it| record::View {
+        name: it.name.clone(),
+        framing: it.framing.clone(),
+        layout: Arc::new(it.plan.layout().clone()),
+    });
+    let scene = record::Scene {
+        views: views.collect(),
+        model: prepared.model,
+        joints: prepared.settings.skeleton.joints,
+        frame_rate_hz: resolved.frame_rate_hz(),
+        frame_step: deployment.capture.frame_step,
+        up_in_world: prepared.up_in_world,
+    };
+    let job = record::Job {
+        scene,
+        config: deployment.record.clone(),
+        output: deployment.output.clone(),
+        start_frame: deployment.capture.start_frame,
+        n_workers: dealing.n_workers,
+        has_quality: resolved.has_quality(),
+    };
+    record::run(service, job)
 }

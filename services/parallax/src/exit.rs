@@ -1,0 +1,42 @@
+//! How a command ends: the exit codes that users and scripts may rely on.
+
+use runtime::{ExitKind, Fault};
+
+use crate::deployment::ConfigError;
+
+/// The table of exit codes, as `--help` shows it.
+pub(crate) const EXIT_CODES: &str = "\
+Exit codes:
+    0  done
+    1  the run failed
+    2  the command line is wrong
+    3  the deployment file is wrong
+    4  an input is missing or unreadable (footage, model, calibration file, table)
+    5  the calibration cannot be used
+    6  a limit was missed
+    7  done, but degraded: views or processes were lost on the way
+  130  stopped by Ctrl-C
+
+Data goes to standard output, messages and progress to standard error.";
+
+impl Fault for ConfigError {
+    fn kind(&self) -> ExitKind {
+        match self {
+            Self::Read { .. } => ExitKind::Input,
+            _ => ExitKind::Config,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_is_in_the_table_that_users_read() {
+        for kind in ExitKind::ALL {
+            let line = format!("{:>5}  ", kind.status());
+            assert!(EXIT_CODES.contains(&line), "{kind:?}");
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! From a deployment to processes and topics.
+
+use core::time::Duration;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use runtime::{
+    Delivery, DeploymentPlan, ExitKind, Failure, Namespace, OrFail as _, TopicPlan, now_nanos,
+};
+use serde::{Deserialize, Serialize};
+use supervise::{Plan, Policy, ProcessSpec, Role};
+use tracing::Level;
+
+use crate::deployment::Deployment;
+use crate::inputs::{self, Footage};
+use crate::prepare::Prepared;
+
+/// A deployment with what was found out about its footage: what every process is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Resolved {
+    /// The deployment, all paths absolute.
+    pub deployment: Deployment,
+    /// The footage of every camera.
+    pub footage: Vec<Footage>,
+}
+
+impl Resolved {
+    /// Looks at the footage of a deployment.
+    pub(crate) fn new(deployment: &Deployment) -> Result<Self, Failure> {
+        Ok(Self {
+            footage: inputs::footage(deployment)?,
+            deployment: deployment.clone(),
+        })
+    }
+
+    /// Frames that will be used.
+    pub(crate) fn n_frames(&self) -> u64 {
+        self.footage.iter().map(|it| it.n_frames).max().unwrap_or(0)
+    }
+
+    /// Frames of the footage per second, where any camera knows.
+    pub(crate) fn frame_rate_hz(&self) -> Option<f64> {
+        let used = self.footage.iter().find_map(|it| it.frame_rate_hz)?;
+        Some(used * self.deployment.capture.frame_step as f64)
+    }
+
+    /// Writes it for the processes to read.
+    pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(self).or_fail(ExitKind::Run)?;
+        std::fs::write(file, text).map_err(|error| inputs::in_file(file, &error))
+    }
+
+    /// Reads what [`Self::write`] wrote.
+    pub(crate) fn read(file: &Path) -> Result<Self, Failure> {
+        let text = inputs::text(file)?;
+        serde_json::from_str(&text).map_err(|error| inputs::in_file(file, &error))
+    }
+
+    /// What happens when a receiver is slower than its sender.
+    pub(crate) fn delivery(&self) -> Delivery {
+        match self.deployment.capture.mode {
+            capture::Mode::Lossless => Delivery::Lossless,
+            capture::Mode::Realtime => Delivery::Realtime,
+        }
+    }
+
+    /// How long a stage waits for a view that is late.
+    pub(crate) fn patience(&self) -> Duration {
+        Duration::from_millis(self.deployment.deadline_ms())
+    }
+
+    /// Whether there are processes that send expected errors.
+    pub(crate) fn has_quality(&self) -> bool {
+        self.deployment.quality.table.is_some()
+    }
+}
+
+/// How the pairs of views are dealt, and who reads what of whom.
+#[derive(Debug, Clone)]
+pub(crate) struct Dealing {
+    /// Fusion processes.
+    pub n_workers: usize,
+    /// The pairs.
+    pub pairs: Vec<[usize; 2]>,
+}
+
+impl Dealing {
+    /// Deals the pairs to at most so many workers.
+    pub(crate) fn new(pairs: &[[usize; 2]], most_workers: usize) -> Self {
+        Self {
+            n_workers: most_workers.min(pairs.len()),
+            pairs: pairs.to_vec(),
+        }
+    }
+
+    /// The pairs of a worker, with their index in the deployment.
+    pub(crate) fn of(&self, worker: usize) -> Vec<(usize, [usize; 2])> {
+        let its = self.pairs.iter().copied().enumerate();
+        its.skip(worker).step_by(self.n_workers.max(1)).collect()
+    }
+
+    /// Workers that need the evidence of a view.
+    pub(crate) fn readers_of(&self, view: usize) -> usize {
+        let reads = |worker: &usize| self.of(*worker).iter().any(|it| it.1.contains(&view));
+        (0..self.n_workers).filter(reads).count()
+    }
+}
+
+/// The topics of a deployment.
+pub(crate) fn topics(
+    resolved: &Resolved,
+    prepared: &Prepared,
+    names: Vec<String>,
+) -> Vec<TopicPlan> {
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let views = prepared.views.iter().enumerate();
+    let plan = DeploymentPlan {
+        delivery: resolved.delivery(),
+        views: views
+            .map(|(view, it)| runtime::ViewPlan {
+                frame_bytes: it
+                    .framing
+                    .out_size()
+                    .map(|side| side as usize)
+                    .iter()
+                    .product::<usize>()
+                    * 3,
+                evidence_values: it.plan.layout().n_responses(),
+                n_workers: dealing.readers_of(view),
+            })
+            .collect(),
+        n_workers: dealing.n_workers,
+        n_recorders: 1,
+        held: 1,
+        processes: names,
+    };
+    plan.topics()
+}
+
+/// The processes of a deployment, consumers first.
+///
+/// * `file`: the resolved deployment, which every process reads.
+pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -> Vec<ProcessSpec> {
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let n_views = prepared.views.len();
+    let n_quality = if resolved.has_quality() { n_views } else { 0 };
+    let mut processes = vec![
+        process("record", None, Role::Optional, file),
+        process("triangulate", None, Role::Essential, file),
+    ];
+    for (service, count, role) in [
+        ("fuse", dealing.n_workers, Role::Redundant),
+        ("quality", n_quality, Role::Optional),
+        ("pose", n_views, Role::Redundant),
+        ("capture", n_views, Role::Redundant),
+    ] {
+        processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
+    }
+    processes
+}
+
+fn process(service: &str, index: Option<usize>, role: Role, file: &Path) -> ProcessSpec {
+    let mut args: Vec<OsString> = vec!["--plan".into(), file.into()];
+    if let Some(index) = index {
+        args.extend(["--index".into(), index.to_string().into()]);
+    }
+    ProcessSpec {
+        name: index.map_or(service.to_owned(), |it| format!("{service}-{it}")),
+        service: service.to_owned(),
+        args,
+        role,
+    }
+}
+
+/// What the supervisor is to run.
+pub(crate) fn plan(
+    resolved: &Resolved,
+    prepared: &Prepared,
+    file: &Path,
+    log: Level,
+) -> Result<Plan, Failure> {
+    let processes = processes(resolved, prepared, file);
+    let names = processes.iter().map(|it| it.name.clone()).collect();
+    let settings = &resolved.deployment.supervise;
+    Ok(Plan {
+        executable: executable()?,
+        namespace: Namespace::new(&resolved.deployment.name)?,
+        session: now_nanos(),
+        delivery: resolved.delivery(),
+        topics: topics(resolved, prepared, names),
+        processes,
+        policy: Policy {
+            max_restarts: settings.max_restarts as usize,
+            restart_window: Duration::from_secs(settings.restart_window_s),
+            ..Policy::default()
+        },
+        log,
+    })
+}
+
+/// This program, which becomes any of the services.
+fn executable() -> Result<PathBuf, Failure> {
+    std::env::current_exe().or_fail(ExitKind::Run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pair_has_one_worker() {
+        let pairs = pipeline::all_pairs(5);
+        for most in 1..12 {
+            let dealing = Dealing::new(&pairs, most);
+            let mut dealt: Vec<usize> = (0..dealing.n_workers)
+                .flat_map(|it| dealing.of(it))
+                .map(|it| it.0)
+                .collect();
+            dealt.sort_unstable();
+            assert_eq!(dealt, (0..10).collect::<Vec<_>>(), "{most} workers");
+        }
+    }
+
+    #[test]
+    fn a_view_is_read_by_the_workers_of_its_pairs() {
+        let dealing = Dealing::new(&[[0, 1], [0, 2], [1, 2]], 3);
+        assert_eq!([0, 1, 2].map(|it| dealing.readers_of(it)), [2, 2, 2]);
+        let dealing = Dealing::new(&[[0, 1]], 4);
+        assert_eq!([0, 1, 2].map(|it| dealing.readers_of(it)), [1, 1, 0]);
+    }
+
+    #[test]
+    fn one_camera_has_no_worker() {
+        let dealing = Dealing::new(&[], 4);
+        assert_eq!(dealing.n_workers, 0);
+        assert_eq!(dealing.readers_of(0), 0);
+    }
+}

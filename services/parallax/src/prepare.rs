@@ -1,0 +1,179 @@
+//! From a deployment and its footage to what the stages work with.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fmp::Model;
+use geometry::files::ReadOptions;
+use geometry::{Framing, OutSize, Rig, upright_roll};
+use multiview::{TypeTables, ViewPlan};
+use nalgebra::UnitVector3;
+use pipeline::{EstimatorSettings, SkeletonSettings, all_pairs};
+use runtime::{ExitKind, Failure, OrFail as _};
+use skeleton::JointSet;
+
+use crate::deployment::Deployment;
+use crate::inputs;
+use crate::plan::Resolved;
+
+/// One view, ready.
+#[derive(Debug, Clone)]
+pub(crate) struct View {
+    /// The camera's name.
+    pub name: String,
+    /// From its footage to the frames of the pipeline.
+    pub framing: Framing,
+    /// Camera, pyramid and cells of those frames.
+    pub plan: Arc<ViewPlan>,
+}
+
+/// What the stages of a deployment work with.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    /// The model.
+    pub model: Arc<Model>,
+    /// The views, as they are numbered.
+    pub views: Vec<View>,
+    /// The pairs of views that are fused, ascending.
+    pub pairs: Vec<[usize; 2]>,
+    /// Against gravity, where the rig knows.
+    pub up_in_world: Option<UnitVector3<f64>>,
+    /// The settings of all steps.
+    pub settings: EstimatorSettings,
+}
+
+impl Prepared {
+    /// Reads model and rig, and prepares the views.
+    pub(crate) fn new(resolved: &Resolved) -> Result<Self, Failure> {
+        let deployment = &resolved.deployment;
+        let model = inputs::model(&deployment.model)?;
+        let rig = inputs::rig(&deployment.rig, &ReadOptions::default())?;
+        let mut views = Vec::new();
+        for (index, camera) in deployment.cameras.iter().enumerate() {
+            let framing = framing(resolved, &rig, index)?;
+            let plan = pipeline::plan(&model, framing.camera()).or_fail(ExitKind::Input)?;
+            views.push(View {
+                name: camera.name.clone(),
+                framing,
+                plan,
+            });
+        }
+        let settings = settings(deployment, &model, &views)?;
+        Ok(Self {
+            pairs: pairs(deployment),
+            up_in_world: rig.up_in_world(),
+            model,
+            views,
+            settings,
+        })
+    }
+
+    /// The prepared views, as the steps take them.
+    pub(crate) fn plans(&self) -> Vec<Arc<ViewPlan>> {
+        self.views.iter().map(|it| Arc::clone(&it.plan)).collect()
+    }
+}
+
+/// From the footage of one camera to its frames.
+pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
+    let deployment = &resolved.deployment;
+    let entry = &deployment.cameras[index];
+    let camera = rig.camera(&entry.name).ok_or_else(|| {
+        let known: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+        let message = format!(
+            "{} has no camera {:?}; it has {}",
+            deployment.rig.display(),
+            entry.name,
+            known.join(", ")
+        );
+        Failure::new(ExitKind::Calibration, message)
+    })?;
+    let out_size = match (deployment.capture.size, deployment.capture.scale) {
+        (Some(size), _) => OutSize::Exact(size.map(|it| it as u32)),
+        (None, scale) => OutSize::Scale(scale.unwrap_or(1.0)),
+    };
+    let roll = if deployment.capture.upright {
+        upright_roll(camera, rig).unwrap_or(0.0)
+    } else {
+        0.0
+    };
+    let size = resolved.footage[index].size;
+    Framing::new(camera, size, entry.source_offset_px, out_size, roll).map_err(|error| {
+        let failure = Failure::new(
+            ExitKind::Calibration,
+            format!("camera {:?}: {error}", entry.name),
+        );
+        failure.with_hint(
+            "calibrate at the size of the footage; if the footage lacks rows or columns of the \
+             calibrated image, say where it begins: source_offset_px = [x, y] in its [[camera]]",
+        )
+    })
+}
+
+/// The pairs of views that are fused.
+fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
+    if deployment.fuse.pairs.is_empty() {
+        return all_pairs(deployment.cameras.len());
+    }
+    let mut pairs: Vec<[usize; 2]> = deployment
+        .fuse
+        .pairs
+        .iter()
+        .filter_map(|names| indices(deployment, names))
+        .map(|(pair, _)| pair)
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// The two cameras, ascending, and whether that exchanged them.
+fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<([usize; 2], bool)> {
+    let index = |name: &String| deployment.cameras.iter().position(|it| it.name == *name);
+    let [first, second] = [index(&names[0])?, index(&names[1])?];
+    Some(([first.min(second), first.max(second)], first > second))
+}
+
+fn settings(
+    deployment: &Deployment,
+    model: &Model,
+    views: &[View],
+) -> Result<EstimatorSettings, Failure> {
+    let scales = views.iter().map(|it| frame_scale(&it.framing));
+    let frame_scale = scales.sum::<f64>() / views.len().max(1) as f64;
+    let mut tables: Vec<(usize, usize, TypeTables)> = Vec::new();
+    for entry in &deployment.fuse.compatibility {
+        let Some(([first, second], swapped)) = indices(deployment, &entry.views) else {
+            continue;
+        };
+        let mut files: [&Path; 2] = [&entry.files[0], &entry.files[1]];
+        if swapped {
+            files.reverse();
+        }
+        tables.push((first, second, inputs::type_tables(files, model)?));
+    }
+    let joints = JointSet::by_name(&deployment.triangulate.joints);
+    let defaults = SkeletonSettings::default();
+    Ok(EstimatorSettings {
+        view: deployment.pose.settings(),
+        fuse: deployment
+            .fuse
+            .settings(deployment.pose.candidates, frame_scale as f32),
+        tables,
+        skeleton: SkeletonSettings {
+            joints: joints.unwrap_or(defaults.joints),
+            triangulation: geometry::Settings {
+                loss_px: deployment.triangulate.loss_px,
+                ..defaults.triangulation
+            },
+            facing: deployment.fuse.facing,
+            ..defaults
+        },
+    })
+}
+
+/// Pixels of the frame per pixel of the footage.
+pub(crate) fn frame_scale(framing: &Framing) -> f64 {
+    let [[a, b, _], [c, d, _]] = framing.source_from_output();
+    1.0 / (a * d - b * c).abs().sqrt()
+}

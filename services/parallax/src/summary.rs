@@ -1,0 +1,273 @@
+//! What a user sees of a run: its progress, and at the end what became of it.
+
+use core::fmt::Write as _;
+use core::time::Duration;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use runtime::ExitKind;
+use serde_json::{Value, json};
+use supervise::{Event, Outcome};
+
+use crate::output;
+use crate::plan::Resolved;
+
+/// Pause between two lines where no bar can be drawn.
+const PERIOD: Duration = Duration::from_secs(5);
+
+/// Shows progress: a bar on a terminal, else a line from time to time.
+#[derive(Debug)]
+pub(crate) struct Watcher {
+    bar: ProgressBar,
+    quiet: bool,
+    n_frames: u64,
+    n_done: u64,
+    said_at: Instant,
+    begin: Instant,
+}
+
+impl Watcher {
+    /// Begins.
+    pub(crate) fn new(n_frames: u64, quiet: bool) -> Self {
+        let bar = if quiet || !output::is_lively() {
+            ProgressBar::hidden()
+        } else {
+            ProgressBar::new(n_frames)
+        };
+        if let Ok(style) = ProgressStyle::with_template(
+            "{elapsed_precise} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left{msg}",
+        ) {
+            bar.set_style(style);
+        }
+        Self {
+            bar,
+            quiet,
+            n_frames,
+            n_done: 0,
+            said_at: Instant::now(),
+            begin: Instant::now(),
+        }
+    }
+
+    /// Takes note of what the supervisor tells.
+    pub(crate) fn note(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Health { process, health } if *process == "triangulate" => {
+                self.n_done = self.n_done.max(health.n_sent);
+                self.bar.set_position(self.n_done);
+                self.say_now_and_then();
+            }
+            Event::Line { text, .. } => self.say(text),
+            Event::Died { process, death } => self.say(&format!("{process} {death}")),
+            Event::Restarting { process, pause } => {
+                self.say(&format!(
+                    "{process} starts again in {} ms",
+                    pause.as_millis()
+                ));
+            }
+            Event::GivenUp { process, restarts } => {
+                self.say(&format!("{process} is given up after {restarts} restarts"));
+            }
+            _ => {}
+        }
+    }
+
+    /// Ends the bar.
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn say(&self, text: &str) {
+        self.bar.suspend(|| output::message(text));
+    }
+
+    fn say_now_and_then(&mut self) {
+        if self.quiet || output::is_lively() || self.said_at.elapsed() < PERIOD {
+            return;
+        }
+        self.said_at = Instant::now();
+        let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
+        output::message(format_args!(
+            "{} of {} frames, {rate:.2} a second",
+            self.n_done, self.n_frames
+        ));
+    }
+}
+
+/// What became of a run.
+#[derive(Debug)]
+pub(crate) struct Report {
+    name: String,
+    folder: String,
+    n_frames: u64,
+    seconds: f64,
+    interrupted: bool,
+    given_up: Vec<String>,
+    restarts: Vec<(String, u32)>,
+    n_dropped: u64,
+    /// `summary.json`, as the recorder wrote it; null if it did not.
+    recorded: Value,
+}
+
+impl Report {
+    /// Puts together what the supervisor and the recorder know.
+    pub(crate) fn new(resolved: &Resolved, outcome: &Outcome, elapsed: Duration) -> Self {
+        let folder = &resolved.deployment.output;
+        let recorded = std::fs::read_to_string(folder.join("summary.json")).unwrap_or_default();
+        let processes = &outcome.processes;
+        let given_up = processes
+            .iter()
+            .filter(|it| it.state == supervise::State::GivenUp);
+        let restarted = processes.iter().filter(|it| it.restarts > 0);
+        Self {
+            name: resolved.deployment.name.clone(),
+            folder: folder.display().to_string(),
+            n_frames: resolved.n_frames(),
+            seconds: elapsed.as_secs_f64(),
+            interrupted: outcome.interrupted,
+            given_up: given_up.map(|it| it.name.clone()).collect(),
+            restarts: restarted.map(|it| (it.name.clone(), it.restarts)).collect(),
+            n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
+            recorded: serde_json::from_str(&recorded).unwrap_or(Value::Null),
+        }
+    }
+
+    /// How the run ended, if not well.
+    pub(crate) fn kind(&self) -> Option<ExitKind> {
+        let count = |key: &str| self.recorded["summary"][key].as_u64().unwrap_or(0);
+        let lost = [
+            "frames_with_views_missing",
+            "frames_missed",
+            "writes_failed",
+        ];
+        if self.interrupted {
+            Some(ExitKind::Interrupted)
+        } else if !self.given_up.is_empty()
+            || self.recorded.is_null()
+            || lost.into_iter().any(|it| count(it) > 0)
+        {
+            Some(ExitKind::Degraded)
+        } else {
+            None
+        }
+    }
+
+    /// For programs.
+    pub(crate) fn json(&self) -> Value {
+        json!({
+            "schema_version": 1,
+            "name": self.name,
+            "output": self.folder,
+            "frames_in_footage": self.n_frames,
+            "seconds": self.seconds,
+            "interrupted": self.interrupted,
+            "degraded": self.kind() == Some(ExitKind::Degraded),
+            "given_up": self.given_up,
+            "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
+            "dropped": self.n_dropped,
+            "recorded": self.recorded,
+        })
+    }
+
+    /// For people.
+    pub(crate) fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _infallible = self.write(&mut text);
+        text.trim_end().to_owned()
+    }
+
+    fn write(&self, text: &mut String) -> core::fmt::Result {
+        let how = match self.kind() {
+            Some(ExitKind::Interrupted) => ", stopped",
+            Some(_) => ", degraded",
+            None => "",
+        };
+        writeln!(
+            text,
+            "{}: {} frames in {:.1} s{how}",
+            self.name, self.n_frames, self.seconds
+        )?;
+        writeln!(text, "  results       {}", self.folder)?;
+        let it = &self.recorded["summary"];
+        if self.recorded.is_null() {
+            writeln!(
+                text,
+                "  recorded      nothing: the recorder wrote no summary"
+            )?;
+        } else {
+            writeln!(
+                text,
+                "  3D            {} of {} frames",
+                it["frames_with_pose"], it["frames"]
+            )?;
+            if let Some(px) = it["reprojection_px"].as_f64() {
+                writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
+            }
+            self.write_views(text, &it["views_used"])?;
+            self.write_latency(text)?;
+        }
+        writeln!(
+            text,
+            "  lost          {} messages dropped, {} frames missed, {} frames with views missing, {} writes failed",
+            self.n_dropped,
+            it["frames_missed"].as_u64().unwrap_or(0),
+            it["frames_with_views_missing"].as_u64().unwrap_or(0),
+            it["writes_failed"].as_u64().unwrap_or(0),
+        )?;
+        let restarts: Vec<String> = self
+            .restarts
+            .iter()
+            .map(|(name, n)| format!("{name} {n}"))
+            .collect();
+        let none = || "none".to_owned();
+        let restarts = if restarts.is_empty() {
+            none()
+        } else {
+            restarts.join(", ")
+        };
+        writeln!(text, "  restarts      {restarts}")?;
+        if !self.given_up.is_empty() {
+            writeln!(text, "  given up      {}", self.given_up.join(", "))?;
+        }
+        Ok(())
+    }
+
+    fn write_views(&self, text: &mut String, used: &Value) -> core::fmt::Result {
+        let used: Vec<String> = used
+            .as_array()
+            .into_iter()
+            .flatten()
+            .map(|it| format!("{} {}", it[0].as_str().unwrap_or_default(), it[1]))
+            .collect();
+        writeln!(text, "  views used    {}", used.join(", "))
+    }
+
+    fn write_latency(&self, text: &mut String) -> core::fmt::Result {
+        let latency = &self.recorded["latency"];
+        writeln!(text, "  latency       {:>9} {:>9}  ms", "p50", "p99")?;
+        let rows = ["capture", "pose", "quality", "fuse", "triangulate"];
+        let stages = rows.map(|it| (it, &latency["stages"][it]));
+        for (name, it) in stages
+            .into_iter()
+            .chain([("end to end", &latency["end_to_end"])])
+        {
+            if let (Some(p50), Some(p99)) = (it["p50_ms"].as_f64(), it["p99_ms"].as_f64()) {
+                writeln!(text, "    {name:<11} {p50:>9.1} {p99:>9.1}")?;
+            }
+        }
+        let share = |key: &str| {
+            latency[key]
+                .as_f64()
+                .map(|it| format!("{:.2} %", 100.0 * it))
+        };
+        if let (Some(waiting), Some(transport)) = (share("share_waiting"), share("share_transport"))
+        {
+            writeln!(
+                text,
+                "    of the end-to-end time {waiting} is waiting for busy processes, {transport} transport"
+            )?;
+        }
+        Ok(())
+    }
+}
