@@ -7,6 +7,8 @@
 mod calibration;
 mod footage;
 mod models;
+mod parse_set;
+mod single_view;
 
 use std::path::{Path, PathBuf};
 
