@@ -364,6 +364,17 @@ mod tests {
     }
 
     #[test]
+    fn a_chain_that_goes_to_and_fro_settles() {
+        let to_and_fro = [0.0, 0.5, 0.5, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+        let second = Compatibility::of(vec![DMatrix::from_row_slice(3, 3, &to_and_fro)]);
+        let first = Compatibility::of(vec![DMatrix::identity(3, 3)]);
+        let (joint, _) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
+        let settled = [2.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0].map(|it| it / 8.0);
+        let settled = Compatibility::of(vec![DMatrix::from_row_slice(3, 3, &settled)]);
+        assert!(largest_difference(&joint, &settled) < 1e-12);
+    }
+
+    #[test]
     fn groups_that_never_meet_count_by_their_types() {
         let apart = table(&[[1.0, 0.0], [0.0, 1.0]]);
         let (joint, disagreement) = Compatibility::joint_from_conditionals(&apart, &apart).unwrap();
@@ -376,6 +387,8 @@ mod tests {
         let second = table(&[[0.5, 0.5], [0.0, 1.0]]);
         let first = table(&[[1.0, 0.0], [0.0, 0.0]]);
         let (joint, _) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
+        assert!(largest_difference(&joint, &table(&[[1.0, 0.0], [0.0, 0.0]])) < 1e-12);
+        let (joint, _) = Compatibility::joint_from_conditionals(&first, &second).unwrap();
         assert!(largest_difference(&joint, &table(&[[1.0, 0.0], [0.0, 0.0]])) < 1e-12);
         let nothing = table(&[[0.0; 2]; 2]);
         let (joint, disagreement) =

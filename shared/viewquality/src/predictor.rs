@@ -156,6 +156,8 @@ mod tests {
         for frame in [1, u64::MAX, i64::MAX as u64] {
             assert_eq!(predictor.sigma_px(frame), None);
         }
+        let predictor = Predictor::from_table(&table(), selection(6, 4), "C1").unwrap();
+        assert_eq!(predictor.sigma_px(1 << 62), None);
     }
 
     #[test]

@@ -204,6 +204,9 @@ mod tests {
         );
         let expected = format!("the file has {} bytes, its header says {n}", n - 1);
         assert_eq!(said_of(&bytes[..n - 1]), expected);
+        let longer = [&bytes[..], &[0]].concat();
+        let expected = format!("the file has {} bytes, its header says {n}", n + 1);
+        assert_eq!(said_of(&longer), expected);
         bytes[n - 1] ^= 1;
         assert!(said_of(&bytes).starts_with("the file is damaged: its checksum is "));
         bytes[8] = 2;

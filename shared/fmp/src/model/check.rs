@@ -472,5 +472,12 @@ mod tests {
             "part 1 mirrors part 3, but not the other way round or not on the same tree"
         );
         assert_eq!(said_of(|it| it.mirror = Some(vec![0, 1, 2])), "fine");
+        // Three arms in a ring: the tree stays, but nothing is exchanged in pairs.
+        let ring = said_of(|it| {
+            it.parts.push(it.parts[2].clone());
+            it.mirror = Some(vec![0, 2, 3, 1]);
+        });
+        let expected = "part 2 mirrors part 3, but not the other way round or not on the same tree";
+        assert_eq!(ring, expected);
     }
 }

@@ -73,6 +73,30 @@ fn a_part_with_one_type_reads_alike_in_both_releases() {
 }
 
 #[test]
+fn a_parent_with_one_type_may_never_go_with_one_of_its_child() {
+    let mut spec = per_pair();
+    spec.parts[0].filter_of_type.truncate(1);
+    for part in &mut spec.parts[1..] {
+        let edge = part.edge.as_mut().unwrap();
+        edge.bias.truncate(1);
+        let crate::Springs::PerTypePair(springs) = &mut edge.springs else {
+            unreachable!("planted per pair");
+        };
+        springs.truncate(1);
+    }
+    assert_eq!(parse(&file("model", &model(&spec), false)).unwrap(), spec);
+}
+
+#[test]
+fn an_array_whose_sizes_and_values_disagree_is_refused() {
+    let expected = "not a readable MATLAB level 5 file: an array of [1, 2] holds 3 values";
+    let said = said_of(&three_parts(), "maxsize", |it| {
+        *it = Mat::Numbers(vec![1, 2], vec![2.0; 3]);
+    });
+    assert_eq!(said, expected);
+}
+
+#[test]
 fn numbers_of_every_storage_are_read() {
     let cases: [(u32, &[u8], f64); 9] = [
         (MI_INT8, &[0xfe], -2.0),
