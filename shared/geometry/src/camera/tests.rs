@@ -1,3 +1,5 @@
+//! Projection, its slope and its inverse belong together.
+
 use proptest::prelude::*;
 
 use crate::testing::{camera, distance, point};

@@ -1,3 +1,5 @@
+//! Images of one point lie on the lines and curves of each other.
+
 use proptest::prelude::*;
 
 use crate::{

@@ -1,3 +1,5 @@
+//! The framed camera and the framed picture agree, whatever the lens and the roll.
+
 use nalgebra::Point2;
 use proptest::prelude::*;
 

@@ -1,3 +1,5 @@
+//! Distorting and undistorting are inverse as far as a lens reaches, and no further.
+
 use proptest::prelude::*;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! What a rig refuses, and where its cameras look.
+
 use nalgebra::Quaternion;
 use proptest::prelude::*;
 

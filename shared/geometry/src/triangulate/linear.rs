@@ -12,6 +12,7 @@ use super::{
 /// The direct linear transform with the point's last coordinate set to 1 (Hartley & Sturm 1997,
 /// "Linear-LS"), so that moving the world's origin moves the answer and nothing else. The second
 /// round divides every equation by the depth and multiplies it by f / σ: pixels instead of metres.
+/// The point may lie behind a camera; the refinement refuses that.
 pub(super) fn triangulate(
     views: &Views<'_>,
     used: Subset,
@@ -29,13 +30,7 @@ pub(super) fn triangulate(
         limit: min_angle,
     };
     let rough = solve(views, used, None).ok_or(parallel)?;
-    let point = solve(views, used, Some(&rough)).unwrap_or(rough);
-    for (view, seen, _) in views.iter(used) {
-        if (seen.camera.camera_from_world * point).z <= 0.0 {
-            return Err(TriangulateError::BehindCamera { view });
-        }
-    }
-    Ok(point)
+    Ok(solve(views, used, Some(&rough)).unwrap_or(rough))
 }
 
 /// The widest angle between two viewing rays, radians in [0, π].

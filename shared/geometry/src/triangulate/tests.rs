@@ -1,3 +1,5 @@
+//! Triangulation inverts projection, survives wild views, and says why where it cannot.
+
 use nalgebra::{Isometry3, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -143,6 +145,18 @@ fn the_covariance_is_the_spread_of_the_answer() {
         (spread - claimed).norm() < 0.1 * claimed.norm(),
         "{spread} {claimed}"
     );
+}
+
+proptest! {
+    #[test]
+    fn a_narrow_loss_finds_the_views_that_agree_from_afar(point in point(), wild in 0_usize..4, dx in 60.0..150.0, dy in 60.0..150.0) {
+        let cameras = ring(4, BARREL);
+        let mut noise = [Vector2::new(0.3, -0.2); 4];
+        noise[wild] = Vector2::new(dx, dy);
+        let settings = Settings { loss_px: 2.0, ..Settings::default() };
+        let got = triangulate(&observe(&cameras, &point, &noise), &settings).expect("a point");
+        prop_assert!((got.in_world - point).norm() < 0.02, "{} is not {}", got.in_world, point);
+    }
 }
 
 #[test]
