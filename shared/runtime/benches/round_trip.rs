@@ -97,7 +97,10 @@ fn answer(
 }
 
 fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
-    let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+    let base = tempfile::Builder::new()
+        .prefix("px")
+        .tempdir_in("/dev/shm")
+        .unwrap();
     let lock = Namespace::below("b", base.path())
         .unwrap()
         .acquire()

@@ -16,8 +16,8 @@ const SMALL_BUFFER_LOSSLESS: usize = 16;
 const LARGE_BUFFER: usize = 1;
 /// Subscribers of small topics beyond those of the deployment: the command line tools.
 const SPARE: usize = 2;
-/// Queues and management of one process, bytes; measured below this.
-const OVERHEAD_BYTES: u64 = 4 << 20;
+/// Queues and management of one process, bytes: ten times what is measured.
+const OVERHEAD_BYTES: u64 = 1 << 20;
 
 /// What decides the topics of a deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]

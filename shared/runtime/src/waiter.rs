@@ -98,6 +98,30 @@ impl Waiter {
         }
     }
 
+    /// Sleeps until the process is to stop, and calls `again` for every receiver that comes anew: one
+    /// that had to be restarted has not heard the last message.
+    ///
+    /// * `n_connected`: how many receivers there are.
+    ///
+    /// # Errors
+    ///
+    /// [`WaitError`], and what `again` fails with.
+    pub fn linger<E: From<WaitError>>(
+        &self,
+        n_connected: impl Fn() -> usize,
+        mut again: impl FnMut() -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut known = n_connected();
+        while self.wait(Duration::from_millis(20))? != Woken::Stop {
+            let now = n_connected();
+            if now > known {
+                again()?;
+            }
+            known = now;
+        }
+        Ok(())
+    }
+
     pub(crate) fn watch(&mut self, listener: Listener<ipc::Service>) {
         self.listeners.push(listener);
     }

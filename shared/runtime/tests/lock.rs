@@ -11,7 +11,7 @@ use runtime::{Bus, LockError, Namespace, NamespaceError, Stop, health_topic};
 
 #[test]
 fn a_deployment_that_runs_is_not_started_again() {
-    let base = tempfile::tempdir().unwrap();
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let lock = namespace.acquire().unwrap();
     let error = namespace.acquire().unwrap_err();
@@ -38,7 +38,7 @@ fn nothing_is_left_after_the_end() {
 
 #[test]
 fn what_a_killed_run_left_behind_is_removed() {
-    let base = tempfile::tempdir().unwrap();
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let leftover = format!("/dev/shm/{}123.data", namespace.prefix());
     fs::write(&leftover, "x").unwrap();
@@ -52,7 +52,7 @@ fn what_a_killed_run_left_behind_is_removed() {
 
 #[test]
 fn files_of_others_stay() {
-    let base = tempfile::tempdir().unwrap();
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let (own, other) = (namespace(base.path()), namespace(base.path()));
     let path = format!("/dev/shm/{}123.data", other.prefix());
     fs::write(&path, "x").unwrap();
@@ -63,7 +63,7 @@ fn files_of_others_stay() {
 
 #[test]
 fn a_deployment_with_a_living_process_is_left_alone() {
-    let base = tempfile::tempdir().unwrap();
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let bus = Bus::open(&namespace, "survivor", &Stop::new().unwrap()).unwrap();
     let error = namespace.acquire().unwrap_err();

@@ -42,7 +42,10 @@ pub(crate) struct Run {
 impl Case {
     /// * `processes`: name, behaviour, role.
     pub(crate) fn new(delivery: Delivery, processes: &[(&str, &str, Role)]) -> Self {
-        let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
+        let base = tempfile::Builder::new()
+            .prefix("px")
+            .tempdir_in("/dev/shm")
+            .unwrap();
         let frames = TopicPlan::slices::<u8, FrameHeader>(
             "data".to_owned(),
             delivery,

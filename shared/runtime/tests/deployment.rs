@@ -1,0 +1,174 @@
+//! All ports of a whole deployment at once.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::os::unix::fs::MetadataExt as _;
+
+use common::{Deployment, shared_memory};
+use messages::{
+    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+};
+use runtime::{
+    Bus, Delivery, DeploymentPlan, Publisher, SlicePublisher, SliceSubscriber, Subscriber,
+    TopicPlan, ViewPlan, Waiter,
+};
+
+const N_VIEWS: usize = 8;
+const N_WORKERS: usize = 3;
+
+fn plan(delivery: Delivery) -> DeploymentPlan {
+    let stages = ["capture", "pose", "quality"];
+    let per_view = (0..N_VIEWS).flat_map(|view| stages.map(|stage| format!("{stage}-{view}")));
+    let view = ViewPlan {
+        frame_bytes: 30_000,
+        evidence_values: 50_000,
+        n_workers: N_WORKERS,
+    };
+    DeploymentPlan {
+        delivery,
+        views: vec![view; N_VIEWS],
+        n_workers: N_WORKERS,
+        n_recorders: 1,
+        held: 2,
+        processes: per_view
+            .chain((0..N_WORKERS).map(|worker| format!("fuse-{worker}")))
+            .chain(["triangulate".to_owned(), "record".to_owned()])
+            .collect(),
+    }
+}
+
+/// The ports of all processes, each with a bus of its own.
+#[derive(Default)]
+struct Ports {
+    frames_out: Vec<SlicePublisher<u8, FrameHeader>>,
+    frames_in: Vec<SliceSubscriber<u8, FrameHeader>>,
+    evidence_out: Vec<SlicePublisher<f32, EvidenceHeader>>,
+    evidence_in: Vec<SliceSubscriber<f32, EvidenceHeader>>,
+    poses_out: Vec<Publisher<ViewPose>>,
+    poses_in: Vec<Subscriber<ViewPose>>,
+    quality_out: Vec<Publisher<ViewQuality>>,
+    quality_in: Vec<Subscriber<ViewQuality>>,
+    pairs_out: Vec<Publisher<PairPose>>,
+    pairs_in: Vec<Subscriber<PairPose>>,
+    result_out: Vec<Publisher<Pose3d>>,
+    result_in: Vec<Subscriber<Pose3d>>,
+    health_out: Vec<Publisher<Health>>,
+    kept: Vec<(Waiter, Bus)>,
+}
+
+impl Ports {
+    fn open(&mut self, deployment: &Deployment, process: &str) {
+        let bus = deployment.bus(process);
+        let mut waiter = bus.waiter();
+        self.health_out
+            .push(bus.publisher(&topic::health(process)).unwrap());
+        let (stage, index) = process.split_once('-').unwrap_or((process, "0"));
+        let index = index.parse().unwrap();
+        match stage {
+            "capture" => self
+                .frames_out
+                .push(bus.slice_publisher(&topic::frame(index)).unwrap()),
+            "pose" => self.open_pose(&bus, &mut waiter, index),
+            "quality" => {
+                self.poses_in.push(
+                    bus.subscriber(&topic::view_pose(index), &mut waiter)
+                        .unwrap(),
+                );
+                self.quality_out
+                    .push(bus.publisher(&topic::view_quality(index)).unwrap());
+            }
+            "fuse" => self.open_fuse(&bus, &mut waiter, index),
+            _ => self.open_last(&bus, &mut waiter, stage == "record"),
+        }
+        self.kept.push((waiter, bus));
+    }
+
+    fn open_pose(&mut self, bus: &Bus, waiter: &mut Waiter, view: usize) {
+        self.frames_in
+            .push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
+        self.poses_out
+            .push(bus.publisher(&topic::view_pose(view)).unwrap());
+        self.evidence_out
+            .push(bus.slice_publisher(&topic::evidence(view)).unwrap());
+    }
+
+    fn open_fuse(&mut self, bus: &Bus, waiter: &mut Waiter, worker: usize) {
+        for view in 0..N_VIEWS {
+            self.evidence_in.push(
+                bus.slice_subscriber(&topic::evidence(view), waiter)
+                    .unwrap(),
+            );
+            self.poses_in
+                .push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            self.quality_in
+                .push(bus.subscriber(&topic::view_quality(view), waiter).unwrap());
+        }
+        self.pairs_out
+            .push(bus.publisher(&topic::pair_pose(worker)).unwrap());
+    }
+
+    /// Triangulate, which publishes the result, and record, which sees everything.
+    fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
+        for view in 0..N_VIEWS {
+            self.poses_in
+                .push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            if records {
+                self.frames_in
+                    .push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
+                self.quality_in
+                    .push(bus.subscriber(&topic::view_quality(view), waiter).unwrap());
+            }
+        }
+        for worker in 0..N_WORKERS {
+            self.pairs_in
+                .push(bus.subscriber(&topic::pair_pose(worker), waiter).unwrap());
+        }
+        if records {
+            self.result_in
+                .push(bus.subscriber(&topic::pose3d(), waiter).unwrap());
+        } else {
+            self.result_out
+                .push(bus.publisher(&topic::pose3d()).unwrap());
+        }
+    }
+}
+
+#[test]
+fn a_deployment_of_eight_views_fits_its_topics_and_its_plan_of_memory() {
+    runtime::raise_file_limit();
+    for delivery in [Delivery::Realtime, Delivery::Lossless] {
+        let plan = plan(delivery);
+        let topics = plan.topics();
+        let deployment = Deployment::new(&topics);
+        let mut ports = Ports::default();
+        for process in &plan.processes {
+            ports.open(&deployment, process);
+        }
+        // One of everything, so that all queues exist.
+        for publisher in &ports.frames_out {
+            assert_eq!(publisher.loan(30_000).unwrap().send().unwrap(), 2);
+        }
+        for publisher in &ports.evidence_out {
+            assert_eq!(publisher.loan(50_000).unwrap().send().unwrap(), N_WORKERS);
+        }
+        for publisher in &ports.poses_out {
+            assert_eq!(publisher.send(&ViewPose::default()).unwrap(), N_WORKERS + 3);
+        }
+        let used: u64 = shared_memory(deployment.namespace())
+            .iter()
+            .map(|name| {
+                std::fs::metadata(format!("/dev/shm/{name}"))
+                    .unwrap()
+                    .blocks()
+                    * 512
+            })
+            .sum();
+        let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
+        let overhead = used.saturating_sub(pools) / plan.processes.len() as u64;
+        assert!(
+            overhead <= 1 << 20,
+            "{overhead} bytes a process beyond the pools of {pools}"
+        );
+    }
+}
