@@ -7,6 +7,7 @@
 mod calibration;
 mod footage;
 mod models;
+mod multi_view;
 mod parse_set;
 mod single_view;
 

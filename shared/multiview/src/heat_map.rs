@@ -10,34 +10,32 @@
 const STRAIGHT: f32 = 0.955;
 const DIAGONAL: f32 = 1.3693;
 
-/// Heat of a line through a map.
+/// Heat of an epipolar line, as the released program has it: 1 on the line, 0 in the farthest cell.
+///
+/// `1 - sqrt(d / d_max)` with `d` a cell's chamfer distance from the line, `d_max` the map's largest;
+/// zeros if the line misses the image. Public for comparison with the program; the terms of
+/// [`EnergyKind::Released`](crate::EnergyKind::Released) are made of it.
 ///
 /// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
 ///   pixels (from 1); rounded half to even, then used as if counted from 0.
 /// * `image_size`: `[width, height]`, pixels.
 /// * `rows`, `cols`: size of the response map; returns one value per cell, row major.
-pub(crate) fn heat_map(
-    ends: [[f64; 2]; 2],
-    image_size: [usize; 2],
-    rows: usize,
-    cols: usize,
-) -> Vec<f32> {
-    let mut distance = vec![f32::INFINITY; rows * cols];
-    for (cell, covered) in coverage(ends, image_size, rows, cols).iter().enumerate() {
-        // Eight-bit averaging: white (255) turns to 254 from half a grey level on.
-        if *covered > 0.5 / 255.0 {
-            distance[cell] = 0.0;
+pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: usize) -> Vec<f32> {
+    let covered = coverage(ends, image_size, rows, cols);
+    // Eight-bit averaging: white (255) turns to 254 from half a grey level on.
+    let on_line = |covered: f64| covered > 0.5 / 255.0;
+    let distance = |covered: f64| if on_line(covered) { 0.0 } else { f32::INFINITY };
+    let mut map: Vec<f32> = covered.into_iter().map(distance).collect();
+    chamfer(&mut map, cols);
+    let largest = map.iter().copied().fold(0.0, f32::max);
+    if largest.is_finite() && largest > 0.0 {
+        for it in &mut map {
+            *it = 1.0 - (*it / largest).sqrt();
         }
+    } else {
+        map.fill(0.0);
     }
-    chamfer(&mut distance, rows, cols);
-    let largest = distance.iter().copied().fold(0.0, f32::max);
-    if !largest.is_finite() || largest == 0.0 {
-        return vec![0.0; rows * cols];
-    }
-    distance
-        .iter()
-        .map(|d| 1.0 - (d / largest).sqrt())
-        .collect()
+    map
 }
 
 /// Share of every cell that the line covers.
@@ -116,7 +114,7 @@ fn clip(ends: [[i64; 2]; 2], [right, bottom]: [i64; 2]) -> Option<[[i64; 2]; 2]>
 }
 
 /// Pixels of an 8-connected line (Bresenham), drawn from left to right.
-fn line_pixels(from: [i64; 2], to: [i64; 2]) -> Vec<[i64; 2]> {
+fn line_pixels(from: [i64; 2], to: [i64; 2]) -> impl Iterator<Item = [i64; 2]> {
     let ([x1, y1], [x2, y2]) = if to[0] < from[0] {
         (to, from)
     } else {
@@ -126,47 +124,47 @@ fn line_pixels(from: [i64; 2], to: [i64; 2]) -> Vec<[i64; 2]> {
     let steep = dy > dx;
     let (long, short) = if steep { (dy, dx) } else { (dx, dy) };
     let (mut at, mut error) = ([x1, y1], long - 2 * short);
-    (0..=long)
-        .map(|_| {
-            let pixel = at;
-            let sideways = error < 0;
-            error += if sideways { 2 * long } else { 0 } - 2 * short;
-            at[0] += i64::from(!steep || sideways);
-            at[1] += if steep || sideways { down } else { 0 };
-            pixel
-        })
-        .collect()
+    (0..=long).map(move |_| {
+        let pixel = at;
+        let sideways = error < 0;
+        error += if sideways { 2 * long } else { 0 } - 2 * short;
+        at[0] += i64::from(!steep || sideways);
+        at[1] += if steep || sideways { down } else { 0 };
+        pixel
+    })
 }
 
-/// Two passes of the 3x3 chamfer distance transform, in place.
-fn chamfer(distance: &mut [f32], rows: usize, cols: usize) {
-    let forward = [
-        (-1, -1, DIAGONAL),
-        (-1, 0, STRAIGHT),
-        (-1, 1, DIAGONAL),
-        (0, -1, STRAIGHT),
-    ];
-    let relax = |distance: &mut [f32], row: usize, col: usize, sign: isize| {
-        for (down, right, weight) in forward {
-            let y = row.checked_add_signed(sign * down);
-            let x = col.checked_add_signed(sign * right);
-            if let (Some(y), Some(x)) = (y.filter(|it| *it < rows), x.filter(|it| *it < cols)) {
-                let through = distance[y * cols + x] + weight;
-                let here = &mut distance[row * cols + col];
-                *here = here.min(through);
-            }
+/// The 3x3 chamfer distance transform in place: down and to the right, then up and to the left.
+fn chamfer(distance: &mut [f32], cols: usize) {
+    let along_row = |before: f32, here: &mut f32| {
+        *here = here.min(before + STRAIGHT);
+        *here
+    };
+    let mut rows: Vec<&mut [f32]> = distance.chunks_exact_mut(cols.max(1)).collect();
+    for row in 0..rows.len() {
+        if let [.., above, here] = &mut rows[..=row] {
+            across_rows(above, here);
+        }
+        rows[row].iter_mut().fold(f32::INFINITY, along_row);
+    }
+    for row in (0..rows.len()).rev() {
+        if let [here, below, ..] = &mut rows[row..] {
+            across_rows(below, here);
+        }
+        rows[row].iter_mut().rev().fold(f32::INFINITY, along_row);
+    }
+}
+
+/// Steps from one row to the next, straight and to either side.
+fn across_rows(from: &[f32], here: &mut [f32]) {
+    let step = |from: &[f32], here: &mut [f32], length: f32| {
+        for (from, here) in from.iter().zip(here) {
+            *here = here.min(from + length);
         }
     };
-    for row in 0..rows {
-        for col in 0..cols {
-            relax(distance, row, col, 1);
-        }
-    }
-    for row in (0..rows).rev() {
-        for col in (0..cols).rev() {
-            relax(distance, row, col, -1);
-        }
-    }
+    step(from, here, STRAIGHT);
+    step(from, &mut here[1..], DIAGONAL);
+    step(&from[1..], here, DIAGONAL);
 }
 
 #[cfg(test)]

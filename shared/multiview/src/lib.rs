@@ -29,6 +29,7 @@ pub use facing::{
     Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
     rank_facing,
 };
+pub use heat_map::heat_map;
 pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair};
 pub use settings::{EnergyKind, Settings, TypeTables};
 pub use start::{Start, choose_start};
