@@ -232,9 +232,9 @@ impl<'a> Camera<'a> {
     }
 
     fn end(&self) -> Result<(), Failure> {
-        self.send_empty(u64::MAX, Status::END)?;
+        let say = || self.send_empty(u64::MAX, Status::END);
+        say()?;
         self.service.health().finished();
-        while self.waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
-        Ok(())
+        self.waiter.linger(|| self.publisher.n_connected(), say)
     }
 }

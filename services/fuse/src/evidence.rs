@@ -27,6 +27,14 @@ impl Evidence {
         })
     }
 
+    /// Takes what there is if nothing is held; its sender waits until it has been heard once.
+    pub(crate) fn listen(&mut self) -> Result<(), Failure> {
+        if self.held.is_none() {
+            self.held = self.subscriber.receive()?;
+        }
+        Ok(())
+    }
+
     /// Gives back what is older than `frame`, and takes what there is up to it.
     pub(crate) fn advance(&mut self, frame: u64) -> Result<(), Failure> {
         let is_old = |it: &Sample<f32, EvidenceHeader>, session| {

@@ -100,7 +100,7 @@ impl<'a> Worker<'a> {
         Ok(Self {
             service,
             job,
-            joiner: Joiner::new(n_views + qualities.len(), job.patience.as_nanos() as u64),
+            joiner: joiner(service.delivery(), n_views + qualities.len(), job.patience),
             poses,
             qualities,
             evidence,
@@ -110,14 +110,23 @@ impl<'a> Worker<'a> {
 
     /// Takes in what has come. Inputs are numbered poses first, then expected errors.
     fn listen(&mut self) -> Result<(), Failure> {
+        for evidence in self.evidence.iter_mut().flatten() {
+            evidence.listen()?;
+        }
         let n_views = self.poses.len();
         for view in 0..n_views {
+            if self.poses[view].n_publishers() > 0 {
+                self.joiner.alive(view, now_nanos());
+            }
             while let Some(message) = self.poses[view].receive()? {
                 let (stamp, status) = (message.stamp, message.status);
                 self.take(view, stamp, status, Word::Pose(Box::new(message)));
             }
         }
         for view in 0..self.qualities.len() {
+            if self.qualities[view].n_publishers() > 0 {
+                self.joiner.alive(n_views + view, now_nanos());
+            }
             while let Some(message) = self.qualities[view].receive()? {
                 let (stamp, status) = (message.stamp, message.status);
                 let word = Word::Quality(Box::new(message));
@@ -236,17 +245,26 @@ impl<'a> Worker<'a> {
     }
 
     fn end(&self, waiter: &Waiter) -> Result<(), Failure> {
-        self.publisher.send(&PairPose {
-            stamp: Stamp {
-                session: self.service.session(),
-                ..Stamp::default()
-            },
-            status: Status::END,
-            ..PairPose::default()
-        })?;
+        let mut end = PairPose::default();
+        end.stamp.session = self.service.session();
+        end.status = Status::END;
+        let say = || -> Result<(), Failure> {
+            self.publisher.send(&end)?;
+            Ok(())
+        };
+        say()?;
         self.service.health().finished();
-        while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
-        Ok(())
+        waiter.linger(|| self.publisher.n_connected(), say)
+    }
+}
+
+/// Where nothing may be lost, a process that is there may take ten times as long: it is computing.
+fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Word> {
+    let nanos = patience.as_nanos() as u64;
+    let joiner = Joiner::new(n_inputs, nanos);
+    match delivery {
+        Delivery::Lossless => joiner.with_patience_for_alive(10 * nanos),
+        Delivery::Realtime => joiner,
     }
 }
 

@@ -57,6 +57,9 @@ pub(crate) struct Deployment {
 pub(crate) struct Supervision {
     /// How long a stage waits for a view that is late, milliseconds; by mode if not given.
     pub deadline_ms: Option<u64>,
+    /// How long the main loop of a process may stand still before it is killed, seconds; by mode if
+    /// not given.
+    pub hang_limit_s: Option<u64>,
     /// Most restarts of one process within the window before it is given up.
     pub max_restarts: u32,
     /// The window in which restarts are counted, seconds.
@@ -67,6 +70,7 @@ impl Default for Supervision {
     fn default() -> Self {
         Self {
             deadline_ms: None,
+            hang_limit_s: None,
             max_restarts: 5,
             restart_window_s: 60,
         }
@@ -81,6 +85,16 @@ impl Deployment {
             .unwrap_or(match self.capture.mode {
                 capture::Mode::Lossless => 10_000,
                 capture::Mode::Realtime => 200,
+            })
+    }
+
+    /// How long the main loop of a process may stand still before it is killed, seconds.
+    pub(crate) fn hang_limit_s(&self) -> u64 {
+        self.supervise
+            .hang_limit_s
+            .unwrap_or(match self.capture.mode {
+                capture::Mode::Lossless => 120,
+                capture::Mode::Realtime => 10,
             })
     }
 

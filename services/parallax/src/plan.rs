@@ -192,6 +192,7 @@ pub(crate) fn plan(
         policy: Policy {
             max_restarts: settings.max_restarts as usize,
             restart_window: Duration::from_secs(settings.restart_window_s),
+            hang_limit: Duration::from_secs(resolved.deployment.hang_limit_s()),
             ..Policy::default()
         },
         log,

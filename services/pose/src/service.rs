@@ -163,13 +163,17 @@ impl View<'_> {
     }
 
     fn end(&self, stamp: &Stamp, waiter: &Waiter) -> Result<(), Failure> {
-        self.poses.send(&ViewPose {
+        let end = ViewPose {
             stamp: *stamp,
             status: Status::END,
             ..ViewPose::default()
-        })?;
+        };
+        let say = || -> Result<(), Failure> {
+            self.poses.send(&end)?;
+            Ok(())
+        };
+        say()?;
         self.service.health().finished();
-        while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
-        Ok(())
+        waiter.linger(|| self.poses.n_connected(), say)
     }
 }

@@ -38,13 +38,18 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
                 continue;
             }
             if pose.status == Status::END {
-                publisher.send(&ViewQuality {
+                let end = ViewQuality {
                     stamp: pose.stamp,
                     status: Status::END,
                     ..ViewQuality::default()
-                })?;
+                };
+                let say = || -> Result<(), Failure> {
+                    publisher.send(&end)?;
+                    Ok(())
+                };
+                say()?;
                 service.health().finished();
-                continue;
+                return waiter.linger(|| publisher.n_connected(), say);
             }
             let received_at_nanos = now_nanos();
             service.health().received(1);

@@ -8,7 +8,8 @@ use messages::{PairPose, Pose3d, Stamp, Status, Timing, ViewPose, topic};
 use multiview::ViewPlan;
 use pipeline::{Answer, PairAnswer, SkeletonStep};
 use runtime::{
-    ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken, now_nanos,
+    Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
+    now_nanos,
 };
 
 /// What the process has to do.
@@ -80,7 +81,7 @@ impl<'a> Stage<'a> {
         Ok(Self {
             service,
             job,
-            joiner: Joiner::new(poses.len() + job.n_pairs, job.patience.as_nanos() as u64),
+            joiner: joiner(service.delivery(), poses.len() + job.n_pairs, job.patience),
             poses,
             pairs,
             publisher: bus.publisher(&topic::pose3d())?,
@@ -91,6 +92,9 @@ impl<'a> Stage<'a> {
     fn listen(&mut self) -> Result<(), Failure> {
         let n_views = self.poses.len();
         for view in 0..n_views {
+            if self.poses[view].n_publishers() > 0 {
+                self.joiner.alive(view, now_nanos());
+            }
             while let Some(message) = self.poses[view].receive()? {
                 if message.stamp.session != self.service.session() {
                     continue;
@@ -103,13 +107,18 @@ impl<'a> Stage<'a> {
             }
         }
         for worker in 0..self.pairs.len() {
+            let its = (worker..self.job.n_pairs).step_by(self.job.n_workers);
+            if self.pairs[worker].n_publishers() > 0 {
+                let now = now_nanos();
+                its.clone()
+                    .for_each(|pair| self.joiner.alive(n_views + pair, now));
+            }
             while let Some(message) = self.pairs[worker].receive()? {
                 if message.stamp.session != self.service.session() {
                     continue;
                 }
                 if message.status == Status::END {
-                    let its = (worker..self.job.n_pairs).step_by(self.job.n_workers);
-                    its.for_each(|pair| self.joiner.end(n_views + pair));
+                    its.clone().for_each(|pair| self.joiner.end(n_views + pair));
                 } else {
                     let input = n_views + message.stamp.view as usize;
                     self.take(input, message.stamp.frame, Word::Pair(Box::new(message)));
@@ -186,11 +195,24 @@ impl<'a> Stage<'a> {
     }
 
     fn end(&self, waiter: &Waiter) -> Result<(), Failure> {
-        self.publisher
-            .send(&wire::end_of_results(self.service.session()))?;
+        let say = || -> Result<(), Failure> {
+            let end = wire::end_of_results(self.service.session());
+            self.publisher.send(&end)?;
+            Ok(())
+        };
+        say()?;
         self.service.health().finished();
-        while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
-        Ok(())
+        waiter.linger(|| self.publisher.n_connected(), say)
+    }
+}
+
+/// Where nothing may be lost, a process that is there may take ten times as long: it is computing.
+fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Word> {
+    let nanos = patience.as_nanos() as u64;
+    let joiner = Joiner::new(n_inputs, nanos);
+    match delivery {
+        Delivery::Lossless => joiner.with_patience_for_alive(10 * nanos),
+        Delivery::Realtime => joiner,
     }
 }
 

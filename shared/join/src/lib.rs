@@ -31,6 +31,7 @@ pub struct Joiner<T> {
     inputs: Vec<Input>,
     pending: BTreeMap<u64, Slot<T>>,
     patience_nanos: u64,
+    alive_patience_nanos: u64,
     /// Frames below this have been given out.
     next_frame: u64,
 }
@@ -39,8 +40,19 @@ pub struct Joiner<T> {
 struct Input {
     last_frame: Option<u64>,
     heard_at: Option<u64>,
+    alive_at: Option<u64>,
     ended: bool,
     down: bool,
+}
+
+impl Input {
+    /// Whether it has been silent for too long; `patience` with nobody there, and with somebody.
+    fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
+        let elapsed = |at: u64| now.saturating_sub(at);
+        let silence = elapsed(began_at.max(self.heard_at.unwrap_or(0)));
+        let absence = silence.min(self.alive_at.map_or(u64::MAX, elapsed));
+        absence >= patience[0] || silence >= patience[1]
+    }
 }
 
 #[derive(Debug)]
@@ -58,7 +70,22 @@ impl<T> Joiner<T> {
             inputs: vec![Input::default(); n_inputs],
             pending: BTreeMap::new(),
             patience_nanos,
+            alive_patience_nanos: patience_nanos,
             next_frame: 0,
+        }
+    }
+
+    /// With another patience for inputs that are known to be alive: they may be busy.
+    #[must_use]
+    pub fn with_patience_for_alive(mut self, nanos: u64) -> Self {
+        self.alive_patience_nanos = nanos;
+        self
+    }
+
+    /// Notes that whoever sends on an input is alive, though it has nothing to say yet.
+    pub fn alive(&mut self, input: usize, now: u64) {
+        if let Some(it) = self.inputs.get_mut(input) {
+            it.alive_at = Some(now);
         }
     }
 
@@ -101,16 +128,17 @@ impl<T> Joiner<T> {
     /// is given up on is not waited for again until it speaks.
     pub fn next(&mut self, now: u64) -> Option<Joined<T>> {
         let (&frame, slot) = self.pending.first_key_value()?;
+        let patience = [self.patience_nanos, self.alive_patience_nanos];
         for (it, item) in self.inputs.iter_mut().zip(&slot.items) {
             let past = it.ended || it.down || it.last_frame.is_some_and(|last| last > frame);
             if item.is_some() || past {
                 continue;
             }
-            let since = slot.began_at.max(it.heard_at.unwrap_or(0));
-            if now.saturating_sub(since) < self.patience_nanos {
+            if it.silent_since(slot.began_at, now, patience) {
+                it.down = true;
+            } else {
                 return None;
             }
-            it.down = true;
         }
         let (frame, slot) = self.pending.pop_first()?;
         self.next_frame = frame + 1;
@@ -144,9 +172,10 @@ impl<T> Joiner<T> {
     /// Whether there is nothing more to come: all inputs have ended, or one has and the others have
     /// been silent for too long, and every frame was given out.
     pub fn is_over(&self, now: u64) -> bool {
+        let patience = [self.patience_nanos, self.alive_patience_nanos];
         let silent = |it: &Input| {
             it.heard_at
-                .is_some_and(|at| now.saturating_sub(at) >= self.patience_nanos)
+                .is_some_and(|at| it.silent_since(at, now, patience))
         };
         self.pending.is_empty()
             && self.inputs.iter().any(|it| it.ended)
@@ -213,6 +242,26 @@ mod tests {
             joiner.push(1, frame, (), now);
             assert_eq!(frames(&mut joiner, now), [(frame, vec![true, true])]);
         }
+    }
+
+    #[test]
+    fn an_input_that_is_there_may_take_longer() {
+        let mut joiner = Joiner::new(2, 100).with_patience_for_alive(1000);
+        joiner.push(0, 0, (), 0);
+        for now in (0..1000).step_by(50) {
+            joiner.alive(1, now);
+            assert_eq!(frames(&mut joiner, now), []);
+        }
+        assert_eq!(frames(&mut joiner, 1000), [(0, vec![true, false])]);
+    }
+
+    #[test]
+    fn an_input_that_has_gone_is_given_the_short_patience() {
+        let mut joiner = Joiner::new(2, 100).with_patience_for_alive(1000);
+        joiner.push(0, 0, (), 0);
+        joiner.alive(1, 50);
+        assert_eq!(frames(&mut joiner, 149), []);
+        assert_eq!(frames(&mut joiner, 150), [(0, vec![true, false])]);
     }
 
     #[test]

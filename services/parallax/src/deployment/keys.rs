@@ -163,6 +163,10 @@ const KEYS: &[(&str, &str)] = &[
         "how long a stage waits for a late view; 10000 lossless, 200 realtime",
     ),
     (
+        "supervise.hang_limit_s",
+        "how long a process may stand still before it is killed, seconds; 120 lossless, 10 realtime",
+    ),
+    (
         "supervise.max_restarts",
         "restarts of one process within the window before it is given up",
     ),
