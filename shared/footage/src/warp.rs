@@ -63,8 +63,8 @@ pub enum WarpError {
 ///   the rectangle that the output pixel covers, exact up to rounding to a grey level (half up);
 /// * any other: the mean of `n × m` bilinear samples, spread evenly over the output pixel and at most
 ///   one source pixel apart. For a turned image this is what turning it at full size (bilinear) and
-///   averaging areas afterwards gives. Positions are rounded to 1/32 source pixel, or to 1/8 output
-///   pixel where that is finer than it needs to be.
+///   averaging areas afterwards gives. Positions are rounded to 1/32 source pixel; from 4 source pixels
+///   per output pixel on coarser, but never coarser than 1/64 output pixel.
 ///
 /// The same bits on every machine: sums are of integers, or of `f32` in a fixed order.
 #[derive(Debug, Clone)]
