@@ -149,6 +149,15 @@ mod tests {
     }
 
     #[test]
+    fn a_gradient_between_two_orientations_votes_for_the_first() {
+        let data = (0..3 * 24 * 24).map(|at| f64::from(u8::from(at / 24 % 24 >= 12)) * 200.0);
+        let map = hog_f64(&Planes::from_samples(24, 24, data.collect()), SHAPE);
+        let cols = SHAPE.map_size(24, 24)[1];
+        let cell = &map[((3 + 2) * cols + 4 + 2) * N_CHANNELS..][..N_CHANNELS];
+        assert!(cell[4] > 0.3 && cell[5] == 0.0, "{cell:?}");
+    }
+
+    #[test]
     fn padding_is_zero_but_for_its_own_channel() {
         let map = hog_f64(&Planes::from_samples(16, 16, vec![9.0; 3 * 256]), SHAPE);
         let [rows, cols] = SHAPE.map_size(16, 16);

@@ -149,7 +149,7 @@ proptest! {
     }
 
     #[test]
-    fn distinct_poses_begin_with_the_best_and_keep_their_distance(
+    fn distinct_poses_are_a_greedy_choice_that_begins_with_the_best(
         seed in any::<u64>(),
         separation in 0.0..3.0_f64,
     ) {
@@ -158,20 +158,47 @@ proptest! {
         let evidence = Evidence::new(&mut noise, &model, &[[12, 9], [6, 5]]);
         let evidence = evidence.view();
         let solver = Solver::new(Arc::clone(&model));
-        let poses = solver.distinct(&evidence, 4, separation);
-        prop_assert_eq!(&poses[0], &solver.best(&evidence, None).unwrap());
-        prop_assert!(poses.len() <= 4 && poses.is_sorted_by(|a, b| a.score >= b.score));
-        for (at, a) in poses.iter().enumerate() {
-            prop_assert_eq!(solver.score(&evidence, a, None), a.score);
-            for b in &poses[at + 1..] {
-                let centres = [a, b].map(|it| it.centres(&model, evidence.layout()));
-                let distance = centres[0].iter().zip(&centres[1]);
-                let distance: f64 = distance.map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1])).sum();
-                let side = |pose: &Pose| evidence.layout().levels[usize::from(pose.level)].scale;
-                let mean_side = f64::midpoint(side(a), side(b));
-                prop_assert!(distance / 3.0 >= separation * mean_side - 1e-9);
+        let all = solver.distinct(&evidence, usize::MAX, 0.0);
+        prop_assert_eq!(&all[0], &solver.best(&evidence, None).unwrap());
+        prop_assert!(all.is_sorted_by(|a, b| a.score >= b.score));
+        let far = |a: &Pose, b: &Pose| {
+            let centres = [a, b].map(|it| it.centres(&model, evidence.layout()));
+            let distance = centres[0].iter().zip(&centres[1]);
+            let distance: f64 = distance.map(|(p, q)| (p[0] - q[0]).hypot(p[1] - q[1])).sum();
+            let side = |pose: &Pose| evidence.layout().levels[usize::from(pose.level)].scale;
+            distance / 3.0 >= separation * f64::midpoint(side(a), side(b))
+        };
+        let mut want: Vec<Pose> = Vec::new();
+        for pose in all {
+            prop_assert_eq!(solver.score(&evidence, &pose, None), pose.score);
+            if want.len() < 4 && want.iter().all(|it| far(it, &pose)) {
+                want.push(pose);
             }
         }
+        prop_assert_eq!(solver.distinct(&evidence, 4, separation), want);
+    }
+
+    #[test]
+    fn distinct_poses_are_the_local_maxima_of_the_root(seed in any::<u64>()) {
+        let mut noise = Noise(seed);
+        let model = tree(&mut noise, 2);
+        let (rows, cols) = (7, 9);
+        let evidence = Evidence::new(&mut noise, &model, &[[rows, cols]]);
+        let evidence = evidence.view();
+        let solver = Solver::new(model);
+        let roots = solver.root_scores(&evidence, 0, None);
+        let neighbours = |y: usize, x: usize| {
+            let around = (0..rows * cols).map(|it| (it / cols, it % cols));
+            around.filter(move |it| it.0.abs_diff(y) <= 1 && it.1.abs_diff(x) <= 1 && *it != (y, x))
+        };
+        let score = |(y, x): (usize, usize)| roots[y * cols + x];
+        let mut found = solver.distinct(&evidence, usize::MAX, 0.0);
+        found.sort_by_key(|it| (it.parts[0].y, it.parts[0].x));
+        let found = found.iter().map(|it| (usize::from(it.parts[0].y), usize::from(it.parts[0].x)));
+        let peaks = (0..rows * cols).map(|it| (it / cols, it % cols)).filter(|&at| {
+            neighbours(at.0, at.1).all(|it| score(it) < score(at) || (score(it) == score(at) && it > at))
+        });
+        prop_assert_eq!(found.collect::<Vec<_>>(), peaks.collect::<Vec<_>>());
     }
 }
 
