@@ -160,6 +160,33 @@ impl Triangulated {
 /// # Errors
 ///
 /// See [`TriangulateError`]; a point is never returned behind a view that it uses.
+///
+/// # Examples
+///
+/// ```
+/// # use geometry::{Camera, Intrinsics, Lens, LensModel, Observation, Settings, triangulate};
+/// # use nalgebra::{Isometry3, Point3};
+/// let k = [-0.29, 0.1, 0.0, 0.0, 0.0, 0.0];
+/// let lens = Lens::new(LensModel::BrownConrady { k, p: [0.0; 2] });
+/// let inside = Intrinsics { fx: 700.0, fy: 700.0, cx: 319.5, cy: 239.5, size: [640, 480], lens };
+/// let camera = |name: &str, x: f64| Camera {
+///     name: name.to_owned(),
+///     intrinsics: inside,
+///     camera_from_world: Isometry3::translation(-x, 0.0, 0.0), // x metres to the right
+/// };
+/// let cameras = [camera("left", -0.5), camera("right", 0.5)];
+/// let point = Point3::new(0.3, -0.2, 4.0);
+/// let seen: Vec<_> = cameras
+///     .iter()
+///     .filter_map(|camera| {
+///         Some(Observation { camera, point_px: camera.project(&point)?, sigma_px: 1.0 })
+///     })
+///     .collect();
+/// let got = triangulate(&seen, &Settings::default())?;
+/// assert!((got.in_world - point).norm() < 1e-9);
+/// assert_eq!(got.views_used, 0b11);
+/// # Ok::<_, geometry::TriangulateError>(())
+/// ```
 pub fn triangulate(
     observations: &[Observation<'_>],
     settings: &Settings,

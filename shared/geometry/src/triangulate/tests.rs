@@ -121,14 +121,9 @@ fn the_covariance_is_the_spread_of_the_answer() {
         ..Settings::default()
     };
     let sigma = [0.5, 1.0, 2.0];
-    // Uniform noise of a plain generator, scaled to unit variance.
-    let mut state = 1_u64;
-    let mut noise = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12.0_f64.sqrt()
-    };
+    // Scaled to unit variance.
+    let mut uniform = uniform();
+    let mut noise = || uniform() * 12.0_f64.sqrt();
     let mut spread = Matrix3::zeros();
     let mut claimed = Matrix3::zeros();
     let n = 4000;
@@ -147,15 +142,36 @@ fn the_covariance_is_the_spread_of_the_answer() {
     );
 }
 
-proptest! {
-    #[test]
-    fn a_narrow_loss_finds_the_views_that_agree_from_afar(point in point(), wild in 0_usize..4, dx in 60.0..150.0, dy in 60.0..150.0) {
-        let cameras = ring(4, BARREL);
-        let mut noise = [Vector2::new(0.3, -0.2); 4];
-        noise[wild] = Vector2::new(dx, dy);
-        let settings = Settings { loss_px: 2.0, ..Settings::default() };
-        let got = triangulate(&observe(&cameras, &point, &noise), &settings).expect("a point");
-        prop_assert!((got.in_world - point).norm() < 0.02, "{} is not {}", got.in_world, point);
+/// Numbers in [-0.5, 0.5) that are the same in every run.
+fn uniform() -> impl FnMut() -> f64 {
+    let mut state = 1_u64;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+#[test]
+fn a_narrow_loss_is_not_caught_by_two_wild_views_of_six() {
+    let cameras = ring(6, BARREL);
+    let mut noise = uniform();
+    let settings = Settings {
+        loss_px: 1.0,
+        ..Settings::default()
+    };
+    for _ in 0..500 {
+        let point = Point3::new(noise(), noise(), noise());
+        let scale = [100.0, 100.0, 2.0, 2.0, 2.0, 2.0];
+        let offsets = scale.map(|scale| Vector2::new(noise(), noise()) * scale);
+        let got = triangulate(&observe(&cameras, &point, &offsets), &settings).expect("a point");
+        // Started at its final width the loss ends elsewhere in 7 of these 500.
+        assert!(
+            (got.in_world - point).norm() < 0.03,
+            "{} is not {point}",
+            got.in_world
+        );
     }
 }
 
