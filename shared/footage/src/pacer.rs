@@ -107,6 +107,14 @@ mod tests {
 
     proptest! {
         #[test]
+        fn a_frame_is_due_from_its_very_nanosecond(
+            start in 0_u64..1 << 60, rate_hz in 0.1..2000.0, k in 0_u64..10_000_000,
+        ) {
+            let pacer = Pacer::realtime(start, rate_hz);
+            prop_assert_eq!(pacer.latest_due(pacer.due_nanos(k)), Some(k));
+        }
+
+        #[test]
         fn the_latest_frame_is_due_and_the_next_is_not(
             start in 0_u64..1 << 60, rate_hz in 0.1..2000.0, elapsed in 0_u64..1 << 47,
         ) {

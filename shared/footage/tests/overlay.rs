@@ -28,17 +28,18 @@ fn amount(canvas: &Canvas) -> f64 {
 
 #[test]
 fn a_line_is_as_wide_as_asked_and_ends_where_it_ends() {
-    let mut canvas = black();
+    const GROUND: [u8; 3] = [90, 120, 150];
+    let mut canvas = Canvas::new(SIZE, GROUND);
     canvas.line([5.0, 10.0], [30.0, 10.0], 3.0, INK);
     for (x, y, expect) in [
         (5, 10, INK),
         (30, 10, INK),
         (17, 9, INK),
         (17, 11, INK),
-        (17, 8, [0; 3]),
-        (17, 12, [0; 3]),
-        (3, 10, [0; 3]),
-        (32, 10, [0; 3]),
+        (17, 8, GROUND),
+        (17, 12, GROUND),
+        (3, 10, GROUND),
+        (32, 10, GROUND),
     ] {
         assert_eq!(pixel(&canvas, x, y), expect, "{x}, {y}");
     }
@@ -217,6 +218,16 @@ fn coordinate() -> impl Strategy<Value = f64> {
     ]
 }
 
+/// Right of the picture, whatever the other coordinate is.
+fn outside() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        80.0..1000.0,
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(1e300)
+    ]
+}
+
 proptest! {
     #[test]
     fn a_colour_on_itself_changes_nothing_wherever_it_is_drawn(
@@ -233,6 +244,20 @@ proptest! {
         prop_assert!(canvas == ground);
         // Text has an edge of its own; that it is drawn is enough.
         canvas.text(a, "text", INK);
+    }
+
+    #[test]
+    fn what_lies_far_outside_leaves_no_trace(
+        a in (outside(), coordinate()), b in (outside(), coordinate()), width in 0.0..20.0,
+    ) {
+        let (a, b) = (<[f64; 2]>::from(a), <[f64; 2]>::from(b));
+        let mut canvas = black();
+        canvas.line(a, b, width, INK);
+        canvas.disc(a, width, INK);
+        canvas.ring(a, width, width, INK);
+        canvas.frame([a[0], a[1], b[0], b[1]], width, INK);
+        canvas.text(a, "text", INK);
+        prop_assert!(canvas == black());
     }
 
     /// Where a shape lies by whole pixels does not change what it looks like.

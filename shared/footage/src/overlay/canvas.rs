@@ -158,11 +158,11 @@ impl Canvas {
         };
         for y in range(y1, y2, self.size.height) {
             for x in range(x1, x2, self.size.width) {
-                let cover = cover(x as f64, y as f64).min(1.0);
+                let cover = cover(x as f64, y as f64);
                 // Not a number, where distances overflow, covers nothing.
                 if cover > 0.0 {
                     let at = (y * self.size.width + x) * 3;
-                    blend(&mut self.rgb[at..at + 3], colour, cover);
+                    blend(&mut self.rgb[at..at + 3], colour, cover.min(1.0));
                 }
             }
         }

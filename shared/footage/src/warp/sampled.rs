@@ -132,11 +132,10 @@ impl Sampled {
             n_blocks,
             ..
         } = self.footprint;
-        let Size { width, height } = self.source;
-        // A block may reach into the next row, with weights of 0, but not beyond the image.
+        let width = self.source.width;
+        // A block may reach into the next row, with weights of 0, but not beyond the last.
         let end = ((top + n_rows - 1) * width + left) * 3 + n_blocks * BLOCK;
-        let is_inside =
-            left + n_columns <= width && top + n_rows <= height && end <= self.source.rgb_bytes();
+        let is_inside = left + n_columns <= width && end <= self.source.rgb_bytes();
         is_inside.then_some((top * width + left) * 3)
     }
 
