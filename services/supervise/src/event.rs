@@ -23,6 +23,11 @@ pub enum Death {
         /// For how long.
         still: Duration,
     },
+    /// It was killed because it gave no sign of life.
+    Silent {
+        /// For how long.
+        still: Duration,
+    },
     /// It was killed because its main loop never began.
     NeverBegan {
         /// How long it was given.
@@ -38,6 +43,9 @@ impl fmt::Display for Death {
             Self::Exit { status } => write!(f, "ended with status {status}"),
             Self::Signal { number } => write!(f, "ended by signal {number}"),
             Self::Hung { still } => write!(f, "hung for {:.1} s", still.as_secs_f64()),
+            Self::Silent { still } => {
+                write!(f, "gave no sign of life for {:.1} s", still.as_secs_f64())
+            }
             Self::NeverBegan { waited } => {
                 write!(f, "did not begin within {:.1} s", waited.as_secs_f64())
             }

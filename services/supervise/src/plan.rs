@@ -65,9 +65,14 @@ pub struct Policy {
     pub restart_window: Duration,
     /// How long a process may take until its main loop turns for the first time.
     pub startup_limit: Duration,
-    /// How long the main loop of a process may stand still; and, once some processes are done and
-    /// others had to be restarted or given up, how long the rest may take nothing in.
+    /// How long a process may give no sign of life: they come from a thread of its own, whatever it
+    /// computes, so one that is silent is stopped.
+    pub silence_limit: Duration,
+    /// How long the main loop of a process may stand still: longer than any frame takes.
     pub hang_limit: Duration,
+    /// How long those that wait for messages may wait in vain, once others are done and some had to
+    /// be restarted or given up.
+    pub idle_limit: Duration,
     /// How long processes may take to end when they are asked to.
     pub grace: Duration,
     /// How often what the dead left is cleaned up where no death was noticed.
@@ -82,7 +87,9 @@ impl Default for Policy {
             max_restarts: 5,
             restart_window: Duration::from_mins(1),
             startup_limit: Duration::from_mins(1),
-            hang_limit: Duration::from_secs(20),
+            silence_limit: Duration::from_secs(10),
+            hang_limit: Duration::from_mins(2),
+            idle_limit: Duration::from_secs(10),
             grace: Duration::from_secs(5),
             clean_period: Duration::from_millis(250),
         }

@@ -11,6 +11,8 @@ use runtime::{Child, ExitKind, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
+/// A main loop that turned since then is one that waits, not one that computes.
+const AWAKE: Duration = Duration::from_secs(1);
 /// Lines of output that are kept to explain a death.
 const KEPT_LINES: usize = 40;
 
@@ -30,6 +32,8 @@ pub(crate) struct Watch {
     current: Option<Health>,
     /// The last sign of any life.
     last: Option<Health>,
+    /// When it last gave a sign of life, by its own clock.
+    signed: Change,
     /// When the main loop last turned.
     turned: Change,
     /// When it last took something in.
@@ -92,6 +96,7 @@ impl Watch {
             past: Counts::default(),
             current: None,
             last: None,
+            signed: Change::new(now),
             turned: Change::new(now),
             received: Change::new(now),
         }
@@ -101,6 +106,7 @@ impl Watch {
     pub(crate) fn begin(&mut self, child: Child, now: Instant) {
         self.life = Life::Running(child);
         self.output.clear();
+        self.signed = Change::new(now);
         self.turned = Change::new(now);
         self.received = Change::new(now);
     }
@@ -125,6 +131,7 @@ impl Watch {
         if health.epoch != self.epoch {
             return false;
         }
+        self.signed.note(health.at_nanos, now);
         self.turned.note(health.n_loops, now);
         self.received.note(health.n_received, now);
         self.current = Some(*health);
@@ -134,6 +141,7 @@ impl Watch {
 
     /// Counts the time from now on: the supervisor itself has been asleep.
     pub(crate) fn forgive(&mut self, now: Instant) {
+        self.signed.at = now;
         self.turned.at = now;
         self.received.at = now;
     }
@@ -141,9 +149,12 @@ impl Watch {
     /// Whether the process should be killed, and as what.
     pub(crate) fn overdue(&self, policy: &Policy, now: Instant) -> Option<Death> {
         self.child()?;
-        let still = now.saturating_duration_since(self.turned.at);
+        let since = |change: Change| now.saturating_duration_since(change.at);
+        let (silent, still) = (since(self.signed), since(self.turned));
         if self.turned.count == 0 {
             (still > policy.startup_limit).then_some(Death::NeverBegan { waited: still })
+        } else if silent > policy.silence_limit {
+            Some(Death::Silent { still: silent })
         } else {
             (still > policy.hang_limit).then_some(Death::Hung { still })
         }
@@ -194,10 +205,12 @@ impl Watch {
         }
     }
 
-    /// Whether it runs but has taken nothing in for so long that nothing more will come.
+    /// Whether it waits for messages, and has got none for so long that none will come.
     pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
-        let still = now.saturating_duration_since(self.received.at);
-        self.child().is_some() && still > policy.hang_limit
+        let since = |change: Change| now.saturating_duration_since(change.at);
+        self.child().is_some()
+            && since(self.turned) < AWAKE
+            && since(self.received) > policy.idle_limit
     }
 
     fn says_finished(&self) -> bool {

@@ -155,7 +155,7 @@ fn a_stopped_process_looks_alive_but_is_found_out() {
         }
     });
     let deaths = run.deaths("source");
-    assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
+    assert!(matches!(deaths[..], [Death::Silent { .. }]), "{deaths:?}");
     assert!(!is_alive(run.pids("source")[0]));
 }
 
@@ -169,6 +169,24 @@ fn a_main_loop_that_stands_still_is_found_out() {
     let deaths = run.deaths("knot");
     assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
     assert_eq!(state_of(&run, "knot"), State::Finished);
+}
+
+#[test]
+fn who_computes_for_long_is_waited_for() {
+    let mut case = Case::new(
+        Delivery::Lossless,
+        &[
+            ("sink", "receive 0", Role::Essential),
+            ("broken", "fail 1", Role::Optional),
+            ("thinker", "think 4", Role::Essential),
+            ("source", "send 3 1 1", Role::Essential),
+        ],
+    );
+    // Trouble, others that are done, and a silent main loop for longer than the idle may wait.
+    case.plan.policy.max_restarts = 0;
+    let run = case.run(|_, _| {});
+    assert_eq!(run.deaths("thinker"), []);
+    assert_eq!(state_of(&run, "thinker"), State::Finished);
 }
 
 #[test]

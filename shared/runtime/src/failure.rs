@@ -176,7 +176,15 @@ impl<E: Fault> From<E> for Failure {
 }
 
 impl Fault for crate::BusError {}
-impl Fault for crate::PortError {}
+impl Fault for crate::PortError {
+    fn hint(&self) -> Option<String> {
+        matches!(self, Self::Memory { .. }).then(|| {
+            "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)"
+                .to_owned()
+        })
+    }
+}
+
 impl Fault for crate::ReceiveError {}
 impl Fault for crate::WaitError {}
 

@@ -70,7 +70,9 @@ impl Case {
             processes: specs.collect(),
             policy: Policy {
                 first_pause: Duration::from_millis(20),
-                hang_limit: Duration::from_secs(3),
+                silence_limit: Duration::from_secs(3),
+                hang_limit: Duration::from_secs(6),
+                idle_limit: Duration::from_secs(2),
                 grace: Duration::from_secs(10),
                 ..Policy::default()
             },

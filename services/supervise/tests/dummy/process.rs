@@ -38,6 +38,7 @@ fn serve() -> ExitCode {
         Some("die-at-end") => receive(service, 0, service.epoch() == 0),
         Some("hold") => hold(service),
         Some("die-in-loan") => die_in_loan(service),
+        Some("think") => think(service, number(1)),
         Some("hang-once") => hang_once(service),
         Some("fail") => Err(failure(number(1))),
         #[expect(clippy::panic, reason = "it is what the test is about")]
@@ -190,6 +191,13 @@ fn hang_once(service: &Service) -> Result<(), Failure> {
     while service.epoch() == 0 {
         std::thread::sleep(SOON);
     }
+    idle(service)
+}
+
+/// Computes for so many seconds, and is done.
+fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
+    service.progress().tick();
+    std::thread::sleep(Duration::from_secs(seconds));
     idle(service)
 }
 
