@@ -38,6 +38,8 @@ fn a_line_is_as_wide_as_asked_and_ends_where_it_ends() {
         (17, 11, INK),
         (17, 8, GROUND),
         (17, 12, GROUND),
+        (17, 7, GROUND),
+        (17, 13, GROUND),
         (3, 10, GROUND),
         (32, 10, GROUND),
     ] {
