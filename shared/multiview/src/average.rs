@@ -13,27 +13,25 @@ pub struct FusedPose {
 
 /// The mean of a view's candidates over its pairs (the paper's section 7: "simply averaged").
 ///
-/// * `candidates`: one pose per pair: its energy and its part centres, as the model names them.
-/// * `mirror`: if the view is exchanged, the part on the other side for every part.
+/// * `candidates`: one pose per pair: its energy and its anatomical part centres.
 /// * Returns `None` if there is no candidate.
 ///
 /// # Panics
 ///
 /// If two candidates differ in their number of parts.
-pub fn average(candidates: &[(f64, Vec<[f64; 2]>)], mirror: Option<&[usize]>) -> Option<FusedPose> {
+pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     let n_parts = candidates.first()?.1.len();
     let mut sum = vec![[0.0; 2]; n_parts];
     for (_, centres) in candidates {
         assert_eq!(centres.len(), n_parts, "one model for all pairs");
-        for (sum, centre) in sum.iter_mut().zip(centres) {
+        for (sum, centre) in sum.iter_mut().zip(*centres) {
             sum[0] += centre[0];
             sum[1] += centre[1];
         }
     }
     let n = candidates.len() as f64;
-    let mean: Vec<[f64; 2]> = sum.iter().map(|it| it.map(|sum| sum / n)).collect();
     Some(FusedPose {
-        centres_px: anatomical(&mean, mirror),
+        centres_px: sum.iter().map(|it| it.map(|sum| sum / n)).collect(),
         n_pairs: candidates.len(),
         energy: candidates.iter().map(|it| it.0).sum(),
     })
@@ -53,27 +51,21 @@ mod tests {
 
     #[test]
     fn candidates_are_averaged_part_by_part() {
-        let got = average(
-            &[
-                (1.0, vec![[0.0, 0.0], [4.0, 2.0]]),
-                (0.5, vec![[2.0, 4.0], [6.0, 2.0]]),
-            ],
-            None,
-        );
-        let got = got.expect("two candidates");
+        let (first, second) = ([[0.0, 0.0], [4.0, 2.0]], [[2.0, 4.0], [6.0, 2.0]]);
+        let got = average(&[(1.0, &first), (0.5, &second)]).expect("two candidates");
         assert_eq!(got.centres_px, [[1.0, 2.0], [5.0, 2.0]]);
         assert_eq!((got.n_pairs, got.energy), (2, 1.5));
     }
 
     #[test]
     fn an_exchanged_view_is_renamed() {
-        let centres = vec![[0.0; 2], [1.0; 2], [2.0; 2]];
-        let got = average(&[(0.0, centres)], Some(&[0, 2, 1])).expect("one candidate");
-        assert_eq!(got.centres_px, [[0.0; 2], [2.0; 2], [1.0; 2]]);
+        let centres = [[0.0; 2], [1.0; 2], [2.0; 2]];
+        let got = anatomical(&centres, Some(&[0, 2, 1]));
+        assert_eq!(got, [[0.0; 2], [2.0; 2], [1.0; 2]]);
     }
 
     #[test]
     fn no_candidate_is_no_pose() {
-        assert_eq!(average(&[], None), None);
+        assert_eq!(average(&[]), None);
     }
 }

@@ -63,7 +63,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             energy: EnergyKind::Paper,
-            alpha: 0.01,
+            alpha: 0.002,
             beta: 0.03,
             max_distance_cells: f64::INFINITY,
             max_iterations: 12,

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use geometry::{Camera, Observation, TriangulateError, Triangulated};
+use fmp::Pose;
+use geometry::{Observation, TriangulateError, Triangulated};
 use multiview::{
     Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose, PairEnergies,
     PairEstimate, ViewPlan, anatomical, anatomical_evidence, average, is_exchanged, rank_facing,
@@ -12,11 +13,25 @@ use skeleton::{JointSet, PARSE14};
 
 use crate::{Answer, PairAnswer};
 
+/// What of a view is triangulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sightings {
+    /// The candidates of all its pairs, each for itself with its share of the view's weight, so that a
+    /// pair that went astray is one outlier among many instead of a bias in the mean. Where the pairs
+    /// are too many to be triangulated at once, as [`Self::Mean`].
+    #[default]
+    EachPair,
+    /// The mean of the candidates: the paper's "simply averaged".
+    Mean,
+}
+
 /// Settings of the last step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSettings {
     /// Which joints to triangulate.
     pub joints: &'static JointSet,
+    /// What of a view is triangulated.
+    pub sightings: Sightings,
     /// How to triangulate.
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, cells of the level it was found on.
@@ -36,6 +51,7 @@ impl Default for SkeletonSettings {
     fn default() -> Self {
         Self {
             joints: &PARSE14,
+            sightings: Sightings::default(),
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
             facing: true,
@@ -111,8 +127,16 @@ impl SkeletonStep {
         } else {
             (0, f64::INFINITY)
         };
-        let views = self.fuse(answers, &pairs, exchanged);
-        let joints = self.triangulate(&views, |centres| self.settings.joints.from_parts(centres));
+        let candidates = self.candidates(answers, &pairs, exchanged);
+        let views = fuse(&candidates, exchanged);
+        let sightings = match self.settings.sightings {
+            Sightings::EachPair => self.sightings_of_candidates(&candidates),
+            Sightings::Mean => None,
+        };
+        let sightings = sightings.unwrap_or_else(|| self.sightings_of_means(&views));
+        let joints = self.triangulate(&sightings, |centres| {
+            self.settings.joints.from_parts(centres)
+        });
         Skeleton {
             joints,
             views,
@@ -149,8 +173,9 @@ impl SkeletonStep {
             rank_facing(self.plans.len(), &energies, N_HYPOTHESES)
                 .into_iter()
                 .map(|(exchanges, energy)| {
-                    let views = self.fuse(answers, pairs, exchanges);
-                    let parts = self.triangulate(&views, <[_]>::to_vec);
+                    let views = fuse(&self.candidates(answers, pairs, exchanges), exchanges);
+                    let sightings = self.sightings_of_means(&views);
+                    let parts = self.triangulate(&sightings, <[_]>::to_vec);
                     let joints: Vec<Option<Point3<f64>>> = PARSE14
                         .joints
                         .iter()
@@ -201,96 +226,156 @@ impl SkeletonStep {
         -self.settings.agreement * parts.iter().map(of_part).sum::<f64>()
     }
 
-    fn fuse(
+    /// What the pairs of every view found under an assignment of facing.
+    fn candidates(
         &self,
         answers: &[Option<Answer>],
         pairs: &[&PairAnswer],
         exchanged: Exchanges,
-    ) -> Vec<Option<FusedView>> {
-        (0..self.plans.len())
-            .map(|view| {
-                let best = answers[view].as_ref()?.candidates.first()?;
-                let plan = &self.plans[view];
-                let mirror = is_exchanged(exchanged, view)
-                    .then(|| plan.model().spec().mirror.as_deref())
-                    .flatten();
-                let found: Vec<(f64, &fmp::Pose)> = pairs
-                    .iter()
-                    .filter_map(|it| chosen(it, exchanged).zip(Some(it.views)))
-                    .filter_map(|(estimate, views)| {
-                        let side = views.iter().position(|it| *it == view)?;
-                        Some((estimate.energy, &estimate.poses[side]))
-                    })
-                    .collect();
-                let scale = |pose: &fmp::Pose| plan.scale(usize::from(pose.level));
-                let candidates: Vec<_> = found
-                    .iter()
-                    .map(|(energy, pose)| (*energy, plan.centres(pose)))
-                    .collect();
-                let pose = average(&candidates, mirror).unwrap_or_else(|| FusedPose {
-                    centres_px: anatomical(&plan.centres(best), mirror),
-                    n_pairs: 0,
-                    energy: f64::from(best.score),
-                });
-                let cell_px = if found.is_empty() {
-                    scale(best)
-                } else {
-                    found.iter().map(|it| scale(it.1)).sum::<f64>() / found.len() as f64
-                };
-                Some(FusedView {
-                    pose,
-                    exchanged: is_exchanged(exchanged, view),
-                    cell_px,
-                    single_score: f64::from(best.score),
-                })
+    ) -> Vec<Option<Candidates>> {
+        let of_view = |view: usize| {
+            let best = answers[view].as_ref()?.candidates.first()?;
+            let plan = &self.plans[view];
+            let mirror = is_exchanged(exchanged, view)
+                .then(|| plan.model().spec().mirror.as_deref())
+                .flatten();
+            let candidate = |energy: f64, pose: &Pose| Candidate {
+                energy,
+                cell_px: plan.scale(usize::from(pose.level)),
+                centres_px: anatomical(&plan.centres(pose), mirror),
+            };
+            let found = pairs.iter().filter_map(|pair| {
+                let side = pair.views.iter().position(|it| *it == view)?;
+                let estimate = chosen(pair, exchanged)?;
+                Some(candidate(estimate.energy, &estimate.poses[side]))
+            });
+            Some(Candidates {
+                found: found.collect(),
+                own: candidate(f64::from(best.score), best),
             })
-            .collect()
+        };
+        (0..self.plans.len()).map(of_view).collect()
+    }
+
+    /// One sighting per view: its fused pose.
+    fn sightings_of_means(&self, views: &[Option<FusedView>]) -> Vec<Sighting> {
+        let seen = views.iter().enumerate();
+        let seen = seen.filter_map(|(view, it)| Some((view, it.as_ref()?)));
+        seen.map(|(view, it)| Sighting {
+            view,
+            sigma_px: it.cell_px * self.settings.sigma_cells,
+            centres_px: it.pose.centres_px.clone(),
+        })
+        .collect()
+    }
+
+    /// One sighting per view and pair; `None` if there are more than can be triangulated.
+    fn sightings_of_candidates(&self, views: &[Option<Candidates>]) -> Option<Vec<Sighting>> {
+        let mut sightings = Vec::new();
+        for (view, it) in views.iter().enumerate() {
+            let Some(it) = it else { continue };
+            // Pairs of one view see the same pixels: together they weigh as much as one view.
+            let share = (it.all().len() as f64).sqrt();
+            sightings.extend(it.all().iter().map(|candidate| Sighting {
+                view,
+                sigma_px: candidate.cell_px * self.settings.sigma_cells * share,
+                centres_px: candidate.centres_px.clone(),
+            }));
+        }
+        (sightings.len() <= geometry::MAX_VIEWS).then_some(sightings)
     }
 
     fn triangulate(
         &self,
-        views: &[Option<FusedView>],
+        sightings: &[Sighting],
         points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
     ) -> Vec<Result<Triangulated, TriangulateError>> {
-        let seen: Vec<(usize, &Camera, f64, Vec<[f64; 2]>)> = views
-            .iter()
-            .enumerate()
-            .filter_map(|(view, it)| {
-                let it = it.as_ref()?;
-                let sigma = it.cell_px * self.settings.sigma_cells;
-                let points = points(&it.pose.centres_px);
-                Some((view, self.plans[view].camera(), sigma, points))
-            })
-            .collect();
-        let n_points = seen.iter().map(|it| it.3.len()).max().unwrap_or(0);
-        (0..n_points)
-            .map(|point| {
-                let observations: Vec<Observation<'_>> = seen
-                    .iter()
-                    .map(|(_, camera, sigma_px, points)| Observation {
-                        camera,
-                        point_px: Point2::from(points[point]),
-                        sigma_px: *sigma_px,
-                    })
-                    .collect();
-                let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
-                Ok(by_view(
-                    found,
-                    &seen.iter().map(|it| it.0).collect::<Vec<_>>(),
-                ))
-            })
-            .collect()
+        let points: Vec<Vec<[f64; 2]>> =
+            sightings.iter().map(|it| points(&it.centres_px)).collect();
+        let n_points = points.iter().map(Vec::len).max().unwrap_or(0);
+        let triangulate = |point: usize| {
+            let observations: Vec<Observation<'_>> = sightings
+                .iter()
+                .zip(&points)
+                .map(|(sighting, points)| Observation {
+                    camera: self.plans[sighting.view].camera(),
+                    point_px: Point2::from(points[point]),
+                    sigma_px: sighting.sigma_px,
+                })
+                .collect();
+            let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
+            Ok(by_view(found, sightings))
+        };
+        (0..n_points).map(triangulate).collect()
     }
 }
 
-/// Renumbers the observations of a joint as the views of the rig.
-fn by_view(mut found: Triangulated, views: &[usize]) -> Triangulated {
+/// A pose of one view, parts named after the side of the body.
+#[derive(Debug, Clone)]
+struct Candidate {
+    energy: f64,
+    cell_px: f64,
+    centres_px: Vec<[f64; 2]>,
+}
+
+/// The poses that one view's pairs found, and the one it found alone.
+#[derive(Debug, Clone)]
+struct Candidates {
+    found: Vec<Candidate>,
+    own: Candidate,
+}
+
+impl Candidates {
+    /// The pairs' poses, or the view's own where it is in no pair.
+    fn all(&self) -> &[Candidate] {
+        if self.found.is_empty() {
+            std::slice::from_ref(&self.own)
+        } else {
+            &self.found
+        }
+    }
+}
+
+/// A pose to be triangulated.
+#[derive(Debug, Clone)]
+struct Sighting {
+    view: usize,
+    sigma_px: f64,
+    centres_px: Vec<[f64; 2]>,
+}
+
+/// The mean pose of every view.
+fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
+    let fuse_view = |(view, it): (usize, &Option<Candidates>)| {
+        let it = it.as_ref()?;
+        let candidates: Vec<_> = it
+            .all()
+            .iter()
+            .map(|it| (it.energy, it.centres_px.as_slice()))
+            .collect();
+        let n = candidates.len() as f64;
+        Some(FusedView {
+            pose: FusedPose {
+                n_pairs: it.found.len(),
+                ..average(&candidates)?
+            },
+            exchanged: is_exchanged(exchanged, view),
+            cell_px: it.all().iter().map(|it| it.cell_px).sum::<f64>() / n,
+            single_score: it.own.energy,
+        })
+    };
+    views.iter().enumerate().map(fuse_view).collect()
+}
+
+/// Renumbers the observations of a joint as the views of the rig; a view's residual is its largest.
+fn by_view(mut found: Triangulated, sightings: &[Sighting]) -> Triangulated {
     let (used, residuals) = (found.views_used, found.residuals_px);
     found.views_used = 0;
     found.residuals_px.fill(f64::NAN);
-    for (i, &view) in views.iter().enumerate() {
-        found.views_used |= (used >> i & 1) << view;
-        found.residuals_px[view] = residuals[i];
+    for (i, sighting) in sightings.iter().enumerate() {
+        found.views_used |= (used >> i & 1) << sighting.view;
+        let residual = &mut found.residuals_px[sighting.view];
+        *residual = residual.max(residuals[i]);
     }
     found
 }
