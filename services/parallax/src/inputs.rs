@@ -23,8 +23,11 @@ pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
 }
 
 /// Reads the calibration, of whichever format.
-pub(crate) fn rig(path: &Path, options: &ReadOptions) -> Result<Rig, Failure> {
-    geometry::files::read(path, options).map_err(|error| match error {
+///
+/// * `paths`: several if every camera has its own file.
+pub(crate) fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
+    let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
+    geometry::files::read_many(&paths, options).map_err(|error| match error {
         RigFileError::Read { .. } | RigFileError::NoFiles => Failure::new(ExitKind::Input, error)
             .with_hint(
                 "a rig file says where the cameras stand; `parallax calib convert` makes one of \

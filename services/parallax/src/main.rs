@@ -4,6 +4,7 @@
 mod cli;
 mod commands;
 mod deployment;
+mod describe;
 mod exit;
 mod inputs;
 mod output;

@@ -47,7 +47,7 @@ impl Prepared {
     pub(crate) fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let model = inputs::model(&deployment.model)?;
-        let rig = inputs::rig(&deployment.rig, &ReadOptions::default())?;
+        let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
         let mut views = Vec::new();
         for (index, camera) in deployment.cameras.iter().enumerate() {
             let framing = framing(resolved, &rig, index)?;

@@ -204,7 +204,7 @@ impl Report {
             if let Some(px) = it["reprojection_px"].as_f64() {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
             }
-            self.write_views(text, &it["views_used"])?;
+            self.write_views(text)?;
             self.write_latency(text)?;
         }
         writeln!(
@@ -233,7 +233,8 @@ impl Report {
         Ok(())
     }
 
-    fn write_views(&self, text: &mut String, used: &Value) -> core::fmt::Result {
+    fn write_views(&self, text: &mut String) -> core::fmt::Result {
+        let used = &self.recorded["summary"]["views_used"];
         let used: Vec<String> = used
             .as_array()
             .into_iter()

@@ -21,6 +21,8 @@ pub struct Job {
     pub n_pose_consumers: usize,
     /// Processes that take the evidence.
     pub n_evidence_consumers: usize,
+    /// Distance between the frames used.
+    pub frame_step: u64,
     /// How long they are waited for.
     pub patience: Duration,
 }
@@ -63,9 +65,8 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             }
             service.health().received(1);
             if let Some(last) = last_frame.replace(header.stamp.frame) {
-                service
-                    .health()
-                    .dropped(header.stamp.frame.saturating_sub(last + 1));
+                let steps = header.stamp.frame.saturating_sub(last) / job.frame_step.max(1);
+                service.health().dropped(steps.saturating_sub(1));
             }
             view.answer(sample, &mut spare)?;
             if service.stop().is_requested() {

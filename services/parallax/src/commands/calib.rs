@@ -1,44 +1,287 @@
 //! `parallax calib`: calibrations read, shown, checked and converted.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Subcommand;
-use runtime::Failure;
+use clap::{Args, Subcommand, ValueEnum};
+use geometry::files::{Format, ReadOptions, Unit};
+use geometry::{Camera, Rig, upright_roll};
+use nalgebra::{Point2, UnitVector3, Vector3};
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde_json::{Value, json};
+
+use crate::{inputs, output};
 
 /// What to do with a calibration.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Print what a calibration says: cameras, image sizes, where they stand.
     Show {
-        /// The calibration file.
-        file: PathBuf,
+        #[command(flatten)]
+        input: Input,
         /// Print JSON.
         #[arg(long)]
         json: bool,
     },
     /// Check units, handedness and image sizes; with detections, every camera's epipolar error.
+    #[command(after_help = "Ends with 5 if something is probably wrong.")]
     Check {
-        /// The calibration file.
-        file: PathBuf,
-        /// Detections of one person in all cameras: `pose2d.jsonl` of a run.
+        #[command(flatten)]
+        input: Input,
+        /// Poses of one person in all cameras: `pose2d.jsonl` of a run on uncropped footage.
         #[arg(long, value_name = "FILE")]
         detections: Option<PathBuf>,
         /// Print JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Convert a calibration into a rig file.
+    /// Convert a calibration into a rig file, or another program's.
+    #[command(after_help = "\
+Examples:
+    parallax calib convert Calib.qca.txt --out rig.toml
+    parallax calib convert C1.cal C2.cal --size 640 480 --up 0 0 1 --out rig.toml
+    parallax calib convert rig.toml --to pose2sim --out Calib.toml")]
     Convert {
-        /// The calibration file, of any format that `show` reads.
-        file: PathBuf,
-        /// The file to write.
+        #[command(flatten)]
+        input: Input,
+        /// The file to write; for `humaneva` and `umpm` a folder that exists.
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
+        /// Its format.
+        #[arg(long, value_enum, default_value_t = To::Rig)]
+        to: To,
     },
 }
 
+/// What to read, and what the files may leave out.
+#[derive(Debug, Args)]
+pub(crate) struct Input {
+    /// The calibration file; several if every camera has its own.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Unit of lengths, where the format does not fix it.
+    #[arg(long, value_enum)]
+    unit: Option<UnitName>,
+    /// Direction against gravity in the world, where the file does not say.
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_hyphen_values = true)]
+    up: Option<Vec<f64>>,
+    /// Image size in pixels, where the file does not say.
+    #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
+    size: Option<Vec<u32>>,
+}
+
+/// Units of lengths.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum UnitName {
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+}
+
+/// Formats that can be written.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum To {
+    /// Parallax's own.
+    Rig,
+    /// Pose2Sim, anipose, Caliscope and their kin.
+    Pose2sim,
+    /// OpenCV YAML.
+    Opencv,
+    /// One `.cal` file a camera.
+    Humaneva,
+    /// One `.ini` file a camera.
+    Umpm,
+}
+
+impl Input {
+    fn read(&self) -> Result<Rig, Failure> {
+        let up = match self.up.as_deref() {
+            Some(&[x, y, z]) => {
+                let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
+                let message = format!("--up {x} {y} {z} is no direction");
+                Some(up.ok_or(message).or_fail(ExitKind::Usage)?)
+            }
+            _ => None,
+        };
+        let options = ReadOptions {
+            unit: self.unit.map(|it| match it {
+                UnitName::M => Unit::Metres,
+                UnitName::Cm => Unit::Centimetres,
+                UnitName::Mm => Unit::Millimetres,
+            }),
+            up,
+            size: match self.size.as_deref() {
+                Some(&[width, height]) => Some([width, height]),
+                _ => None,
+            },
+        };
+        inputs::rig(&self.files, &options)
+    }
+}
+
 /// Shows, checks or converts.
-pub(crate) fn run(_command: &Command) -> Result<ExitCode, Failure> {
+pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
+    match command {
+        Command::Show { input, json } => show(&input.read()?, *json),
+        Command::Check {
+            input,
+            detections,
+            json,
+        } => check(&input.read()?, detections.as_deref(), *json),
+        Command::Convert { input, out, to } => convert(&input.read()?, out, *to),
+    }
+}
+
+fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
+    if as_json {
+        let cameras: Vec<Value> = rig.cameras().iter().map(|it| describe(it, rig)).collect();
+        let up = rig
+            .up_in_world()
+            .map(|it| <[f64; 3]>::from(it.into_inner()));
+        output::json(&json!({
+            "schema_version": 1, "source": rig.source(), "up": up, "cameras": cameras,
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    output::line(format_args!(
+        "{} cameras; {}",
+        rig.cameras().len(),
+        rig.source()
+    ))?;
+    match rig.up_in_world() {
+        Some(up) => output::line(format_args!(
+            "up is ({:.3}, {:.3}, {:.3})",
+            up.x, up.y, up.z
+        ))?,
+        None => output::line("which way is up is not known: frames are not turned upright")?,
+    }
+    for camera in rig.cameras() {
+        let inside = &camera.intrinsics;
+        let centre = camera.centre_in_world();
+        let roll = upright_roll(camera, rig).map_or("unknown".to_owned(), |it| {
+            format!("{:.1} degrees", it.to_degrees())
+        });
+        output::line(format_args!(
+            "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), at ({:.3}, {:.3}, {:.3}) m, roll to upright {roll}",
+            camera.name,
+            inside.size[0],
+            inside.size[1],
+            inside.fx,
+            inside.fy,
+            inside.cx,
+            inside.cy,
+            centre.x,
+            centre.y,
+            centre.z,
+        ))?;
+        output::line(format_args!("             {:?}", inside.lens.model()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn describe(camera: &Camera, rig: &Rig) -> Value {
+    let inside = &camera.intrinsics;
+    json!({
+        "name": camera.name,
+        "size_px": inside.size,
+        "focal_px": [inside.fx, inside.fy],
+        "principal_point_px": [inside.cx, inside.cy],
+        "lens": format!("{:?}", inside.lens.model()),
+        "centre_m": <[f64; 3]>::from(camera.centre_in_world().coords),
+        "axis": <[f64; 3]>::from(camera.axis_in_world().into_inner()),
+        "roll_to_upright_degrees": upright_roll(camera, rig).map(f64::to_degrees),
+    })
+}
+
+fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode, Failure> {
+    let findings = geometry::files::check(rig);
+    let wrong = findings
+        .iter()
+        .any(|it| it.severity() != geometry::files::Severity::Note);
+    let report = detections
+        .map(|it| -> Result<_, Failure> {
+            Ok(geometry::files::epipolar_check(rig, &points(rig, it)?))
+        })
+        .transpose()?;
+    let name = |index: usize| rig.cameras()[index].name.as_str();
+    if as_json {
+        let findings: Vec<Value> = findings
+            .iter()
+            .map(|it| json!({ "severity": format!("{:?}", it.severity()).to_lowercase(), "text": it.to_string() }))
+            .collect();
+        let cameras = report.as_ref().map(|it| {
+            let each = it.cameras.iter();
+            each.map(|it| json!({ "camera": name(it.camera), "median_px": it.median_px, "points": it.n_points }))
+                .collect::<Vec<_>>()
+        });
+        output::json(&json!({ "schema_version": 1, "findings": findings, "epipolar": cameras }))?;
+    } else {
+        for finding in &findings {
+            output::line(format_args!("{:?}: {finding}", finding.severity()))?;
+        }
+        if findings.is_empty() {
+            output::line("nothing odd was found")?;
+        }
+        for it in report.iter().flat_map(|it| &it.cameras) {
+            output::line(format_args!(
+                "{}: median epipolar error {:.2} px over {} pairs of points",
+                name(it.camera),
+                it.median_px,
+                it.n_points
+            ))?;
+        }
+    }
+    Ok(if wrong {
+        ExitCode::from(ExitKind::Calibration.status())
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+/// The parts of every frame of a `pose2d.jsonl`, in every camera of the rig.
+fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failure> {
+    let n_cameras = rig.cameras().len();
+    let mut frames = std::collections::BTreeMap::<u64, Vec<Vec<Option<Point2<f64>>>>>::new();
+    for (index, line) in inputs::text(file)?.lines().enumerate() {
+        let value: Value = serde_json::from_str(line).map_err(|error| {
+            Failure::new(
+                ExitKind::Input,
+                format!("{}:{}: {error}", file.display(), index + 1),
+            )
+        })?;
+        let view = value["view"].as_str().unwrap_or_default();
+        let Some(camera) = rig.cameras().iter().position(|it| it.name == view) else {
+            continue;
+        };
+        let points = frames
+            .entry(value["frame"].as_u64().unwrap_or(0))
+            .or_default();
+        let parts = value["fused"]["parts"]
+            .as_array()
+            .map_or(&[][..], Vec::as_slice);
+        for (part, it) in parts.iter().enumerate() {
+            if points.len() <= part {
+                points.push(vec![None; n_cameras]);
+            }
+            let at = it["x"].as_f64().zip(it["y"].as_f64());
+            points[part][camera] = at.map(|(x, y)| Point2::new(x, y));
+        }
+    }
+    Ok(frames.into_values().flatten().collect())
+}
+
+fn convert(rig: &Rig, out: &Path, to: To) -> Result<ExitCode, Failure> {
+    let format = match to {
+        To::Rig => Format::Own,
+        To::Pose2sim => Format::Pose2Sim,
+        To::Opencv => Format::OpenCv,
+        To::Humaneva => Format::HumanEva,
+        To::Umpm => Format::Umpm,
+    };
+    geometry::files::write(out, format, rig).or_fail(ExitKind::Input)?;
+    output::message(format_args!("wrote {}", out.display()));
     Ok(ExitCode::SUCCESS)
 }

@@ -1,14 +1,28 @@
 //! `parallax detect`: people in single images.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Args;
-use runtime::Failure;
+use fmp::{CandidateSettings, Extractor, Layout, Model, Pose, Responses, Solver};
+use footage::{ACCENT, Canvas, FAINT, Size, Source, SourceSpec};
+use kernels::Rgb8View;
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde_json::json;
+use skeleton::JointSet;
+
+use crate::describe::{self, Placed};
+use crate::{inputs, output};
 
 /// Which images, and how.
 #[derive(Debug, Args)]
 #[command(after_help = "\
+With --json one line per image, best detection first:
+    {\"image\", \"width\", \"height\", \"detections\": [{\"score\", \"level\", \"scale\",
+     \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
+Pixels of the image, the centre of its top-left pixel is (0, 0); types and levels count from 1.
+
 Examples:
     parallax detect photo.jpg --model parse.mat
     parallax detect folder/ --model parse.mat --threshold -0.5 --json > people.jsonl
@@ -20,11 +34,11 @@ pub(crate) struct Arguments {
     /// The model file.
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Lowest score of a detection; the model's own by default.
+    /// Lowest score of a detection; the trained threshold, but at most -1, if not given.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
-    /// Largest share of a better detection's box that a worse one may cover.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    /// Largest share of a better detection's boxes that a worse one may cover.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     overlap: f64,
     /// Most detections of an image.
     #[arg(long, value_name = "N", default_value_t = 100)]
@@ -32,15 +46,146 @@ pub(crate) struct Arguments {
     /// Print one line of JSON per image.
     #[arg(long)]
     json: bool,
-    /// Draw the detections into this folder.
+    /// Draw the detections into this folder, as PNG.
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
     /// Joints: parse14, umpm15 or humaneva20.
-    #[arg(long, value_name = "NAME", default_value = "parse14")]
-    joints: String,
+    #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
+    joints: &'static JointSet,
 }
 
 /// Detects.
-pub(crate) fn run(_arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let model = inputs::model(&arguments.model)?;
+    let detector = Detector {
+        extractor: Extractor::new(Arc::clone(&model)),
+        solver: Solver::new(Arc::clone(&model)),
+        settings: CandidateSettings {
+            threshold: arguments.threshold.unwrap_or(model.detection_threshold()) as f32,
+            overlap: arguments.overlap,
+            max: arguments.max,
+        },
+        model,
+    };
+    if let Some(folder) = &arguments.overlay {
+        std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+    }
+    for image in images(&arguments.images)? {
+        detector.one(&image, arguments)?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The images that are named, those of folders in the order of their names.
+fn images(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut images = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            images.push(path.clone());
+            continue;
+        }
+        let wrong = |error: std::io::Error| inputs::in_file(path, &error);
+        let mut inside = Vec::new();
+        for entry in std::fs::read_dir(path).map_err(wrong)? {
+            inside.push(entry.map_err(wrong)?.path());
+        }
+        inside.retain(|it| is_image(it));
+        inside.sort();
+        if inside.is_empty() {
+            let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        images.append(&mut inside);
+    }
+    Ok(images)
+}
+
+fn is_image(path: &Path) -> bool {
+    let extension = path
+        .extension()
+        .and_then(|it| it.to_str())
+        .unwrap_or_default();
+    ["png", "jpg", "jpeg", "bmp"]
+        .iter()
+        .any(|it| extension.eq_ignore_ascii_case(it))
+}
+
+struct Detector {
+    model: Arc<Model>,
+    extractor: Extractor,
+    solver: Solver,
+    settings: CandidateSettings,
+}
+
+impl Detector {
+    fn one(&self, path: &Path, arguments: &Arguments) -> Result<(), Failure> {
+        let spec = SourceSpec::new(path.to_string_lossy());
+        let mut source = Source::open(&spec).or_fail(ExitKind::Input)?;
+        let size = source.info().size;
+        let frame = source.next_frame().or_fail(ExitKind::Input)?;
+        let rgb = frame.map_or(&[][..], |it| it.rgb);
+        let image = Rgb8View::new(size.width, size.height, rgb);
+        let image = image.map_err(|error| inputs::in_file(path, &error))?;
+        let layout = Layout::new(&self.model, size.width, size.height);
+        let layout = layout.map_err(|error| inputs::in_file(path, &error))?;
+        let found = self.detect(image, &layout);
+        if arguments.json {
+            let detections: Vec<_> = found
+                .iter()
+                .map(|pose| Placed::new(pose, &self.model, &layout).json(Some(arguments.joints)))
+                .collect();
+            output::json(&json!({
+                "image": path,
+                "width": size.width,
+                "height": size.height,
+                "detections": detections,
+            }))?;
+        } else {
+            output::line(format_args!(
+                "{}: {} detections",
+                path.display(),
+                found.len()
+            ))?;
+            for pose in &found {
+                let [x, y] = pose.centre(&self.model, &layout, 0);
+                output::line(format_args!(
+                    "  score {:8.4}  level {:2}  head at ({x:.1}, {y:.1})",
+                    pose.score,
+                    pose.level + 1
+                ))?;
+            }
+        }
+        if let Some(folder) = &arguments.overlay {
+            let canvas = self.draw(size, rgb, &layout, &found);
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            let file = folder.join(format!("{name}.png"));
+            canvas.save_png(&file).or_fail(ExitKind::Input)?;
+        }
+        Ok(())
+    }
+
+    fn detect(&self, image: Rgb8View<'_>, layout: &Layout) -> Vec<Pose> {
+        let mut values = vec![0.0; layout.n_responses()];
+        self.extractor.responses(image, layout, &mut values);
+        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
+        let evidence = Responses::new(layout, &values, &levels);
+        self.solver.candidates(&evidence, &self.settings)
+    }
+
+    /// The best detection in colour, the others faint.
+    fn draw(&self, size: Size, rgb: &[u8], layout: &Layout, found: &[Pose]) -> Canvas {
+        let mut canvas = Canvas::from_rgb(size, rgb);
+        for (rank, pose) in found.iter().enumerate().rev() {
+            let colour = if rank == 0 { ACCENT } else { FAINT };
+            let centres = pose.centres(&self.model, layout);
+            for (part, spec) in self.model.spec().parts.iter().enumerate() {
+                if let Some(edge) = &spec.edge {
+                    canvas.line(centres[edge.parent], centres[part], 1.5, colour);
+                }
+            }
+            let [x, y] = centres[0];
+            canvas.text([x + 6.0, y], &format!("{:.2}", pose.score), colour);
+        }
+        canvas
+    }
 }

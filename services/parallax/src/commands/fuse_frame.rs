@@ -1,17 +1,31 @@
 //! `parallax fuse-frame`: one synchronised set of still images, in this process.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
-use runtime::Failure;
+use fmp::Model;
+use footage::{Fill, Size, Source, SourceSpec, Warp};
+use fuse::{Tau, TauName};
+use geometry::files::ReadOptions;
+use geometry::{Framing, OutSize, Rig, upright_roll};
+use kernels::Rgb8View;
+use pipeline::{Estimate, Estimator, EstimatorSettings, SkeletonSettings, ViewSettings};
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde_json::{Value, json};
+use skeleton::JointSet;
+
+use crate::describe::{self, Placed};
+use crate::prepare::frame_scale;
+use crate::{inputs, output};
 
 /// Which energy ties two views together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Energy {
     /// The paper's.
     Paper,
-    /// What the authors' program computes.
+    /// What the authors' program computes; one candidate a view and no facing unless asked for.
     Released,
 }
 
@@ -21,9 +35,9 @@ pub(crate) enum Energy {
 Examples:
     parallax fuse-frame --rig rig.toml --model he.txt C1.png C2.png --json
     parallax fuse-frame --rig rig.toml --model he.txt --energy released --no-upright \\
-        --ptc C1wrtC2.csv C2wrtC1.csv --images C1.png C2.png --json")]
+        --ptc C1wrtC2.csv --ptc C2wrtC1.csv C1=one.png C2=two.png --json")]
 pub(crate) struct Arguments {
-    /// One image per camera of the rig, in its order; NAME=FILE names the camera.
+    /// One image per camera of the rig, in its order, or CAMERA=FILE for some of them.
     #[arg(required = true)]
     images: Vec<String>,
     /// The calibration.
@@ -41,21 +55,30 @@ pub(crate) struct Arguments {
     /// Weight of the part-type term.
     #[arg(long)]
     beta: Option<f64>,
-    /// Part-type table, `first wrt second`; give it twice, once for either direction.
+    /// Part-type table of the first two views, `first wrt second`; and again, `second wrt first`.
     #[arg(long, value_name = "FILE")]
     ptc: Vec<PathBuf>,
     /// Expected errors in pixels: one line per view, one number per part.
     #[arg(long, value_name = "FILE")]
     sigma: Option<PathBuf>,
+    /// Thresholds of the expected errors: none, humaneva or umpm.
+    #[arg(long, value_enum, default_value_t = Threshold::None)]
+    tau: Threshold,
     /// Most candidates of a view.
     #[arg(long, value_name = "N")]
     candidates: Option<usize>,
-    /// Do not decide who sees the person from behind.
-    #[arg(long)]
-    no_facing: bool,
+    /// Decide who sees the person from behind; with `paper` it is unless this says false.
+    #[arg(long, value_name = "BOOL")]
+    facing: Option<bool>,
     /// Do not turn the images upright.
     #[arg(long)]
     no_upright: bool,
+    /// Take the cameras as pinholes, whatever their lenses.
+    #[arg(long)]
+    no_lens: bool,
+    /// Size of the frames as a share of the images'.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
     /// Most single-view solutions of a pair.
     #[arg(long, value_name = "N")]
     max_iterations: Option<usize>,
@@ -63,14 +86,370 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PX")]
     epsilon: Option<f64>,
     /// Joints: parse14, umpm15 or humaneva20.
-    #[arg(long, value_name = "NAME", default_value = "parse14")]
-    joints: String,
+    #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
+    joints: &'static JointSet,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
+/// Thresholds that are known by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Threshold {
+    /// No part is switched off.
+    None,
+    /// Those of the authors' program for HumanEva.
+    Humaneva,
+    /// Those of the authors' program for UMPM.
+    Umpm,
+}
+
+/// One view: its picture, framed.
+struct View {
+    file: String,
+    framing: Framing,
+    rgb: Vec<u8>,
+}
+
 /// Fuses.
-pub(crate) fn run(_arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let model = inputs::model(&arguments.model)?;
+    let rig = inputs::rig(
+        std::slice::from_ref(&arguments.rig),
+        &ReadOptions::default(),
+    )?;
+    let views = views(arguments, &rig)?;
+    let settings = settings(arguments, &model, &views)?;
+    let cameras: Vec<_> = views.iter().map(|it| it.framing.camera().clone()).collect();
+    let estimator = Estimator::new(&model, &cameras, rig.up_in_world(), &settings);
+    let mut estimator = estimator.or_fail(ExitKind::Input)?;
+    let scales: Vec<f32> = views
+        .iter()
+        .map(|it| frame_scale(&it.framing) as f32)
+        .collect();
+    let sigma = sigma(arguments.sigma.as_deref(), &scales, model.n_parts())?;
+    let mut images = Vec::new();
+    for view in &views {
+        let [width, height] = view.framing.out_size().map(|it| it as usize);
+        images.push(Some(
+            Rgb8View::new(width, height, &view.rgb).or_fail(ExitKind::Input)?,
+        ));
+    }
+    let estimate = estimator.estimate(&images, &sigma);
+    let report = Report {
+        views: &views,
+        model: &model,
+        estimator: &estimator,
+        estimate: &estimate,
+        joints: arguments.joints,
+    };
+    if arguments.json {
+        output::json(&report.json())?;
+    } else {
+        report.print()?;
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The cameras that were given an image, in the rig's order, with their images framed.
+fn views(arguments: &Arguments, rig: &Rig) -> Result<Vec<View>, Failure> {
+    let n = rig.cameras().len();
+    let mut files: Vec<Option<&str>> = vec![None; n];
+    for (index, argument) in arguments.images.iter().enumerate() {
+        let named = argument.split_once('=').and_then(|(name, file)| {
+            let camera = rig.cameras().iter().position(|it| it.name == name)?;
+            Some((camera, file))
+        });
+        let (camera, file) = named.unwrap_or((index, argument));
+        let slot = files.get_mut(camera).ok_or_else(|| {
+            let message = format!("{argument}: the rig has only {n} cameras");
+            Failure::new(ExitKind::Usage, message)
+        })?;
+        *slot = Some(file);
+    }
+    let given = files.into_iter().enumerate();
+    given
+        .filter_map(|(camera, file)| Some((camera, file?)))
+        .map(|(camera, file)| view(arguments, rig, camera, file))
+        .collect()
+}
+
+fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<View, Failure> {
+    let mut camera = rig.cameras()[camera].clone();
+    if arguments.no_lens {
+        camera.intrinsics.lens = geometry::Lens::default();
+    }
+    let mut source = Source::open(&SourceSpec::new(file)).or_fail(ExitKind::Input)?;
+    let size = source.info().size;
+    let roll = if arguments.no_upright {
+        0.0
+    } else {
+        upright_roll(&camera, rig).unwrap_or(0.0)
+    };
+    let source_size = [size.width as u32, size.height as u32];
+    let framing = Framing::new(
+        &camera,
+        source_size,
+        None,
+        OutSize::Scale(arguments.scale),
+        roll,
+    );
+    let framing = framing.or_fail(ExitKind::Calibration)?;
+    let [width, height] = framing.out_size().map(|it| it as usize);
+    let output = Size::new(width, height);
+    let warp = Warp::new(size, output, &framing.source_from_output(), Fill::Black);
+    let mut rgb = vec![0; output.rgb_bytes()];
+    if let Some(frame) = source.next_frame().or_fail(ExitKind::Input)? {
+        warp.or_fail(ExitKind::Input)?.apply(frame.rgb, &mut rgb);
+    }
+    Ok(View {
+        file: file.to_owned(),
+        framing,
+        rgb,
+    })
+}
+
+fn settings(
+    arguments: &Arguments,
+    model: &Model,
+    views: &[View],
+) -> Result<EstimatorSettings, Failure> {
+    let released = arguments.energy == Energy::Released;
+    let defaults = fuse::Config::default();
+    let facing = arguments.facing.unwrap_or(!released);
+    let config = fuse::Config {
+        energy: if released {
+            fuse::Energy::Released
+        } else {
+            fuse::Energy::Paper
+        },
+        alpha: arguments.alpha,
+        beta: arguments.beta.unwrap_or(defaults.beta),
+        tau: Tau::Named(match arguments.tau {
+            Threshold::None => TauName::None,
+            Threshold::Humaneva => TauName::HumanEva,
+            Threshold::Umpm => TauName::Umpm,
+        }),
+        facing,
+        max_iterations: arguments.max_iterations.unwrap_or(defaults.max_iterations),
+        epsilon_px: arguments.epsilon.unwrap_or(defaults.epsilon_px),
+        ..defaults
+    };
+    let view = ViewSettings::default();
+    let n_candidates = arguments
+        .candidates
+        .unwrap_or(if released { 1 } else { view.n_candidates });
+    let tables = match &arguments.ptc[..] {
+        [] => Vec::new(),
+        [first, second] => vec![(0, 1, inputs::type_tables([first, second], model)?)],
+        _ => {
+            return Err(Failure::new(
+                ExitKind::Usage,
+                "--ptc is given twice, or not at all",
+            ));
+        }
+    };
+    let scale = views.iter().map(|it| frame_scale(&it.framing)).sum::<f64>() / views.len() as f64;
+    Ok(EstimatorSettings {
+        fuse: config.settings(n_candidates, scale as f32),
+        view: ViewSettings {
+            n_candidates,
+            ..view
+        },
+        tables,
+        skeleton: SkeletonSettings {
+            joints: arguments.joints,
+            facing,
+            ..SkeletonSettings::default()
+        },
+    })
+}
+
+/// Expected errors: one line per view, in pixels of the images.
+fn sigma(
+    file: Option<&Path>,
+    scales: &[f32],
+    n_parts: usize,
+) -> Result<Vec<Option<Vec<f32>>>, Failure> {
+    let Some(file) = file else {
+        return Ok(vec![None; scales.len()]);
+    };
+    let text = inputs::text(file)?;
+    let lines: Vec<&str> = text.lines().filter(|it| !it.trim().is_empty()).collect();
+    let wrong =
+        |message: String| Failure::new(ExitKind::Input, format!("{}: {message}", file.display()));
+    if lines.len() != scales.len() {
+        return Err(wrong(format!(
+            "{} lines, expected one for each of {} views",
+            lines.len(),
+            scales.len()
+        )));
+    }
+    let views = lines.iter().zip(scales).enumerate();
+    views
+        .map(|(index, (line, scale))| {
+            let words = line.split(|it: char| it == ',' || it.is_whitespace());
+            let words: Vec<&str> = words.filter(|it| !it.is_empty()).collect();
+            let numbers: Vec<f32> = words
+                .iter()
+                .filter_map(|it| it.parse::<f32>().ok())
+                .filter(|it| it.is_finite() && *it >= 0.0)
+                .map(|it| it * scale)
+                .collect();
+            if numbers.len() != n_parts || words.len() != n_parts {
+                let message = format!("line {}: expected {n_parts} errors in pixels", index + 1);
+                return Err(wrong(message));
+            }
+            Ok(Some(numbers))
+        })
+        .collect()
+}
+
+/// What is said about the estimate.
+struct Report<'a> {
+    views: &'a [View],
+    model: &'a Arc<Model>,
+    estimator: &'a Estimator,
+    estimate: &'a Estimate,
+    joints: &'static JointSet,
+}
+
+impl Report<'_> {
+    fn pose(&self, view: usize, pose: &fmp::Pose) -> Value {
+        let layout = self.estimator.plans()[view].layout();
+        Placed::new(pose, self.model, layout)
+            .in_footage(&self.views[view].framing)
+            .json(Some(self.joints))
+    }
+
+    fn json(&self) -> Value {
+        let views: Vec<Value> = (0..self.views.len()).map(|it| self.view(it)).collect();
+        let pairs: Vec<Value> = self.estimate.pairs.iter().map(|it| self.pair(it)).collect();
+        let joints = self
+            .joints
+            .joints
+            .iter()
+            .zip(&self.estimate.skeleton.joints);
+        let joints: serde_json::Map<String, Value> = joints
+            .map(|(joint, it)| {
+                let value = match it {
+                    Ok(it) => json!({
+                        "position_m": <[f64; 3]>::from(it.in_world.coords),
+                        "reprojection_px": it.reprojection_px,
+                        "views": (0..self.views.len()).filter(|view| it.uses(*view)).map(|view| self.name(view)).collect::<Vec<_>>(),
+                    }),
+                    Err(error) => json!({ "error": error.to_string() }),
+                };
+                (joint.name.to_owned(), value)
+            })
+            .collect();
+        json!({
+            "schema_version": 1,
+            "views": views,
+            "pairs": pairs,
+            "facing_margin": self.estimate.skeleton.facing_margin,
+            "joints": joints,
+        })
+    }
+
+    fn name(&self, view: usize) -> &str {
+        &self.views[view].framing.camera().name
+    }
+
+    fn view(&self, view: usize) -> Value {
+        let answer = self.estimate.answers[view].as_ref();
+        let candidates = answer.map(|it| {
+            let each = it.candidates.iter();
+            each.map(|pose| self.pose(view, pose)).collect::<Vec<_>>()
+        });
+        let fused = self.estimate.skeleton.views[view].as_ref();
+        json!({
+            "name": self.name(view),
+            "image": self.views[view].file,
+            "candidates": candidates,
+            "start": self.estimate.start[view].map(|it| it.0),
+            "behind": fused.map(|it| it.exchanged),
+            "fused": fused.map(|it| json!({
+                "energy": it.pose.energy,
+                "pairs": it.pose.n_pairs,
+                "parts": it.pose.centres_px.iter().map(|[x, y]| {
+                    let at = self.views[view].framing.source_from_output().map(|row| row[0] * x + row[1] * y + row[2]);
+                    json!({ "x": at[0], "y": at[1] })
+                }).collect::<Vec<_>>(),
+            })),
+        })
+    }
+
+    fn pair(&self, pair: &pipeline::PairAnswer) -> Value {
+        let hypotheses: Vec<Value> = pair
+            .hypotheses
+            .iter()
+            .map(|it| {
+                let iterations: Vec<Value> = it
+                    .iterations
+                    .iter()
+                    .map(|step| {
+                        let view = pair.views[step.target];
+                        json!({
+                            "view": self.name(view),
+                            "score": step.score,
+                            "moved_px": step.moved_px,
+                            "pose": self.pose(view, &step.pose),
+                        })
+                    })
+                    .collect();
+                json!({
+                    "exchanged": it.start.exchanged,
+                    "energy": it.energy,
+                    "converged": it.converged,
+                    "active": it.active,
+                    "iterations": iterations,
+                    "poses": [self.pose(pair.views[0], &it.poses[0]), self.pose(pair.views[1], &it.poses[1])],
+                })
+            })
+            .collect();
+        json!({ "views": pair.views.map(|it| self.name(it)), "hypotheses": hypotheses })
+    }
+
+    fn print(&self) -> Result<(), Failure> {
+        for (view, answer) in self.estimate.answers.iter().enumerate() {
+            let best = answer.as_ref().and_then(|it| it.candidates.first());
+            let score = best.map_or("nobody found".to_owned(), |it| {
+                format!("score {:.4}, level {}", it.score, it.level + 1)
+            });
+            output::line(format_args!("{}: {score}", self.name(view)))?;
+        }
+        for pair in &self.estimate.pairs {
+            for it in &pair.hypotheses {
+                let facing = if it.start.exchanged {
+                    "opposite"
+                } else {
+                    "same"
+                };
+                output::line(format_args!(
+                    "{} - {}, {facing} facing: energy {:.4} after {} iterations{}",
+                    self.name(pair.views[0]),
+                    self.name(pair.views[1]),
+                    it.energy,
+                    it.iterations.len(),
+                    if it.converged { "" } else { ", not settled" }
+                ))?;
+            }
+        }
+        for (joint, it) in self
+            .joints
+            .joints
+            .iter()
+            .zip(&self.estimate.skeleton.joints)
+        {
+            match it {
+                Ok(it) => output::line(format_args!(
+                    "  {:<20} {:8.3} {:8.3} {:8.3} m  {:6.2} px",
+                    joint.name, it.in_world.x, it.in_world.y, it.in_world.z, it.reprojection_px
+                ))?,
+                Err(error) => output::line(format_args!("  {:<20} {error}", joint.name))?,
+            }
+        }
+        Ok(())
+    }
 }

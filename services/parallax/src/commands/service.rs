@@ -93,7 +93,7 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
 
 fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let deployment = &resolved.deployment;
-    let rig = inputs::rig(&deployment.rig, &ReadOptions::default())?;
+    let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
@@ -116,6 +116,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         // The workers, triangulate, record, and quality if there is one.
         n_pose_consumers: dealing.n_workers + 2 + usize::from(resolved.has_quality()),
         n_evidence_consumers: dealing.readers_of(view),
+        frame_step: resolved.deployment.capture.frame_step,
         patience: resolved.patience(),
     };
     pose::run(service, &job)

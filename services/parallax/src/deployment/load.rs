@@ -12,8 +12,6 @@ use super::{ConfigError, Deployment, rules};
 /// A deployment, and what of it was said by whom.
 #[derive(Debug)]
 pub(crate) struct Loaded {
-    /// The file.
-    pub file: PathBuf,
     /// What it says, paths resolved, defaults filled in.
     pub deployment: Deployment,
     /// What the file says, as it stands there.
@@ -53,7 +51,6 @@ impl Loaded {
             expected: complaint.expected,
         })?;
         Ok(Self {
-            file: file.to_owned(),
             deployment,
             in_file,
             on_command_line,
@@ -74,7 +71,6 @@ impl Loaded {
         merge(&mut table, NO_FILE.parse().map_err(explain)?);
         merge(&mut table, on_command_line.clone());
         Ok(Self {
-            file: PathBuf::new(),
             deployment: table.try_into().map_err(explain)?,
             in_file: Table::new(),
             on_command_line,
@@ -207,8 +203,8 @@ workers = 2
     #[test]
     fn relative_paths_are_relative_to_the_file() {
         let loaded = read(SHORT, &[]).unwrap();
-        let folder = loaded.file.parent().unwrap();
-        assert_eq!(loaded.deployment.rig, folder.join("rig.toml"));
+        let folder = loaded.deployment.rig.parent().unwrap();
+        assert!(folder.is_absolute() && loaded.deployment.rig.ends_with("rig.toml"));
         assert_eq!(loaded.deployment.model, Path::new("/models/m.mat"));
         assert!(Path::new(&loaded.deployment.cameras[0].source).starts_with(folder));
         assert_eq!(loaded.deployment.cameras[1].source, "/videos/b.mp4");

@@ -1,0 +1,103 @@
+//! Poses as JSON, as users see them: pixels from 0, types and levels from 1.
+
+use fmp::{Layout, Model, Pose};
+use geometry::Framing;
+use serde_json::{Map, Value, json};
+use skeleton::JointSet;
+
+/// A pose, and where its cells lie.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Placed<'a> {
+    pose: &'a Pose,
+    model: &'a Model,
+    layout: &'a Layout,
+    framing: Option<&'a Framing>,
+}
+
+impl<'a> Placed<'a> {
+    /// A pose in an image as it is.
+    pub(crate) fn new(pose: &'a Pose, model: &'a Model, layout: &'a Layout) -> Self {
+        Self {
+            pose,
+            model,
+            layout,
+            framing: None,
+        }
+    }
+
+    /// Pixels of the footage that was framed, instead of those of the frame.
+    pub(crate) fn in_footage(self, framing: &'a Framing) -> Self {
+        Self {
+            framing: Some(framing),
+            ..self
+        }
+    }
+
+    /// Score, level, scale and parts; joints of the set if the model has the parts for it.
+    pub(crate) fn json(&self, joints: Option<&JointSet>) -> Value {
+        let centres: Vec<[f64; 2]> = self
+            .pose
+            .centres(self.model, self.layout)
+            .into_iter()
+            .map(|it| self.at(it))
+            .collect();
+        let parts: Vec<Value> = centres
+            .iter()
+            .enumerate()
+            .map(|(part, it)| self.part(part, *it))
+            .collect();
+        let mut value = json!({
+            "score": self.pose.score,
+            "level": self.pose.level + 1,
+            "scale": self.layout.levels[usize::from(self.pose.level)].scale,
+            "parts": parts,
+        });
+        if let (Some(joints), Some(object)) = (joints, value.as_object_mut()) {
+            object.insert("joints".to_owned(), joints_of(&centres, joints));
+        }
+        value
+    }
+
+    fn part(&self, part: usize, [x, y]: [f64; 2]) -> Value {
+        let mixture = self.pose.parts[part].mixture + 1;
+        if self.framing.is_some() {
+            // A box of a turned frame is no box in the footage.
+            return json!({ "x": x, "y": y, "type": mixture });
+        }
+        let corners = self.pose.part_box(self.model, self.layout, part);
+        json!({ "x": x, "y": y, "type": mixture, "box": corners })
+    }
+
+    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        self.framing.map_or([x, y], |it| {
+            it.source_from_output()
+                .map(|row| row[0] * x + row[1] * y + row[2])
+        })
+    }
+}
+
+/// The joints of a pose by name; null if the model has other parts than the set is made of.
+fn joints_of(centres: &[[f64; 2]], joints: &JointSet) -> Value {
+    let needed = joints
+        .joints
+        .iter()
+        .flat_map(|it| it.parts)
+        .max()
+        .map_or(0, |it| it + 1);
+    if centres.len() < needed {
+        return Value::Null;
+    }
+    let found = joints.from_parts(centres);
+    let named = joints.joints.iter().zip(found);
+    Value::Object(
+        named
+            .map(|(joint, it)| (joint.name.to_owned(), json!(it)))
+            .collect::<Map<_, _>>(),
+    )
+}
+
+/// The joint set of that name, for the command line.
+pub(crate) fn joint_set(name: &str) -> Result<&'static JointSet, String> {
+    let known = || JointSet::ALL.map(|it| it.name).join(", ");
+    JointSet::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
+}
