@@ -44,19 +44,16 @@ impl<'a> PairTerms<'a> {
     }
 
     /// Value of the two consistency sums of eq. 3 for two given poses.
-    pub(crate) fn between(&self, poses: &[Pose; 2]) -> f64 {
-        let [first, second] = [0, 1].map(|it| self.pair.views[it].plan);
-        let fixed = Consistency::new(self, 0, &poses[1]);
-        let target_scale2 = first.scale(usize::from(poses[0].level)).powi(2);
-        debug_assert_eq!(second.model().n_parts(), first.model().n_parts());
+    pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
+        let plan = self.pair.views[0].plan;
+        let fixed = Consistency::new(self, 0, second);
+        let scale2 = plan.scale(usize::from(first.level)).powi(2);
         (0..self.active.len())
             .map(|part| {
-                let geometric = fixed.terms[part].map_or(0.0, |term| {
-                    let at = first.ideal_centre(&poses[0], part);
-                    -self.settings.alpha * term.distance2(at, target_scale2)
-                });
-                let mixture = usize::from(poses[0].parts[part].mixture);
-                geometric + f64::from(fixed.of_type(part, mixture))
+                let at = plan.ideal_centre(first, part);
+                let distance2 = fixed.terms[part].map_or(0.0, |it| it.distance2(at, scale2));
+                let mixture = usize::from(first.parts[part].mixture);
+                f64::from(fixed.of_type(part, mixture)) - self.settings.alpha * distance2
             })
             .sum()
     }
@@ -109,7 +106,7 @@ impl<'a> Consistency<'a> {
 
 impl Extra for Consistency<'_> {
     fn add_position(&self, part: usize, level: usize, score: &mut [f32]) -> bool {
-        let Some(term) = self.terms[part] else {
+        let Some(term) = self.terms[part].filter(|it| !it.is_constant()) else {
             return false;
         };
         let plan = self.pair_terms.pair.views[self.target].plan;

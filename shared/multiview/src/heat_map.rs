@@ -169,6 +169,8 @@ fn across_rows(from: &[f32], here: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -208,5 +210,38 @@ mod tests {
             clip([[-10, 10], [70, 10]], [63, 47]),
             Some([[0, 10], [63, 10]])
         );
+    }
+
+    proptest! {
+        /// Nothing stands in the way, so the shortest way is diagonal first, then straight.
+        #[test]
+        fn the_chamfer_distance_is_that_of_the_shortest_way(
+            sources in prop::collection::vec((0..7_usize, 0..9_usize), 1..4),
+        ) {
+            let mut distance = [f32::INFINITY; 7 * 9];
+            for (row, col) in &sources {
+                distance[row * 9 + col] = 0.0;
+            }
+            chamfer(&mut distance, 9);
+            for (cell, got) in distance.iter().enumerate() {
+                let way = |(row, col): &(usize, usize)| {
+                    let (down, right) = (row.abs_diff(cell / 9), col.abs_diff(cell % 9));
+                    let diagonal = down.min(right);
+                    DIAGONAL * diagonal as f32 + STRAIGHT * (down.max(right) - diagonal) as f32
+                };
+                let expect = sources.iter().map(way).fold(f32::INFINITY, f32::min);
+                prop_assert!((got - expect).abs() < 1e-4, "{got} {expect}");
+            }
+        }
+
+        #[test]
+        fn any_line_and_any_map_give_heat_between_0_and_1(
+            ends in prop::array::uniform2(prop::array::uniform2(-1e4..1e4_f64)),
+            (rows, cols) in (0..12_usize, 0..12_usize),
+        ) {
+            let map = heat_map(ends, [64, 48], rows, cols);
+            prop_assert_eq!(map.len(), rows * cols);
+            prop_assert!(map.iter().all(|it| (0.0..=1.0).contains(it)));
+        }
     }
 }

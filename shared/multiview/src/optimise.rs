@@ -3,7 +3,7 @@
 use fmp::{Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
-use crate::released::{self, ReleasedTerms};
+use crate::released::{ReleasedPair, ReleasedTerms};
 use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewAnswer};
 
 /// A pair of views of one frame.
@@ -50,7 +50,8 @@ pub struct PairEstimate {
     pub iterations: Vec<Iteration>,
     /// Whether nothing moved any more at the end.
     pub converged: bool,
-    /// Whether the consistency terms of each part of the first view were switched on.
+    /// Whether the consistency terms of each part of the first view were switched on; `Released`: while
+    /// the first view was the support, which says nothing about the second view as a support.
     pub active: Vec<bool>,
     /// The pose in the first and in the second view; parts as the model names them, not exchanged.
     pub poses: [Pose; 2],
@@ -59,10 +60,15 @@ pub struct PairEstimate {
 /// Maximises the joint energy of a pair from a given start.
 ///
 /// Eq. 3 of the paper is maximised by solving one view exactly while the other one (the support) is
-/// fixed, then exchanging roles (section 6). Under [`EnergyKind::Paper`] a solution is taken only if
-/// the energy rises, so the energy never falls and a cycle is impossible; it ends when a view no
-/// longer moves although its support is settled. Under [`EnergyKind::Released`] every solution is taken, as in the
-/// authors' program, and the cap on iterations may end a two-cycle.
+/// fixed, then exchanging roles (section 6). The first support is the view of lower expected error,
+/// summed over its parts, or the one of higher score if either view has no expectation.
+///
+/// Under [`EnergyKind::Paper`] a solution is taken only if the energy rises, so the energy never falls
+/// and a cycle is impossible. It ends when a view answers the other one's answer by staying as it is:
+/// then neither view alone can raise the energy (but for what `epsilon_px` lets pass).
+///
+/// Under [`EnergyKind::Released`] every solution is taken, whatever its score, as in the authors'
+/// program, until both views have moved by `epsilon_px` at most; a cycle ends at the cap on iterations.
 ///
 /// * `evidence`: the responses of either view, where they lie.
 pub fn estimate_pair(
@@ -88,26 +94,26 @@ fn paper(
     let terms = PairTerms::new(settings, pair, start.exchanged);
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
-    let mut between = terms.between(&poses);
+    let mut between = terms.between(&poses[0], &poses[1]);
     let mut target = 1 - initial_support(pair, &poses);
     let (mut iterations, mut converged) = (Vec::new(), false);
     for iteration in 0..settings.max_iterations {
-        let moved_px = {
-            let consistency = Consistency::new(&terms, target, &poses[1 - target]);
-            let found = solver.best(evidence[target], Some(&consistency));
-            let better = found.and_then(|pose| {
-                let mut trial = poses.clone();
-                trial[target] = pose;
-                let score = own_score(solver, evidence[target], &trial[target]);
-                let term = terms.between(&trial);
-                (score + term > own[target] + between).then_some((trial, score, term))
-            });
-            better.map_or(0.0, |(trial, score, term)| {
-                let moved = mean_movement(pair, target, &poses[target], &trial[target]);
-                (poses, own[target], between) = (trial, score, term);
-                moved
-            })
-        };
+        let consistency = Consistency::new(&terms, target, &poses[1 - target]);
+        let found = solver.best(evidence[target], Some(&consistency));
+        let better = found.and_then(|pose| {
+            let score = own_score(solver, evidence[target], &pose);
+            let term = match target {
+                0 => terms.between(&pose, &poses[1]),
+                _ => terms.between(&poses[0], &pose),
+            };
+            (score + term > own[target] + between).then_some((pose, score, term))
+        });
+        let (mut moved_px, mut same_types) = (0.0, true);
+        if let Some((pose, score, term)) = better {
+            moved_px = mean_movement(pair, target, &poses[target], &pose);
+            same_types = types(&poses[target]).eq(types(&pose));
+            (poses[target], own[target], between) = (pose, score, term);
+        }
         iterations.push(Iteration {
             target,
             score: own[0] + own[1] + between,
@@ -115,7 +121,7 @@ fn paper(
             pose: poses[target].clone(),
         });
         // From the second iteration on the support has itself been solved against this target.
-        if iteration > 0 && moved_px <= settings.epsilon_px {
+        if iteration > 0 && moved_px <= settings.epsilon_px && same_types {
             converged = true;
             break;
         }
@@ -138,19 +144,12 @@ fn released_pair(
     evidence: [&Responses<'_>; 2],
     start: PairStart,
 ) -> PairEstimate {
-    let weights = released::weights(settings, pair);
+    let released = ReleasedPair::new(settings, pair, start.exchanged);
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut target = 1 - initial_support(pair, &poses);
     let (mut iterations, mut converged) = (Vec::<Iteration>::new(), false);
     for _ in 0..settings.max_iterations {
-        let support = 1 - target;
-        let terms = ReleasedTerms::new(
-            settings,
-            pair,
-            target,
-            &poses[support],
-            (&weights[support], start.exchanged),
-        );
+        let terms = ReleasedTerms::new(&released, target, &poses[1 - target]);
         let Some(pose) = solver.best(evidence[target], Some(&terms)) else {
             break;
         };
@@ -167,14 +166,14 @@ fn released_pair(
             converged = true;
             break;
         }
-        target = support;
+        target = 1 - target;
     }
     PairEstimate {
         start,
         energy: poses.iter().map(|it| f64::from(it.score)).sum(),
         iterations,
         converged,
-        active: weights[0].clone(),
+        active: released.weights()[0].clone(),
         poses,
     }
 }
@@ -194,6 +193,10 @@ fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
         [Some(first), Some(second)] => usize::from(second < first),
         _ => usize::from(poses[1].score > poses[0].score),
     }
+}
+
+fn types(pose: &Pose) -> impl Iterator<Item = u8> {
+    pose.parts.iter().map(|it| it.mixture)
 }
 
 fn mean_movement(pair: &PairInput<'_>, view: usize, from: &Pose, to: &Pose) -> f64 {

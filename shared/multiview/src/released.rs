@@ -6,127 +6,146 @@
 //! training adds nothing (the program's table holds NaN).
 
 use fmp::{Extra, Pose};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::consistency::counterparts;
 use crate::heat_map::heat_map;
 use crate::{Compatibility, PairInput, Settings};
 
-/// The released program's extra scores for one target and a fixed support.
+/// Everything about the terms of a pair that does not change from one iteration to the next.
 #[derive(Debug)]
-pub(crate) struct ReleasedTerms<'a> {
+pub(crate) struct ReleasedPair<'a> {
     settings: &'a Settings,
     pair: &'a PairInput<'a>,
-    target: usize,
-    support: &'a Pose,
+    /// `counterpart[i]` of the one view is the anatomical part that `i` of the other view shows.
     counterpart: Vec<usize>,
-    /// Border points of every part's epipolar line, or nothing where the part adds nothing.
-    lines: Vec<Option<[[f64; 2]; 2]>>,
-    table: Option<&'a Compatibility>,
+    weights: [Vec<bool>; 2],
+    /// `p(type in the other view | type in this view)` of either view.
+    tables: Option<[&'a Compatibility; 2]>,
 }
 
-impl<'a> ReleasedTerms<'a> {
-    /// * `active`: switches of the support view, by its parts.
-    pub(crate) fn new(
-        settings: &'a Settings,
-        pair: &'a PairInput<'a>,
-        target: usize,
-        support: &'a Pose,
-        (active, exchanged): (&[bool], bool),
-    ) -> Self {
-        let model = pair.views[0].plan.model();
-        let counterpart = counterparts(model, exchanged);
-        let [target_plan, support_plan] = [target, 1 - target].map(|it| pair.views[it].plan);
-        let target_from_support = pair.epipolar.support_from_target(target != 0);
-        let lines = (0..support.parts.len())
-            .map(|part| {
-                let other = counterpart[part];
-                if !active[other] {
-                    return None;
-                }
-                let centre = support_plan.layout();
-                let [x, y] = support.centre(support_plan.model(), centre, other);
-                let size = target_plan.layout().image_size;
-                line_ends(&target_from_support, [x, y], size)
-            })
-            .collect();
-        let table = pair
-            .tables
-            .filter(|_| !exchanged && settings.beta != 0.0)
-            .map(|it| it.conditional[1 - target].as_ref());
+impl<'a> ReleasedPair<'a> {
+    /// * `exchanged`: the second view shows the other side of the body; such a pair goes without the
+    ///   type tables, which are learned on views as the model names their parts.
+    pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
+        let counterpart = counterparts(pair.views[0].plan.model(), exchanged);
         Self {
             settings,
             pair,
+            weights: weights(settings, pair, &counterpart),
+            counterpart,
+            tables: pair
+                .tables
+                .filter(|_| !exchanged && settings.beta != 0.0)
+                .map(|it| it.conditional.each_ref().map(AsRef::as_ref)),
+        }
+    }
+
+    /// Which parts of either view may support the other one.
+    pub(crate) fn weights(&self) -> &[Vec<bool>; 2] {
+        &self.weights
+    }
+}
+
+/// The released program's extra scores for one target and a fixed support.
+#[derive(Debug)]
+pub(crate) struct ReleasedTerms<'a> {
+    released: &'a ReleasedPair<'a>,
+    target: usize,
+    support: &'a Pose,
+    /// Of every part of the target; `None` where the part adds nothing.
+    lines: Vec<Option<Line>>,
+}
+
+impl<'a> ReleasedTerms<'a> {
+    pub(crate) fn new(released: &'a ReleasedPair<'a>, target: usize, support: &'a Pose) -> Self {
+        let pair = released.pair;
+        let [target_plan, support_plan] = [target, 1 - target].map(|it| pair.views[it].plan);
+        let target_from_support = pair.epipolar.support_from_target(target == 1);
+        let line = |part: &usize| {
+            let support_layout = support_plan.layout();
+            let centre = support.centre(support_plan.model(), support_layout, *part);
+            let pixel = looked_up(centre, support_layout.image_size)?;
+            let size = target_plan.layout().image_size;
+            released.weights[1 - target][*part]
+                .then(|| Line::new(&target_from_support, pixel, size))
+        };
+        Self {
+            lines: released.counterpart.iter().map(line).collect(),
+            released,
             target,
             support,
-            counterpart,
-            lines,
-            table,
         }
     }
 }
 
 impl Extra for ReleasedTerms<'_> {
     fn add_position(&self, part: usize, level: usize, score: &mut [f32]) -> bool {
-        let Some(ends) = self.lines[part] else {
+        let Some(Line::Across(ends)) = self.lines[part] else {
             return false;
         };
-        let layout = self.pair.views[self.target].plan.layout();
+        let layout = self.released.pair.views[self.target].plan.layout();
         let it = &layout.levels[level];
         let heat = heat_map(ends, layout.image_size, it.rows, it.cols);
         for (score, heat) in score.iter_mut().zip(heat) {
-            *score += (self.settings.alpha * f64::from(heat)) as f32;
+            *score += (self.released.settings.alpha * f64::from(heat)) as f32;
         }
         true
     }
 
     fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        match (self.table, self.lines[part]) {
-            (Some(table), Some(_)) => {
-                let seen = usize::from(self.support.parts[self.counterpart[part]].mixture);
-                (self.settings.beta * table.value(part, seen, mixture)) as f32
+        match (self.released.tables, self.lines[part]) {
+            (Some(tables), Some(_)) => {
+                let other = self.released.counterpart[part];
+                let seen = usize::from(self.support.parts[other].mixture);
+                let table = tables[1 - self.target];
+                (self.released.settings.beta * table.value(part, seen, mixture)) as f32
             }
             _ => 0.0,
         }
     }
 }
 
-/// Where the epipolar line of a support meets the border of the target image, counted from 1.
+/// The whole pixel, counted from 0, at which the program looks up the line of a support.
 ///
-/// * `support_px`: centre of the support, pixels from 0; the program looks its line up at the
-///   nearest whole pixel.
-/// * Returns `None` if the support lies outside the image; two equal points outside if its line
-///   misses the image, which warms nothing.
-fn line_ends(
-    target_from_support: &nalgebra::Matrix3<f64>,
-    support_px: [f64; 2],
-    size: [usize; 2],
-) -> Option<[[f64; 2]; 2]> {
-    const MISSED: [[f64; 2]; 2] = [[-1.0, -1.0]; 2];
-    let [width, height] = size.map(|it| it as f64);
+/// * `support_px`: centre of the support, pixels from 0.
+/// * `size`: of its image, which is that of the program's table. The pixels of the last row and
+///   column are in the table, but the program takes them for outside.
+fn looked_up(support_px: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
     // Rounding half away from zero happens to the coordinate counted from 1.
-    let [x, y] = support_px.map(|it| (it + 1.0).round());
-    if x <= 0.0 || y <= 0.0 || x >= width || y >= height {
-        return None;
-    }
-    let line = target_from_support * Vector3::new(x - 1.0, y - 1.0, 1.0);
-    let (left, right) = (-0.5, width - 0.5);
-    let (top, bottom) = (-0.5, height - 0.5);
-    let at_x = |x: f64| [x, -(line.x * x + line.z) / line.y];
-    let at_y = |y: f64| [-(line.y * y + line.z) / line.x, y];
-    let mut ends: Vec<[f64; 2]> = [at_x(left), at_x(right)]
-        .into_iter()
-        .filter(|[_, y]| (top..=bottom).contains(y))
-        .chain(
-            [at_y(top), at_y(bottom)]
-                .into_iter()
-                .filter(|[x, _]| left < *x && *x < right),
-        )
-        .collect();
-    ends.truncate(2);
-    match ends[..] {
-        [from, to] => Some([from, to].map(|end| end.map(|it| it + 1.0))),
-        _ => Some(MISSED),
+    let from_one = support_px.map(|it| (it + 1.0).round());
+    let inside = |at: f64, side: usize| 0.0 < at && at < side as f64;
+    (inside(from_one[0], size[0]) && inside(from_one[1], size[1]))
+        .then(|| from_one.map(|it| it - 1.0))
+}
+
+/// The epipolar line of a support in the image of the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Line {
+    /// Misses the image, and warms nothing.
+    Outside,
+    /// Meets the border at these points, `[x, y]` in pixels counted from 1.
+    Across([[f64; 2]; 2]),
+}
+
+impl Line {
+    fn new(target_from_support: &Matrix3<f64>, support_px: [f64; 2], size: [usize; 2]) -> Self {
+        let line = target_from_support * Vector3::new(support_px[0], support_px[1], 1.0);
+        let [right, bottom] = size.map(|it| it as f64 - 0.5);
+        let (left, top) = (-0.5, -0.5);
+        let at_x = |x: f64| [x, -(line.x * x + line.z) / line.y];
+        let at_y = |y: f64| [-(line.y * y + line.z) / line.x, y];
+        let sides = [at_x(left), at_x(right)];
+        let sides = sides
+            .into_iter()
+            .filter(|[_, y]| (top..=bottom).contains(y));
+        let ends = [at_y(top), at_y(bottom)];
+        let ends = ends.into_iter().filter(|[x, _]| left < *x && *x < right);
+        let mut points = sides.chain(ends).map(|point| point.map(|it| it + 1.0));
+        match (points.next(), points.next()) {
+            (Some(from), Some(to)) => Self::Across([from, to]),
+            _ => Self::Outside,
+        }
     }
 }
 
@@ -135,23 +154,78 @@ fn line_ends(
 /// Where both views would be off and their expectations differ by more than the part's median
 /// training error, the better one is switched back on (the intended form of the program's
 /// rescue; its own test looks at the wrong part).
-pub(crate) fn weights(settings: &Settings, pair: &PairInput<'_>) -> [Vec<bool>; 2] {
-    let n_parts = pair.views[0].plan.model().n_parts();
+fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
+    let n_parts = counterpart.len();
     let sigma = |view: usize, part: usize| pair.views[view].sigma_px.and_then(|it| it.get(part));
-    let mut on = [vec![true; n_parts], vec![true; n_parts]];
-    for part in 0..n_parts {
-        let Some(tau) = settings.tau_px.get(part) else {
-            continue;
-        };
-        for (view, on) in on.iter_mut().enumerate() {
-            on[part] = sigma(view, part).is_none_or(|it| it <= tau);
-        }
-        if let (Some(first), Some(second), false, false) =
-            (sigma(0, part), sigma(1, part), on[0][part], on[1][part])
-            && (first - second).abs() > settings.rescue_px.get(part).copied().unwrap_or(f32::MAX)
+    let is_on = |view: usize, part: usize| match (sigma(view, part), settings.tau_px.get(part)) {
+        (Some(sigma), Some(tau)) => sigma <= tau,
+        _ => true,
+    };
+    let mut on = [0, 1].map(|view| {
+        (0..n_parts)
+            .map(|part| is_on(view, part))
+            .collect::<Vec<_>>()
+    });
+    for (part, &other) in counterpart.iter().enumerate() {
+        if let (Some(first), Some(second), Some(rescue), false, false) = (
+            sigma(0, part),
+            sigma(1, other),
+            settings.rescue_px.get(part),
+            on[0][part],
+            on[1][other],
+        ) && (first - second).abs() > *rescue
         {
-            on[usize::from(second < first)][part] = true;
+            if second < first {
+                on[1][other] = true;
+            } else {
+                on[0][part] = true;
+            }
         }
     }
     on
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two cameras side by side: the line of a point is its own row.
+    fn side_by_side() -> Matrix3<f64> {
+        Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
+    }
+
+    #[test]
+    fn a_line_across_ends_at_the_outer_edges_of_the_image() {
+        let line = Line::new(&side_by_side(), [7.0, 20.0], [64, 48]);
+        assert_eq!(line, Line::Across([[0.5, 21.0], [64.5, 21.0]]));
+    }
+
+    #[test]
+    fn an_upright_line_ends_at_top_and_bottom() {
+        let above_each_other = Matrix3::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0);
+        let line = Line::new(&above_each_other, [7.0, 20.0], [64, 48]);
+        assert_eq!(line, Line::Across([[8.0, 0.5], [8.0, 48.5]]));
+    }
+
+    #[test]
+    fn a_line_beside_the_image_is_outside() {
+        let line = Line::new(&side_by_side(), [7.0, 48.0], [64, 48]);
+        assert_eq!(line, Line::Outside);
+        let nowhere = Line::new(&Matrix3::zeros(), [7.0, 20.0], [64, 48]);
+        assert_eq!(nowhere, Line::Outside);
+    }
+
+    #[test]
+    fn a_support_is_looked_up_at_the_nearest_pixel() {
+        assert_eq!(looked_up([6.4, 19.5], [64, 48]), Some([6.0, 20.0]));
+    }
+
+    #[test]
+    fn a_support_outside_its_own_image_is_in_no_table() {
+        assert_eq!(looked_up([-0.6, 20.0], [64, 48]), None);
+        assert_eq!(looked_up([7.0, 100.0], [64, 48]), None);
+        // The program takes the last row and column for outside.
+        assert_eq!(looked_up([63.0, 20.0], [64, 48]), None);
+        assert_eq!(looked_up([62.0, 46.0], [64, 48]), Some([62.0, 46.0]));
+    }
 }

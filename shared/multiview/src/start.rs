@@ -23,6 +23,9 @@ pub struct Start {
 /// per view but the first (an exchange in all views changes nothing that two views could tell). With
 /// one candidate per view and `facing` off this is the paper's start. Up to 200 000 joint states are
 /// searched through; beyond that views join one by one and are then revised until nothing changes.
+/// Among equals the lower candidates win. The terms between views are the paper's under
+/// [`EnergyKind::Released`](crate::EnergyKind::Released) too, whose program has no choice of a start:
+/// with its alpha, which is meant for heat maps, they weigh heavily.
 ///
 /// * `views`: the views that answered, in a fixed order.
 /// * `tables`: part-type tables of a pair of indices into `views`.
@@ -96,11 +99,10 @@ fn between<'a>(
         };
         let terms = [false, true].map(|exchanged| PairTerms::new(settings, &input, exchanged));
         let value = |a: &State, b: &State| {
-            let poses = [
-                views[first].candidates[a.candidate].clone(),
-                views[second].candidates[b.candidate].clone(),
-            ];
-            terms[usize::from(a.exchanged != b.exchanged)].between(&poses)
+            terms[usize::from(a.exchanged != b.exchanged)].between(
+                &views[first].candidates[a.candidate],
+                &views[second].candidates[b.candidate],
+            )
         };
         states[first]
             .iter()

@@ -32,11 +32,12 @@ impl Epipolar {
     }
 }
 
-/// The term `xi` of eq. 4 as a function of the target's position, for a fixed support.
+/// The term `xi` of eq. 4, negated, as a function of the target's position, for a fixed support.
 ///
 /// With `r = q' F p`: the squared distances of `p` from the line of `q`, and of `q` from the line of
 /// `p`, are `r^2 / |F'q|^2` and `r^2 / |Fp|^2` (norms of the first two components), each divided by
-/// the squared cell size of its own view.
+/// the squared cell size of its own view: the paper's alpha, which weighs pixels, then means the same
+/// at every level of the pyramid and at every resolution of the cameras.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Term {
     support_from_target: Matrix3<f64>,
@@ -45,11 +46,13 @@ pub(crate) struct Term {
     /// `1 / (n^2)` of that line.
     inverse_norm2: f64,
     support_scale2: f64,
-    max_distance2: f64,
+    /// Bounds either distance, cells^2.
+    cap: f64,
 }
 
 impl Term {
-    /// The term of a support at `support_px` (undistorted), or `None` if it says nothing.
+    /// The term of a support at `support_px` (undistorted), or `None` if it has no line: it lies on
+    /// the epipole, or the cameras stand in one place.
     pub(crate) fn new(
         support_from_target: Matrix3<f64>,
         support_px: [f64; 2],
@@ -59,13 +62,19 @@ impl Term {
         let support = Vector3::new(support_px[0], support_px[1], 1.0);
         let line = support_from_target.tr_mul(&support);
         let inverse_norm2 = 1.0 / (line.x * line.x + line.y * line.y);
-        inverse_norm2.is_finite().then_some(Self {
+        (!inverse_norm2.is_infinite()).then_some(Self {
             support_from_target,
             line,
             inverse_norm2,
             support_scale2: support_scale * support_scale,
-            max_distance2: max_distance_cells * max_distance_cells,
+            cap: (max_distance_cells * max_distance_cells).min(UNSEEN),
         })
+    }
+
+    /// Whether the term is the same wherever the target is: the lens model has no answer for the
+    /// support.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.inverse_norm2.is_nan()
     }
 
     /// Sum of the two squared distances for a target at `target_px` (undistorted), cells^2.
@@ -79,14 +88,16 @@ impl Term {
         let r2 = r * r;
         let in_target = r2 * self.inverse_norm2 / target_scale2;
         let in_support = r2 / ((mx * mx + my * my) * self.support_scale2);
-        // `min` also turns the NaN of an unseen cell, and of the epipole, into the cap.
-        let cap = self.max_distance2.min(UNSEEN);
-        in_target.min(cap) + in_support.min(cap)
+        // `min` also turns the NaN of an unseen place, and of the epipole, into the cap.
+        in_target.min(self.cap) + in_support.min(self.cap)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use geometry::{Camera, Intrinsics, Lens, LensModel};
+    use nalgebra::{Isometry3, Point2, Vector2};
+
     use super::*;
 
     /// Two cameras side by side: the line of a point is its own row.
@@ -122,7 +133,63 @@ mod tests {
     }
 
     #[test]
-    fn an_unseen_support_says_nothing() {
-        assert!(Term::new(side_by_side(), [f64::NAN; 2], 4.0, 3.0).is_none());
+    fn an_unseen_support_is_as_far_from_everywhere() {
+        let term = Term::new(side_by_side(), [f64::NAN; 2], 4.0, 3.0).unwrap();
+        assert!(term.is_constant());
+        assert_eq!(term.distance2([7.0, 38.0], 4.0), 2.0 * 9.0);
+    }
+
+    #[test]
+    fn a_support_without_a_line_says_nothing() {
+        let in_one_place = Matrix3::zeros();
+        assert!(Term::new(in_one_place, [50.0, 30.0], 4.0, 3.0).is_none());
+    }
+
+    fn distorted(name: &str, k1: f64, pose: Isometry3<f64>) -> Camera {
+        let model = LensModel::BrownConrady {
+            k: [k1, 0.1, 0.0, 0.0, 0.0, 0.0],
+            p: [0.001, -0.002],
+        };
+        Camera {
+            name: name.to_owned(),
+            intrinsics: Intrinsics {
+                fx: 300.0,
+                fy: 310.0,
+                cx: 160.0,
+                cy: 120.0,
+                size: [320, 240],
+                lens: Lens::new(model),
+            },
+            camera_from_world: pose,
+        }
+    }
+
+    #[test]
+    fn it_vanishes_along_the_epipolar_curve_of_distorted_views() {
+        let first = distorted("first", -0.3, Isometry3::identity());
+        let turned = Isometry3::new(Vector3::new(-2.0, 0.1, 0.8), Vector3::new(0.0, 0.7, 0.1));
+        let second = distorted("second", -0.25, turned);
+        let second_from_first = geometry::epipolar::fundamental(&first, &second);
+        let of_pixels = |p: Point2<f64>, q: Point2<f64>| {
+            let term = Term::new(second_from_first, [q.x, q.y], 4.0, f64::INFINITY).unwrap();
+            term.distance2([p.x, p.y], 16.0)
+        };
+        // A segment of the world that the second view sees as one point: 2 to 4 m along its ray.
+        let pixel = Point2::new(90.0, 60.0);
+        let ray = second.ray(&pixel).unwrap();
+        let ideal = second.undistorted_px(&pixel).unwrap();
+        let mut without_lenses = 0.0_f64;
+        for step in 0..=10 {
+            let along = ray.direction.into_inner() * (2.0 + 0.2 * f64::from(step));
+            let seen = first.project(&(ray.origin + along)).unwrap();
+            let on_curve = of_pixels(first.undistorted_px(&seen).unwrap(), ideal);
+            assert!(on_curve < 1e-12, "{on_curve}");
+            let beside = first
+                .undistorted_px(&(seen + Vector2::new(0.0, 4.0)))
+                .unwrap();
+            assert!(of_pixels(beside, ideal) > 0.5, "a cell away");
+            without_lenses = without_lenses.max(of_pixels(seen, pixel));
+        }
+        assert!(without_lenses > 0.5, "{without_lenses}");
     }
 }

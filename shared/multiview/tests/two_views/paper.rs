@@ -1,0 +1,308 @@
+//! Laws of the paper's energy and of its optimiser.
+
+use std::sync::Arc;
+
+use fmp::{Placement, Pose};
+use multiview::{PairEstimate, PairStart, Settings, ViewPlan};
+use nalgebra::Point2;
+use proptest::prelude::*;
+
+use crate::oracle;
+use crate::planted::{
+    FROM_BEST, MIRROR, N_PARTS, N_TYPES, Noise, Scene, layout, mirrored, settings,
+};
+
+const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
+/// Few enough cells to try every pose there is.
+const TINY: [[usize; 2]; 2] = [[3, 4], [2, 2]];
+/// Single-view scores are sums in single precision.
+const ROUNDING: f64 = 1e-4;
+
+fn starts() -> impl Strategy<Value = PairStart> {
+    (0..4_usize, 0..4_usize, any::<bool>()).prop_map(|(a, b, exchanged)| PairStart {
+        candidates: [a, b],
+        exchanged,
+    })
+}
+
+fn parts(estimate: &PairEstimate) -> [(u16, Vec<Placement>); 2] {
+    let of = |pose: &Pose| (pose.level, pose.parts.clone());
+    estimate.poses.each_ref().map(of)
+}
+
+/// Every pose of a view.
+fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
+    let mut poses = Vec::new();
+    for (level, it) in plan.layout().levels.iter().enumerate() {
+        let n = it.rows * it.cols * N_TYPES;
+        for mut index in 0..n.pow(N_PARTS as u32) {
+            let mut next = |count: usize| {
+                let digit = index % count;
+                index /= count;
+                digit
+            };
+            let parts = (0..N_PARTS).map(|_| Placement {
+                mixture: next(N_TYPES) as u8,
+                x: next(it.cols) as u16,
+                y: next(it.rows) as u16,
+            });
+            poses.push(Pose {
+                score: 0.0,
+                level: level as u16,
+                parts: parts.collect(),
+            });
+        }
+    }
+    poses
+}
+
+proptest! {
+    #[test]
+    fn the_energy_is_that_of_the_paper_and_never_falls(seed: u64, start in starts()) {
+        let (scene, settings) = (Scene::new(seed, 2, &SIZES), settings(seed));
+        let found = scene.fuse(&settings, [0, 1], start);
+        let energy = |poses: &[Pose; 2]| {
+            oracle::energy(&scene, &settings, [0, 1], poses.each_ref(), start.exchanged)
+        };
+        let mut poses = [0, 1].map(|it| scene.views[it].candidates[start.candidates[it]].clone());
+        let mut before = energy(&poses) - ROUNDING;
+        for it in &found.iterations {
+            prop_assert!(it.score >= before, "{} after {before}", it.score);
+            poses[it.target] = it.pose.clone();
+            prop_assert!((it.score - energy(&poses)).abs() < ROUNDING);
+            before = it.score;
+        }
+        prop_assert!(found.converged);
+        prop_assert_eq!(&found.poses, &poses);
+        prop_assert!((found.energy - energy(&poses)).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn exchanging_the_views_exchanges_their_poses(seed: u64, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        // The scene knows no tables of the pair (1, 0).
+        let settings = Settings { beta: 0.0, ..settings(seed) };
+        // A tie would go to the first view in either order.
+        scene.views[0].sigma_px = None;
+        let there = scene.fuse(&settings, [0, 1], start);
+        let [a, b] = start.candidates;
+        let back = scene.fuse(&settings, [1, 0], PairStart { candidates: [b, a], ..start });
+        prop_assert!((there.energy - back.energy).abs() < ROUNDING);
+        let [first, second] = parts(&back);
+        prop_assert_eq!(parts(&there), [second, first]);
+        let targets = |it: &PairEstimate| it.iterations.iter().map(|it| it.target).collect::<Vec<_>>();
+        let exchanged: Vec<usize> = targets(&back).into_iter().map(|it| 1 - it).collect();
+        prop_assert_eq!(targets(&there), exchanged);
+    }
+
+    #[test]
+    fn exchanging_left_and_right_in_both_views_changes_nothing(seed: u64, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        let settings = Settings { beta: 0.0, ..settings(seed) };
+        let plain = scene.fuse(&settings, [0, 1], start);
+        scene.views.iter_mut().for_each(crate::planted::View::mirrored);
+        let exchanged = scene.fuse(&settings, [0, 1], start);
+        prop_assert!((plain.energy - exchanged.energy).abs() < ROUNDING);
+        let [first, second] = parts(&exchanged);
+        let back = [first, second].map(|(level, it)| (level, MIRROR.map(|part| it[part]).to_vec()));
+        prop_assert_eq!(parts(&plain), back);
+    }
+
+    #[test]
+    fn a_view_from_behind_is_understood_when_its_sides_are_exchanged(seed: u64, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        let settings = Settings { beta: 0.0, ..settings(seed) };
+        let plain = scene.fuse(&settings, [0, 1], start);
+        scene.views[1].mirrored();
+        let start = PairStart { exchanged: !start.exchanged, ..start };
+        let behind = scene.fuse(&settings, [0, 1], start);
+        prop_assert!((plain.energy - behind.energy).abs() < ROUNDING);
+        prop_assert_eq!(&plain.active, &behind.active);
+        let [first, second] = behind.poses.each_ref();
+        let [plain_first, plain_second] = plain.poses.each_ref();
+        prop_assert_eq!(&plain_first.parts, &first.parts);
+        prop_assert_eq!(&plain_second.parts, &mirrored(second).parts);
+    }
+
+    #[test]
+    fn parts_that_are_off_feel_no_force(seed: u64, blind in 0..2_usize, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        scene.views[blind].sigma_px = Some(vec![9.0; N_PARTS]);
+        let settings = Settings { tau_px: vec![8.0; N_PARTS], ..settings(seed) };
+        let found = scene.fuse(&settings, [0, 1], start);
+        prop_assert_eq!(&found.active, &[false; N_PARTS]);
+        let alone = [0, 1].map(|it| scene.views[it].candidates[0].clone());
+        prop_assert_eq!(found.poses.each_ref().map(|it| &it.parts), alone.each_ref().map(|it| &it.parts));
+        let sum: f64 = alone.iter().map(|it| f64::from(it.score)).sum();
+        prop_assert!((found.energy - sum).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn without_weight_every_view_keeps_its_own_best(seed: u64, start in starts()) {
+        let scene = Scene::new(seed, 2, &SIZES);
+        let settings = Settings { alpha: 0.0, beta: 0.0, ..settings(seed) };
+        let found = scene.fuse(&settings, [0, 1], start);
+        for (view, pose) in scene.views.iter().zip(&found.poses) {
+            prop_assert_eq!(&view.candidates[0].parts, &pose.parts);
+        }
+    }
+
+    #[test]
+    fn the_same_scene_at_twice_the_resolution_has_the_same_energy(seed: u64, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        let settings = settings(seed);
+        let coarse = scene.fuse(&settings, [0, 1], start);
+        for view in &mut scene.views {
+            let mut camera = view.plan.camera().clone();
+            let inside = &mut camera.intrinsics;
+            (inside.fx, inside.fy) = (2.0 * inside.fx, 2.0 * inside.fy);
+            // Pixels count from the centre of the first one.
+            (inside.cx, inside.cy) = (2.0 * inside.cx + 0.5, 2.0 * inside.cy + 0.5);
+            inside.size = inside.size.map(|it| 2 * it);
+            let model = Arc::clone(scene.solver.model());
+            view.plan = ViewPlan::new(camera, model, Arc::new(layout(&SIZES, 8.0)));
+        }
+        let fine = scene.fuse(&settings, [0, 1], start);
+        prop_assert!((coarse.energy - fine.energy).abs() < ROUNDING);
+        prop_assert_eq!(parts(&coarse), parts(&fine));
+    }
+
+    #[test]
+    fn cells_lie_where_the_lens_would_put_them_without_distortion(seed: u64) {
+        let scene = Scene::new(seed, 1, &SIZES);
+        let plan = &scene.views[0].plan;
+        let mut pose = scene.views[0].candidates[0].clone();
+        for (level, it) in plan.layout().levels.iter().enumerate() {
+            pose.level = level as u16;
+            for (cell, ideal) in plan.cells(0, level).iter().enumerate() {
+                pose.parts[0].x = (cell % it.cols) as u16;
+                pose.parts[0].y = (cell / it.cols) as u16;
+                let centre = Point2::from(plan.centres(&pose)[0]);
+                let Some(back) = plan.camera().distort_px(&Point2::from(*ideal)) else {
+                    prop_assert!(plan.camera().undistorted_px(&centre).is_none());
+                    continue;
+                };
+                prop_assert!((back - centre).norm() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_view_that_sees_nothing_is_pulled_to_the_lines_of_the_other(seed: u64, blind in 0..2_usize) {
+        let mut scene = Scene::new(seed, 2, &[[12, 16]]);
+        let settings = Settings {
+            alpha: 1e4,
+            beta: 0.0,
+            max_distance_cells: 20.0,
+            ..Settings::default()
+        };
+        for (view, it) in scene.views.iter_mut().enumerate() {
+            it.sigma_px = None;
+            it.values.fill(0.0);
+            if view != blind {
+                it.believe(1, 1e9);
+            }
+            it.candidates = vec![scene.solver.best(&it.evidence(), None).unwrap()];
+        }
+        let found = scene.fuse(&settings, [0, 1], FROM_BEST);
+        prop_assert_eq!(&found.poses[1 - blind].parts, &scene.views[1 - blind].candidates[0].parts);
+        let best = all_placements(&scene, &settings, blind, &found.poses);
+        let got = oracle::between(&scene, &settings, [0, 1], found.poses.each_ref(), false);
+        // The springs, 120 at most, are nothing beside a cell's worth of alpha.
+        prop_assert!(got >= best - 500.0, "{got} of {best}");
+    }
+}
+
+/// The best that the terms alone can be, each part of `view` by itself, the other view fixed.
+fn all_placements(scene: &Scene, settings: &Settings, view: usize, poses: &[Pose; 2]) -> f64 {
+    let it = &scene.views[view].plan.layout().levels[0];
+    let with = |part: usize, cell: usize| {
+        let mut moved = poses.clone();
+        moved[view].parts[part].x = (cell % it.cols) as u16;
+        moved[view].parts[part].y = (cell / it.cols) as u16;
+        oracle::between(scene, settings, [0, 1], moved.each_ref(), false)
+    };
+    let now = oracle::between(scene, settings, [0, 1], poses.each_ref(), false);
+    let gain = |part: usize| {
+        let cells = (0..it.rows * it.cols).map(|cell| with(part, cell) - now);
+        cells.fold(0.0, f64::max)
+    };
+    now + (0..N_PARTS).map(gain).sum::<f64>()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn neither_view_alone_can_raise_the_energy(seed: u64, start in starts()) {
+        let (scene, settings) = (Scene::new(seed, 2, &TINY), settings(seed));
+        let found = scene.fuse(&settings, [0, 1], start);
+        prop_assert!(found.converged);
+        for view in 0..2 {
+            for pose in all_poses(&scene.views[view].plan) {
+                let mut poses = found.poses.each_ref();
+                poses[view] = &pose;
+                let other = oracle::energy(&scene, &settings, [0, 1], poses, start.exchanged);
+                prop_assert!(other <= found.energy + ROUNDING, "{other} beats {}", found.energy);
+            }
+        }
+    }
+}
+
+/// The view that supports the other one first.
+fn first_support(sigma_px: [Option<[f32; N_PARTS]>; 2], seed: u64) -> (usize, usize) {
+    let mut scene = Scene::new(seed, 2, &SIZES);
+    for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {
+        view.sigma_px = sigma.map(|it| it.to_vec());
+    }
+    let found = scene.fuse(&settings(seed), [0, 1], FROM_BEST);
+    let [a, b] = [0, 1].map(|it| scene.views[it].candidates[0].score);
+    (1 - found.iterations[0].target, usize::from(b > a))
+}
+
+#[test]
+fn the_first_support_is_the_view_of_lower_expected_error() {
+    for seed in 0..20 {
+        let good = Some([1.0, 2.0, 2.5]);
+        // The largest error of a part is not what counts.
+        let bad = Some([2.0, 2.0, 2.0]);
+        assert_eq!(first_support([good, bad], seed).0, 0);
+        assert_eq!(first_support([bad, good], seed).0, 1);
+        assert_eq!(first_support([bad, bad], seed).0, 0, "a tie");
+    }
+}
+
+#[test]
+fn without_an_expectation_the_first_support_is_the_view_of_higher_score() {
+    let mut seen = [0, 0];
+    for seed in 0..20 {
+        for sigma in [[None, None], [None, Some([1.0; 3])], [Some([1.0; 3]), None]] {
+            let (first, higher) = first_support(sigma, seed);
+            assert_eq!(first, higher);
+            seen[first] += 1;
+        }
+    }
+    assert!(seen.iter().all(|it| *it > 0), "{seen:?}");
+}
+
+#[test]
+fn no_iterations_leave_the_start_as_it_is() {
+    let (scene, mut settings) = (Scene::new(1, 2, &SIZES), settings(1));
+    settings.max_iterations = 0;
+    let start = PairStart {
+        candidates: [2, 1],
+        exchanged: true,
+    };
+    let found = scene.fuse(&settings, [0, 1], start);
+    assert!(!found.converged && found.iterations.is_empty());
+    assert_eq!(found.poses[0], scene.views[0].candidates[2]);
+    let expect = oracle::energy(&scene, &settings, [0, 1], found.poses.each_ref(), true);
+    assert!((found.energy - expect).abs() < ROUNDING);
+}
+
+#[test]
+fn the_noise_is_spread() {
+    let mut noise = Noise(3);
+    let mean = (0..1000).map(|_| noise.unit()).sum::<f64>() / 1000.0;
+    assert!((mean - 0.5).abs() < 0.05, "{mean}");
+}

@@ -1,0 +1,67 @@
+//! The choice of candidates and exchanges, against every combination there is.
+
+use multiview::{Settings, TypeTables, ViewAnswer, choose_start};
+use proptest::prelude::*;
+
+use crate::oracle;
+use crate::planted::{Scene, View, settings};
+
+const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
+
+fn chosen(scene: &Scene, settings: &Settings) -> multiview::Start {
+    let answers: Vec<ViewAnswer<'_>> = scene.views.iter().map(View::answer).collect();
+    let tables =
+        |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
+    choose_start(settings, &answers, &tables)
+}
+
+/// Sum of eq. 3 over all pairs.
+fn energy(scene: &Scene, settings: &Settings, candidates: &[usize], exchanged: &[bool]) -> f64 {
+    let n = candidates.len();
+    let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
+    pairs
+        .map(|views| {
+            let poses = views.map(|it| &scene.views[it].candidates[candidates[it]]);
+            let opposite = exchanged[views[0]] != exchanged[views[1]];
+            oracle::energy(scene, settings, views, poses, opposite)
+        })
+        .sum()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_start_is_the_best_of_all_combinations(seed: u64, facing: bool) {
+        let scene = Scene::new(seed, 3, &SIZES);
+        let settings = Settings { facing, n_candidates: 3, ..settings(seed) };
+        let start = chosen(&scene, &settings);
+        let told = energy(&scene, &settings, &start.candidates, &start.exchanged);
+        prop_assert!((start.energy - told).abs() < 1e-4);
+        prop_assert!(!start.exchanged[0], "the first view is what others are exchanged against");
+        let n_exchanges = if facing { 4 } else { 1 };
+        for index in 0..27 * n_exchanges {
+            let candidates = [index % 3, index / 3 % 3, index / 9 % 3];
+            let exchanged = [false, index / 27 % 2 == 1, index / 54 == 1];
+            let other = energy(&scene, &settings, &candidates, &exchanged);
+            prop_assert!(other <= start.energy + 1e-4, "{candidates:?} {exchanged:?}");
+        }
+    }
+
+    #[test]
+    fn with_one_candidate_the_start_is_that_of_the_paper(seed: u64) {
+        let scene = Scene::new(seed, 3, &SIZES);
+        let settings = Settings { facing: false, n_candidates: 1, ..settings(seed) };
+        let start = chosen(&scene, &settings);
+        prop_assert_eq!((start.candidates, start.exchanged), (vec![0; 3], vec![false; 3]));
+    }
+}
+
+#[test]
+fn a_view_alone_starts_from_its_best() {
+    let scene = Scene::new(5, 1, &SIZES);
+    let start = chosen(&scene, &settings(5));
+    assert_eq!((start.candidates, start.exchanged), (vec![0], vec![false]));
+    let best = f64::from(scene.views[0].candidates[0].score);
+    assert_eq!(start.energy, best);
+}
