@@ -105,6 +105,7 @@ pub(crate) struct Report {
     given_up: Vec<String>,
     restarts: Vec<(String, u32)>,
     n_dropped: u64,
+    is_lossless: bool,
     /// `summary.json`, as the recorder wrote it; null if it did not.
     recorded: Value,
 }
@@ -128,6 +129,7 @@ impl Report {
             given_up: given_up.map(|it| it.name.clone()).collect(),
             restarts: restarted.map(|it| (it.name.clone(), it.restarts)).collect(),
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
+            is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
             recorded: serde_json::from_str(&recorded).unwrap_or(Value::Null),
         }
     }
@@ -143,7 +145,9 @@ impl Report {
         if self.interrupted {
             Some(ExitKind::Interrupted)
         } else if !self.given_up.is_empty()
+            || !self.restarts.is_empty()
             || self.recorded.is_null()
+            || (self.is_lossless && count("frames") < self.n_frames)
             || lost.into_iter().any(|it| count(it) > 0)
         {
             Some(ExitKind::Degraded)
@@ -199,7 +203,7 @@ impl Report {
             writeln!(
                 text,
                 "  3D            {} of {} frames",
-                it["frames_with_pose"], it["frames"]
+                it["frames_with_pose"], self.n_frames
             )?;
             if let Some(px) = it["reprojection_px"].as_f64() {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;

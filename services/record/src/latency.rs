@@ -115,7 +115,12 @@ impl Latency {
                         .filter(|it| it.status == Status::OK)
                         .map(|it| it.timing),
                 ),
-                ("pose", view.pose.map(|it| it.timing)),
+                (
+                    "pose",
+                    view.pose
+                        .filter(|it| it.status == Status::OK)
+                        .map(|it| it.timing),
+                ),
                 ("quality", view.quality.map(|it| it.timing)),
             ];
             for (stage, timing) in timings {
@@ -124,15 +129,12 @@ impl Latency {
                 }
             }
         }
-        for pair in &record.pairs {
+        for pair in record.pairs.iter().filter(|it| it.status == Status::OK) {
             self.note(Kind::Stage, "fuse", computation(pair.timing));
         }
-        self.note(
-            Kind::Stage,
-            "triangulate",
-            computation(record.pose3d.timing),
-        );
         if record.pose3d.status == Status::OK {
+            let timing = record.pose3d.timing;
+            self.note(Kind::Stage, "triangulate", computation(timing));
             self.walk(record);
         }
         self.remember(record);

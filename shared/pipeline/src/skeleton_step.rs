@@ -134,7 +134,8 @@ impl SkeletonStep {
             Sightings::Mean => None,
         };
         let sightings = sightings.unwrap_or_else(|| self.sightings_of_means(&views));
-        let joints = self.triangulate(&sightings, |centres| {
+        let n_joints = self.settings.joints.joints.len();
+        let joints = self.triangulate(&sightings, n_joints, |centres| {
             self.settings.joints.from_parts(centres)
         });
         Skeleton {
@@ -175,7 +176,7 @@ impl SkeletonStep {
                 .map(|(exchanges, energy)| {
                     let views = fuse(&self.candidates(answers, pairs, exchanges), exchanges);
                     let sightings = self.sightings_of_means(&views);
-                    let parts = self.triangulate(&sightings, <[_]>::to_vec);
+                    let parts = self.triangulate(&sightings, skeleton::N_PARTS, <[_]>::to_vec);
                     let joints: Vec<Option<Point3<f64>>> = PARSE14
                         .joints
                         .iter()
@@ -288,11 +289,11 @@ impl SkeletonStep {
     fn triangulate(
         &self,
         sightings: &[Sighting],
+        n_points: usize,
         points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
     ) -> Vec<Result<Triangulated, TriangulateError>> {
         let points: Vec<Vec<[f64; 2]>> =
             sightings.iter().map(|it| points(&it.centres_px)).collect();
-        let n_points = points.iter().map(Vec::len).max().unwrap_or(0);
         let triangulate = |point: usize| {
             let observations: Vec<Observation<'_>> = sightings
                 .iter()

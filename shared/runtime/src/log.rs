@@ -21,6 +21,7 @@ pub fn init_logging(process: &str, level: Level) {
     let set = tracing_subscriber::fmt()
         .with_max_level(level)
         .with_writer(io::stderr)
+        .with_ansi(false)
         .log_internal_errors(false)
         .event_format(Line {
             process: Arc::from(process),

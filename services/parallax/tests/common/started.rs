@@ -1,0 +1,149 @@
+//! One running `parallax`: what it says, its processes, and how it ends.
+
+use core::time::Duration;
+use std::fs::{self, File};
+use std::os::unix::process::CommandExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// What takes longer has got stuck.
+const WATCHDOG: Duration = Duration::from_mins(4);
+
+/// A running `parallax`.
+pub(crate) struct Started {
+    child: Child,
+    folder: PathBuf,
+    log: PathBuf,
+}
+
+/// How it ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    pub(crate) status: ExitStatus,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl Started {
+    /// Starts it in a folder, and in a process group of its own.
+    pub(crate) fn new(folder: &Path, arguments: &[&str]) -> Self {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let nth = COUNT.fetch_add(1, Ordering::Relaxed);
+        let log = folder.join(format!("log-{nth}"));
+        let child = Command::new(env!("CARGO_BIN_EXE_parallax"))
+            .args(arguments)
+            .current_dir(folder)
+            .stdout(File::create(log.with_extension("out")).unwrap())
+            .stderr(File::create(log.with_extension("err")).unwrap())
+            .process_group(0)
+            .spawn()
+            .unwrap();
+        Self {
+            child,
+            folder: folder.to_owned(),
+            log,
+        }
+    }
+
+    /// Waits for its end; no process of it may be left then.
+    pub(crate) fn wait(mut self) -> Ended {
+        let begin = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            if begin.elapsed() > WATCHDOG {
+                self.child.kill().unwrap();
+                self.child.wait().unwrap();
+                panic!("stuck:\n{}", self.said("err"));
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        let ended = Ended {
+            status,
+            stdout: self.said("out"),
+            stderr: self.said("err"),
+        };
+        assert_eq!(processes(&self.folder), [], "left behind after\n{}", ended.stderr);
+        assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
+        ended
+    }
+
+    /// The process of a service, once there is one.
+    ///
+    /// * `service`: as on its command line, for example `pose --index 1`.
+    pub(crate) fn pid_of(&mut self, service: &str) -> u32 {
+        let words: Vec<&str> = service.split(' ').collect();
+        let mut found = None;
+        self.until(service, |folder| {
+            found = processes(folder)
+                .into_iter()
+                .find(|(_, line)| words.iter().all(|word| line.contains(&(*word).to_owned())))
+                .map(|it| it.0);
+            found.is_some()
+        });
+        found.unwrap()
+    }
+
+    /// Waits until something holds while it runs.
+    pub(crate) fn until(&mut self, what: &str, mut holds: impl FnMut(&Path) -> bool) {
+        let folder = self.folder.clone();
+        wait_until(what, || {
+            let over = self.child.try_wait().unwrap();
+            assert!(over.is_none(), "over before {what}:\n{}", self.said("err"));
+            holds(&folder)
+        });
+    }
+
+    /// Its process id, which is that of its group too.
+    pub(crate) fn id(&self) -> i64 {
+        i64::from(self.child.id())
+    }
+
+    fn said(&self, what: &str) -> String {
+        fs::read_to_string(self.log.with_extension(what)).unwrap()
+    }
+}
+
+impl Drop for Started {
+    /// Ends what a failed test left running; a process that has been waited for is left alone.
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+/// Sends a signal to a process, or to a process group if the number is negative.
+pub(crate) fn signal(name: &str, id: i64) {
+    let status = Command::new("kill")
+        .args(["-s", name, "--", &id.to_string()])
+        .status();
+    assert!(status.unwrap().success(), "kill -s {name} {id}");
+}
+
+/// Waits until something holds.
+fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < WATCHDOG, "waited in vain: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Processes whose command line names a folder, with its words.
+fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
+    let folder = folder.to_str().unwrap();
+    let entries = fs::read_dir("/proc").unwrap();
+    entries
+        .filter_map(|entry| {
+            let entry = entry.ok()?;
+            let pid = entry.file_name().to_str()?.parse().ok()?;
+            // A process that ended in between has no command line any more.
+            let line = fs::read_to_string(entry.path().join("cmdline")).ok()?;
+            let words = line.split('\0').map(str::to_owned).collect();
+            line.contains(folder).then_some((pid, words))
+        })
+        .collect()
+}
