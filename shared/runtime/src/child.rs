@@ -179,8 +179,12 @@ mod tests {
     use std::ffi::OsString;
     use std::path::Path;
     use std::process::ExitStatus;
+    use std::time::Instant;
 
     use super::{Child, wait_for_any};
+
+    /// What takes longer will never happen.
+    const WATCHDOG: Duration = Duration::from_mins(1);
 
     fn shell(script: &str) -> Child {
         Child::start(Path::new("/bin/sh"), &["-c", script].map(OsString::from)).unwrap()
@@ -230,9 +234,12 @@ mod tests {
         let (lines, status) = run(&mut child);
         assert!(!status.success());
         let orphan = format!("/proc/{}/cmdline", lines[0]);
-        while std::fs::read(&orphan).is_ok_and(|line| !line.is_empty()) {
+        let is_alive = || std::fs::read(&orphan).is_ok_and(|line| !line.is_empty());
+        let begin = Instant::now();
+        while is_alive() && begin.elapsed() < WATCHDOG {
             std::thread::sleep(Duration::from_millis(5));
         }
+        assert!(!is_alive(), "{orphan}");
     }
 
     #[test]
