@@ -168,15 +168,14 @@ impl<'a> Worker<'a> {
         let present = (0..answers.len()).filter(|it| answers[*it].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
         let start = self.job.step.start(&answers);
+        // Of every view: one whose partner is missing would else wait for room for ever.
+        for evidence in self.evidence.iter_mut().flatten() {
+            evidence.advance(joined.frame)?;
+        }
         for &(index, views) in &self.job.pairs {
             let received_at_nanos = now_nanos();
             self.service.progress().tick();
             let answer = if views.iter().all(|&view| answers[view].is_some()) {
-                for view in views {
-                    if let Some(evidence) = &mut self.evidence[view] {
-                        evidence.advance(joined.frame)?;
-                    }
-                }
                 self.evidence_of(views, joined.frame)
                     .and_then(|[first, second]| {
                         self.job
