@@ -4,13 +4,15 @@
 mod common;
 
 use common::{Case, planted, signal};
+use geometry::files::ReadOptions;
 use kernels::Rgb8View;
 use pipeline::{Estimate, Estimator, EstimatorSettings};
 use serde_json::{Value, json};
 use skeleton::PARSE14;
 
 /// No overlays and no turning, so that frames are the pictures as they were planted.
-const PLAIN: &str = "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+const PLAIN: &str =
+    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
 /// The same at a pace that leaves time to interfere.
 const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\nframe_rate_hz = 20\n\
@@ -18,7 +20,7 @@ const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\nframe_rate
 
 /// Compares the results of a run with those of one process, bit for bit.
 fn assert_same_bits(case: &Case, n_views: usize, n_frames: usize) {
-    let rig = planted::rig(n_views);
+    let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
     let model = planted::model();
     let (up, settings) = (rig.up_in_world(), EstimatorSettings::default());
     let mut estimator = Estimator::new(&model, rig.cameras(), up, &settings).unwrap();
@@ -41,7 +43,10 @@ fn assert_same_bits(case: &Case, n_views: usize, n_frames: usize) {
         assert_same_skeleton(&pose3d[frame], frame, &estimate);
         for view in 0..n_views {
             let line = &pose2d[frame * n_views + view];
-            assert_eq!((&line["frame"], &line["view"]), (&json!(frame), &json!(planted::name(view))));
+            assert_eq!(
+                (&line["frame"], &line["view"]),
+                (&json!(frame), &json!(planted::name(view)))
+            );
             let answer = estimate.answers[view].as_ref().unwrap();
             let best = &answer.candidates[0];
             assert_eq!(line["single"]["candidates"], json!(answer.candidates.len()));
@@ -61,23 +66,39 @@ fn assert_same_bits(case: &Case, n_views: usize, n_frames: usize) {
             assert_eq!(line["facing"] == json!("behind"), fused.exchanged);
         }
     }
-    assert!(n_placed > 10 * n_frames, "little to compare: {n_placed} joints");
+    assert!(
+        n_placed > 10 * n_frames,
+        "little to compare: {n_placed} joints"
+    );
 }
 
 fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
     assert_eq!(line["frame"], json!(frame));
     assert_eq!(line["pairs"], json!(estimate.skeleton.n_pairs));
-    assert_eq!(line["facing_margin"], json!(estimate.skeleton.facing_margin));
+    assert_eq!(
+        line["facing_margin"],
+        json!(estimate.skeleton.facing_margin)
+    );
     for (joint, expected) in PARSE14.joints.iter().zip(&estimate.skeleton.joints) {
         let got = &line["joints"][joint.name];
         let Ok(expected) = expected else {
-            assert_eq!(got["position_m"], Value::Null, "frame {frame}, {}", joint.name);
+            assert_eq!(
+                got["position_m"],
+                Value::Null,
+                "frame {frame}, {}",
+                joint.name
+            );
             continue;
         };
         let c = &expected.covariance;
         let covariance = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|it| c[it]);
         let position: [f64; 3] = expected.in_world.coords.into();
-        assert_eq!(got["position_m"], json!(position), "frame {frame}, {}", joint.name);
+        assert_eq!(
+            got["position_m"],
+            json!(position),
+            "frame {frame}, {}",
+            joint.name
+        );
         assert_eq!(got["covariance_m2"], json!(covariance));
         assert_eq!(got["reprojection_px"], json!(expected.reprojection_px));
     }
@@ -85,7 +106,10 @@ fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
 
 /// The frame numbers of a run's results.
 fn frames(lines: &[Value]) -> Vec<u64> {
-    lines.iter().map(|it| it["frame"].as_u64().unwrap()).collect()
+    lines
+        .iter()
+        .map(|it| it["frame"].as_u64().unwrap())
+        .collect()
 }
 
 #[test]
@@ -102,14 +126,16 @@ fn deployments_side_by_side_do_not_meet() {
         Case::new("left", &[12; 2], PLAIN),
         Case::new("right", &[9; 3], PLAIN),
     ];
-    let started = cases.each_ref().map(|it| it.start(&["run", "deployment.toml"]));
+    let started = cases
+        .each_ref()
+        .map(|it| it.start(&["run", "deployment.toml"]));
     for started in started {
         let ended = started.wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     }
     assert_same_bits(&cases[0], 2, 12);
     assert_same_bits(&cases[1], 3, 9);
-    cases.each_ref().map(Case::assert_nothing_left);
+    cases.iter().for_each(Case::assert_nothing_left);
 }
 
 #[test]
@@ -124,7 +150,11 @@ fn an_interrupted_run_ends_cleanly() {
         assert_eq!(ended.status.code(), Some(130), "{name}: {}", ended.stderr);
         case.assert_nothing_left();
         let lines = case.lines("pose3d.jsonl");
-        assert!((3..400).contains(&lines.len()), "{name}: {} frames", lines.len());
+        assert!(
+            (3..400).contains(&lines.len()),
+            "{name}: {} frames",
+            lines.len()
+        );
     }
 }
 
@@ -138,16 +168,29 @@ fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
     let ended = started.wait();
     case.assert_nothing_left();
     let lines = case.lines("pose3d.jsonl");
-    assert_eq!(frames(&lines), (0..100).collect::<Vec<_>>(), "{}", ended.stderr);
+    assert_eq!(
+        frames(&lines),
+        (0..100).collect::<Vec<_>>(),
+        "{}",
+        ended.stderr
+    );
     let all = json!(["a", "b", "c"]);
     let without = lines.iter().filter(|it| it["views_present"] != all);
     let without: Vec<_> = without.map(|it| it["views_present"].clone()).collect();
-    assert!(without.iter().all(|it| *it == json!(["a", "c"])), "{without:?}");
+    assert!(
+        without.iter().all(|it| *it == json!(["a", "c"])),
+        "{without:?}"
+    );
     assert_eq!(lines[99]["views_present"], all, "the view is not back");
     let code = if without.is_empty() { 0 } else { 7 };
     assert_eq!(ended.status.code(), Some(code), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(report["restarts"], json!([{ "process": "pose-1", "restarts": 1 }]));
+    assert_eq!(
+        report["restarts"],
+        json!([{ "process": "pose-1", "restarts": 1 }]),
+        "{}",
+        ended.stderr
+    );
     let missing = &report["recorded"]["summary"]["frames_with_views_missing"];
     assert_eq!(*missing, json!(without.len()));
 }
@@ -158,9 +201,18 @@ fn a_view_that_ends_early_is_missing_from_there_on() {
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let lines = case.lines("pose3d.jsonl");
-    assert_eq!(frames(&lines), (0..12).collect::<Vec<_>>());
+    assert_eq!(
+        frames(&lines),
+        (0..12).collect::<Vec<_>>(),
+        "{}",
+        ended.stderr
+    );
     for (frame, line) in lines.iter().enumerate() {
-        let views: &[&str] = if frame < 7 { &["a", "b", "c"] } else { &["a", "b"] };
+        let views: &[&str] = if frame < 7 {
+            &["a", "b", "c"]
+        } else {
+            &["a", "b"]
+        };
         assert_eq!(line["views_present"], json!(views), "frame {frame}");
     }
 }
@@ -175,10 +227,25 @@ fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
     let ended = started.wait();
     case.assert_nothing_left();
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(report["restarts"], json!([{ "process": "record", "restarts": 1 }]));
+    assert_eq!(
+        report["restarts"],
+        json!([{ "process": "record", "restarts": 1 }]),
+        "{}",
+        ended.stderr
+    );
     let frames = frames(&case.lines("pose3d.jsonl"));
     assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
-    assert_eq!((frames[0], frames.last()), (0, Some(&99)), "{}", ended.stderr);
+    assert_eq!(
+        (frames[0], frames.last()),
+        (0, Some(&99)),
+        "{}",
+        ended.stderr
+    );
     let code = if frames.len() == 100 { 0 } else { 7 };
-    assert_eq!(ended.status.code(), Some(code), "{report:#}\n{}", ended.stderr);
+    assert_eq!(
+        ended.status.code(),
+        Some(code),
+        "{report:#}\n{}",
+        ended.stderr
+    );
 }

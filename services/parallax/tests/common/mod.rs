@@ -28,7 +28,10 @@ impl Case {
     /// * `more`: what else the deployment file says.
     pub(crate) fn new(name: &str, n_frames: &[usize], more: &str) -> Self {
         let case = Self {
-            folder: tempfile::Builder::new().prefix("parallax-").tempdir().unwrap(),
+            folder: tempfile::Builder::new()
+                .prefix("parallax-")
+                .tempdir()
+                .unwrap(),
             name: format!("{name}-{}", std::process::id()),
         };
         let rig = planted::rig(n_frames.len());
@@ -45,7 +48,10 @@ impl Case {
                 let file = folder.join(format!("{frame:04}.png"));
                 planted::picture(camera, frame).save_png(&file).unwrap();
             }
-            text += &format!("\n[[camera]]\nname = \"{0}\"\nsource = \"{0}\"\n", camera.name);
+            text += &format!(
+                "\n[[camera]]\nname = \"{0}\"\nsource = \"{0}\"\n",
+                camera.name
+            );
         }
         case.write("deployment.toml", format!("{text}\n{more}\n"));
         case
@@ -69,7 +75,10 @@ impl Case {
     /// Replaces text in a file of the folder; it must be there.
     pub(crate) fn edit(&self, name: &str, from: &str, to: &str) {
         let text = fs::read_to_string(self.path(name)).unwrap();
-        assert!(text.contains(from), "{name} does not contain {from}:\n{text}");
+        assert!(
+            text.contains(from),
+            "{name} does not contain {from}:\n{text}"
+        );
         self.write(name, text.replace(from, to));
     }
 
@@ -94,7 +103,11 @@ impl Case {
             .filter(|name| name.starts_with(namespace.prefix()))
             .collect();
         assert_eq!(left, Vec::<String>::new(), "left in shared memory");
-        assert!(!namespace.root().exists(), "{} is left", namespace.root().display());
+        assert!(
+            !namespace.root().exists(),
+            "{} is left",
+            namespace.root().display()
+        );
     }
 
     /// The lines of a file of results, as far as they are whole; those of a run that goes on, too.

@@ -47,7 +47,11 @@ pub(crate) fn picture(camera: &Camera, frame: usize) -> Canvas {
     let mut canvas = Canvas::new(Size::new(width, height), [90, 96, 102]);
     let parts = figure(frame).map(|at| camera.project(&at).unwrap());
     for (part, at) in parts.iter().enumerate() {
-        let colour = [40 * (part % 6) as u8, 255 - 9 * part as u8, 30 * (part % 7) as u8];
+        let colour = [
+            40 * (part % 6) as u8,
+            255 - 9 * part as u8,
+            30 * (part % 7) as u8,
+        ];
         if let Some(parent) = PARENT[part] {
             canvas.line(parts[parent].coords.into(), at.coords.into(), 3.0, colour);
         }
@@ -70,7 +74,11 @@ fn standing(part: usize) -> Point3<f64> {
     let side = (MIRROR[part] as f64 - part as f64).signum();
     let side = if MIRROR[part] == part { 0.0 } else { side };
     let swing = 0.04 * ((part * 7) % 5) as f64;
-    Point3::new(side * (0.12 + 0.02 * depth), swing - 0.08, 0.55 - 0.11 * depth)
+    Point3::new(
+        side * (0.12 + 0.02 * depth),
+        swing - 0.08,
+        0.55 - 0.11 * depth,
+    )
 }
 
 /// A model of 26 parts of two types with four filters of 3x3 cells that like edges.

@@ -66,7 +66,12 @@ impl Started {
             stdout: self.said("out"),
             stderr: self.said("err"),
         };
-        assert_eq!(processes(&self.folder), [], "left behind after\n{}", ended.stderr);
+        assert_eq!(
+            processes(&self.folder),
+            [],
+            "left behind after\n{}",
+            ended.stderr
+        );
         assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
         ended
     }
