@@ -19,10 +19,14 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
+        let step = ViewSettings::default();
         Self {
-            evidence_window: Window::All(All::All),
-            candidates: 5,
-            min_separation: 0.5,
+            evidence_window: match step.window {
+                EvidenceWindow::All => Window::All(All::All),
+                EvidenceWindow::Around(reach) => Window::Levels(reach),
+            },
+            candidates: step.n_candidates,
+            min_separation: step.min_separation,
             threads: 1,
         }
     }

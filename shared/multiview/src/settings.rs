@@ -71,7 +71,7 @@ impl Default for Settings {
             tau_px: Vec::new(),
             rescue_px: Vec::new(),
             facing: true,
-            n_candidates: 5,
+            n_candidates: 8,
         }
     }
 }

@@ -13,25 +13,11 @@ use skeleton::{JointSet, PARSE14};
 
 use crate::{Answer, PairAnswer};
 
-/// What of a view is triangulated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Sightings {
-    /// The candidates of all its pairs, each for itself with its share of the view's weight, so that a
-    /// pair that went astray is one outlier among many instead of a bias in the mean. Where the pairs
-    /// are too many to be triangulated at once, as [`Self::Mean`].
-    #[default]
-    EachPair,
-    /// The mean of the candidates: the paper's "simply averaged".
-    Mean,
-}
-
 /// Settings of the last step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSettings {
     /// Which joints to triangulate.
     pub joints: &'static JointSet,
-    /// What of a view is triangulated.
-    pub sightings: Sightings,
     /// How to triangulate.
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, cells of the level it was found on.
@@ -51,7 +37,6 @@ impl Default for SkeletonSettings {
     fn default() -> Self {
         Self {
             joints: &PARSE14,
-            sightings: Sightings::default(),
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
             facing: true,
@@ -129,11 +114,7 @@ impl SkeletonStep {
         };
         let candidates = self.candidates(answers, &pairs, exchanged);
         let views = fuse(&candidates, exchanged);
-        let sightings = match self.settings.sightings {
-            Sightings::EachPair => self.sightings_of_candidates(&candidates),
-            Sightings::Mean => None,
-        };
-        let sightings = sightings.unwrap_or_else(|| self.sightings_of_means(&views));
+        let sightings = self.sightings(&views);
         let n_joints = self.settings.joints.joints.len();
         let joints = self.triangulate(&sightings, n_joints, |centres| {
             self.settings.joints.from_parts(centres)
@@ -175,7 +156,7 @@ impl SkeletonStep {
                 .into_iter()
                 .map(|(exchanges, energy)| {
                     let views = fuse(&self.candidates(answers, pairs, exchanges), exchanges);
-                    let sightings = self.sightings_of_means(&views);
+                    let sightings = self.sightings(&views);
                     let parts = self.triangulate(&sightings, skeleton::N_PARTS, <[_]>::to_vec);
                     let joints: Vec<Option<Point3<f64>>> = PARSE14
                         .joints
@@ -259,7 +240,7 @@ impl SkeletonStep {
     }
 
     /// One sighting per view: its fused pose.
-    fn sightings_of_means(&self, views: &[Option<FusedView>]) -> Vec<Sighting> {
+    fn sightings(&self, views: &[Option<FusedView>]) -> Vec<Sighting> {
         let seen = views.iter().enumerate();
         let seen = seen.filter_map(|(view, it)| Some((view, it.as_ref()?)));
         seen.map(|(view, it)| Sighting {
@@ -268,22 +249,6 @@ impl SkeletonStep {
             centres_px: it.pose.centres_px.clone(),
         })
         .collect()
-    }
-
-    /// One sighting per view and pair; `None` if there are more than can be triangulated.
-    fn sightings_of_candidates(&self, views: &[Option<Candidates>]) -> Option<Vec<Sighting>> {
-        let mut sightings = Vec::new();
-        for (view, it) in views.iter().enumerate() {
-            let Some(it) = it else { continue };
-            // Pairs of one view see the same pixels: together they weigh as much as one view.
-            let share = (it.all().len() as f64).sqrt();
-            sightings.extend(it.all().iter().map(|candidate| Sighting {
-                view,
-                sigma_px: candidate.cell_px * self.settings.sigma_cells * share,
-                centres_px: candidate.centres_px.clone(),
-            }));
-        }
-        (sightings.len() <= geometry::MAX_VIEWS).then_some(sightings)
     }
 
     fn triangulate(
@@ -368,15 +333,14 @@ fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedV
     views.iter().enumerate().map(fuse_view).collect()
 }
 
-/// Renumbers the observations of a joint as the views of the rig; a view's residual is its largest.
+/// Renumbers the observations of a joint as the views of the rig.
 fn by_view(mut found: Triangulated, sightings: &[Sighting]) -> Triangulated {
     let (used, residuals) = (found.views_used, found.residuals_px);
     found.views_used = 0;
     found.residuals_px.fill(f64::NAN);
     for (i, sighting) in sightings.iter().enumerate() {
         found.views_used |= (used >> i & 1) << sighting.view;
-        let residual = &mut found.residuals_px[sighting.view];
-        *residual = residual.max(residuals[i]);
+        found.residuals_px[sighting.view] = residuals[i];
     }
     found
 }

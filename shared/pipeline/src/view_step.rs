@@ -44,8 +44,8 @@ impl Default for ViewSettings {
     fn default() -> Self {
         Self {
             window: EvidenceWindow::All,
-            n_candidates: 5,
-            min_separation: 0.5,
+            n_candidates: 8,
+            min_separation: 1.0,
         }
     }
 }
