@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{Case, planted, signal};
+use common::started::signal;
+use common::{Case, planted};
 use geometry::files::ReadOptions;
 use kernels::Rgb8View;
 use pipeline::{Estimate, Estimator, EstimatorSettings};

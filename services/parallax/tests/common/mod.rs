@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 pub(crate) mod planted;
-mod started;
+pub(crate) mod started;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use geometry::files::Format;
 use runtime::Namespace;
 use tempfile::TempDir;
 
-pub(crate) use started::{Ended, Started, signal};
+pub(crate) use started::{Ended, Started};
 
 /// Footage, rig, model and deployment file in a folder.
 pub(crate) struct Case {

@@ -1,0 +1,407 @@
+//! What is wrong with an input is said with its file and its field, and nothing is left behind.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::fs;
+
+use common::{Case, Ended, planted};
+use image::DynamicImage;
+use serde_json::Value;
+
+const PLAIN: &str =
+    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+
+const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
+const RUN: &[&str] = &["run", "deployment.toml"];
+const DETECT: &[&str] = &["detect", "it.png", "--model", "model.plx", "--json"];
+
+/// One way to break a good deployment of two views, `a` and `b`, of two frames.
+struct Row {
+    what: &'static str,
+    broken: fn(&Case),
+    arguments: &'static [&'static str],
+    code: i32,
+    /// What the message must contain.
+    words: &'static [&'static str],
+}
+
+fn check(rows: &[Row]) {
+    let mut wrong = Vec::new();
+    for row in rows {
+        let case = Case::new("bad", &[2; 2], PLAIN);
+        (row.broken)(&case);
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = case.start(row.arguments).wait();
+        case.assert_nothing_left();
+        let lacks = row.words.iter().find(|it| !stderr.contains(**it));
+        if status.code() != Some(row.code) || lacks.is_some() || !stdout.is_empty() {
+            wrong.push(format!(
+                "{}: {status}, expected {}; lacks {lacks:?}\n{stdout}{stderr}",
+                row.what, row.code
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn deployment_files() {
+    check(&[
+        Row {
+            what: "unknown key",
+            broken: |it| it.edit("deployment.toml", "workers", "wrokers"),
+            arguments: DRY,
+            code: 3,
+            words: &["deployment.toml:19", "wrokers", "did you mean `workers`"],
+        },
+        Row {
+            what: "unknown key, in a run",
+            broken: |it| it.edit("deployment.toml", "upright", "uprigth"),
+            arguments: RUN,
+            code: 3,
+            words: &["deployment.toml:15", "did you mean `upright`"],
+        },
+        Row {
+            what: "no such file",
+            broken: |it| fs::remove_file(it.path("deployment.toml")).unwrap(),
+            arguments: DRY,
+            code: 4,
+            words: &["deployment.toml", "No such file"],
+        },
+        Row {
+            what: "frames of fewer than 40 pixels",
+            broken: |it| it.edit("deployment.toml", "upright", "size = [96, 39]\nupright"),
+            arguments: DRY,
+            code: 4,
+            words: &["view \"a\"", "96x39", "40"],
+        },
+    ]);
+}
+
+#[test]
+fn footage() {
+    check(&[
+        Row {
+            what: "missing video",
+            broken: |it| it.edit("deployment.toml", "source = \"b\"", "source = \"b.mp4\""),
+            arguments: DRY,
+            code: 4,
+            words: &["no such footage", "b.mp4", "camera \"b\""],
+        },
+        Row {
+            what: "text that is called a video",
+            broken: |it| {
+                it.edit("deployment.toml", "source = \"b\"", "source = \"b.mp4\"");
+                it.write("b.mp4", "once upon a time");
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["cannot decode the video", "b.mp4", "camera \"b\""],
+        },
+        Row {
+            what: "folder without images",
+            broken: |it| {
+                it.edit("deployment.toml", "source = \"b\"", "source = \"none\"");
+                fs::create_dir(it.path("none")).unwrap();
+            },
+            arguments: RUN,
+            code: 4,
+            words: &["no image", "none", "camera \"b\""],
+        },
+        Row {
+            what: "empty first image",
+            broken: |it| it.write("b/0000.png", ""),
+            arguments: RUN,
+            code: 4,
+            words: &["b/0000.png", "0 bytes"],
+        },
+        Row {
+            what: "images of one pixel",
+            broken: |it| {
+                for name in ["b/0000.png", "b/0001.png"] {
+                    picture(1, 1).save(it.path(name)).unwrap();
+                }
+            },
+            arguments: DRY,
+            code: 5,
+            words: &["camera \"b\"", "1x1", "calibrated for 96x128"],
+        },
+    ]);
+}
+
+#[test]
+fn images_of_differing_size_end_their_view_and_name_the_file() {
+    let case = Case::new("sizes", &[3; 2], PLAIN);
+    picture(90, 128).save(case.path("b/0001.png")).unwrap();
+    let ended = case.run();
+    for word in ["b/0001.png", "90x128", "96x128"] {
+        assert!(
+            ended.stderr.contains(word),
+            "lacks {word}: {}",
+            ended.stderr
+        );
+    }
+    assert_ne!(ended.status.code(), Some(0), "{}", ended.stderr);
+}
+
+#[test]
+fn models() {
+    check(&[
+        Row {
+            what: "no model",
+            broken: |it| fs::remove_file(it.path("model.plx")).unwrap(),
+            arguments: RUN,
+            code: 4,
+            words: &["model.plx", "parallax model import"],
+        },
+        Row {
+            what: "truncated",
+            broken: |it| {
+                let bytes = fs::read(it.path("model.plx")).unwrap();
+                it.write("model.plx", &bytes[..bytes.len() / 2]);
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["model.plx", "bytes, its header says"],
+        },
+        Row {
+            what: "text that ends early",
+            broken: |it| it.write("model.plx", &model("0 1", 1)[..200]),
+            arguments: DRY,
+            code: 4,
+            words: &["model.plx", "line ", "`filters_w`"],
+        },
+        Row {
+            what: "tree with a cycle",
+            broken: |it| it.write("model.plx", model("0 2", 1)),
+            arguments: DRY,
+            code: 4,
+            words: &["model.plx", "part 2 names part 2 as its parent", "cycle"],
+        },
+        Row {
+            what: "filter of another size than the header says",
+            broken: |it| it.write("model.plx", model("0 1", 2)),
+            arguments: DRY,
+            code: 4,
+            words: &["model.plx", "line ", "`maxsize`", "expected 1"],
+        },
+        Row {
+            what: "some other file",
+            broken: |it| {
+                fs::copy(it.path("a/0000.png"), it.path("model.plx"))
+                    .map(drop)
+                    .unwrap()
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["model.plx is not a model", "PNG"],
+        },
+    ]);
+}
+
+#[test]
+fn calibrations() {
+    check(&[
+        Row {
+            what: "for another image size",
+            broken: |it| it.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]"),
+            arguments: DRY,
+            code: 5,
+            words: &[
+                "camera \"a\"",
+                "96x128",
+                "calibrated for 128x96",
+                "source_offset_px",
+            ],
+        },
+        Row {
+            what: "without one of the cameras",
+            broken: |it| it.edit("deployment.toml", "name = \"b\"", "name = \"z\""),
+            arguments: RUN,
+            code: 5,
+            words: &["rig.toml", "no camera \"z\"", "a, b"],
+        },
+        Row {
+            what: "not a rotation",
+            broken: |it| {
+                let rows = "rotation = [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]";
+                replace_line(it, "rotation_rad", rows);
+            },
+            arguments: DRY,
+            code: 5,
+            words: &["rig.toml", "camera \"a\": rotation", "not a rotation"],
+        },
+        Row {
+            what: "mirrored",
+            broken: |it| {
+                let rows = "rotation = [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]";
+                replace_line(it, "rotation_rad", rows);
+            },
+            arguments: DRY,
+            code: 5,
+            words: &["rig.toml", "camera \"a\": rotation", "determinant"],
+        },
+        Row {
+            what: "a focal length that is none",
+            broken: |it| replace_line(it, "focal_px", "focal_px = [nan, 170.0]"),
+            arguments: DRY,
+            code: 5,
+            words: &["rig.toml", "camera \"a\": focal_px", "NaN"],
+        },
+        Row {
+            what: "absent",
+            broken: |it| fs::remove_file(it.path("rig.toml")).unwrap(),
+            arguments: RUN,
+            code: 4,
+            words: &["rig.toml", "parallax calib convert"],
+        },
+    ]);
+}
+
+#[test]
+fn tables() {
+    check(&[
+        Row {
+            what: "expected errors with a NaN",
+            broken: |it| {
+                let quality =
+                    "[quality]\ntable = \"q.csv\"\nsubject = \"s\"\naction = \"w\"\n[record]";
+                it.edit("deployment.toml", "[record]", quality);
+                let row = |view, third| format!("s,w,0,{view},1,2,{third}{}\n", ",4".repeat(23));
+                it.write("q.csv", row('a', "3") + &row('b', "nan"));
+            },
+            arguments: RUN,
+            code: 4,
+            words: &["q.csv: line 2, column 7", "part 3", "`nan`"],
+        },
+        Row {
+            what: "part-type table with a NaN",
+            broken: |it| {
+                let tables = "workers = 2\n[[fuse.compatibility]]\nviews = [\"a\", \"b\"]\n\
+                              files = [\"ab.csv\", \"ba.csv\"]";
+                it.edit("deployment.toml", "workers = 2", tables);
+                let rows: String = (0..52)
+                    .map(|it| format!("{},0.5,0.5\n", it / 2 + 1))
+                    .collect();
+                it.write("ab.csv", &rows);
+                it.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["ba.csv: line 3, column 2", "`NaN`"],
+        },
+    ]);
+}
+
+#[test]
+fn single_images() {
+    check(&[
+        Row {
+            what: "absent",
+            broken: |_| {},
+            arguments: DETECT,
+            code: 4,
+            words: &["no such footage", "it.png"],
+        },
+        Row {
+            what: "0 bytes",
+            broken: |it| it.write("it.png", ""),
+            arguments: DETECT,
+            code: 4,
+            words: &["it.png", "0 bytes"],
+        },
+        Row {
+            what: "no image",
+            broken: |it| it.write("it.png", "once upon a time"),
+            arguments: DETECT,
+            code: 4,
+            words: &["cannot decode the image", "it.png"],
+        },
+        Row {
+            what: "1 pixel",
+            broken: |it| picture(1, 1).save(it.path("it.png")).unwrap(),
+            arguments: DETECT,
+            code: 4,
+            words: &["it.png", "1x1", "40"],
+        },
+        Row {
+            what: "39 pixels high",
+            broken: |it| picture(96, 39).save(it.path("it.png")).unwrap(),
+            arguments: DETECT,
+            code: 4,
+            words: &["it.png", "96x39", "40"],
+        },
+    ]);
+}
+
+#[test]
+fn every_kind_of_pixel_works() {
+    let case = Case::new("kinds", &[1; 2], PLAIN);
+    let rgb = picture(96, 128);
+    let kinds = [
+        ("rgb.png", rgb.clone()),
+        ("rgba.png", rgb.to_rgba8().into()),
+        ("grey.png", rgb.to_luma8().into()),
+        (
+            "grey-as-rgb.png",
+            DynamicImage::from(rgb.to_luma8()).to_rgb8().into(),
+        ),
+        ("sixteen.png", rgb.to_rgb16().into()),
+        (
+            "smallest.png",
+            rgb.resize_exact(40, 40, image::imageops::Nearest),
+        ),
+    ];
+    let found = kinds.map(|(name, image)| {
+        image.save(case.path(name)).unwrap();
+        let ended = case
+            .start(&["detect", name, "--model", "model.plx", "--json"])
+            .wait();
+        assert_eq!(ended.status.code(), Some(0), "{name}: {}", ended.stderr);
+        let mut line: Value = serde_json::from_str(&ended.stdout).unwrap();
+        line["detections"].take()
+    });
+    assert!(
+        found[0][0]["score"].is_number(),
+        "nothing is found: {}",
+        found[0]
+    );
+    assert_eq!(found[1], found[0], "alpha");
+    assert_eq!(found[2], found[3], "grey");
+    assert_eq!(found[4], found[0], "sixteen bits");
+}
+
+/// A planted picture of another size.
+fn picture(width: u32, height: u32) -> DynamicImage {
+    let [w, h] = planted::SIZE;
+    let canvas = planted::picture(&planted::rig(2).cameras()[0], 0);
+    let image = image::RgbImage::from_raw(w, h, canvas.rgb().to_vec()).unwrap();
+    DynamicImage::from(image).resize_exact(width, height, image::imageops::Nearest)
+}
+
+/// Replaces the first line of the rig that begins with a key.
+fn replace_line(case: &Case, key: &str, line: &str) {
+    let text = fs::read_to_string(case.path("rig.toml")).unwrap();
+    let old = text.lines().find(|it| it.starts_with(key)).unwrap();
+    case.write("rig.toml", text.replacen(old, line, 1));
+}
+
+/// A model of two parts in the authors' text format.
+///
+/// * `parents`: from 1, 0 for the root.
+/// * `filter_rows`: what the header says; it is one.
+fn model(parents: &str, filter_rows: usize) -> String {
+    let weights = "0.1 ".repeat(32);
+    format!(
+        "partsNbr 2\ntypesNbr 1\nbiasSz 2\nbias_w 2 1 1 0 0\nbias_i 2 1 1 1 2\nfiltersSz 1\n\
+         filters_w 1 1 32 {weights}\nfilters_i 1 1 1 1\ndefsSz 1\ndefs_w 1 4 1 0.1 0 0.1 0\n\
+         defs_i 1 1 1 1\ndefs_anchor 1 3 1 1 1 0\ncomponentsNbr 1\ncomponentSz 2\n\
+         components_biasid 1 1 2 1 2\ncomponents_filterid 2 1 1 1 1\ncomponents_defid 2 1 1 0 1\n\
+         components_parent 2 1 1 {parents}\npa 1 2 1 {parents}\nmaxsize 1 2 1 {filter_rows} 1\n\
+         interval 2\nsbin 4\nthresh 0\n"
+    )
+}
