@@ -7,6 +7,7 @@ pub(crate) mod started;
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use geometry::files::Format;
 use runtime::Namespace;
@@ -23,16 +24,18 @@ pub(crate) struct Case {
 impl Case {
     /// A planted scene.
     ///
-    /// * `name`: of the test; the deployment's is made of it and the process's id.
+    /// * `name`: of the test; the deployment's is made of it, and is another every time.
     /// * `n_frames`: of every view.
     /// * `more`: what else the deployment file says.
     pub(crate) fn new(name: &str, n_frames: &[usize], more: &str) -> Self {
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        let nth = COUNT.fetch_add(1, Ordering::Relaxed);
         let case = Self {
             folder: tempfile::Builder::new()
                 .prefix("parallax-")
                 .tempdir()
                 .unwrap(),
-            name: format!("{name}-{}", std::process::id()),
+            name: format!("{name}-{}-{nth}", std::process::id()),
         };
         let rig = planted::rig(n_frames.len());
         geometry::files::write(&case.path("rig.toml"), Format::Own, &rig).unwrap();
