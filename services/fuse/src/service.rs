@@ -201,6 +201,10 @@ impl<'a> Worker<'a> {
             health.sent(joined.frame);
             health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
         }
+        // Room for the next, whatever its sender has left undone: it may have died half-way.
+        for evidence in self.evidence.iter_mut().flatten() {
+            evidence.advance(joined.frame + 1)?;
+        }
         Ok(())
     }
 
