@@ -48,9 +48,10 @@ enum Word {
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let mut worker = Worker::open(service, job, &mut waiter)?;
-    worker
+    let n = worker
         .publisher
         .wait_for_subscribers(job.n_consumers, job.patience);
+    tracing::info!(n, expected = job.n_consumers, "begins");
     loop {
         if waiter.wait(Duration::from_millis(20))? == Woken::Stop {
             return Ok(());

@@ -21,6 +21,8 @@ pub(crate) struct Watcher {
     bar: ProgressBar,
     quiet: bool,
     n_frames: u64,
+    start_frame: u64,
+    frame_step: u64,
     n_done: u64,
     said_at: Instant,
     begin: Instant,
@@ -28,7 +30,8 @@ pub(crate) struct Watcher {
 
 impl Watcher {
     /// Begins.
-    pub(crate) fn new(n_frames: u64, quiet: bool) -> Self {
+    pub(crate) fn new(resolved: &Resolved, quiet: bool) -> Self {
+        let n_frames = resolved.n_frames();
         let bar = if quiet || !output::is_lively() {
             ProgressBar::hidden()
         } else {
@@ -43,6 +46,8 @@ impl Watcher {
             bar,
             quiet,
             n_frames,
+            start_frame: resolved.deployment.capture.start_frame,
+            frame_step: resolved.deployment.capture.frame_step.max(1),
             n_done: 0,
             said_at: Instant::now(),
             begin: Instant::now(),
@@ -53,7 +58,11 @@ impl Watcher {
     pub(crate) fn note(&mut self, event: &Event<'_>) {
         match event {
             Event::Health { process, health } if *process == "triangulate" => {
-                self.n_done = self.n_done.max(health.n_sent);
+                // By frame, for a restarted process counts anew.
+                if health.n_sent > 0 {
+                    let nth = health.last_frame.saturating_sub(self.start_frame) / self.frame_step;
+                    self.n_done = self.n_done.max(nth + 1);
+                }
                 self.bar.set_position(self.n_done);
                 self.say_now_and_then();
             }

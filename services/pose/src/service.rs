@@ -42,12 +42,20 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         poses: bus.publisher(&topic::view_pose(job.view))?,
         evidence: bus.slice_publisher(&topic::evidence(job.view))?,
     };
-    view.poses
+    let n = view
+        .poses
         .wait_for_subscribers(job.n_pose_consumers, job.patience);
-    view.evidence
+    tracing::info!(n, expected = job.n_pose_consumers, "candidates are awaited");
+    let n = view
+        .evidence
         .wait_for_subscribers(job.n_evidence_consumers, job.patience);
+    tracing::info!(
+        n,
+        expected = job.n_evidence_consumers,
+        "evidence is awaited, begins"
+    );
     let mut spare = Vec::new();
-    let mut last_frame = None;
+    let mut last_frame: Option<u64> = None;
     loop {
         if waiter.wait(Duration::from_millis(100))? == Woken::Stop {
             return Ok(());
@@ -64,8 +72,14 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
                 return view.end(&header.stamp, &waiter);
             }
             service.health().received(1);
-            if let Some(last) = last_frame.replace(header.stamp.frame) {
-                let steps = header.stamp.frame.saturating_sub(last) / job.frame_step.max(1);
+            let frame = header.stamp.frame;
+            if let Some(last) = last_frame.filter(|it| *it >= frame) {
+                // Sent again for the sake of another receiver.
+                tracing::debug!(frame, last, "a frame came again");
+                continue;
+            }
+            if let Some(last) = last_frame.replace(frame) {
+                let steps = (frame - last) / job.frame_step.max(1);
                 service.health().dropped(steps.saturating_sub(1));
             }
             view.answer(sample, &mut spare)?;

@@ -55,6 +55,13 @@ impl Folder {
     /// [`FolderError`].
     pub fn file(&mut self, name: &str) -> Result<BufWriter<File>, FolderError> {
         let path = self.part(name);
+        if self.resume {
+            cut_half_line(&path).map_err(|source| FolderError {
+                doing: "mend",
+                path: path.clone(),
+                source,
+            })?;
+        }
         let file = OpenOptions::new()
             .create(true)
             .write(true)
@@ -118,6 +125,25 @@ impl Folder {
     }
 }
 
+/// Removes what a killed writer left after the last whole line.
+fn cut_half_line(path: &Path) -> io::Result<()> {
+    let text = match fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        text => text?,
+    };
+    let whole = text
+        .iter()
+        .rposition(|it| *it == b'\n')
+        .map_or(0, |it| it + 1);
+    if whole < text.len() {
+        OpenOptions::new()
+            .write(true)
+            .open(path)?
+            .set_len(whole as u64)?;
+    }
+    Ok(())
+}
+
 fn remove(path: &Path) -> Result<(), FolderError> {
     match fs::remove_dir_all(path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => Err(FolderError {
@@ -171,10 +197,12 @@ mod tests {
     fn a_killed_writer_goes_on_where_it_stopped() {
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), false, "one", false);
+        let half = "one\nhalf a li";
+        fs::write(dir.path().join("a.txt.part"), half).unwrap();
         write(dir.path(), true, "two", true);
         assert_eq!(
             fs::read_to_string(dir.path().join("a.txt")).unwrap(),
-            "onetwo"
+            "one\ntwo"
         );
         assert!(dir.path().join("pictures/one.png").exists());
     }

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use messages::Status;
 use serde::Serialize;
@@ -103,6 +103,11 @@ impl Output {
             None
         };
         let n_views = scene.views.len();
+        let earlier = if resume {
+            earlier(&folder.part("pose3d.jsonl"), &scene)
+        } else {
+            Earlier::default()
+        };
         Ok(Self {
             pose3d_jsonl: folder.file("pose3d.jsonl")?,
             pose2d_jsonl: folder.file("pose2d.jsonl")?,
@@ -111,10 +116,18 @@ impl Output {
             overlays,
             epipolar_part: config.epipolar_part.saturating_sub(1),
             latency: Latency::new(n_workers)?,
-            summary: Summary::default(),
-            views_used: vec![0; n_views],
-            squared_px: (0.0, 0),
-            last_frame: None,
+            summary: Summary {
+                frames: earlier.frames,
+                frames_with_pose: earlier.frames_with_pose,
+                ..Summary::default()
+            },
+            views_used: if resume {
+                earlier.views_used
+            } else {
+                vec![0; n_views]
+            },
+            squared_px: earlier.squared_px,
+            last_frame: earlier.last_frame,
             dropped: vec![0; n_views],
             scene,
             folder,
@@ -282,6 +295,46 @@ impl Output {
     }
 }
 
+/// What a killed recorder had written, as far as the summary needs it.
+#[derive(Debug, Default)]
+struct Earlier {
+    frames: u64,
+    frames_with_pose: u64,
+    views_used: Vec<u64>,
+    squared_px: (f64, u64),
+    last_frame: Option<u64>,
+}
+
+/// Reads `pose3d.jsonl` again; a file that is not there, or a broken line, counts for nothing.
+fn earlier(file: &Path, scene: &Scene) -> Earlier {
+    let mut earlier = Earlier {
+        views_used: vec![0; scene.views.len()],
+        ..Earlier::default()
+    };
+    let text = fs::read_to_string(file).unwrap_or_default();
+    for line in text.lines() {
+        let Ok(value) = serde_json::from_str::<Value>(line) else {
+            continue;
+        };
+        earlier.frames += 1;
+        earlier.frames_with_pose += u64::from(value["status"] == Status::OK.reason());
+        earlier.last_frame = value["frame"].as_u64().or(earlier.last_frame);
+        let used = value["views_used"].as_array();
+        for (count, view) in earlier.views_used.iter_mut().zip(&scene.views) {
+            let is_used = used.is_some_and(|it| it.iter().any(|it| *it == view.name.as_str()));
+            *count += u64::from(is_used);
+        }
+        let joints = value["joints"].as_object();
+        for px in joints.into_iter().flat_map(|it| it.values()) {
+            if let Some(px) = px["reprojection_px"].as_f64() {
+                earlier.squared_px.0 += px.powi(2);
+                earlier.squared_px.1 += 1;
+            }
+        }
+    }
+    earlier
+}
+
 fn append(file: &mut BufWriter<File>, text: &str) -> io::Result<()> {
     file.write_all(text.as_bytes())?;
     file.flush()
@@ -352,6 +405,26 @@ mod tests {
             [("left".to_owned(), 3), ("right".to_owned(), 3)]
         );
         assert!((summary.reprojection_px.unwrap() - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_restarted_recorder_counts_what_it_had_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let begin = |resume| {
+            let folder = Folder::open(dir.path(), resume).unwrap();
+            Output::begin(scene(), &Config::default(), 1, folder, resume).unwrap()
+        };
+        let mut killed = begin(false);
+        killed.frame(&record(0));
+        killed.frame(&record(2));
+        drop(killed);
+        let mut restarted = begin(true);
+        restarted.frame(&record(6));
+        let summary = restarted.finish().unwrap();
+        assert_eq!((summary.frames, summary.frames_with_pose), (3, 3));
+        assert_eq!(summary.frames_missed, 1);
+        assert_eq!(summary.views_used[0].1, 3);
+        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 3 * 14);
     }
 
     #[test]

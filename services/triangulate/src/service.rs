@@ -44,9 +44,10 @@ enum Word {
 pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let mut stage = Stage::open(service, job, &mut waiter)?;
-    stage
+    let n = stage
         .publisher
         .wait_for_subscribers(job.n_consumers, job.patience);
+    tracing::info!(n, expected = job.n_consumers, "begins");
     while waiter.wait(Duration::from_millis(20))? != Woken::Stop {
         stage.listen()?;
         while let Some(joined) = stage.joiner.next(now_nanos()) {

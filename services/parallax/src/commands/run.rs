@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     resolved.write(&file)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let begin = Instant::now();
-    let mut watcher = Watcher::new(resolved.n_frames(), globals.quiet);
+    let mut watcher = Watcher::new(&resolved, globals.quiet);
     let outcome = supervise::run(&plan, &stop, &mut |event| watcher.note(&event));
     watcher.finish();
     let report = Report::new(&resolved, &outcome?, begin.elapsed());
