@@ -192,9 +192,8 @@ fn models() {
         Row {
             what: "some other file",
             broken: |it| {
-                fs::copy(it.path("a/0000.png"), it.path("model.plx"))
-                    .map(drop)
-                    .unwrap()
+                let picture = fs::read(it.path("a/0000.png")).unwrap();
+                it.write("model.plx", picture);
             },
             arguments: DRY,
             code: 4,
@@ -284,9 +283,10 @@ fn tables() {
                 let tables = "workers = 2\n[[fuse.compatibility]]\nviews = [\"a\", \"b\"]\n\
                               files = [\"ab.csv\", \"ba.csv\"]";
                 it.edit("deployment.toml", "workers = 2", tables);
-                let rows: String = (0..52)
-                    .map(|it| format!("{},0.5,0.5\n", it / 2 + 1))
+                let rows: Vec<String> = (2..54)
+                    .map(|row| format!("{},0.5,0.5\n", row / 2))
                     .collect();
+                let rows = rows.concat();
                 it.write("ab.csv", &rows);
                 it.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
             },

@@ -172,7 +172,8 @@ fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
     assert_eq!(
         frames(&lines),
         (0..100).collect::<Vec<_>>(),
-        "{}",
+        "{}: {}",
+        ended.status,
         ended.stderr
     );
     let all = json!(["a", "b", "c"]);
@@ -239,7 +240,8 @@ fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
     assert_eq!(
         (frames[0], frames.last()),
         (0, Some(&99)),
-        "{}",
+        "{}: {}",
+        ended.status,
         ended.stderr
     );
     let code = if frames.len() == 100 { 0 } else { 7 };

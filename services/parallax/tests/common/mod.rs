@@ -5,6 +5,7 @@
 pub(crate) mod planted;
 pub(crate) mod started;
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -51,10 +52,8 @@ impl Case {
                 let file = folder.join(format!("{frame:04}.png"));
                 planted::picture(camera, frame).save_png(&file).unwrap();
             }
-            text += &format!(
-                "\n[[camera]]\nname = \"{0}\"\nsource = \"{0}\"\n",
-                camera.name
-            );
+            let name = &camera.name;
+            writeln!(text, "\n[[camera]]\nname = {name:?}\nsource = {name:?}").unwrap();
         }
         case.write("deployment.toml", format!("{text}\n{more}\n"));
         case
