@@ -169,7 +169,10 @@ impl<'a> Camera<'a> {
             let n = self
                 .publisher
                 .wait_for_subscribers(self.n_expected, self.job.patience);
-            if n < self.n_expected || self.service.stop().is_requested() {
+            if self.service.stop().is_requested() {
+                break;
+            }
+            if n < self.n_expected {
                 tracing::warn!(
                     n,
                     expected = self.n_expected,
