@@ -3,7 +3,13 @@
 //! `cargo test --release -p system-tests --features data --test on_data`
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "the figures are what these tests are run for"
+)]
 
+mod balancing;
 mod calibration;
 mod footage;
 mod models;
@@ -20,6 +26,9 @@ fn shared_dir() -> Option<PathBuf> {
     if dir.join("data").is_dir() && dir.join("reference").is_dir() {
         return Some(dir);
     }
-    eprintln!("skipped: no data and reference numbers in {}", dir.display());
+    eprintln!(
+        "skipped: no data and reference numbers in {}",
+        dir.display()
+    );
     None
 }
