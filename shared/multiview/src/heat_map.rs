@@ -186,6 +186,16 @@ mod tests {
         assert_eq!(row(6), 1.0);
         assert_eq!(row(0), 0.0);
         assert!(row(5) > row(4) && row(4) > row(3), "cools with distance");
+        assert!((row(4) - (1.0 - (2.0_f32 / 6.0).sqrt())).abs() < 1e-6);
+    }
+
+    #[test]
+    fn ends_between_two_pixels_go_to_the_even_one() {
+        for (y, row) in [(10.5, 10), (11.5, 12)] {
+            let map = heat_map([[0.5, y], [64.5, y]], [64, 48], 48, 64);
+            assert_eq!(map[row * 64 + 5], 1.0);
+            assert!(map[11 * 64 + 5] < 1.0);
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
-//! The joint energy of the paper, written down from eq. 1, 3, 4 and 7 without the crate's terms.
+//! The energies, written down a second time: the paper's from eq. 1, 3, 4 and 6, the program's from its
+//! description.
 
 use fmp::Pose;
 use geometry::epipolar;
-use multiview::Settings;
+use multiview::{Settings, heat_map};
 use nalgebra::Point2;
 
 use crate::planted::{MIRROR, N_TYPES, Scene};
@@ -83,4 +84,72 @@ fn distance2(
         (cells * cells).min(cap)
     };
     of_side(0) + of_side(1)
+}
+
+/// What the released program would call the score of `poses[target]`, the other pose being fixed.
+pub(crate) fn released(
+    scene: &Scene,
+    settings: &Settings,
+    target: usize,
+    poses: &[Pose; 2],
+    exchanged: bool,
+) -> f64 {
+    let support = 1 - target;
+    let mut sum = own(scene, target, &poses[target]);
+    for (part, &mirror) in MIRROR.iter().enumerate() {
+        let other = if exchanged { mirror } else { part };
+        let centre = scene.views[support].plan.centres(&poses[support])[other];
+        // The program counts from 1.
+        let pixel = centre.map(|it| (it + 1.0).round());
+        let size = scene.views[support].plan.layout().image_size;
+        let inside = |axis: usize| pixel[axis] > 0.0 && pixel[axis] < size[axis] as f64;
+        if !inside(0) || !inside(1) || !is_supporting(scene, settings, support, [other, part]) {
+            continue;
+        }
+        sum += settings.alpha * heat(scene, target, &poses[target], part, pixel);
+        if !exchanged {
+            let [seen, own] =
+                [support, target].map(|it| usize::from(poses[it].parts[part].mixture));
+            sum += settings.beta * scene.tables.conditional[support].value(part, seen, own);
+        }
+    }
+    sum
+}
+
+/// Whether a part of the support is on: it is good enough, or both are bad but it is clearly better.
+///
+/// * `parts`: of the support and of the target.
+fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {
+    let views = [support, 1 - support];
+    let [here, there] = [0, 1].map(|it| is_usable(scene, settings, views[it], parts[it]));
+    let sigma = |it: usize| scene.views[views[it]].sigma_px.as_ref().unwrap()[parts[it]];
+    here || (!there && sigma(0) < sigma(1) - settings.rescue_px[parts[0]])
+}
+
+/// Heat at a part of the target of the line of a support at `pixel`, counted from 1.
+fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
+    let [here, there] = [target, 1 - target].map(|it| scene.views[it].plan.camera());
+    let fundamental = epipolar::fundamental(there, here);
+    let at = Point2::from(pixel.map(|it| it - 1.0));
+    let line = epipolar::epipolar_line(&fundamental, &at).unwrap();
+    let layout = scene.views[target].plan.layout();
+    let [right, bottom] = layout.image_size.map(|it| it as f64 - 0.5);
+    let mut ends = Vec::new();
+    for x in [-0.5, right] {
+        let y = -(line.x * x + line.z) / line.y;
+        if (-0.5..=bottom).contains(&y) {
+            ends.push([x + 1.0, y + 1.0]);
+        }
+    }
+    for y in [-0.5, bottom] {
+        let x = -(line.y * y + line.z) / line.x;
+        if -0.5 < x && x < right {
+            ends.push([x + 1.0, y + 1.0]);
+        }
+    }
+    let [from, to] = ends[..] else { return 0.0 };
+    let it = &layout.levels[usize::from(pose.level)];
+    let map = heat_map([from, to], layout.image_size, it.rows, it.cols);
+    let cell = usize::from(pose.parts[part].y) * it.cols + usize::from(pose.parts[part].x);
+    f64::from(map[cell])
 }

@@ -9,12 +9,12 @@ use proptest::prelude::*;
 
 use crate::oracle;
 use crate::planted::{
-    FROM_BEST, MIRROR, N_PARTS, N_TYPES, Noise, Scene, layout, mirrored, settings,
+    FROM_BEST, MIRROR, N_PARTS, N_TYPES, Noise, Scene, camera, layout, lenses, mirrored, settings,
 };
 
 const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
-/// Few enough cells to try every pose there is.
-const TINY: [[usize; 2]; 2] = [[3, 4], [2, 2]];
+/// Few enough cells to try every pose there is; in the second, only types can change.
+const TINY: [&[[usize; 2]]; 2] = [&[[3, 4], [2, 2]], &[[1, 1]]];
 /// Single-view scores are sums in single precision.
 const ROUNDING: f64 = 1e-4;
 
@@ -75,6 +75,19 @@ proptest! {
         prop_assert!(found.converged);
         prop_assert_eq!(&found.poses, &poses);
         prop_assert!((found.energy - energy(&poses)).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn rounding_neither_lowers_the_energy_nor_makes_it_cycle(seed: u64, start in starts()) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        for view in &mut scene.views {
+            // Sums of scores this large are right to a tenth or so.
+            view.values.iter_mut().for_each(|it| *it += 1e6);
+        }
+        let found = scene.fuse(&settings(seed), [0, 1], start);
+        prop_assert!(found.converged);
+        let energies: Vec<f64> = found.iterations.iter().map(|it| it.score).collect();
+        prop_assert!(energies.is_sorted(), "{energies:?}");
     }
 
     #[test]
@@ -234,8 +247,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn neither_view_alone_can_raise_the_energy(seed: u64, start in starts()) {
-        let (scene, settings) = (Scene::new(seed, 2, &TINY), settings(seed));
+    fn neither_view_alone_can_raise_the_energy(seed: u64, start in starts(), sizes in 0..2_usize) {
+        let (scene, settings) = (Scene::new(seed, 2, TINY[sizes]), settings(seed));
         let found = scene.fuse(&settings, [0, 1], start);
         prop_assert!(found.converged);
         for view in 0..2 {
@@ -247,6 +260,70 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn types_that_still_change_are_followed_although_nothing_moves() {
+    let sizes = [[1, 1]];
+    for seed in 0..300 {
+        let scene = Scene::new(seed, 2, &sizes);
+        let settings = Settings {
+            beta: 3.0,
+            ..Settings::default()
+        };
+        let found = scene.fuse(&settings, [0, 1], FROM_BEST);
+        for view in 0..2 {
+            for pose in all_poses(&scene.views[view].plan) {
+                let mut poses = found.poses.each_ref();
+                poses[view] = &pose;
+                let other = oracle::energy(&scene, &settings, [0, 1], poses, false);
+                assert!(other <= found.energy + ROUNDING, "seed {seed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_support_without_an_answer_of_its_lens_says_nothing() {
+    for seed in 0..20 {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        let layout = Arc::new(layout(&SIZES, 4.0));
+        let corners_unseen = camera(0.1, 0.5, layout.image_size, lenses()[3]);
+        let model = Arc::clone(scene.solver.model());
+        scene.views[0].plan = ViewPlan::new(corners_unseen, model, layout);
+        scene.views[0].candidates[0] = Pose {
+            score: 0.0,
+            level: 0,
+            parts: vec![Placement::default(); N_PARTS],
+        };
+        scene.views[0].sigma_px = Some(vec![1.0; N_PARTS]);
+        scene.views[1].sigma_px = Some(vec![2.0; N_PARTS]);
+        let settings = Settings {
+            alpha: 3.0,
+            beta: 0.0,
+            max_distance_cells: f64::INFINITY,
+            ..Settings::default()
+        };
+        let elsewhere = PairStart {
+            candidates: [0, 1],
+            exchanged: false,
+        };
+        let found = scene.fuse(&settings, [0, 1], elsewhere);
+        assert_eq!(found.iterations[0].target, 1);
+        let alone = &scene.views[1].candidates[0];
+        assert_eq!(found.iterations[0].pose.parts, alone.parts, "seed {seed}");
+    }
+}
+
+#[test]
+fn an_expected_error_at_the_threshold_is_not_above_it() {
+    let mut scene = Scene::new(1, 2, &SIZES);
+    scene.views[0].sigma_px = Some(vec![8.0, 8.1, 7.0]);
+    scene.views[1].sigma_px = Some(vec![8.0, 8.0, 9.0]);
+    let mut settings = settings(1);
+    settings.tau_px = vec![8.0; N_PARTS];
+    let found = scene.fuse(&settings, [0, 1], FROM_BEST);
+    assert_eq!(found.active, [true, false, false]);
 }
 
 /// The view that supports the other one first.

@@ -277,7 +277,7 @@ pub(crate) fn settings(seed: u64) -> Settings {
     Settings {
         alpha: noise.pick(&[0.01, 0.1, 0.5, 3.0]),
         beta: noise.pick(&[0.0, 0.5, 2.0]),
-        max_distance_cells: noise.pick(&[1.0, 3.0, 8.0]),
+        max_distance_cells: noise.pick(&[1.0, 3.0, 8.0, f64::INFINITY]),
         max_iterations: 60,
         tau_px: noise.pick(&[Vec::new(), vec![8.0; N_PARTS]]),
         rescue_px: vec![2.0; N_PARTS],
