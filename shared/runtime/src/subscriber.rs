@@ -7,6 +7,7 @@ use std::sync::Arc;
 use iceoryx2::port::ReceiveError as IoxReceiveError;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
 use iceoryx2::sample::Sample as IoxSample;
 
@@ -197,13 +198,24 @@ impl<E: Message, H: Header> Port<E, H> {
             ready,
             known_publishers: RefCell::new(Vec::new()),
         };
-        port.acknowledge(port.publishers());
+        port.connect();
         Ok(port)
     }
 
+    /// Connects to the publishers that are there.
+    fn connect(&self) {
+        // Listed before they are connected to, so that none is acknowledged that was not: one may
+        // have come while this subscriber was being made.
+        let publishers = self.publishers();
+        match self.subscriber.update_connections() {
+            Ok(()) => self.acknowledge(publishers),
+            // It will be tried again when something is to be received.
+            Err(error) => tracing::debug!(topic = %self.topic, %error, "cannot connect"),
+        }
+    }
+
     fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
-        // Listed before the connections are brought up to date, so that none is acknowledged that
-        // was not connected.
+        // Listed before they are connected to, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample = self.subscriber.receive().map_err(|source| match source {

@@ -194,10 +194,13 @@ fn hang_once(service: &Service) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for so many seconds, and is done.
+/// Computes for so many seconds, and is done unless it was interrupted.
 fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     service.progress().tick();
     std::thread::sleep(Duration::from_secs(seconds));
+    if service.stop().is_requested() {
+        return Ok(());
+    }
     idle(service)
 }
 
