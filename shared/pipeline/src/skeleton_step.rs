@@ -114,9 +114,8 @@ impl SkeletonStep {
         };
         let candidates = self.candidates(answers, &pairs, exchanged);
         let views = fuse(&candidates, exchanged);
-        let sightings = self.sightings(&views);
         let n_joints = self.settings.joints.joints.len();
-        let joints = self.triangulate(&sightings, n_joints, |centres| {
+        let joints = self.triangulate(&views, n_joints, |centres| {
             self.settings.joints.from_parts(centres)
         });
         Skeleton {
@@ -156,8 +155,7 @@ impl SkeletonStep {
                 .into_iter()
                 .map(|(exchanges, energy)| {
                     let views = fuse(&self.candidates(answers, pairs, exchanges), exchanges);
-                    let sightings = self.sightings(&views);
-                    let parts = self.triangulate(&sightings, skeleton::N_PARTS, <[_]>::to_vec);
+                    let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec);
                     let joints: Vec<Option<Point3<f64>>> = PARSE14
                         .joints
                         .iter()
@@ -239,38 +237,33 @@ impl SkeletonStep {
         (0..self.plans.len()).map(of_view).collect()
     }
 
-    /// One sighting per view: its fused pose.
-    fn sightings(&self, views: &[Option<FusedView>]) -> Vec<Sighting> {
-        let seen = views.iter().enumerate();
-        let seen = seen.filter_map(|(view, it)| Some((view, it.as_ref()?)));
-        seen.map(|(view, it)| Sighting {
-            view,
-            sigma_px: it.cell_px * self.settings.sigma_cells,
-            centres_px: it.pose.centres_px.clone(),
-        })
-        .collect()
-    }
-
+    /// Triangulates points of the fused poses.
+    ///
+    /// * `points`: from the part centres of a view to the `n_points` points wanted.
     fn triangulate(
         &self,
-        sightings: &[Sighting],
+        views: &[Option<FusedView>],
         n_points: usize,
         points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
     ) -> Vec<Result<Triangulated, TriangulateError>> {
-        let points: Vec<Vec<[f64; 2]>> =
-            sightings.iter().map(|it| points(&it.centres_px)).collect();
+        let seen = views.iter().enumerate();
+        let seen: Vec<(usize, &FusedView, Vec<[f64; 2]>)> = seen
+            .filter_map(|(view, it)| {
+                let it = it.as_ref()?;
+                Some((view, it, points(&it.pose.centres_px)))
+            })
+            .collect();
         let triangulate = |point: usize| {
-            let observations: Vec<Observation<'_>> = sightings
+            let observations: Vec<Observation<'_>> = seen
                 .iter()
-                .zip(&points)
-                .map(|(sighting, points)| Observation {
-                    camera: self.plans[sighting.view].camera(),
+                .map(|(view, fused, points)| Observation {
+                    camera: self.plans[*view].camera(),
                     point_px: Point2::from(points[point]),
-                    sigma_px: sighting.sigma_px,
+                    sigma_px: fused.cell_px * self.settings.sigma_cells,
                 })
                 .collect();
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
-            Ok(by_view(found, sightings))
+            Ok(by_view(found, seen.iter().map(|it| it.0)))
         };
         (0..n_points).map(triangulate).collect()
     }
@@ -302,14 +295,6 @@ impl Candidates {
     }
 }
 
-/// A pose to be triangulated.
-#[derive(Debug, Clone)]
-struct Sighting {
-    view: usize,
-    sigma_px: f64,
-    centres_px: Vec<[f64; 2]>,
-}
-
 /// The mean pose of every view.
 fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
     let fuse_view = |(view, it): (usize, &Option<Candidates>)| {
@@ -334,13 +319,13 @@ fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedV
 }
 
 /// Renumbers the observations of a joint as the views of the rig.
-fn by_view(mut found: Triangulated, sightings: &[Sighting]) -> Triangulated {
+fn by_view(mut found: Triangulated, views: impl Iterator<Item = usize>) -> Triangulated {
     let (used, residuals) = (found.views_used, found.residuals_px);
     found.views_used = 0;
     found.residuals_px.fill(f64::NAN);
-    for (i, sighting) in sightings.iter().enumerate() {
-        found.views_used |= (used >> i & 1) << sighting.view;
-        found.residuals_px[sighting.view] = residuals[i];
+    for (i, view) in views.enumerate() {
+        found.views_used |= (used >> i & 1) << view;
+        found.residuals_px[view] = residuals[i];
     }
     found
 }
