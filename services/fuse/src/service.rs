@@ -262,13 +262,11 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// Where nothing may be lost, a process that is there may take ten times as long: it is computing.
 fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Word> {
     let nanos = patience.as_nanos() as u64;
-    let joiner = Joiner::new(n_inputs, nanos);
     match delivery {
-        Delivery::Lossless => joiner.with_patience_for_alive(10 * nanos),
-        Delivery::Realtime => joiner,
+        Delivery::Lossless => Joiner::lossless(n_inputs, nanos),
+        Delivery::Realtime => Joiner::new(n_inputs, nanos),
     }
 }
 

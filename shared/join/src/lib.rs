@@ -75,11 +75,13 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// With another patience for inputs that are known to be alive: they may be busy.
-    #[must_use]
-    pub fn with_patience_for_alive(mut self, nanos: u64) -> Self {
-        self.alive_patience_nanos = nanos;
-        self
+    /// As [`Self::new`], where nothing may be lost: an input that is known to be alive may take ten times
+    /// as long, for it is computing.
+    pub fn lossless(n_inputs: usize, patience_nanos: u64) -> Self {
+        Self {
+            alive_patience_nanos: patience_nanos.saturating_mul(10),
+            ..Self::new(n_inputs, patience_nanos)
+        }
     }
 
     /// Notes that whoever sends on an input is alive, though it has nothing to say yet.
@@ -246,7 +248,7 @@ mod tests {
 
     #[test]
     fn an_input_that_is_there_may_take_longer() {
-        let mut joiner = Joiner::new(2, 100).with_patience_for_alive(1000);
+        let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         for now in (0..1000).step_by(50) {
             joiner.alive(1, now);
@@ -257,7 +259,7 @@ mod tests {
 
     #[test]
     fn an_input_that_has_gone_is_given_the_short_patience() {
-        let mut joiner = Joiner::new(2, 100).with_patience_for_alive(1000);
+        let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.alive(1, 50);
         assert_eq!(frames(&mut joiner, 149), []);
