@@ -14,7 +14,7 @@ Exit codes:
     4  an input is missing or unreadable (footage, model, calibration file, table)
     5  the calibration cannot be used
     6  a limit was missed
-    7  done, but degraded: views or processes were lost on the way
+    7  done, but degraded: views, frames or processes were lost on the way
   130  stopped by Ctrl-C
 
 Data goes to standard output, messages and progress to standard error.";

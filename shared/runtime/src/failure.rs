@@ -16,7 +16,7 @@ use std::process::ExitCode;
 /// | 4 | an input is missing, unreadable or malformed: footage, model, table |
 /// | 5 | a calibration cannot be used: not a rotation, another image size, a camera without one |
 /// | 6 | a limit that was asked for was missed |
-/// | 7 | the run ended, but degraded: a view or a process was given up |
+/// | 7 | the run ended, but degraded: views, frames or processes were lost on the way |
 /// | 130 | interrupted |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExitKind {
