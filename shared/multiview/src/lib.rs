@@ -2,7 +2,7 @@
 //!
 //! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewAnswer`], what a
 //! view brings; [`choose_start`], which candidate of every view is the person; [`estimate_pair`], the
-//! optimiser; [`rank_facing`], [`FacingFilter`] and [`average`], from the pairs back to one pose per view.
+//! optimiser; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], from the pairs back to one pose per view.
 #![forbid(unsafe_code)]
 
 mod settings;
@@ -15,6 +15,7 @@ mod heat_map;
 mod released;
 
 mod average;
+mod consensus;
 mod facing;
 mod optimise;
 mod start;
@@ -25,6 +26,7 @@ mod compatibility;
 pub use anatomy::anatomical_evidence;
 pub use average::{FusedPose, anatomical, average};
 pub use compatibility::{Compatibility, CompatibilityError};
+pub use consensus::{ConsensusSettings, Sightings, consensus};
 pub use facing::{
     Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
     rank_facing,

@@ -1,0 +1,364 @@
+//! One position of a part per view, out of those that the view's pairs found, such that all views mean
+//! the same point of the world.
+
+use geometry::{Camera, Ray};
+use nalgebra::{Point2, Point3};
+
+/// Where one view's pairs saw a part.
+#[derive(Debug, Clone)]
+pub struct Sightings<'a> {
+    /// The camera of the frame.
+    pub camera: &'a Camera,
+    /// Uncertainty of a position, pixels of the frame.
+    pub sigma_px: f64,
+    /// One position per pair, pixels of the frame.
+    pub points_px: Vec<[f64; 2]>,
+}
+
+/// How a position is chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConsensusSettings {
+    /// Reprojection error at which a view begins to pull less, sigma.
+    pub loss_sigmas: f64,
+    /// Distance up to which two pairs of a view are said to have found the same, sigma.
+    pub same_sigmas: f64,
+    /// What the votes of a view's pairs weigh against agreement between the views.
+    pub vote_weight: f64,
+}
+
+impl Default for ConsensusSettings {
+    fn default() -> Self {
+        Self {
+            loss_sigmas: 1.0,
+            same_sigmas: 0.5,
+            vote_weight: 0.5,
+        }
+    }
+}
+
+/// Stands for the error of a view that cannot see a point, sigma.
+const UNSEEN: f64 = 1e6;
+
+/// A position that some of a view's pairs found.
+#[derive(Debug, Clone, Copy)]
+struct Choice {
+    at: Point2<f64>,
+    ray: Option<Ray>,
+    /// What choosing it costs.
+    cost: f64,
+}
+
+/// Chooses a part's position in every view.
+///
+/// The paper takes the mean over a view's pairs. Where the pairs disagree, as they do about crossed
+/// legs and lifted arms, the mean lies between two answers and belongs to neither. Here the point of the
+/// world is sought that most views have an answer for: over all points `X` in which the rays of two
+/// answers of different views meet, the least
+///
+/// `sum over views of min over answers k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
+///
+/// where `r_k` is the distance of `X`'s image from the answer in sigma, and `n_k` of the view's `n` pairs
+/// gave it. The means compete as well, at the price of one answer that a single pair gave: where nothing
+/// fits together, they win. A view that has one answer keeps it. No source: our own rule.
+///
+/// * Returns one position per view, pixels; `None` for a view without sightings.
+pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
+    let choices: Vec<Vec<Choice>> = views.iter().map(|it| distinct(settings, it)).collect();
+    if choices.iter().all(|it| it.len() <= 1) {
+        return choices
+            .iter()
+            .map(|it| it.first().map(|it| it.at.into()))
+            .collect();
+    }
+    let means: Vec<Vec<Choice>> = views.iter().map(of_means).collect();
+    let most = views.iter().map(|it| it.points_px.len()).max();
+    let price = vote_cost(settings, 1, most.unwrap_or(1));
+    let chosen = best(settings, views, &choices);
+    let average = best(settings, views, &means);
+    let picked = match (chosen, average) {
+        (Some((cost, picked)), Some((cost_of_means, _))) if cost <= cost_of_means + price => {
+            return pick(&choices, &picked);
+        }
+        (Some((_, picked)), None) => return pick(&choices, &picked),
+        _ => vec![0; views.len()],
+    };
+    pick(&means, &picked)
+}
+
+fn pick(choices: &[Vec<Choice>], picked: &[usize]) -> Vec<Option<[f64; 2]>> {
+    choices
+        .iter()
+        .zip(picked)
+        .map(|(choices, &it)| choices.get(it).map(|it| it.at.into()))
+        .collect()
+}
+
+fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f64 {
+    let share = n_votes as f64 / n_pairs.max(1) as f64;
+    -settings.loss_sigmas.powi(2) * settings.vote_weight * share.ln()
+}
+
+/// The different answers of a view, in the order in which they were first given.
+///
+/// Answers close to the first one of their kind are one answer, at their mean.
+fn distinct(settings: &ConsensusSettings, view: &Sightings<'_>) -> Vec<Choice> {
+    let mut kinds: Vec<Vec<[f64; 2]>> = Vec::new();
+    let reach = settings.same_sigmas * view.sigma_px;
+    for &point in &view.points_px {
+        let is_near =
+            |it: &&mut Vec<[f64; 2]>| (it[0][0] - point[0]).hypot(it[0][1] - point[1]) <= reach;
+        match kinds.iter_mut().find(is_near) {
+            Some(kind) => kind.push(point),
+            None => kinds.push(vec![point]),
+        }
+    }
+    let choice = |kind: &Vec<[f64; 2]>| {
+        let at = mean(kind);
+        Choice {
+            at,
+            ray: view.camera.ray(&at),
+            cost: vote_cost(settings, kind.len(), view.points_px.len()),
+        }
+    };
+    kinds.iter().map(choice).collect()
+}
+
+fn of_means(view: &Sightings<'_>) -> Vec<Choice> {
+    if view.points_px.is_empty() {
+        return Vec::new();
+    }
+    let at = mean(&view.points_px);
+    let ray = view.camera.ray(&at);
+    vec![Choice { at, ray, cost: 0.0 }]
+}
+
+fn mean(points: &[[f64; 2]]) -> Point2<f64> {
+    let sum = points
+        .iter()
+        .fold([0.0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+    Point2::from(sum.map(|it| it / points.len() as f64))
+}
+
+/// The cheapest point in which two rays meet, as its cost and the choice of every view.
+fn best(
+    settings: &ConsensusSettings,
+    views: &[Sightings<'_>],
+    choices: &[Vec<Choice>],
+) -> Option<(f64, Vec<usize>)> {
+    let mut best: Option<(f64, Vec<usize>)> = None;
+    for (first, of_first) in choices.iter().enumerate() {
+        for of_second in &choices[first + 1..] {
+            for (a, b) in of_first
+                .iter()
+                .flat_map(|a| of_second.iter().map(move |b| (a, b)))
+            {
+                let (Some(a), Some(b)) = (&a.ray, &b.ray) else {
+                    continue;
+                };
+                let Some(point) = meeting_point(a, b) else {
+                    continue;
+                };
+                let found = judge(settings, views, choices, &point);
+                if best.as_ref().is_none_or(|it| found.0 < it.0) {
+                    best = Some(found);
+                }
+            }
+        }
+    }
+    best
+}
+
+/// What a point of the world costs in all views, and the answer of each that it is nearest to.
+fn judge(
+    settings: &ConsensusSettings,
+    views: &[Sightings<'_>],
+    choices: &[Vec<Choice>],
+    point: &Point3<f64>,
+) -> (f64, Vec<usize>) {
+    let c2 = settings.loss_sigmas.powi(2);
+    let mut total = 0.0;
+    let mut picked = Vec::with_capacity(views.len());
+    for (view, choices) in views.iter().zip(choices) {
+        let seen = view.camera.project(point);
+        let cost = |it: &Choice| {
+            let r = seen.map_or(UNSEEN, |seen| (seen - it.at).norm() / view.sigma_px);
+            it.cost + c2 * (r * r / c2).ln_1p()
+        };
+        let costs = choices.iter().map(cost).enumerate();
+        let least = costs.fold(
+            (0, f64::INFINITY),
+            |least, it| {
+                if it.1 < least.1 { it } else { least }
+            },
+        );
+        picked.push(least.0);
+        if !choices.is_empty() {
+            total += least.1;
+        }
+    }
+    (total, picked)
+}
+
+/// The point nearest to both rays; `None` if they are parallel or it lies behind one of them.
+fn meeting_point(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
+    let between = b.origin - a.origin;
+    let cosine = a.direction.dot(&b.direction);
+    let sine2 = 1.0 - cosine * cosine;
+    if sine2 < 1e-9 {
+        return None;
+    }
+    let [on_a, on_b] = [a.direction.dot(&between), b.direction.dot(&between)];
+    let along_a = (on_a - cosine * on_b) / sine2;
+    let along_b = (cosine * on_a - on_b) / sine2;
+    (along_a > 0.0 && along_b > 0.0).then(|| {
+        nalgebra::center(
+            &(a.origin + a.direction.scale(along_a)),
+            &(b.origin + b.direction.scale(along_b)),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use geometry::{Intrinsics, Lens, LensModel};
+    use nalgebra::{Isometry3, Vector3};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Cameras on a circle of 4 m, looking at the origin.
+    fn cameras(n: usize) -> Vec<Camera> {
+        let camera = |i: usize| {
+            let angle = 0.9 * i as f64;
+            let eye = Point3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.0);
+            let down = -Vector3::z();
+            Camera {
+                name: format!("camera {i}"),
+                intrinsics: Intrinsics {
+                    fx: 400.0,
+                    fy: 400.0,
+                    cx: 200.0,
+                    cy: 200.0,
+                    size: [400, 400],
+                    lens: Lens::new(LensModel::BrownConrady {
+                        k: [0.0; 6],
+                        p: [0.0; 2],
+                    }),
+                },
+                camera_from_world: Isometry3::look_at_lh(&eye, &Point3::origin(), &down),
+            }
+        };
+        (0..n).map(camera).collect()
+    }
+
+    fn seen(camera: &Camera, point: [f64; 3]) -> [f64; 2] {
+        camera.project(&Point3::from(point)).unwrap().into()
+    }
+
+    fn sightings(
+        cameras: &[Camera],
+        points: impl Fn(usize) -> Vec<[f64; 2]>,
+    ) -> Vec<Sightings<'_>> {
+        let of_view = |(view, camera)| Sightings {
+            camera,
+            sigma_px: 5.0,
+            points_px: points(view),
+        };
+        cameras.iter().enumerate().map(of_view).collect()
+    }
+
+    fn choose(views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
+        consensus(&ConsensusSettings::default(), views)
+    }
+
+    const KNEE: [f64; 3] = [0.1, 0.0, 0.2];
+    const OTHER_KNEE: [f64; 3] = [-0.2, 0.15, 0.2];
+
+    #[test]
+    fn the_answer_that_fits_the_other_views_beats_the_more_frequent_one() {
+        let cameras = cameras(4);
+        let right = |view: usize| seen(&cameras[view], KNEE);
+        let wrong = |view: usize| seen(&cameras[view], OTHER_KNEE);
+        let views = sightings(&cameras, |view| match view {
+            0 => vec![wrong(0), right(0), wrong(0)],
+            _ => vec![right(view); 3],
+        });
+        let got = choose(&views);
+        for (view, got) in got.into_iter().enumerate() {
+            let ([x, y], [gx, gy]) = (right(view), got.unwrap());
+            assert!((gx - x).hypot(gy - y) < 1e-9, "view {view}: {gx} {gy}");
+        }
+    }
+
+    #[test]
+    fn one_answer_a_view_is_kept_whatever_the_others_say() {
+        let cameras = cameras(3);
+        let points = [[10.0, 20.0], [300.0, 7.0], [55.0, 390.0]];
+        let views = sightings(&cameras, |view| vec![points[view]]);
+        assert_eq!(choose(&views), points.map(Some));
+    }
+
+    #[test]
+    fn a_view_without_sightings_has_none_and_does_not_count() {
+        let cameras = cameras(4);
+        let right = |view: usize| seen(&cameras[view], KNEE);
+        let wrong = |view: usize| seen(&cameras[view], OTHER_KNEE);
+        let views = sightings(&cameras, |view| match view {
+            0 => vec![wrong(0), right(0)],
+            1 => Vec::new(),
+            _ => vec![right(view); 2],
+        });
+        let got = choose(&views);
+        assert_eq!(got[1], None);
+        assert_eq!(got[0], Some(right(0)), "of the two, the one that fits");
+    }
+
+    #[test]
+    fn where_only_the_means_fit_together_they_are_taken() {
+        let cameras = cameras(4);
+        let views = sightings(&cameras, |view| {
+            let [x, y] = seen(&cameras[view], KNEE);
+            // To all sides, so that no two answers of different views meet near a third.
+            let [dx, dy] = [[60.0, 80.0], [-70.0, 75.0], [65.0, -90.0], [-85.0, -60.0]][view];
+            vec![[x + dx, y + dy], [x - dx, y - dy]]
+        });
+        for (view, got) in choose(&views).into_iter().enumerate() {
+            let ([x, y], [gx, gy]) = (seen(&cameras[view], KNEE), got.unwrap());
+            assert!((gx - x).hypot(gy - y) < 1e-9, "view {view}: {gx} {gy}");
+        }
+    }
+
+    #[test]
+    fn answers_that_differ_by_less_than_they_are_sure_of_are_one() {
+        let cameras = cameras(2);
+        let [x, y] = seen(&cameras[0], KNEE);
+        let views = sightings(&cameras, |view| match view {
+            0 => vec![[x - 1.0, y], [x + 1.0, y]],
+            _ => vec![seen(&cameras[1], KNEE)],
+        });
+        assert_eq!(choose(&views)[0], Some([x, y]));
+    }
+
+    #[test]
+    fn cameras_in_one_place_keep_the_means() {
+        let camera = cameras(1).remove(0);
+        let cameras = [camera.clone(), camera];
+        let views = sightings(&cameras, |_| vec![[100.0, 100.0], [200.0, 100.0]]);
+        assert_eq!(choose(&views), [Some([150.0, 100.0]); 2]);
+    }
+
+    proptest! {
+        #[test]
+        fn every_view_gets_an_answer_of_its_own_or_its_mean(
+            points in prop::collection::vec(prop::collection::vec([0.0..400.0_f64, 0.0..400.0], 1..4), 2..5),
+        ) {
+            let cameras = cameras(points.len());
+            let settings = ConsensusSettings { same_sigmas: 0.0, ..ConsensusSettings::default() };
+            let views = sightings(&cameras, |view| points[view].clone());
+            for (got, points) in consensus(&settings, &views).into_iter().zip(&points) {
+                let got = got.unwrap();
+                prop_assert!(points.contains(&got) || got == <[f64; 2]>::from(mean(points)));
+            }
+        }
+    }
+}
