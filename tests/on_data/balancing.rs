@@ -10,7 +10,7 @@ use evaluation::{Trc, percentile};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
-use pipeline::{Estimator, EstimatorSettings};
+use pipeline::{Combine, Estimator, EstimatorSettings};
 use skeleton::PARSE14;
 
 use crate::shared_dir;
@@ -28,6 +28,7 @@ struct Switches {
     upright: bool,
     facing: bool,
     candidates: bool,
+    combine: Combine,
 }
 
 /// Errors of a set of frames.
@@ -52,17 +53,23 @@ impl Errors {
 }
 
 /// Nothing, each of the three switches alone, and all of them.
-fn rows() -> [(&'static str, Switches); 5] {
+fn rows() -> [(&'static str, Switches); 6] {
     let row = |upright, facing, candidates| Switches {
         upright,
         facing,
         candidates,
+        combine: Combine::Mean,
+    };
+    let consensus = Switches {
+        combine: Combine::Consensus,
+        ..row(true, true, true)
     };
     [
         ("nothing: the paper's own start", row(false, false, false)),
         ("upright only", row(true, false, false)),
         ("facing only", row(false, true, false)),
         ("candidates only", row(false, false, true)),
+        ("all three, combined by consensus", consensus),
         ("all three", row(true, true, true)),
     ]
 }
@@ -117,6 +124,7 @@ fn errors(
     let mut settings = EstimatorSettings::default();
     settings.fuse.facing = switches.facing;
     settings.skeleton.facing = switches.facing;
+    settings.skeleton.combine = switches.combine;
     if !switches.candidates {
         settings.fuse.n_candidates = 1;
         settings.view.n_candidates = 1;

@@ -166,6 +166,7 @@ fn settings(
                 loss_px: deployment.triangulate.loss_px,
                 ..defaults.triangulation
             },
+            combine: deployment.triangulate.combine.into(),
             facing: deployment.fuse.facing,
             ..defaults
         },

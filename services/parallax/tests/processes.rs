@@ -244,10 +244,5 @@ fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
         ended.status,
         ended.stderr
     );
-    assert_eq!(
-        ended.status.code(),
-        Some(7),
-        "{report:#}\n{}",
-        ended.stderr
-    );
+    assert_eq!(ended.status.code(), Some(7), "{report:#}\n{}", ended.stderr);
 }

@@ -8,14 +8,37 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Which joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,
+    /// How a view's pose is made of those of its pairs: `mean`, as in the paper, or `consensus`.
+    pub combine: Combine,
     /// Reprojection error at which an observation begins to count less, pixels.
     pub loss_px: f64,
+}
+
+/// How a view's pose is made of those of its pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Combine {
+    /// Their mean, as in the paper.
+    #[default]
+    Mean,
+    /// Part by part the answers that all views can mean together.
+    Consensus,
+}
+
+impl From<Combine> for pipeline::Combine {
+    fn from(from: Combine) -> Self {
+        match from {
+            Combine::Mean => Self::Mean,
+            Combine::Consensus => Self::Consensus,
+        }
+    }
 }
 
 impl Default for Config {
     fn default() -> Self {
         Self {
             joints: "parse14".to_owned(),
+            combine: Combine::default(),
             loss_px: geometry::Settings::default().loss_px,
         }
     }

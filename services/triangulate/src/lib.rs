@@ -4,5 +4,5 @@
 mod config;
 mod service;
 
-pub use config::Config;
+pub use config::{Combine, Config};
 pub use service::{Job, run};

@@ -5,13 +5,24 @@ use std::sync::Arc;
 use fmp::Pose;
 use geometry::{Observation, TriangulateError, Triangulated};
 use multiview::{
-    Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose, PairEnergies,
-    PairEstimate, ViewPlan, anatomical, anatomical_evidence, average, is_exchanged, rank_facing,
+    ConsensusSettings, Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose,
+    PairEnergies, PairEstimate, Sightings, ViewPlan, anatomical, anatomical_evidence, average,
+    consensus, is_exchanged, rank_facing,
 };
 use nalgebra::{Point2, Point3, UnitVector3};
 use skeleton::{JointSet, PARSE14};
 
 use crate::{Answer, PairAnswer};
+
+/// How a view's pose is made of those of its pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Combine {
+    /// Their mean: the paper's section 7.
+    #[default]
+    Mean,
+    /// Part by part the answers that all views can mean together ([`multiview::consensus()`]).
+    Consensus,
+}
 
 /// Settings of the last step.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +33,11 @@ pub struct SkeletonSettings {
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, cells of the level it was found on.
     pub sigma_cells: f64,
+    /// How a view's pose is made of those of its pairs.
+    pub combine: Combine,
+    /// How the views come to agree on a part. Facing is always decided on poses that do: mixtures of
+    /// poses that found different limbs fit together under no assumption about left and right.
+    pub consensus: ConsensusSettings,
     /// Decide which views see the person from behind.
     pub facing: bool,
     /// How facing is followed over time.
@@ -39,6 +55,8 @@ impl Default for SkeletonSettings {
             joints: &PARSE14,
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
+            combine: Combine::default(),
+            consensus: ConsensusSettings::default(),
             facing: true,
             facing_filter: FacingSettings::default(),
             agreement: 0.01,
@@ -50,7 +68,7 @@ impl Default for SkeletonSettings {
 /// One view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedView {
-    /// The averaged pose, parts named after the side of the body.
+    /// The pose that its pairs make, parts named after the side of the body.
     pub pose: FusedPose,
     /// Whether the view sees the person from behind.
     pub exchanged: bool,
@@ -113,7 +131,10 @@ impl SkeletonStep {
             (0, f64::INFINITY)
         };
         let candidates = self.candidates(answers, &pairs, exchanged);
-        let views = fuse(&candidates, exchanged);
+        let views = match self.settings.combine {
+            Combine::Mean => fuse(&candidates, exchanged),
+            Combine::Consensus => self.agreed(&candidates, exchanged),
+        };
         let n_joints = self.settings.joints.joints.len();
         let joints = self.triangulate(&views, n_joints, |centres| {
             self.settings.joints.from_parts(centres)
@@ -154,7 +175,7 @@ impl SkeletonStep {
             rank_facing(self.plans.len(), &energies, N_HYPOTHESES)
                 .into_iter()
                 .map(|(exchanges, energy)| {
-                    let views = fuse(&self.candidates(answers, pairs, exchanges), exchanges);
+                    let views = self.agreed(&self.candidates(answers, pairs, exchanges), exchanges);
                     let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec);
                     let joints: Vec<Option<Point3<f64>>> = PARSE14
                         .joints
@@ -235,6 +256,47 @@ impl SkeletonStep {
             })
         };
         (0..self.plans.len()).map(of_view).collect()
+    }
+
+    /// One pose per view, of what the views agree on.
+    fn agreed(
+        &self,
+        candidates: &[Option<Candidates>],
+        exchanged: Exchanges,
+    ) -> Vec<Option<FusedView>> {
+        let mut views = fuse(candidates, exchanged);
+        let n_parts = self.plans.first().map_or(0, |it| it.model().n_parts());
+        for part in 0..n_parts {
+            let sightings: Vec<Sightings<'_>> = (0..views.len())
+                .map(|view| self.sightings(view, part, candidates, &views))
+                .collect();
+            for (view, agreed) in views
+                .iter_mut()
+                .zip(consensus(&self.settings.consensus, &sightings))
+            {
+                if let (Some(view), Some(agreed)) = (view, agreed) {
+                    view.pose.centres_px[part] = agreed;
+                }
+            }
+        }
+        views
+    }
+
+    /// Where the pairs of a view saw a part; nowhere, if the view is missing.
+    fn sightings(
+        &self,
+        view: usize,
+        part: usize,
+        candidates: &[Option<Candidates>],
+        views: &[Option<FusedView>],
+    ) -> Sightings<'_> {
+        let cell_px = views[view].as_ref().map_or(1.0, |it| it.cell_px);
+        let all = candidates[view].iter().flat_map(Candidates::all);
+        Sightings {
+            camera: self.plans[view].camera(),
+            sigma_px: cell_px * self.settings.sigma_cells,
+            points_px: all.map(|it| it.centres_px[part]).collect(),
+        }
     }
 
     /// Triangulates points of the fused poses.

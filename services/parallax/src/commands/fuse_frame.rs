@@ -88,9 +88,21 @@ pub(crate) struct Arguments {
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
+    /// How a view's pose is made of those of its pairs.
+    #[arg(long, value_enum, default_value_t = Combine::Mean)]
+    combine: Combine,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// How a view's pose is made of those of its pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Combine {
+    /// Their mean, as in the paper.
+    Mean,
+    /// Part by part the answers that all views can mean together.
+    Consensus,
 }
 
 /// Thresholds that are known by name.
@@ -259,6 +271,10 @@ fn settings(
         tables,
         skeleton: SkeletonSettings {
             joints: arguments.joints,
+            combine: match arguments.combine {
+                Combine::Mean => pipeline::Combine::Mean,
+                Combine::Consensus => pipeline::Combine::Consensus,
+            },
             facing,
             ..SkeletonSettings::default()
         },

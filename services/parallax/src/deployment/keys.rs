@@ -146,6 +146,10 @@ const KEYS: &[(&str, &str)] = &[
     ),
     ("triangulate.joints", "parse14, umpm15 or humaneva20"),
     (
+        "triangulate.combine",
+        "one pose per view out of its pairs': mean, as in the paper, or consensus",
+    ),
+    (
         "triangulate.loss_px",
         "reprojection error at which an observation begins to count less",
     ),
