@@ -5,12 +5,9 @@ mod common;
 
 use std::fs;
 
-use common::{Case, Ended, planted};
+use common::{Case, Ended, PLAIN, planted};
 use image::DynamicImage;
 use serde_json::Value;
-
-const PLAIN: &str =
-    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
 const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 const RUN: &[&str] = &["run", "deployment.toml"];

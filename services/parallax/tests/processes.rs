@@ -1,109 +1,11 @@
-//! Whole deployments of real processes: the same bits as one process, and what faults leave of them.
+//! Whole deployments of real processes, and what faults leave of them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
 
 use common::started::signal;
-use common::{Case, planted};
-use geometry::files::ReadOptions;
-use kernels::Rgb8View;
-use pipeline::{Estimate, Estimator, EstimatorSettings};
+use common::{Case, PACED, PLAIN};
 use serde_json::{Value, json};
-use skeleton::PARSE14;
-
-/// No overlays and no turning, so that frames are the pictures as they were planted.
-const PLAIN: &str =
-    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
-
-/// The same at a pace that leaves time to interfere.
-const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\nframe_rate_hz = 20\n\
-                     [record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
-
-/// Compares the results of a run with those of one process, bit for bit.
-fn assert_same_bits(case: &Case, n_views: usize, n_frames: usize) {
-    let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
-    let model = planted::model();
-    let (up, settings) = (rig.up_in_world(), EstimatorSettings::default());
-    let mut estimator = Estimator::new(&model, rig.cameras(), up, &settings).unwrap();
-    let (pose3d, pose2d) = (case.lines("pose3d.jsonl"), case.lines("pose2d.jsonl"));
-    assert_eq!((pose3d.len(), pose2d.len()), (n_frames, n_frames * n_views));
-    let mut n_placed = 0;
-    for frame in 0..n_frames {
-        let pictures: Vec<_> = rig
-            .cameras()
-            .iter()
-            .map(|it| planted::picture(it, frame))
-            .collect();
-        let [width, height] = planted::SIZE.map(|it| it as usize);
-        let images: Vec<_> = pictures
-            .iter()
-            .map(|it| Some(Rgb8View::new(width, height, it.rgb()).unwrap()))
-            .collect();
-        let estimate = estimator.estimate(&images, &vec![None; n_views]);
-        n_placed += estimate.skeleton.joints.iter().flatten().count();
-        assert_same_skeleton(&pose3d[frame], frame, &estimate);
-        for view in 0..n_views {
-            let line = &pose2d[frame * n_views + view];
-            assert_eq!(
-                (&line["frame"], &line["view"]),
-                (&json!(frame), &json!(planted::name(view)))
-            );
-            let answer = estimate.answers[view].as_ref().unwrap();
-            let best = &answer.candidates[0];
-            assert_eq!(line["single"]["candidates"], json!(answer.candidates.len()));
-            assert_eq!(line["single"]["score"], json!(best.score));
-            assert_eq!(line["single"]["level"], json!(best.level + 1));
-            let layout = estimator.plans()[view].layout();
-            let parts = (0..model.n_parts()).map(|part| {
-                let [x, y] = best.centre(&model, layout, part);
-                json!({ "x": x, "y": y, "type": best.parts[part].mixture + 1 })
-            });
-            assert_eq!(line["single"]["parts"], parts.collect::<Value>());
-            let fused = estimate.skeleton.views[view].as_ref().unwrap();
-            let parts = fused.pose.centres_px.iter();
-            let parts: Value = parts.map(|[x, y]| json!({ "x": x, "y": y })).collect();
-            assert_eq!(line["fused"]["parts"], parts, "frame {frame}, view {view}");
-            assert_eq!(line["fused"]["energy"], json!(fused.pose.energy));
-            assert_eq!(line["facing"] == json!("behind"), fused.exchanged);
-        }
-    }
-    assert!(
-        n_placed > 10 * n_frames,
-        "little to compare: {n_placed} joints"
-    );
-}
-
-fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
-    assert_eq!(line["frame"], json!(frame));
-    assert_eq!(line["pairs"], json!(estimate.skeleton.n_pairs));
-    assert_eq!(
-        line["facing_margin"],
-        json!(estimate.skeleton.facing_margin)
-    );
-    for (joint, expected) in PARSE14.joints.iter().zip(&estimate.skeleton.joints) {
-        let got = &line["joints"][joint.name];
-        let Ok(expected) = expected else {
-            assert_eq!(
-                got["position_m"],
-                Value::Null,
-                "frame {frame}, {}",
-                joint.name
-            );
-            continue;
-        };
-        let c = &expected.covariance;
-        let covariance = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|it| c[it]);
-        let position: [f64; 3] = expected.in_world.coords.into();
-        assert_eq!(
-            got["position_m"],
-            json!(position),
-            "frame {frame}, {}",
-            joint.name
-        );
-        assert_eq!(got["covariance_m2"], json!(covariance));
-        assert_eq!(got["reprojection_px"], json!(expected.reprojection_px));
-    }
-}
 
 /// The frame numbers of a run's results.
 fn frames(lines: &[Value]) -> Vec<u64> {
@@ -111,32 +13,6 @@ fn frames(lines: &[Value]) -> Vec<u64> {
         .iter()
         .map(|it| it["frame"].as_u64().unwrap())
         .collect()
-}
-
-#[test]
-fn many_processes_give_the_same_bits_as_one() {
-    let case = Case::new("parity", &[20; 3], PLAIN);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    assert_same_bits(&case, 3, 20);
-}
-
-#[test]
-fn deployments_side_by_side_do_not_meet() {
-    let cases = [
-        Case::new("left", &[12; 2], PLAIN),
-        Case::new("right", &[9; 3], PLAIN),
-    ];
-    let started = cases
-        .each_ref()
-        .map(|it| it.start(&["run", "deployment.toml"]));
-    for started in started {
-        let ended = started.wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    }
-    assert_same_bits(&cases[0], 2, 12);
-    assert_same_bits(&cases[1], 3, 9);
-    cases.iter().for_each(Case::assert_nothing_left);
 }
 
 #[test]

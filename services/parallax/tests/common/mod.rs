@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 pub(crate) mod planted;
+pub(crate) mod same_bits;
 pub(crate) mod started;
 
 use std::fmt::Write as _;
@@ -10,11 +11,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use geometry::Rig;
 use geometry::files::Format;
 use runtime::Namespace;
 use tempfile::TempDir;
 
 pub(crate) use started::{Ended, Started};
+
+/// No overlays and no turning, so that frames are the pictures as they were planted.
+pub(crate) const PLAIN: &str =
+    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+
+/// The same at a pace that leaves time to interfere.
+pub(crate) const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\n\
+     frame_rate_hz = 20\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
 /// Footage, rig, model and deployment file in a folder.
 pub(crate) struct Case {
@@ -29,6 +39,11 @@ impl Case {
     /// * `n_frames`: of every view.
     /// * `more`: what else the deployment file says.
     pub(crate) fn new(name: &str, n_frames: &[usize], more: &str) -> Self {
+        Self::seen_by(&planted::rig(n_frames.len()), name, n_frames, more)
+    }
+
+    /// The same, seen by other cameras, one for every number of frames.
+    pub(crate) fn seen_by(rig: &Rig, name: &str, n_frames: &[usize], more: &str) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
         let case = Self {
@@ -38,8 +53,7 @@ impl Case {
                 .unwrap(),
             name: format!("{name}-{}-{nth}", std::process::id()),
         };
-        let rig = planted::rig(n_frames.len());
-        geometry::files::write(&case.path("rig.toml"), Format::Own, &rig).unwrap();
+        geometry::files::write(&case.path("rig.toml"), Format::Own, rig).unwrap();
         fmp::files::write(&case.path("model.plx"), &planted::model()).unwrap();
         let mut text = format!(
             "name = \"{}\"\nrig = \"rig.toml\"\nmodel = \"model.plx\"\noutput = \"out\"\n",

@@ -36,6 +36,29 @@ pub(crate) fn rig(n_views: usize) -> Rig {
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
 }
 
+/// The same cameras with lenses that distort, each rolled by an angle of its own.
+pub(crate) fn tilted_rig(n_views: usize) -> Rig {
+    let tilted = rig(n_views).cameras().to_vec().into_iter().enumerate();
+    let cameras = tilted.map(|(view, it)| {
+        let roll = 0.5 - 0.4 * view as f64;
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+        let lens = LensModel::BrownConrady {
+            k: [-0.2, 0.05, 0.0, 0.0, 0.0, 0.0],
+            p: [0.002, -0.001],
+        };
+        Camera {
+            camera_from_world: turn * it.camera_from_world,
+            intrinsics: Intrinsics {
+                fy: 168.0,
+                lens: Lens::new(lens),
+                ..it.intrinsics
+            },
+            ..it
+        }
+    });
+    Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
+}
+
 /// The name of a view.
 pub(crate) fn name(view: usize) -> String {
     char::from(b'a' + view as u8).to_string()

@@ -1,0 +1,167 @@
+//! The results of a run against those of one process that does the same, bit for bit.
+
+use fmp::Layout;
+use footage::{Canvas, Fill, Size, Warp};
+use geometry::files::ReadOptions;
+use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
+use kernels::Rgb8View;
+use pipeline::{Estimate, Estimator, EstimatorSettings};
+use serde_json::{Value, json};
+use skeleton::PARSE14;
+
+use super::{Case, planted};
+
+/// What the one process does.
+#[derive(Debug, Default)]
+pub(crate) struct OneProcess {
+    /// The settings of its steps.
+    pub(crate) settings: EstimatorSettings,
+    /// Size of its frames, which are turned upright; the pictures as they are without it.
+    pub(crate) upright_size: Option<[u32; 2]>,
+}
+
+impl OneProcess {
+    /// Compares the results of a run with what this one gives.
+    pub(crate) fn assert_same(&self, case: &Case, n_views: usize, n_frames: usize) {
+        let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
+        let mut views: Vec<View> = rig
+            .cameras()
+            .iter()
+            .map(|it| View::new(it, &rig, self.upright_size))
+            .collect();
+        let cameras: Vec<Camera> = views.iter().map(|it| it.framing.camera().clone()).collect();
+        let (model, up) = (planted::model(), rig.up_in_world());
+        let mut estimator = Estimator::new(&model, &cameras, up, &self.settings).unwrap();
+        let (pose3d, pose2d) = (case.lines("pose3d.jsonl"), case.lines("pose2d.jsonl"));
+        assert_eq!((pose3d.len(), pose2d.len()), (n_frames, n_frames * n_views));
+        let mut n_placed = 0;
+        for frame in 0..n_frames {
+            let pictures = rig.cameras().iter().map(|it| planted::picture(it, frame));
+            let frames: Vec<Vec<u8>> = pictures
+                .zip(&mut views)
+                .map(|(it, view)| view.frame(&it))
+                .collect();
+            let images = frames.iter().zip(&views).map(|(it, view)| {
+                let [width, height] = view.framing.out_size().map(|it| it as usize);
+                Some(Rgb8View::new(width, height, it).unwrap())
+            });
+            let images: Vec<_> = images.collect();
+            let estimate = estimator.estimate(&images, &vec![None; n_views]);
+            n_placed += estimate.skeleton.joints.iter().flatten().count();
+            assert_same_skeleton(&pose3d[frame], frame, &estimate);
+            for (view, it) in views.iter().enumerate() {
+                let line = &pose2d[frame * n_views + view];
+                let layout = estimator.plans()[view].layout();
+                it.assert_same(line, [frame, view], &estimate, layout);
+            }
+        }
+        assert!(
+            n_placed > 10 * n_frames,
+            "little to compare: {n_placed} joints"
+        );
+    }
+}
+
+/// From the pictures of a camera to the frames of the pipeline.
+struct View {
+    framing: Framing,
+    warp: Warp,
+}
+
+impl View {
+    fn new(camera: &Camera, rig: &Rig, upright_size: Option<[u32; 2]>) -> Self {
+        let roll = upright_size.and_then(|_| upright_roll(camera, rig));
+        let size = upright_size.map_or(OutSize::Scale(1.0), OutSize::Exact);
+        let framing = Framing::new(camera, planted::SIZE, None, size, roll.unwrap_or(0.0)).unwrap();
+        let size = |[width, height]: [u32; 2]| Size::new(width as usize, height as usize);
+        let fill = match roll {
+            Some(_) => Fill::Black,
+            None => Fill::Replicate,
+        };
+        let map = framing.source_from_output();
+        let warp = Warp::new(size(planted::SIZE), size(framing.out_size()), &map, fill);
+        Self {
+            warp: warp.unwrap(),
+            framing,
+        }
+    }
+
+    fn frame(&mut self, picture: &Canvas) -> Vec<u8> {
+        let mut rgb = vec![0; self.warp.output_size().rgb_bytes()];
+        self.warp.apply(picture.rgb(), &mut rgb);
+        rgb
+    }
+
+    /// A point of the frame in pixels of the picture.
+    fn in_picture(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let map = self.framing.source_from_output();
+        map.map(|row| row[0] * x + row[1] * y + row[2])
+    }
+
+    fn assert_same(
+        &self,
+        line: &Value,
+        [frame, view]: [usize; 2],
+        estimate: &Estimate,
+        layout: &Layout,
+    ) {
+        assert_eq!(
+            (&line["frame"], &line["view"]),
+            (&json!(frame), &json!(planted::name(view)))
+        );
+        let model = planted::model();
+        let answer = estimate.answers[view].as_ref().unwrap();
+        let best = &answer.candidates[0];
+        assert_eq!(line["single"]["candidates"], json!(answer.candidates.len()));
+        assert_eq!(line["single"]["score"], json!(best.score));
+        assert_eq!(line["single"]["level"], json!(best.level + 1));
+        let parts = (0..model.n_parts()).map(|part| {
+            let [x, y] = self.in_picture(best.centre(&model, layout, part));
+            json!({ "x": x, "y": y, "type": best.parts[part].mixture + 1 })
+        });
+        assert_eq!(line["single"]["parts"], parts.collect::<Value>());
+        let fused = estimate.skeleton.views[view].as_ref().unwrap();
+        let parts = fused
+            .pose
+            .centres_px
+            .iter()
+            .map(|at| self.in_picture(*at))
+            .map(|[x, y]| json!({ "x": x, "y": y }));
+        let parts: Value = parts.collect();
+        assert_eq!(line["fused"]["parts"], parts, "frame {frame}, view {view}");
+        assert_eq!(line["fused"]["energy"], json!(fused.pose.energy));
+        assert_eq!(line["facing"] == json!("behind"), fused.exchanged);
+    }
+}
+
+fn assert_same_skeleton(line: &Value, frame: usize, estimate: &Estimate) {
+    assert_eq!(line["frame"], json!(frame));
+    assert_eq!(line["pairs"], json!(estimate.skeleton.n_pairs));
+    assert_eq!(
+        line["facing_margin"],
+        json!(estimate.skeleton.facing_margin)
+    );
+    for (joint, expected) in PARSE14.joints.iter().zip(&estimate.skeleton.joints) {
+        let got = &line["joints"][joint.name];
+        let Ok(expected) = expected else {
+            assert_eq!(
+                got["position_m"],
+                Value::Null,
+                "frame {frame}, {}",
+                joint.name
+            );
+            continue;
+        };
+        let c = &expected.covariance;
+        let covariance = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|it| c[it]);
+        let position: [f64; 3] = expected.in_world.coords.into();
+        assert_eq!(
+            got["position_m"],
+            json!(position),
+            "frame {frame}, {}",
+            joint.name
+        );
+        assert_eq!(got["covariance_m2"], json!(covariance));
+        assert_eq!(got["reprojection_px"], json!(expected.reprojection_px));
+    }
+}
