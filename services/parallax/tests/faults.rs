@@ -1,0 +1,124 @@
+//! What is left of a run of real processes when one of them is stopped or killed.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::started::signal;
+use common::{Case, PACED};
+use serde_json::{Value, json};
+
+const N_FRAMES: u64 = 50;
+
+/// What became of a run of three views one process of which got a signal after ten frames.
+struct Struck {
+    lines: Vec<Value>,
+    summary: Value,
+    said: String,
+}
+
+impl Struck {
+    /// It is over, it says that it lost something, and nothing of it is left.
+    ///
+    /// * `victim`: as on its command line, for example `pose --index 1`.
+    fn new(more: &str, name: &str, victim: &str) -> Self {
+        let process = victim.replace(" --index ", "-");
+        let case = Case::new(&process, &[N_FRAMES as usize; 3], more);
+        let mut started = case.start(&["run", "deployment.toml", "--json"]);
+        started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+        signal(name, started.pid_of(victim).into());
+        let ended = started.wait();
+        case.assert_nothing_left();
+        assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+        let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+        let restarts = json!([{ "process": process, "restarts": 1 }]);
+        assert_eq!(report["restarts"], restarts, "{}", ended.stderr);
+        Self {
+            lines: case.lines("pose3d.jsonl"),
+            summary: report["recorded"]["summary"].clone(),
+            said: ended.stderr,
+        }
+    }
+
+    fn frames(&self) -> Vec<u64> {
+        let frames = self.lines.iter().map(|it| it["frame"].as_u64().unwrap());
+        frames.collect()
+    }
+
+    fn assert_every_frame(&self) {
+        let expected: Vec<u64> = (0..N_FRAMES).collect();
+        assert_eq!(self.frames(), expected, "{}", self.said);
+    }
+
+    /// The views of the frames that do not have all of them.
+    fn without_all(&self) -> Vec<&Value> {
+        let views = self.lines.iter().map(|it| &it["views_present"]);
+        views.filter(|it| **it != json!(["a", "b", "c"])).collect()
+    }
+}
+
+#[test]
+fn a_killed_camera_goes_on_where_it_was() {
+    let struck = Struck::new(PACED, "KILL", "capture --index 1");
+    struck.assert_every_frame();
+    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+}
+
+#[test]
+fn a_killed_fusion_worker_costs_its_pairs_of_a_few_frames() {
+    let struck = Struck::new(PACED, "KILL", "fuse --index 0");
+    struck.assert_every_frame();
+    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+    // The other worker has one pair of the three.
+    let pairs: Vec<_> = struck.lines.iter().map(|it| &it["pairs"]).collect();
+    assert!(pairs.iter().all(|it| **it != json!(0)), "{pairs:?}");
+    let n_without = pairs.iter().filter(|it| ***it != json!(3)).count();
+    assert!(n_without < 20, "{pairs:?}");
+    assert_eq!(pairs.last(), Some(&&json!(3)), "it is not back");
+}
+
+#[test]
+fn a_killed_triangulation_costs_the_frames_it_held_and_they_are_counted() {
+    let struck = Struck::new(PACED, "KILL", "triangulate");
+    let frames = struck.frames();
+    assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+    assert_eq!(frames.last(), Some(&(N_FRAMES - 1)), "{}", struck.said);
+    let missed = N_FRAMES as usize - frames.len();
+    assert!(missed < 20, "{frames:?}");
+    assert_eq!(struck.summary["frames_missed"], json!(missed));
+}
+
+#[test]
+fn a_stopped_view_is_found_out_and_no_frame_is_lost() {
+    let patience = PACED.to_owned() + "[supervise]\nhang_limit_s = 2\n";
+    let struck = Struck::new(&patience, "STOP", "pose --index 1");
+    assert!(
+        struck.said.contains("gave no sign of life"),
+        "{}",
+        struck.said
+    );
+    struck.assert_every_frame();
+    // All that it may cost is the frame that it held.
+    let without = struck.without_all();
+    assert!(
+        without.is_empty() || without == [&json!(["a", "c"])],
+        "{without:?}"
+    );
+}
+
+#[test]
+fn a_live_run_goes_on_without_a_stopped_view_until_it_is_back() {
+    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let more = live + "[supervise]\nhang_limit_s = 1\n";
+    let struck = Struck::new(&more, "STOP", "pose --index 1");
+    assert!(
+        struck.said.contains("gave no sign of life"),
+        "{}",
+        struck.said
+    );
+    let without = struck.without_all();
+    assert!(without.len() > 3, "{without:?}");
+    let last = struck.lines.last().unwrap();
+    assert_eq!(last["views_present"], json!(["a", "b", "c"]), "{last}");
+    let n_without_b = without.iter().filter(|it| **it == &json!(["a", "c"]));
+    assert!(n_without_b.count() > 3, "{without:?}");
+}
