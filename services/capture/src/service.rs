@@ -53,12 +53,12 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         let asked_at = now_nanos();
         match source.next_frame() {
             Ok(Some(frame)) => camera.send_frame(&frame, asked_at)?,
-            Ok(None) => return camera.end(),
+            Ok(None) => return camera.end(at),
             Err(error) => {
                 tracing::error!(view = job.view, %error, "no more frames of this view");
                 let from = job.source.start + at * job.source.step;
                 camera.send_missing(from, n_frames.saturating_sub(at))?;
-                return camera.end();
+                return camera.end(n_frames);
             }
         }
         at += 1;
@@ -114,9 +114,10 @@ impl<'a> Camera<'a> {
 
     /// Waits for the consumers, then passes over what an earlier life of this process has sent.
     fn go_on(&mut self, source: &mut Source) -> Result<u64, Failure> {
+        let patience = self.service.patience_at_start(self.job.patience);
         let n = self
             .publisher
-            .wait_for_subscribers(self.n_expected, self.job.patience);
+            .wait_for_subscribers(self.n_expected, patience);
         if n < self.n_expected {
             tracing::warn!(
                 n,
@@ -125,7 +126,7 @@ impl<'a> Camera<'a> {
             );
             self.n_expected = n;
         }
-        if self.service.epoch() == 0 || self.job.mode == Mode::Realtime {
+        if self.service.epoch() == 0 {
             return Ok(0);
         }
         source.skip(self.place.sent()).or_fail(ExitKind::Input)
@@ -227,15 +228,15 @@ impl<'a> Camera<'a> {
     }
 
     fn note(&self, n_sent: u64) {
-        if self.job.mode == Mode::Lossless
-            && let Err(error) = self.place.note(n_sent)
-        {
+        if let Err(error) = self.place.note(n_sent) {
             tracing::debug!(%error, "cannot note the place in the footage");
         }
     }
 
-    fn end(&self) -> Result<(), Failure> {
-        let say = || self.send_empty(u64::MAX, Status::END);
+    /// Says that the footage is over, and how many frames it had.
+    fn end(&self, n_frames: u64) -> Result<(), Failure> {
+        let beyond = self.job.source.start + n_frames * self.job.source.step;
+        let say = || self.send_empty(beyond, Status::END);
         say()?;
         self.service.health().finished();
         self.waiter.linger(|| self.publisher.n_connected(), say)

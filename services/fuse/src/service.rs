@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::sync::Arc;
 
-use join::{Joined, Joiner, Push};
+use join::{Cadence, Joined, Joiner, Push};
 use messages::{PairPose, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
 use multiview::ViewPlan;
 use pipeline::{Answer, FuseStep};
@@ -27,6 +27,8 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
+    /// Distance between the frames used, at least 1.
+    pub frame_step: u64,
     /// Processes that take the answers.
     pub n_consumers: usize,
     /// How long a view may be silent.
@@ -50,7 +52,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut worker = Worker::open(service, job, &mut waiter)?;
     let n = worker
         .publisher
-        .wait_for_subscribers(job.n_consumers, job.patience);
+        .wait_for_subscribers(job.n_consumers, service.patience_at_start(job.patience));
     tracing::info!(n, expected = job.n_consumers, "begins");
     loop {
         if waiter.wait(Duration::from_millis(20))? == Woken::Stop {
@@ -58,7 +60,9 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         }
         worker.listen()?;
         while let Some(joined) = worker.next_frame() {
+            let begin = now_nanos();
             worker.answer(&joined)?;
+            worker.answered(&joined, now_nanos() - begin);
             if service.stop().is_requested() {
                 return Ok(());
             }
@@ -79,6 +83,7 @@ struct Worker<'a> {
     evidence: Vec<Option<Evidence>>,
     publisher: Publisher<PairPose>,
     joiner: Joiner<Word>,
+    cadence: Cadence,
 }
 
 impl<'a> Worker<'a> {
@@ -102,6 +107,7 @@ impl<'a> Worker<'a> {
             service,
             job,
             joiner: joiner(service.delivery(), n_views + qualities.len(), job.patience),
+            cadence: Cadence::default(),
             poses,
             qualities,
             evidence,
@@ -154,10 +160,20 @@ impl<'a> Worker<'a> {
     fn next_frame(&mut self) -> Option<Joined<Word>> {
         match self.service.delivery() {
             Delivery::Lossless => self.joiner.next(now_nanos()),
-            Delivery::Realtime => self.joiner.latest(now_nanos()).map(|(joined, n_passed)| {
+            Delivery::Realtime => {
+                let wants = |it: &Joined<Word>| self.cadence.takes(it.frame / self.job.frame_step);
+                let (joined, n_passed) = self.joiner.latest(now_nanos(), wants);
                 self.service.health().dropped(n_passed);
                 joined
-            }),
+            }
+        }
+    }
+
+    fn answered(&mut self, joined: &Joined<Word>, busy_nanos: u64) {
+        if let Some(stamp) = stamp_of(joined) {
+            let nth = joined.frame / self.job.frame_step;
+            self.cadence
+                .answered(nth, stamp.captured_at_nanos, busy_nanos);
         }
     }
 

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod config;
+mod intake;
 mod service;
 
 pub use config::{All, Config, Window};

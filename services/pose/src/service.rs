@@ -10,6 +10,8 @@ use runtime::{
     Waiter, Woken, now_nanos,
 };
 
+use crate::intake::Intake;
+
 /// What one view's process has to do.
 #[derive(Debug)]
 pub struct Job {
@@ -21,6 +23,8 @@ pub struct Job {
     pub n_pose_consumers: usize,
     /// Processes that take the evidence.
     pub n_evidence_consumers: usize,
+    /// First frame that is used.
+    pub start_frame: u64,
     /// Distance between the frames used.
     pub frame_step: u64,
     /// How long they are waited for.
@@ -42,20 +46,22 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         poses: bus.publisher(&topic::view_pose(job.view))?,
         evidence: bus.slice_publisher(&topic::evidence(job.view))?,
     };
+    let patience = service.patience_at_start(job.patience);
     let n = view
         .poses
-        .wait_for_subscribers(job.n_pose_consumers, job.patience);
+        .wait_for_subscribers(job.n_pose_consumers, patience);
     tracing::info!(n, expected = job.n_pose_consumers, "candidates are awaited");
     let n = view
         .evidence
-        .wait_for_subscribers(job.n_evidence_consumers, job.patience);
+        .wait_for_subscribers(job.n_evidence_consumers, patience);
     tracing::info!(
         n,
         expected = job.n_evidence_consumers,
         "evidence is awaited, begins"
     );
+    let frame_range = [job.start_frame, job.frame_step];
+    let mut intake = Intake::new(service.delivery(), frame_range, service.epoch());
     let mut spare = Vec::new();
-    let mut last_frame: Option<u64> = None;
     loop {
         if waiter.wait(Duration::from_millis(100))? == Woken::Stop {
             return Ok(());
@@ -69,20 +75,17 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
                 continue;
             }
             if header.status == Status::END {
+                service.health().dropped(intake.n_lost_before(&header));
                 return view.end(&header.stamp, &waiter);
             }
-            service.health().received(1);
-            let frame = header.stamp.frame;
-            if let Some(last) = last_frame.filter(|it| *it >= frame) {
-                // Sent again for the sake of another receiver.
-                tracing::debug!(frame, last, "a frame came again");
+            if !intake.takes(&header) {
                 continue;
             }
-            if let Some(last) = last_frame.replace(frame) {
-                let steps = (frame - last) / job.frame_step.max(1);
-                service.health().dropped(steps.saturating_sub(1));
-            }
+            service.health().received(1);
+            service.health().dropped(intake.n_lost_before(&header));
+            let begin = now_nanos();
             view.answer(sample, &mut spare)?;
+            intake.answered(&header, now_nanos() - begin);
             if service.stop().is_requested() {
                 return Ok(());
             }

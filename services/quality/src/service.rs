@@ -31,7 +31,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut waiter = bus.waiter();
     let poses = bus.subscriber::<ViewPose>(&topic::view_pose(job.view), &mut waiter)?;
     let publisher = bus.publisher::<ViewQuality>(&topic::view_quality(job.view))?;
-    publisher.wait_for_subscribers(job.n_consumers, job.patience);
+    publisher.wait_for_subscribers(job.n_consumers, service.patience_at_start(job.patience));
     while waiter.wait(Duration::from_millis(100))? != Woken::Stop {
         while let Some(pose) = poses.receive()? {
             if pose.stamp.session != service.session() {

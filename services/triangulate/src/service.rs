@@ -46,7 +46,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
     let mut stage = Stage::open(service, job, &mut waiter)?;
     let n = stage
         .publisher
-        .wait_for_subscribers(job.n_consumers, job.patience);
+        .wait_for_subscribers(job.n_consumers, service.patience_at_start(job.patience));
     tracing::info!(n, expected = job.n_consumers, "begins");
     while waiter.wait(Duration::from_millis(20))? != Woken::Stop {
         stage.listen()?;

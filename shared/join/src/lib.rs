@@ -5,7 +5,11 @@
 //! here reads a clock: the caller says what time it is, so every rule is tested without waiting.
 #![forbid(unsafe_code)]
 
+mod cadence;
+
 use std::collections::BTreeMap;
+
+pub use cadence::Cadence;
 
 /// What was brought together about one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -150,15 +154,25 @@ impl<T> Joiner<T> {
         })
     }
 
-    /// The latest complete frame, and how many earlier ones were passed over for it.
-    pub fn latest(&mut self, now: u64) -> Option<(Joined<T>, u64)> {
-        let mut latest = self.next(now)?;
+    /// The latest complete frame that is wanted, and how many others were passed over.
+    ///
+    /// * `wants`: whether a frame is one of those that are taken.
+    pub fn latest(
+        &mut self,
+        now: u64,
+        wants: impl Fn(&Joined<T>) -> bool,
+    ) -> (Option<Joined<T>>, u64) {
+        let mut latest = None;
         let mut n_passed = 0;
         while let Some(later) = self.next(now) {
-            latest = later;
-            n_passed += 1;
+            let passed = if wants(&later) {
+                latest.replace(later).is_some()
+            } else {
+                true
+            };
+            n_passed += u64::from(passed);
         }
-        Some((latest, n_passed))
+        (latest, n_passed)
     }
 
     /// Inputs that are not waited for because they fell silent.
@@ -283,8 +297,20 @@ mod tests {
         for frame in 0..3 {
             joiner.push(0, frame, frame, 0);
         }
-        let (got, n_passed) = joiner.latest(0).unwrap();
-        assert_eq!((got.frame, n_passed), (2, 2));
+        let (got, n_passed) = joiner.latest(0, |_| true);
+        assert_eq!((got.unwrap().frame, n_passed), (2, 2));
+    }
+
+    #[test]
+    fn frames_that_are_not_wanted_are_passed_over() {
+        let mut joiner = Joiner::new(1, 100);
+        for frame in 0..5 {
+            joiner.push(0, frame, frame, 0);
+        }
+        let (got, n_passed) = joiner.latest(0, |it| it.frame == 3);
+        assert_eq!((got.unwrap().frame, n_passed), (3, 4));
+        joiner.push(0, 5, 5, 0);
+        assert_eq!(joiner.latest(0, |_| false), (None, 1));
     }
 
     #[test]

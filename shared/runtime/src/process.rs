@@ -1,5 +1,6 @@
 //! The life of a service process, from its first line to its exit status.
 
+use core::time::Duration;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -58,7 +59,22 @@ impl Service {
     pub fn delivery(&self) -> Delivery {
         self.launch.delivery
     }
+
+    /// How long to wait for receivers before the first message. All processes of a deployment begin
+    /// at the same time and take as long as they take; one that was restarted finds the others there.
+    ///
+    /// * `deadline`: how long anybody is waited for later on.
+    pub fn patience_at_start(&self, deadline: Duration) -> Duration {
+        if self.launch.epoch == 0 {
+            deadline.max(BEGINNING)
+        } else {
+            deadline
+        }
+    }
 }
+
+/// How long the processes of a deployment may take to find each other when it begins.
+const BEGINNING: Duration = Duration::from_secs(10);
 
 /// Runs a service in this process and answers with its exit status.
 ///

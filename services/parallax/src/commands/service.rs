@@ -116,6 +116,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         // The workers, triangulate, record, and quality if there is one.
         n_pose_consumers: dealing.n_workers + 2 + usize::from(resolved.has_quality()),
         n_evidence_consumers: dealing.readers_of(view),
+        start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         patience: resolved.patience(),
     };
@@ -162,6 +163,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         ),
         plans,
         has_quality: resolved.has_quality(),
+        frame_step: resolved.deployment.capture.frame_step.max(1),
         n_consumers: 2, // triangulate and record
         patience: resolved.patience(),
     };

@@ -1,0 +1,140 @@
+//! Which of the frames that come are answered, and how many never were.
+
+use join::Cadence;
+use messages::{FrameHeader, Status};
+use runtime::Delivery;
+
+/// Looks at the frames of one view as they come.
+#[derive(Debug)]
+pub(crate) struct Intake {
+    delivery: Delivery,
+    start_frame: u64,
+    frame_step: u64,
+    cadence: Cadence,
+    /// Number of the frame that is expected next; unknown to a process that was restarted.
+    next: Option<u64>,
+    last_frame: Option<u64>,
+    /// Frames that the camera has left out.
+    n_dropped: u64,
+}
+
+impl Intake {
+    /// * `epoch`: how often this process was restarted.
+    pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], epoch: u32) -> Self {
+        Self {
+            delivery,
+            start_frame,
+            frame_step: frame_step.max(1),
+            cadence: Cadence::default(),
+            next: (epoch == 0).then_some(0),
+            last_frame: None,
+            n_dropped: 0,
+        }
+    }
+
+    /// Whether a frame is to be answered: not one that came again for the sake of another receiver,
+    /// and not one that there is no time for.
+    pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
+        let frame = header.stamp.frame;
+        self.last_frame.is_none_or(|last| last < frame)
+            && (self.delivery == Delivery::Lossless
+                || header.status != Status::OK
+                || self.cadence.takes(self.nth(frame)))
+    }
+
+    /// Counts the frames before one that is taken, or before the end, that were never seen and that
+    /// the camera did not leave out.
+    pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
+        let nth = self.nth(header.stamp.frame);
+        let skipped = self.next.map_or(0, |next| nth.saturating_sub(next));
+        let left_out = header.n_dropped.saturating_sub(self.n_dropped);
+        self.next = Some(nth + 1);
+        self.n_dropped = header.n_dropped;
+        skipped.saturating_sub(left_out)
+    }
+
+    /// Notes that a frame was answered, and how long that took.
+    pub(crate) fn answered(&mut self, header: &FrameHeader, busy_nanos: u64) {
+        let frame = header.stamp.frame;
+        self.last_frame = Some(frame);
+        let stride = self.cadence.stride();
+        self.cadence
+            .answered(self.nth(frame), header.stamp.captured_at_nanos, busy_nanos);
+        if self.delivery == Delivery::Realtime && self.cadence.stride() != stride {
+            tracing::info!(frame, every = self.cadence.stride(), "another cadence");
+        }
+    }
+
+    fn nth(&self, frame: u64) -> u64 {
+        frame.saturating_sub(self.start_frame) / self.frame_step
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::Stamp;
+
+    use super::*;
+
+    /// Frame `nth` of footage of which every third from 6 on is used, at 10 Hz.
+    fn header(nth: u64, n_dropped: u64) -> FrameHeader {
+        FrameHeader {
+            stamp: Stamp {
+                frame: 6 + 3 * nth,
+                captured_at_nanos: nth * 100_000_000,
+                ..Stamp::default()
+            },
+            n_dropped,
+            ..FrameHeader::default()
+        }
+    }
+
+    fn intake(delivery: Delivery, epoch: u32) -> Intake {
+        Intake::new(delivery, [6, 3], epoch)
+    }
+
+    #[test]
+    fn every_frame_is_answered_dropped_by_the_camera_or_lost() {
+        let mut intake = intake(Delivery::Realtime, 0);
+        // 0 and 1 are lost, the camera leaves 3 and 4 out, 5 is lost, 7 and 8 are lost before the end.
+        assert_eq!(intake.n_lost_before(&header(2, 0)), 2);
+        assert_eq!(intake.n_lost_before(&header(6, 2)), 1);
+        assert_eq!(intake.n_lost_before(&header(9, 2)), 2);
+    }
+
+    #[test]
+    fn a_restarted_process_does_not_count_what_its_earlier_lives_answered() {
+        let mut intake = intake(Delivery::Realtime, 1);
+        assert_eq!(intake.n_lost_before(&header(20, 3)), 0);
+        assert_eq!(intake.n_lost_before(&header(22, 3)), 1);
+    }
+
+    #[test]
+    fn a_restarted_camera_counts_anew() {
+        let mut intake = intake(Delivery::Realtime, 0);
+        assert_eq!(intake.n_lost_before(&header(4, 4)), 0);
+        assert_eq!(intake.n_lost_before(&header(6, 0)), 1);
+        assert_eq!(intake.n_lost_before(&header(8, 1)), 0);
+    }
+
+    #[test]
+    fn a_frame_that_comes_again_is_answered_once() {
+        let mut intake = intake(Delivery::Lossless, 0);
+        assert!(intake.takes(&header(0, 0)));
+        intake.answered(&header(0, 0), 1);
+        assert!(!intake.takes(&header(0, 0)));
+        assert!(intake.takes(&header(1, 0)));
+    }
+
+    #[test]
+    fn who_is_too_slow_takes_fewer_frames_only_where_frames_may_be_lost() {
+        for (delivery, expected) in [(Delivery::Realtime, false), (Delivery::Lossless, true)] {
+            let mut intake = intake(delivery, 0);
+            for nth in [0, 2, 4, 6] {
+                intake.answered(&header(nth, 0), 150_000_000);
+            }
+            assert_eq!(intake.takes(&header(7, 0)), expected);
+            assert!(intake.takes(&header(8, 0)));
+        }
+    }
+}
