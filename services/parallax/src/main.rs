@@ -11,6 +11,7 @@ mod output;
 mod plan;
 mod prepare;
 mod summary;
+mod views;
 
 use std::process::ExitCode;
 

@@ -11,6 +11,7 @@ use supervise::{Event, Outcome};
 
 use crate::output;
 use crate::plan::Resolved;
+use crate::views::ViewReport;
 
 /// Pause between two lines where no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);
@@ -115,15 +116,26 @@ pub(crate) struct Report {
     restarts: Vec<(String, u32)>,
     n_dropped: u64,
     is_lossless: bool,
+    views: Vec<ViewReport>,
     /// `summary.json`, as the recorder wrote it; null if it did not.
     recorded: Value,
 }
 
 impl Report {
     /// Puts together what the supervisor and the recorder know.
-    pub(crate) fn new(resolved: &Resolved, outcome: &Outcome, elapsed: Duration) -> Self {
+    ///
+    /// * `session`: the run; what an earlier one left in the folder says nothing about this.
+    pub(crate) fn new(
+        resolved: &Resolved,
+        session: u64,
+        outcome: &Outcome,
+        elapsed: Duration,
+    ) -> Self {
         let folder = &resolved.deployment.output;
         let recorded = std::fs::read_to_string(folder.join("summary.json")).unwrap_or_default();
+        let recorded: Value = serde_json::from_str(&recorded).unwrap_or(Value::Null);
+        let recorded = Some(recorded).filter(|it| it["session"] == session);
+        let recorded = recorded.unwrap_or(Value::Null);
         let processes = &outcome.processes;
         let given_up = processes
             .iter()
@@ -139,25 +151,27 @@ impl Report {
             restarts: restarted.map(|it| (it.name.clone(), it.restarts)).collect(),
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
             is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
-            recorded: serde_json::from_str(&recorded).unwrap_or(Value::Null),
+            views: ViewReport::all(resolved, outcome, &recorded["summary"]),
+            recorded,
         }
     }
 
     /// How the run ended, if not well.
     pub(crate) fn kind(&self) -> Option<ExitKind> {
         let count = |key: &str| self.recorded["summary"][key].as_u64().unwrap_or(0);
-        let lost = [
-            "frames_with_views_missing",
-            "frames_missed",
-            "writes_failed",
-        ];
+        let lost: &[&str] = if self.is_lossless {
+            &["frames_missed", "frames_not_recorded", "writes_failed"]
+        } else {
+            &["frames_not_recorded", "writes_failed"]
+        };
         if self.interrupted {
             Some(ExitKind::Interrupted)
         } else if !self.given_up.is_empty()
             || !self.restarts.is_empty()
             || self.recorded.is_null()
             || (self.is_lossless && count("frames") < self.n_frames)
-            || lost.into_iter().any(|it| count(it) > 0)
+            || lost.iter().any(|it| count(it) > 0)
+            || self.views.iter().any(|it| it.is_lost(self.is_lossless))
         {
             Some(ExitKind::Degraded)
         } else {
@@ -178,6 +192,7 @@ impl Report {
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "dropped": self.n_dropped,
+            "views": self.views,
             "recorded": self.recorded,
         })
     }
@@ -254,7 +269,11 @@ impl Report {
             .flatten()
             .map(|it| format!("{} {}", it[0].as_str().unwrap_or_default(), it[1]))
             .collect();
-        writeln!(text, "  views used    {}", used.join(", "))
+        writeln!(text, "  views used    {}", used.join(", "))?;
+        for view in self.views.iter().filter(|it| it.used < it.frames) {
+            writeln!(text, "    {view}")?;
+        }
+        Ok(())
     }
 
     fn write_latency(&self, text: &mut String) -> core::fmt::Result {

@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::collections::BTreeSet;
+
 use common::started::signal;
 use common::{Case, PACED};
 use serde_json::{Value, json};
@@ -121,4 +123,12 @@ fn a_live_run_goes_on_without_a_stopped_view_until_it_is_back() {
     assert_eq!(last["views_present"], json!(["a", "b", "c"]), "{last}");
     let n_without_b = without.iter().filter(|it| **it == &json!(["a", "c"]));
     assert!(n_without_b.count() > 3, "{without:?}");
+    let reasons: BTreeSet<&str> = struck
+        .lines
+        .iter()
+        .filter_map(|it| it["views_missing"]["b"].as_str())
+        .collect();
+    for reason in ["late", "process lost"] {
+        assert!(reasons.contains(reason), "{reasons:?}");
+    }
 }

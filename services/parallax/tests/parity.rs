@@ -1,5 +1,4 @@
 //! A deployment of real processes gives the same bits as one process that does the same.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
 

@@ -54,9 +54,11 @@ fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
     );
     let all = json!(["a", "b", "c"]);
     let without = lines.iter().filter(|it| it["views_present"] != all);
-    let without: Vec<_> = without.map(|it| it["views_present"].clone()).collect();
+    let without: Vec<_> = without.map(|it| it["views_missing"].clone()).collect();
     assert!(
-        without.iter().all(|it| *it == json!(["a", "c"])),
+        without
+            .iter()
+            .all(|it| *it == json!({ "b": "process lost" })),
         "{without:?}"
     );
     assert_eq!(lines[99]["views_present"], all, "the view is not back");
@@ -92,6 +94,12 @@ fn a_view_that_ends_early_is_missing_from_there_on() {
             &["a", "b"]
         };
         assert_eq!(line["views_present"], json!(views), "frame {frame}");
+        let missing = if frame < 7 {
+            json!({})
+        } else {
+            json!({ "c": "end of footage" })
+        };
+        assert_eq!(line["views_missing"], missing, "frame {frame}");
     }
 }
 

@@ -1,8 +1,10 @@
 //! The output folder: files grow beside their final name, and take it when they are whole.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+
+use serde_json::Value;
 
 /// The folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -48,12 +50,19 @@ impl Folder {
         })
     }
 
+    /// Whether a run has left all its files there under their final names.
+    pub fn is_finished(dir: &Path, session: u64) -> bool {
+        let text = fs::read_to_string(dir.join("summary.json")).unwrap_or_default();
+        let value: Value = serde_json::from_str(&text).unwrap_or_default();
+        value["session"] == session
+    }
+
     /// Begins a file.
     ///
     /// # Errors
     ///
     /// [`FolderError`].
-    pub fn file(&mut self, name: &str) -> Result<BufWriter<File>, FolderError> {
+    pub fn file(&mut self, name: &str) -> Result<File, FolderError> {
         let path = self.part(name);
         if self.resume {
             cut_half_line(&path).map_err(|source| FolderError {
@@ -62,19 +71,56 @@ impl Folder {
                 source,
             })?;
         }
-        let file = OpenOptions::new()
-            .create(true)
-            .write(true)
-            .append(self.resume)
-            .truncate(!self.resume)
-            .open(&path);
-        let file = file.map_err(|source| FolderError {
+        let begin = || {
+            let file = OpenOptions::new().create(true).append(true).open(&path)?;
+            if !self.resume {
+                file.set_len(0)?;
+            }
+            Ok(file)
+        };
+        let file = begin().map_err(|source| FolderError {
             doing: "write",
-            path,
+            path: path.clone(),
             source,
         })?;
         self.parts.push(name.to_owned());
-        Ok(BufWriter::new(file))
+        Ok(file)
+    }
+
+    /// Takes room for a file that is written at the end, when the disk may be full.
+    ///
+    /// # Errors
+    ///
+    /// [`FolderError`].
+    pub fn reserve(&mut self, name: &str, bytes: usize) -> Result<(), FolderError> {
+        let path = self.part(name);
+        let is_there = fs::metadata(&path).is_ok_and(|it| it.len() == bytes as u64);
+        if !(self.resume && is_there) {
+            fs::write(&path, vec![b' '; bytes]).map_err(|source| FolderError {
+                doing: "make room for",
+                path,
+                source,
+            })?;
+        }
+        self.parts.push(name.to_owned());
+        Ok(())
+    }
+
+    /// Writes a file for which room was taken.
+    ///
+    /// # Errors
+    ///
+    /// What the system said.
+    pub fn fill(&self, name: &str, text: &str) -> io::Result<()> {
+        // In place: what is emptied first may be taken by others.
+        let mut file = OpenOptions::new().write(true).open(self.part(name))?;
+        file.write_all(text.as_bytes())?;
+        file.set_len(text.len() as u64)
+    }
+
+    /// Leaves a file the name of a part.
+    pub fn leave(&mut self, name: &str) {
+        self.parts.retain(|it| it != name);
     }
 
     /// Begins a folder in the folder, empty unless it is resumed.
@@ -101,27 +147,26 @@ impl Folder {
         self.dir.join(format!("{name}.part"))
     }
 
-    /// Gives every file its final name; close them first.
+    /// Gives every file its final name, in the order of their names: `summary.json` after all that it
+    /// speaks of.
     ///
-    /// # Errors
-    ///
-    /// The first [`FolderError`]; the other files get their names all the same.
-    pub fn finish(self) -> Result<(), FolderError> {
-        let mut outcome = Ok(());
-        for name in &self.parts {
+    /// Returns what failed; the other files get their names all the same.
+    pub fn finish(&self) -> Vec<FolderError> {
+        let mut names = self.parts.clone();
+        names.sort();
+        let outcomes = names.iter().map(|name| {
             let (from, to) = (self.part(name), self.dir.join(name));
             // A folder does not take the place of another by renaming.
-            let cleared = if from.is_dir() { remove(&to) } else { Ok(()) };
-            let renamed = cleared.and_then(|()| {
-                fs::rename(&from, &to).map_err(|source| FolderError {
-                    doing: "rename the finished",
-                    path: from,
-                    source,
-                })
-            });
-            outcome = outcome.and(renamed);
-        }
-        outcome
+            if from.is_dir() {
+                remove(&to)?;
+            }
+            fs::rename(&from, &to).map_err(|source| FolderError {
+                doing: "rename the finished",
+                path: from,
+                source,
+            })
+        });
+        outcomes.filter_map(Result::err).collect()
     }
 }
 
@@ -157,8 +202,6 @@ fn remove(path: &Path) -> Result<(), FolderError> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write as _;
-
     use super::*;
 
     fn write(dir: &Path, resume: bool, text: &str, finish: bool) {
@@ -169,7 +212,7 @@ mod tests {
         let inner = folder.folder("pictures").unwrap();
         fs::write(inner.join(format!("{text}.png")), "").unwrap();
         if finish {
-            folder.finish().unwrap();
+            assert!(folder.finish().is_empty());
         }
     }
 
@@ -205,6 +248,32 @@ mod tests {
             "one\ntwo"
         );
         assert!(dir.path().join("pictures/one.png").exists());
+    }
+
+    #[test]
+    fn room_that_was_taken_is_filled_and_the_rest_given_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut folder = Folder::open(dir.path(), false).unwrap();
+        folder.reserve("summary.json", 100).unwrap();
+        let part = dir.path().join("summary.json.part");
+        assert_eq!(fs::metadata(&part).unwrap().len(), 100);
+        folder.fill("summary.json", "{ \"session\": 5 }\n").unwrap();
+        assert!(!Folder::is_finished(dir.path(), 5));
+        assert!(folder.finish().is_empty());
+        let text = fs::read_to_string(dir.path().join("summary.json")).unwrap();
+        assert_eq!(text, "{ \"session\": 5 }\n");
+        assert!(Folder::is_finished(dir.path(), 5));
+        assert!(!Folder::is_finished(dir.path(), 6), "another run");
+    }
+
+    #[test]
+    fn a_file_that_is_left_keeps_the_name_of_a_part() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut folder = Folder::open(dir.path(), false).unwrap();
+        folder.file("a.txt").unwrap();
+        folder.leave("a.txt");
+        assert!(folder.finish().is_empty());
+        assert!(dir.path().join("a.txt.part").exists());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use fmp::Pose;
 use messages::{FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
 
-use crate::Scene;
+use crate::{Missing, Scene};
 
 /// What one view said about one frame; `None` where nothing came.
 #[derive(Debug, Clone, Default)]
@@ -16,6 +16,8 @@ pub struct ViewRecord {
     pub quality: Option<ViewQuality>,
     /// Its pixels, if they are to be drawn on.
     pub picture: Option<Picture>,
+    /// Why it has no part in the result, if it has none.
+    pub missing: Option<Missing>,
 }
 
 /// A frame's pixels, copied for drawing.

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use messages::{FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 
+use crate::missing::Voice;
 use crate::{FrameRecord, Picture, ViewRecord};
 
 /// Frames that are kept while their results are awaited; beyond it the oldest are forgotten.
@@ -12,8 +13,10 @@ const MOST_FRAMES: usize = 512;
 /// What was said about frames whose results have not come yet.
 #[derive(Debug)]
 pub(crate) struct Gather {
-    n_views: usize,
     frames: BTreeMap<u64, Parts>,
+    voices: Vec<Voice>,
+    /// The latest life of the process that sends results.
+    epoch: u32,
 }
 
 #[derive(Debug)]
@@ -25,13 +28,27 @@ struct Parts {
 impl Gather {
     pub(crate) fn new(n_views: usize) -> Self {
         Self {
-            n_views,
             frames: BTreeMap::new(),
+            voices: vec![Voice::default(); n_views],
+            epoch: 0,
+        }
+    }
+
+    /// Notes whether the processes that answer for a view are there.
+    pub(crate) fn is_there(&mut self, view: usize, is_there: bool) {
+        if let Some(voice) = self.voices.get_mut(view) {
+            voice.is_there(is_there);
         }
     }
 
     /// Notes a frame, with its pixels if they are to be drawn on.
     pub(crate) fn frame(&mut self, view: usize, header: &FrameHeader, picture: Option<Picture>) {
+        if let Some(voice) = self.voices.get_mut(view) {
+            voice.frame(header);
+        }
+        if header.status == Status::END {
+            return;
+        }
         if let Some(it) = self.view(view, header.stamp.frame) {
             it.frame = Some(*header);
             it.picture = picture;
@@ -39,6 +56,12 @@ impl Gather {
     }
 
     pub(crate) fn pose(&mut self, view: usize, pose: &ViewPose) {
+        if let Some(voice) = self.voices.get_mut(view) {
+            voice.pose(pose);
+        }
+        if pose.status == Status::END {
+            return;
+        }
         if let Some(it) = self.view(view, pose.stamp.frame) {
             it.pose = Some(*pose);
         }
@@ -61,7 +84,13 @@ impl Gather {
             .split_off(&(pose3d.stamp.frame.saturating_add(1)));
         let mut past = std::mem::replace(&mut self.frames, later);
         let parts = past.remove(&pose3d.stamp.frame);
-        let Parts { views, pairs } = parts.unwrap_or_else(|| self.empty());
+        let Parts { mut views, pairs } = parts.unwrap_or_else(|| self.empty());
+        let is_first = pose3d.stamp.epoch > self.epoch;
+        self.epoch = self.epoch.max(pose3d.stamp.epoch);
+        for (view, (it, voice)) in views.iter_mut().zip(&mut self.voices).enumerate() {
+            let missing = voice.settle(pose3d.stamp.frame, it.pose.as_ref(), is_first);
+            it.missing = (pose3d.views_present >> view & 1 == 0).then_some(missing);
+        }
         FrameRecord {
             pose3d: *pose3d,
             views,
@@ -83,7 +112,7 @@ impl Gather {
 
     fn empty(&self) -> Parts {
         Parts {
-            views: vec![ViewRecord::default(); self.n_views],
+            views: vec![ViewRecord::default(); self.voices.len()],
             pairs: Vec::new(),
         }
     }
@@ -94,6 +123,7 @@ mod tests {
     use messages::Stamp;
 
     use super::*;
+    use crate::Missing;
     use crate::testing::pose3d;
 
     fn pose(frame: u64) -> ViewPose {
@@ -114,7 +144,21 @@ mod tests {
         let got = gather.result(&pose3d(3));
         assert_eq!(got.views[0].pose, Some(pose(3)));
         assert_eq!(got.views[1].pose, None);
+        assert_eq!(got.views[0].missing, None, "it is present");
         assert_eq!(gather.result(&pose3d(4)).views[1].pose, Some(pose(4)));
+    }
+
+    #[test]
+    fn who_has_no_part_in_a_result_is_asked_why() {
+        let mut gather = Gather::new(2);
+        gather.pose(0, &pose(3));
+        gather.pose(1, &pose(4));
+        let mut result = pose3d(3);
+        result.views_present = 0b01;
+        assert_eq!(
+            gather.result(&result).views[1].missing,
+            Some(Missing::Dropped)
+        );
     }
 
     #[test]

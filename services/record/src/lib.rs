@@ -9,6 +9,7 @@ mod config;
 mod scene;
 
 mod frame;
+mod missing;
 
 mod latency;
 mod overlay;
@@ -17,6 +18,9 @@ mod pose3d;
 mod trc;
 
 mod folder;
+mod lines;
+
+mod summary;
 
 mod output;
 
@@ -28,9 +32,11 @@ pub use config::Config;
 pub use folder::{Folder, FolderError};
 pub use frame::{FrameRecord, Picture, ViewRecord};
 pub use latency::{Latency, Percentiles, Report};
-pub use output::{Output, OutputError, Summary};
+pub use missing::Missing;
+pub use output::{Output, OutputError};
 pub use scene::{Scene, View};
 pub use service::{Job, run};
+pub use summary::Summary;
 
 #[cfg(test)]
 mod testing;

@@ -1,9 +1,11 @@
 //! `pose3d.jsonl` and `pose3d.csv`: joints in the world.
 
+use std::collections::BTreeMap;
+
 use messages::{Joint3d, Pose3d, Status};
 use serde_json::{Map, Value, json};
 
-use crate::Scene;
+use crate::{FrameRecord, Scene};
 
 /// First line of `pose3d.csv`; one row a joint follows, empty where there is no position.
 pub(crate) const CSV_HEADER: &str = "frame,time_s,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
@@ -29,7 +31,8 @@ pub(crate) fn is_placed(joint: &Joint3d) -> bool {
 }
 
 /// One line of `pose3d.jsonl`, without its end.
-pub(crate) fn json_line(scene: &Scene, pose: &Pose3d) -> String {
+pub(crate) fn json_line(scene: &Scene, record: &FrameRecord) -> String {
+    let pose = &record.pose3d;
     let joints: Map<String, Value> = joints(scene, pose)
         .map(|(name, it)| (name.to_owned(), joint(scene, it)))
         .collect();
@@ -38,12 +41,24 @@ pub(crate) fn json_line(scene: &Scene, pose: &Pose3d) -> String {
         "time_s": scene.time_s(pose.stamp.frame),
         "status": pose.status.reason(),
         "views_present": scene.names(pose.views_present),
+        "views_missing": missing(scene, record),
         "views_used": scene.names(pose.views_used),
         "pairs": pose.n_pairs,
         "facing_margin": pose.facing_margin,
         "joints": joints,
     })
     .to_string()
+}
+
+/// The views that have no part in the result, and why.
+pub(crate) fn missing<'a>(
+    scene: &'a Scene,
+    record: &FrameRecord,
+) -> BTreeMap<&'a str, &'static str> {
+    let views = scene.views.iter().zip(&record.views);
+    views
+        .filter_map(|(view, it)| Some((view.name.as_str(), it.missing?.reason())))
+        .collect()
 }
 
 /// Numbers that are none become `null` in JSON, never `NaN`.
@@ -96,34 +111,42 @@ fn cell(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{pose3d, scene};
+    use crate::Missing;
+    use crate::testing::{pose3d, record, scene};
 
     #[test]
     fn a_line_says_which_views_were_used() {
-        let mut pose = pose3d(7);
-        pose.views_present = 0b11;
-        pose.views_used = 0b10;
-        let line: Value = serde_json::from_str(&json_line(&scene(), &pose)).unwrap();
+        let mut record = record(7);
+        record.pose3d.views_present = 0b10;
+        record.pose3d.views_used = 0b10;
+        record.views[0].missing = Some(Missing::Lost);
+        let line: Value = serde_json::from_str(&json_line(&scene(), &record)).unwrap();
         assert_eq!(line["frame"], 7);
-        assert_eq!(line["views_present"], json!(["left", "right"]));
+        assert_eq!(line["views_present"], json!(["right"]));
+        assert_eq!(line["views_missing"], json!({ "left": "process lost" }));
         assert_eq!(line["views_used"], json!(["right"]));
         assert_eq!(line["joints"]["head"]["position_m"], json!([1.0, 2.0, 3.0]));
     }
 
     #[test]
     fn a_number_that_is_none_is_never_written_as_one() {
-        let mut pose = pose3d(0);
+        let mut record = record(0);
+        let pose = &mut record.pose3d;
         pose.facing_margin = f64::INFINITY;
         pose.joints[0].reprojection_px = f64::NAN;
         pose.joints[1].in_world[2] = f64::NAN;
-        let text = json_line(&scene(), &pose);
+        let text = json_line(&scene(), &record);
         let line: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(
             line["joints"]["right ankle"]["reprojection_px"],
             Value::Null
         );
         assert_eq!(line["joints"]["right knee"].get("position_m"), None);
-        assert!(!csv_rows(&scene(), &pose).to_lowercase().contains("nan"));
+        assert!(
+            !csv_rows(&scene(), &record.pose3d)
+                .to_lowercase()
+                .contains("nan")
+        );
     }
 
     #[test]

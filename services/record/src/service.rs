@@ -16,7 +16,7 @@ use runtime::{
 };
 
 use crate::gather::Gather;
-use crate::{Config, Folder, FrameRecord, Output, OutputError, Picture, Scene};
+use crate::{Config, Folder, FrameRecord, Output, Picture, Scene};
 
 /// Results that may wait to be written.
 const QUEUE: usize = 256;
@@ -47,8 +47,12 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let n_views = job.scene.views.len();
     let n_joints = job.scene.joints.joints.len();
+    if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
+        // Killed after its work was done: to begin anew would empty the files.
+        return rest(service, &waiter);
+    }
     let ports = Ports::open(service, &job, &mut waiter)?;
-    let writer = Writer::start(job, service.epoch() > 0)?;
+    let writer = Writer::start(job, service)?;
     let mut gather = Gather::new(n_views);
     let mut is_over = false;
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
@@ -76,6 +80,11 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
         }
     }
     writer.finish(service)?;
+    rest(service, &waiter)
+}
+
+/// Says that all is done, and waits to be told so.
+fn rest(service: &Service, waiter: &Waiter) -> Result<(), Failure> {
     service.health().finished();
     while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
     Ok(())
@@ -123,7 +132,7 @@ impl Ports {
         for (view, frames) in self.frames.iter().enumerate() {
             while let Some(sample) = frames.receive()? {
                 let header = *sample.header();
-                if header.stamp.session == session && header.status != Status::END {
+                if header.stamp.session == session {
                     let size = [header.width as usize, header.height as usize];
                     let wanted = header.status == Status::OK && writer.draws(header.stamp.frame);
                     let picture = wanted.then(|| Picture {
@@ -135,8 +144,10 @@ impl Ports {
             }
         }
         for (view, poses) in self.poses.iter().enumerate() {
+            let is_there = poses.n_publishers() > 0 && self.frames[view].n_publishers() > 0;
+            gather.is_there(view, is_there);
             while let Some(pose) = poses.receive()? {
-                if pose.stamp.session == session && pose.status != Status::END {
+                if pose.stamp.session == session {
                     gather.pose(view, &pose);
                 }
             }
@@ -162,7 +173,7 @@ impl Ports {
 /// The thread that writes, and the queue before it.
 struct Writer {
     queue: SyncSender<FrameRecord>,
-    thread: JoinHandle<Result<(), OutputError>>,
+    thread: JoinHandle<()>,
     n_missed: Arc<AtomicU64>,
     overlay_every: u64,
     start_frame: u64,
@@ -170,17 +181,24 @@ struct Writer {
 }
 
 impl Writer {
-    fn start(job: Job, resume: bool) -> Result<Self, Failure> {
-        let folder = Folder::open(&job.output, resume).or_fail(ExitKind::Input)?;
+    fn start(job: Job, service: &Service) -> Result<Self, Failure> {
+        let (session, resume) = (service.session(), service.epoch() > 0);
+        // What was writable when the run began and is no longer does not stop the others.
+        let kind = if resume {
+            ExitKind::Run
+        } else {
+            ExitKind::Input
+        };
+        let folder = Folder::open(&job.output, resume).or_fail(kind)?;
         let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
-        let output = Output::begin(job.scene, &job.config, job.n_workers, folder, resume);
-        let output = output.or_fail(ExitKind::Input)?;
+        let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
+        let output = output.or_fail(kind)?;
         let (queue, records) = sync_channel(QUEUE);
         let n_missed = Arc::new(AtomicU64::new(0));
         let missed = Arc::clone(&n_missed);
         let thread = Builder::new()
             .name("writer".to_owned())
-            .spawn(move || write_all(output, &records, &missed))
+            .spawn(move || write_all(output, &records, &missed, session))
             .or_fail(ExitKind::Run)?;
         Ok(Self {
             queue,
@@ -216,10 +234,8 @@ impl Writer {
             service.progress().tick();
             std::thread::sleep(Duration::from_millis(20));
         }
-        match self.thread.join() {
-            Ok(outcome) => outcome.or_fail(ExitKind::Run),
-            Err(_) => Err(Failure::new(ExitKind::Run, "the writing thread panicked")),
-        }
+        let panicked = |_| Failure::new(ExitKind::Run, "the writing thread panicked");
+        self.thread.join().map_err(panicked)
     }
 }
 
@@ -227,10 +243,11 @@ fn write_all(
     mut output: Output,
     records: &Receiver<FrameRecord>,
     n_missed: &AtomicU64,
-) -> Result<(), OutputError> {
+    session: u64,
+) {
     while let Ok(record) = records.recv() {
         output.frame(&record);
     }
     output.missed(n_missed.load(Ordering::Relaxed));
-    output.finish().map(|_| ())
+    output.finish(session);
 }

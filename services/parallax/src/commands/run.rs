@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let mut watcher = Watcher::new(&resolved, globals.quiet);
     let outcome = supervise::run(&plan, &stop, &mut |event| watcher.note(&event));
     watcher.finish();
-    let report = Report::new(&resolved, &outcome?, begin.elapsed());
+    let report = Report::new(&resolved, plan.session, &outcome?, begin.elapsed());
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {

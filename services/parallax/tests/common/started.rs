@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -29,11 +29,33 @@ pub(crate) struct Ended {
 impl Started {
     /// Starts it in a folder, and in a process group of its own.
     pub(crate) fn new(folder: &Path, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_parallax"));
+        command.args(arguments);
+        Self::from_command(folder, command)
+    }
+
+    /// The same among file systems of its own, which a shell script prepares; `$PARALLAX` is the
+    /// program. None where that is not allowed.
+    pub(crate) fn among_own_file_systems(folder: &Path, script: &str) -> Option<Self> {
+        let allowed = Command::new("unshare")
+            .args(["-m", "sh", "-c", "mount -t tmpfs tmpfs /mnt"])
+            .stderr(Stdio::null())
+            .status();
+        if !allowed.is_ok_and(|it| it.success()) {
+            return None;
+        }
+        let mut command = Command::new("unshare");
+        command
+            .args(["-m", "sh", "-ec", script])
+            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"));
+        Some(Self::from_command(folder, command))
+    }
+
+    fn from_command(folder: &Path, mut command: Command) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
         let log = folder.join(format!("log-{nth}"));
-        let child = Command::new(env!("CARGO_BIN_EXE_parallax"))
-            .args(arguments)
+        let child = command
             .current_dir(folder)
             .stdout(File::create(log.with_extension("out")).unwrap())
             .stderr(File::create(log.with_extension("err")).unwrap())

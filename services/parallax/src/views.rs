@@ -1,0 +1,157 @@
+//! What became of the frames of every view.
+
+use core::fmt;
+
+use serde::Serialize;
+use serde_json::Value;
+use supervise::{Counts, Outcome};
+
+use crate::plan::Resolved;
+
+/// What became of the frames of one view: all counts but the first add up to it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(crate) struct ViewReport {
+    /// The camera.
+    pub name: String,
+    /// Frames of the footage.
+    pub frames: u64,
+    /// Frames that have a part in a result.
+    pub used: u64,
+    /// Frames in which nobody was found, or that could not be read.
+    pub empty: u64,
+    /// Frames that were answered, but too late for a result.
+    pub late: u64,
+    /// Frames that were passed over because there was no time for them.
+    pub dropped: u64,
+    /// All others: what a process held when it died, or was not reached before the run was stopped.
+    pub unanswered: u64,
+    /// Results without this view, by reason.
+    #[serde(skip)]
+    pub missing: Vec<(String, u64)>,
+}
+
+impl ViewReport {
+    /// Puts together what the supervisor and the recorder know.
+    ///
+    /// * `summary`: of the recorder.
+    pub(crate) fn all(resolved: &Resolved, outcome: &Outcome, summary: &Value) -> Vec<Self> {
+        let counts = |process: String| {
+            let found = outcome.processes.iter().find(|it| it.name == process);
+            found.map_or_else(Counts::default, |it| it.counts)
+        };
+        let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);
+        let views = cameras.enumerate().map(|(view, (camera, footage))| {
+            let counts = ["capture", "pose"].map(|it| counts(format!("{it}-{view}")));
+            Self::new(&camera.name, footage.n_frames, counts, summary)
+        });
+        views.collect()
+    }
+
+    /// * `counts`: of its camera and of its pose process.
+    fn new(name: &str, frames: u64, [camera, pose]: [Counts; 2], summary: &Value) -> Self {
+        let missing: Vec<(String, u64)> = summary["views_missing"][name]
+            .as_object()
+            .into_iter()
+            .flatten()
+            .map(|(reason, n)| (reason.clone(), n.as_u64().unwrap_or(0)))
+            .collect();
+        let used = summary["views_present"][name].as_u64().unwrap_or(0);
+        let empty = missing.iter().filter(|it| is_empty(&it.0));
+        let empty: u64 = empty.map(|it| it.1).sum();
+        // The last count of a process that was killed may be missing.
+        let answered = pose.n_sent.max(used + empty);
+        let dropped = (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
+        Self {
+            name: name.to_owned(),
+            frames,
+            used,
+            empty,
+            late: answered - used - empty,
+            dropped,
+            unanswered: frames.saturating_sub(answered + dropped),
+            missing,
+        }
+    }
+
+    /// Whether it is missing for a reason that nobody asked for.
+    pub(crate) fn is_lost(&self, is_lossless: bool) -> bool {
+        let is_asked_for = |reason: &str| match reason {
+            "no detection" => true,
+            "late" | "dropped" => !is_lossless,
+            _ => false,
+        };
+        self.missing
+            .iter()
+            .any(|(reason, n)| *n > 0 && !is_asked_for(reason))
+    }
+}
+
+/// Whether a view that is missing for this reason has answered.
+fn is_empty(reason: &str) -> bool {
+    !["late", "dropped", "process lost", "end of footage"].contains(&reason)
+}
+
+impl fmt::Display for ViewReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} of {} frames", self.name, self.used, self.frames)?;
+        for (n, what) in [
+            (self.empty, "empty"),
+            (self.late, "late"),
+            (self.dropped, "dropped"),
+            (self.unanswered, "not answered"),
+        ] {
+            if n > 0 {
+                write!(f, ", {n} {what}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn view(missing: &Value) -> ViewReport {
+        let camera = Counts {
+            n_dropped: 4,
+            ..Counts::default()
+        };
+        let pose = Counts {
+            n_sent: 12,
+            n_dropped: 3,
+            ..Counts::default()
+        };
+        let summary = json!({ "views_present": { "a": 9 }, "views_missing": { "a": missing } });
+        ViewReport::new("a", 20, [camera, pose], &summary)
+    }
+
+    #[test]
+    fn every_frame_is_counted_once() {
+        let got = view(&json!({ "no detection": 2, "late": 1, "dropped": 5 }));
+        let all = [got.used, got.empty, got.late, got.dropped, got.unanswered];
+        assert_eq!(all, [9, 2, 1, 7, 1]);
+        assert_eq!(all.iter().sum::<u64>(), got.frames);
+        let said = "a: 9 of 20 frames, 2 empty, 1 late, 7 dropped, 1 not answered";
+        assert_eq!(got.to_string(), said);
+    }
+
+    #[test]
+    fn what_latest_wins_means_is_no_loss_but_for_those_who_want_every_frame() {
+        for (reason, expected) in [
+            ("no detection", [false, false]),
+            ("late", [false, true]),
+            ("dropped", [false, true]),
+            ("process lost", [true, true]),
+            ("no frame", [true, true]),
+            ("end of footage", [true, true]),
+        ] {
+            let mut missing = json!({});
+            missing[reason] = json!(1);
+            let got = [false, true].map(|it| view(&missing).is_lost(it));
+            assert_eq!(got, expected, "{reason}");
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Runs on a disk, and in a shared memory, that are too small.
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+
+mod common;
+
+use std::fs;
+
+use common::{Case, PLAIN, Started};
+use serde_json::{Value, json};
+
+#[test]
+fn a_full_disk_stops_nobody_and_what_was_not_written_is_counted() {
+    let case = Case::new("disk", &[40; 2], PLAIN);
+    fs::create_dir(case.path("out")).unwrap();
+    let script = "mount -t tmpfs -o size=400k tmpfs out\n\
+                  code=0; \"$PARALLAX\" run deployment.toml --json || code=$?\n\
+                  cp -r out copy; exit $code";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let summary = &report["recorded"]["summary"];
+    // Every frame was made, not every one was written, and nobody had to be restarted.
+    assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
+    assert_eq!(summary["frames"], json!(40));
+    assert!(summary["writes_failed"].as_u64() > Some(10), "{summary:#}");
+    let why = summary["first_failure"].as_str().unwrap();
+    assert!(why.contains("No space left"), "{why}");
+    assert!(ended.stderr.contains("No space left"), "{}", ended.stderr);
+    // What was written is whole.
+    for name in ["pose3d.jsonl", "pose2d.jsonl"] {
+        let text = fs::read_to_string(case.path("copy").join(name)).unwrap();
+        assert!(text.ends_with('\n'), "{name} ends in the middle of a line");
+        let lines = text.lines().map(serde_json::from_str::<Value>);
+        let frames: Vec<u64> = lines
+            .map(|it| it.unwrap()["frame"].as_u64().unwrap())
+            .collect();
+        assert!(frames.len() > 3 && frames.is_sorted(), "{frames:?}");
+        assert!(frames.last() < Some(&39), "the disk was not full");
+    }
+    let text = fs::read_to_string(case.path("copy/summary.json")).unwrap();
+    let written: Value = serde_json::from_str(&text).unwrap();
+    assert!(written["summary"]["writes_failed"].as_u64() > Some(10));
+}
+
+#[test]
+fn too_little_shared_memory_is_refused_with_the_numbers() {
+    let case = Case::new("room", &[2; 2], PLAIN);
+    let script = "mount -t tmpfs -o size=4m tmpfs /dev/shm\n\
+                  exec \"$PARALLAX\" run deployment.toml --json";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    for words in [
+        "MB of shared memory",
+        "4 MB are free in /dev/shm",
+        "--shm-size=",
+    ] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    assert_eq!(ended.stdout, "");
+}

@@ -1,0 +1,120 @@
+//! Runs in which the latest frame wins: what is too slow loses frames, and every one is counted.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::started::signal;
+use common::{Case, Ended};
+use serde_json::{Value, json};
+
+const LIVE: &str = "[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
+                    [capture]\nupright = false\nmode = \"realtime\"\n";
+const PACED: &str = "pace = \"realtime\"\nframe_rate_hz = 20\n";
+
+/// What became of a run.
+struct Told {
+    report: Value,
+    lines: Vec<Value>,
+}
+
+impl Told {
+    /// Checks that every frame of every view is accounted for, and that the results agree.
+    fn new(case: &Case, ended: &Ended) -> Self {
+        let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+        let lines = case.lines("pose3d.jsonl");
+        for view in report["views"].as_array().unwrap() {
+            let count = |key: &str| view[key].as_u64().unwrap();
+            let kinds = ["used", "empty", "late", "dropped", "unanswered"];
+            assert_eq!(
+                kinds.map(count).iter().sum::<u64>(),
+                count("frames"),
+                "{view}"
+            );
+            let is_in = |it: &&Value| {
+                let present = it["views_present"].as_array().unwrap();
+                assert_ne!(
+                    present.contains(&view["name"]),
+                    it["views_missing"]
+                        .get(view["name"].as_str().unwrap())
+                        .is_some(),
+                    "present, or missing for a reason: {it}"
+                );
+                present.contains(&view["name"])
+            };
+            let n_lines = lines.iter().filter(is_in).count();
+            assert_eq!(count("used"), n_lines as u64, "{view}");
+        }
+        Self { report, lines }
+    }
+
+    /// A count of one view.
+    fn view(&self, view: usize, key: &str) -> u64 {
+        self.report["views"][view][key].as_u64().unwrap()
+    }
+
+    /// Results that have all of three views.
+    fn n_with_all(&self) -> usize {
+        let all = json!(["a", "b", "c"]);
+        let with = self.lines.iter().filter(|it| it["views_present"] == all);
+        with.count()
+    }
+}
+
+#[test]
+fn who_keeps_up_loses_nothing() {
+    let case = Case::new("live", &[30; 2], &format!("{LIVE}{PACED}"));
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let told = Told::new(&case, &ended);
+    // A loaded machine may be late for a frame or two.
+    assert!(told.view(0, "used") > 20, "{:#}", told.report["views"]);
+}
+
+#[test]
+fn who_is_too_slow_answers_fewer_frames_and_the_same_in_all_views() {
+    let more = format!("{LIVE}{PACED}size = [240, 320]\n");
+    let case = Case::new("slow", &[80; 3], &more);
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let told = Told::new(&case, &ended);
+    assert!(told.view(0, "dropped") > 5, "{:#}", told.report["views"]);
+    // Once every view has found its cadence.
+    let n_late = told.lines.len() / 2;
+    assert!(2 * told.n_with_all() > n_late, "{:#}", told.report["views"]);
+}
+
+#[test]
+fn footage_that_nobody_paces_is_over_at_once_and_what_was_left_out_is_counted() {
+    let case = Case::new("unpaced", &[60; 2], LIVE);
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let told = Told::new(&case, &ended);
+    for view in 0..2 {
+        assert!(told.view(view, "dropped") > 0, "{:#}", told.report["views"]);
+        assert_eq!(told.view(view, "unanswered"), 0);
+    }
+}
+
+#[test]
+fn a_slow_consumer_does_not_slow_its_producer() {
+    let case = Case::new("pause", &[60; 2], &format!("{LIVE}{PACED}"));
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    let pid = started.pid_of("pose --index 1");
+    signal("STOP", pid.into());
+    let n = case.lines("pose3d.jsonl").len();
+    // The other view goes on in the meantime.
+    started.until("ten more", |_| case.lines("pose3d.jsonl").len() >= n + 10);
+    signal("CONT", pid.into());
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let told = Told::new(&case, &ended);
+    assert_eq!(
+        told.report["recorded"]["summary"]["frames_dropped_by_capture"],
+        json!(0)
+    );
+    assert!(told.view(1, "dropped") >= 5, "{:#}", told.report["views"]);
+    let missing = &told.report["recorded"]["summary"]["views_missing"]["b"];
+    assert!(missing["late"].as_u64() > Some(0), "{missing}");
+}

@@ -1,0 +1,183 @@
+//! Why a view has no part in a result.
+
+use messages::{FrameHeader, Status, ViewPose};
+
+/// Why a view has no part in a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Missing {
+    /// It answered, but with nothing: nobody was found, or there was no frame.
+    Empty(Status),
+    /// It answered too late, or had not answered yet.
+    Late,
+    /// It passed the frame over and went on.
+    Dropped,
+    /// Its process, or the one that puts the views together, had died.
+    Lost,
+    /// Its footage has fewer frames.
+    Ended,
+}
+
+impl Missing {
+    /// In words.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Empty(status) => status.reason(),
+            Self::Late => "late",
+            Self::Dropped => "dropped",
+            Self::Lost => "process lost",
+            Self::Ended => "end of footage",
+        }
+    }
+}
+
+/// What is known of one view's processes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Voice {
+    /// The latest life of its pose process that was heard.
+    epoch: u32,
+    /// The latest whose answer has a result.
+    settled: u32,
+    /// Somebody was not there to answer, and there has been no answer since.
+    is_absent: bool,
+    last_frame: Option<u64>,
+    /// Its first frame that does not exist.
+    end: Option<u64>,
+}
+
+impl Voice {
+    /// Hears of a frame, or that there are no more.
+    pub(crate) fn frame(&mut self, header: &FrameHeader) {
+        if header.status == Status::END {
+            self.end = Some(header.stamp.frame);
+        }
+    }
+
+    /// Hears an answer, or that there are no more.
+    pub(crate) fn pose(&mut self, pose: &ViewPose) {
+        self.is_absent = false;
+        if pose.status == Status::END {
+            self.end = Some(pose.stamp.frame);
+            return;
+        }
+        self.epoch = self.epoch.max(pose.stamp.epoch);
+        self.last_frame = self.last_frame.max(Some(pose.stamp.frame));
+    }
+
+    /// Notes whether the processes that answer are there.
+    pub(crate) fn is_there(&mut self, is_there: bool) {
+        self.is_absent |= !is_there && self.last_frame.is_some();
+    }
+
+    /// Takes note of a result, and says why the view would have no part in it.
+    ///
+    /// * `pose`: what it said about that frame.
+    /// * `is_first`: whether this is the first result of a restarted process.
+    pub(crate) fn settle(
+        &mut self,
+        frame: u64,
+        pose: Option<&ViewPose>,
+        is_first: bool,
+    ) -> Missing {
+        let is_new = self.epoch != self.settled;
+        if let Some(pose) = pose {
+            self.settled = self.settled.max(pose.stamp.epoch);
+        }
+        let was_lost = is_first || (pose.is_none() && (self.is_absent || is_new));
+        match pose {
+            Some(pose) if pose.status != Status::OK => Missing::Empty(pose.status),
+            None if self.end.is_some_and(|end| end <= frame) => Missing::Ended,
+            _ if was_lost => Missing::Lost,
+            None if self.last_frame > Some(frame) => Missing::Dropped,
+            _ => Missing::Late,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::Stamp;
+
+    use super::*;
+
+    fn pose(frame: u64, epoch: u32, status: Status) -> ViewPose {
+        ViewPose {
+            stamp: Stamp {
+                frame,
+                epoch,
+                ..Stamp::default()
+            },
+            status,
+            ..ViewPose::default()
+        }
+    }
+
+    /// A view that has answered frames 0 and 1, of which there are results.
+    fn voice() -> Voice {
+        let mut voice = Voice::default();
+        for frame in 0..2 {
+            let said = pose(frame, 0, Status::OK);
+            voice.pose(&said);
+            voice.settle(frame, Some(&said), false);
+        }
+        voice
+    }
+
+    #[test]
+    fn an_answer_without_a_pose_says_why() {
+        for status in [Status::NO_DETECTION, Status::NO_FRAME, Status::BAD_INPUT] {
+            let got = voice().settle(2, Some(&pose(2, 0, status)), false);
+            assert_eq!(got.reason(), status.reason());
+        }
+    }
+
+    #[test]
+    fn an_answer_that_has_no_part_was_late() {
+        let mut voice = voice();
+        let said = pose(2, 0, Status::OK);
+        assert_eq!(voice.settle(2, Some(&said), false), Missing::Late);
+        assert_eq!(voice.settle(3, None, false), Missing::Late);
+    }
+
+    #[test]
+    fn who_went_on_has_dropped_the_frame() {
+        let mut voice = voice();
+        voice.pose(&pose(4, 0, Status::OK));
+        assert_eq!(voice.settle(3, None, false), Missing::Dropped);
+    }
+
+    #[test]
+    fn frames_between_two_lives_are_lost() {
+        let mut voice = voice();
+        voice.is_there(false);
+        assert_eq!(voice.settle(2, None, false), Missing::Lost);
+        voice.is_there(true);
+        assert_eq!(voice.settle(3, None, false), Missing::Lost);
+        let back = pose(5, 1, Status::OK);
+        voice.pose(&back);
+        assert_eq!(voice.settle(4, None, false), Missing::Lost);
+        voice.settle(5, Some(&back), false);
+        assert_eq!(voice.settle(6, None, false), Missing::Late);
+    }
+
+    #[test]
+    fn who_has_never_been_there_is_late() {
+        let mut voice = Voice::default();
+        voice.is_there(false);
+        assert_eq!(voice.settle(0, None, false), Missing::Late);
+    }
+
+    #[test]
+    fn what_a_killed_triangulation_held_is_lost() {
+        let mut voice = voice();
+        let said = pose(2, 0, Status::OK);
+        assert_eq!(voice.settle(2, Some(&said), true), Missing::Lost);
+    }
+
+    #[test]
+    fn beyond_the_end_there_is_nothing_to_miss() {
+        let mut voice = voice();
+        voice.pose(&pose(3, 0, Status::END));
+        assert_eq!(voice.settle(2, None, false), Missing::Late);
+        assert_eq!(voice.settle(3, None, false), Missing::Ended);
+    }
+}

@@ -1,0 +1,181 @@
+//! What was seen and what was missed, over the whole run.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use messages::Status;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::pose3d::{is_placed, joints, missing};
+use crate::{FrameRecord, Scene};
+
+/// What was seen and what was missed, over the whole run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Summary {
+    /// Results that were received.
+    pub frames: u64,
+    /// Of these with a skeleton.
+    pub frames_with_pose: u64,
+    /// Of these without every view of the rig.
+    pub frames_with_views_missing: u64,
+    /// How many results every view has a part in, by name.
+    pub views_present: BTreeMap<String, u64>,
+    /// Of how many results every view is missing, by name, for every reason.
+    pub views_missing: BTreeMap<String, BTreeMap<String, u64>>,
+    /// How often every view was used, by name.
+    pub views_used: Vec<(String, u64)>,
+    /// Root mean square reprojection error over all joints, pixels of the frame.
+    pub reprojection_px: Option<f64>,
+    /// Frames of all views that the cameras' side dropped.
+    pub frames_dropped_by_capture: u64,
+    /// Results whose number was skipped, as far as the recorder can tell.
+    pub frames_missed: u64,
+    /// Results that came but were not written, because writing was too slow.
+    pub frames_not_recorded: u64,
+    /// Writes that failed.
+    pub writes_failed: u64,
+    /// The first of those failures.
+    pub first_failure: Option<String>,
+}
+
+/// Counts frame by frame.
+#[derive(Debug)]
+pub(crate) struct Tally {
+    summary: Summary,
+    squared_px: (f64, u64),
+    last_frame: Option<u64>,
+    /// By view.
+    dropped: Vec<u64>,
+}
+
+impl Tally {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let names = || scene.views.iter().map(|it| it.name.clone());
+        Self {
+            summary: Summary {
+                views_present: names().map(|it| (it, 0)).collect(),
+                views_missing: names().map(|it| (it, BTreeMap::new())).collect(),
+                views_used: names().map(|it| (it, 0)).collect(),
+                ..Summary::default()
+            },
+            squared_px: (0.0, 0),
+            last_frame: None,
+            dropped: vec![0; scene.views.len()],
+        }
+    }
+
+    /// Counts what a killed recorder had written: reads `pose3d.jsonl` again. A file that is not
+    /// there, or a broken line, counts for nothing.
+    pub(crate) fn resume(scene: &Scene, file: &Path) -> Self {
+        let mut tally = Self::new(scene);
+        let text = fs::read_to_string(file).unwrap_or_default();
+        for line in text.lines() {
+            if let Ok(value) = serde_json::from_str::<Value>(line) {
+                tally.line(scene, &value);
+            }
+        }
+        tally
+    }
+
+    fn line(&mut self, scene: &Scene, value: &Value) {
+        let Some(frame) = value["frame"].as_u64() else {
+            return;
+        };
+        let used = value["views_used"].as_array();
+        let is_used = |name: &str| used.is_some_and(|it| it.iter().any(|it| *it == name));
+        let missing = value["views_missing"].as_object();
+        let why = |name: &str| missing.and_then(|it| it.get(name)).and_then(Value::as_str);
+        self.frame(scene, frame, value["status"] == Status::OK.reason());
+        self.views(&is_used, &why);
+        let joints = value["joints"].as_object();
+        for joint in joints.into_iter().flat_map(|it| it.values()) {
+            if let Some(px) = joint["reprojection_px"].as_f64() {
+                self.pixels(px);
+            }
+        }
+    }
+
+    /// Counts a frame.
+    pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
+        let pose = &record.pose3d;
+        let used = scene.names(pose.views_used);
+        let missing = missing(scene, record);
+        self.frame(scene, record.frame(), pose.status == Status::OK);
+        self.views(&|name| used.contains(&name), &|name| {
+            missing.get(name).copied()
+        });
+        for (_, joint) in joints(scene, pose) {
+            if is_placed(joint) && joint.reprojection_px.is_finite() {
+                self.pixels(joint.reprojection_px);
+            }
+        }
+        for (count, it) in self.dropped.iter_mut().zip(&record.views) {
+            *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
+        }
+    }
+
+    fn frame(&mut self, scene: &Scene, frame: u64, has_pose: bool) {
+        let step = scene.frame_step.max(1);
+        let skipped = self.last_frame.replace(frame).map_or(0, |last| {
+            (frame.saturating_sub(last) / step).saturating_sub(1)
+        });
+        self.summary.frames += 1;
+        self.summary.frames_missed += skipped;
+        self.summary.frames_with_pose += u64::from(has_pose);
+    }
+
+    fn views<'a>(&mut self, is_used: &dyn Fn(&str) -> bool, why: &dyn Fn(&str) -> Option<&'a str>) {
+        let summary = &mut self.summary;
+        let mut n_missing = 0;
+        for (name, count) in &mut summary.views_present {
+            let Some(reason) = why(name) else {
+                *count += 1;
+                continue;
+            };
+            n_missing += 1;
+            let reasons = summary.views_missing.entry(name.clone()).or_default();
+            *reasons.entry(reason.to_owned()).or_default() += 1;
+        }
+        summary.frames_with_views_missing += u64::from(n_missing > 0);
+        for (name, count) in &mut summary.views_used {
+            *count += u64::from(is_used(name));
+        }
+    }
+
+    fn pixels(&mut self, px: f64) {
+        self.squared_px.0 += px.powi(2);
+        self.squared_px.1 += 1;
+    }
+
+    /// Counts results that came but could not be written in time.
+    pub(crate) fn missed(&mut self, n: u64) {
+        self.summary.frames_not_recorded += n;
+    }
+
+    /// Counts a write that failed; answers whether it is the first.
+    pub(crate) fn failed(&mut self, what: &dyn core::fmt::Display) -> bool {
+        self.summary.writes_failed += 1;
+        let is_first = self.summary.first_failure.is_none();
+        self.summary
+            .first_failure
+            .get_or_insert_with(|| what.to_string());
+        is_first
+    }
+
+    /// Results that were counted.
+    pub(crate) fn n_frames(&self) -> u64 {
+        self.summary.frames
+    }
+
+    /// What was seen so far.
+    pub(crate) fn summary(&self) -> Summary {
+        let (sum, n) = self.squared_px;
+        Summary {
+            reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
+            frames_dropped_by_capture: self.dropped.iter().sum(),
+            ..self.summary.clone()
+        }
+    }
+}
