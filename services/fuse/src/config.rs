@@ -95,45 +95,77 @@ pub enum Energy {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "expected \"none\", \"humaneva\", \"umpm\", or one number per part"
+    expecting = "expected \"none\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", \
+                 one number per part, or { file = \"...\" }"
 )]
 pub enum Tau {
     /// Thresholds that are known by name.
     Named(TauName),
     /// Pixels of the footage, one per part.
     Given(Vec<f32>),
+    /// The same from a file.
+    File(TauFile),
+}
+
+/// A file with thresholds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TauFile {
+    /// Numbers separated by white space or commas, pixels of the footage; `#` begins a comment.
+    pub file: PathBuf,
 }
 
 /// Thresholds that are known by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
 pub enum TauName {
     /// No part is ever switched off.
+    #[serde(rename = "none")]
     None,
     /// Those of the authors' program for `HumanEva`: median training error plus inaccuracy.
+    #[serde(rename = "humaneva")]
     HumanEva,
+    /// The paper's rule for `HumanEva`: the median training error alone.
+    #[serde(rename = "humaneva-median")]
+    HumanEvaMedian,
     /// Those of the authors' program for UMPM.
+    #[serde(rename = "umpm")]
     Umpm,
+    /// The paper's rule for UMPM.
+    #[serde(rename = "umpm-median")]
+    UmpmMedian,
 }
 
 impl Tau {
     fn training(&self) -> Option<TrainingErrors> {
-        match self {
-            Self::Named(TauName::HumanEva) => Some(TrainingErrors::HUMANEVA),
-            Self::Named(TauName::Umpm) => Some(TrainingErrors::UMPM),
-            Self::Named(TauName::None) | Self::Given(_) => None,
+        let Self::Named(name) = self else {
+            return None;
+        };
+        match name {
+            TauName::None => None,
+            TauName::HumanEva | TauName::HumanEvaMedian => Some(TrainingErrors::HUMANEVA),
+            TauName::Umpm | TauName::UmpmMedian => Some(TrainingErrors::UMPM),
         }
     }
 
-    /// The thresholds, pixels of the footage; empty if there are none.
+    /// The thresholds, pixels of the footage; empty if there are none, or if a file has them that is
+    /// still to be read.
     pub fn px(&self) -> Vec<f32> {
-        match (self, self.training()) {
-            (Self::Given(px), _) => px.clone(),
-            (_, Some(errors)) => viewquality::Tau::median_and_inaccuracy(&errors)
-                .px()
-                .to_vec(),
-            (Self::Named(_), None) => Vec::new(),
-        }
+        let Some(errors) = self.training() else {
+            return match self {
+                Self::Given(px) => px.clone(),
+                Self::Named(_) | Self::File(_) => Vec::new(),
+            };
+        };
+        let is_median = matches!(
+            self,
+            Self::Named(TauName::HumanEvaMedian | TauName::UmpmMedian)
+        );
+        let tau = if is_median {
+            viewquality::Tau::median_only(&errors)
+        } else {
+            viewquality::Tau::median_and_inaccuracy(&errors)
+        };
+        tau.px().to_vec()
     }
 
     /// The median training errors, by which the released energy takes one of two switched-off views
@@ -166,6 +198,18 @@ mod tests {
             Config::default().settings(expected.n_candidates, 1.0),
             expected
         );
+    }
+
+    #[test]
+    fn the_papers_rule_is_the_median_alone() {
+        let px = |name| Tau::Named(name).px();
+        assert_eq!(
+            px(TauName::HumanEvaMedian),
+            TrainingErrors::HUMANEVA.median_px
+        );
+        assert_eq!(px(TauName::UmpmMedian), TrainingErrors::UMPM.median_px);
+        assert!(px(TauName::Umpm)[0] > px(TauName::UmpmMedian)[0]);
+        assert_eq!(px(TauName::None), []);
     }
 
     #[test]

@@ -5,5 +5,5 @@ mod config;
 mod evidence;
 mod service;
 
-pub use config::{Compatibility, Config, Energy, Tau, TauName};
+pub use config::{Compatibility, Config, Energy, Tau, TauFile, TauName};
 pub use service::{Job, run};

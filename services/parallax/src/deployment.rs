@@ -109,6 +109,9 @@ impl Deployment {
         if let Some(table) = &mut self.quality.table {
             *table = base.join(&table);
         }
+        if let fuse::Tau::File(tau) = &mut self.fuse.tau {
+            tau.file = base.join(&tau.file);
+        }
         for tables in &mut self.fuse.compatibility {
             for file in &mut tables.files {
                 *file = base.join(&file);

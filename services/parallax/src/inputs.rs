@@ -11,7 +11,7 @@ use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
-use viewquality::Table;
+use viewquality::{Table, Tau};
 
 use crate::deployment::Deployment;
 
@@ -108,6 +108,12 @@ pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failur
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
 }
 
+/// Reads thresholds of the expected errors.
+pub(crate) fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
+    let tau = Tau::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))?;
+    Ok(tau.px().to_vec())
+}
+
 /// Reads a text file, and names it if that fails.
 pub(crate) fn text(file: &Path) -> Result<String, Failure> {
     fs::read_to_string(file).map_err(|error| in_file(file, &error))
@@ -122,6 +128,7 @@ pub(crate) fn in_file(file: &Path, error: &dyn std::error::Error) -> Failure {
 pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
     let resolved = crate::plan::Resolved::new(deployment)?;
     let prepared = crate::prepare::Prepared::new(&resolved)?;
+    prepared.check_predictions(&resolved)?;
     let n_frames = resolved.n_frames();
     Ok(format!(
         "{} views, {} pairs, {n_frames} frames, a model of {} parts",

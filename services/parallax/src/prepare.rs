@@ -11,6 +11,7 @@ use nalgebra::UnitVector3;
 use pipeline::{EstimatorSettings, SkeletonSettings, all_pairs};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
+use viewquality::Predictor;
 
 use crate::deployment::Deployment;
 use crate::inputs;
@@ -66,6 +67,43 @@ impl Prepared {
             views,
             settings,
         })
+    }
+
+    /// What knows the expected errors of a view, if there is a table of them.
+    pub(crate) fn predictor(
+        &self,
+        resolved: &Resolved,
+        view: usize,
+    ) -> Result<Option<Predictor>, Failure> {
+        let config = &resolved.deployment.quality;
+        let Some(file) = &config.table else {
+            return Ok(None);
+        };
+        let table = inputs::quality_table(file, self.model.n_parts())?;
+        let name = config.name_in_table(&resolved.deployment.cameras[view].name);
+        let predictor = Predictor::from_table(&table, config.selection(), name);
+        let predictor = predictor.map_err(|error| inputs::in_file(file, &error))?;
+        Ok(Some(predictor))
+    }
+
+    /// Sees that the table of expected errors, if there is one, speaks of every view, and warns where
+    /// it speaks of none of the frames.
+    pub(crate) fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
+        let capture = &resolved.deployment.capture;
+        for (view, footage) in resolved.footage.iter().enumerate() {
+            let Some(predictor) = self.predictor(resolved, view)? else {
+                return Ok(());
+            };
+            let frame = |nth: u64| capture.start_frame + nth * capture.frame_step;
+            if !(0..footage.n_frames).any(|it| predictor.sigma_px(frame(it)).is_some()) {
+                tracing::warn!(
+                    view = self.views[view].name,
+                    "quality.table has no row for any frame of this view: see quality.frame_offset \
+                     and quality.frame_step; every part counts as usable"
+                );
+            }
+        }
+        Ok(())
     }
 
     /// The prepared views, as the steps take them.
@@ -152,13 +190,23 @@ fn settings(
         }
         tables.push((first, second, inputs::type_tables(files, model)?));
     }
+    let mut fuse = deployment.fuse.clone();
+    if let fuse::Tau::File(tau) = &fuse.tau {
+        fuse.tau = fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    }
+    let n_thresholds = fuse.tau.px().len();
+    if ![0, model.n_parts()].contains(&n_thresholds) {
+        let message = format!(
+            "`fuse.tau` has {n_thresholds} thresholds, the model has {} parts",
+            model.n_parts()
+        );
+        return Err(Failure::new(ExitKind::Config, message));
+    }
     let joints = JointSet::by_name(&deployment.triangulate.joints);
     let defaults = SkeletonSettings::default();
     Ok(EstimatorSettings {
         view: deployment.pose.settings(),
-        fuse: deployment
-            .fuse
-            .settings(deployment.pose.candidates, frame_scale as f32),
+        fuse: fuse.settings(deployment.pose.candidates, frame_scale as f32),
         tables,
         skeleton: SkeletonSettings {
             joints: joints.unwrap_or(defaults.joints),

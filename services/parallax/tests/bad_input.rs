@@ -275,6 +275,56 @@ fn tables() {
             words: &["q.csv: line 2, column 7", "part 3", "`nan`"],
         },
         Row {
+            what: "expected errors without one of the views",
+            broken: |it| {
+                it.edit(
+                    "deployment.toml",
+                    "[record]",
+                    "[quality]\ntable = \"q.csv\"\n[record]",
+                );
+                let head: String = (1..27).map(|part| format!(",part_{part}")).collect();
+                let row = ",1".repeat(26);
+                it.write("q.csv", format!("frame,view{head}\n0,a{row}\n0,C2{row}\n"));
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["q.csv", "no rows for", "view `b`", "C2"],
+        },
+        Row {
+            what: "a name for a camera that is not there",
+            broken: |it| {
+                let quality = "[quality]\nviews = { z = \"C1\" }\n[record]";
+                it.edit("deployment.toml", "[record]", quality);
+            },
+            arguments: DRY,
+            code: 3,
+            words: &["quality.views", "\"z\"", "[[camera]]"],
+        },
+        Row {
+            what: "thresholds with a NaN",
+            broken: |it| {
+                let tau = "workers = 2\ntau = { file = \"tau.txt\" }";
+                it.edit("deployment.toml", "workers = 2", tau);
+                it.write("tau.txt", "1 2\n3 nan");
+            },
+            arguments: DRY,
+            code: 4,
+            words: &["tau.txt: line 2", "`nan`"],
+        },
+        Row {
+            what: "thresholds of a model of other parts",
+            broken: |it| {
+                it.edit(
+                    "deployment.toml",
+                    "workers = 2",
+                    "workers = 2\ntau = [1, 2]",
+                )
+            },
+            arguments: DRY,
+            code: 3,
+            words: &["`fuse.tau` has 2 thresholds", "26 parts"],
+        },
+        Row {
             what: "part-type table with a NaN",
             broken: |it| {
                 let tables = "workers = 2\n[[fuse.compatibility]]\nviews = [\"a\", \"b\"]\n\

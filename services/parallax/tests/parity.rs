@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::fmt::Write as _;
+
 use common::same_bits::OneProcess;
 use common::{Case, PLAIN, planted};
 use pipeline::EstimatorSettings;
@@ -47,6 +49,46 @@ fn the_released_energy() {
         ..OneProcess::default()
     };
     one.assert_same(&case, 3, 20);
+}
+
+/// Expected errors in quarters of pixels, other ones for every part, view and frame.
+fn sigma_px(frame: usize, view: usize) -> Vec<f32> {
+    let quarters = |part: usize| (part * 7 + frame * 3 + view * 5) % 40;
+    (0..26).map(|part| quarters(part) as f32 / 4.0).collect()
+}
+
+#[test]
+fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
+    let more = PLAIN.to_owned()
+        + "tau = { file = \"tau.txt\" }\n[quality]\ntable = \"q.csv\"\nframe_offset = 100\n\
+           frame_step = 2\nviews = { a = \"C1\", b = \"C2\" }\n";
+    let case = Case::new("expected", &[10; 3], &more);
+    case.write("tau.txt", format!("# all alike\n{}", "5\n".repeat(26)));
+    let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
+    let mut table = format!("view,frame,{}\n", parts.join(","));
+    for (view, name) in ["C1", "C2", "c"].iter().enumerate() {
+        for frame in 0..10 {
+            let cells: Vec<String> = sigma_px(frame, view).iter().map(f32::to_string).collect();
+            writeln!(table, "{name},{},{}", 100 + 2 * frame, cells.join(",")).unwrap();
+        }
+    }
+    case.write("q.csv", table);
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let config = fuse::Config {
+        tau: fuse::Tau::Given(vec![5.0; 26]),
+        ..fuse::Config::default()
+    };
+    let n_candidates = pose::Config::default().candidates;
+    let one = OneProcess {
+        settings: EstimatorSettings {
+            fuse: config.settings(n_candidates, 1.0),
+            ..EstimatorSettings::default()
+        },
+        sigma_px: Some(sigma_px),
+        ..OneProcess::default()
+    };
+    one.assert_same(&case, 3, 10);
 }
 
 #[test]

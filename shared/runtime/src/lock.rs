@@ -64,7 +64,7 @@ impl Fault for LockError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::AlreadyRunning { .. } => {
-                Some("stop it, or run this one under another name with --name".to_owned())
+                Some("stop it, or run this one under another name with `--set name=...`".to_owned())
             }
             Self::StillAlive { .. } => Some("end them with kill -9".to_owned()),
             Self::File { .. } | Self::Bus(_) => None,

@@ -51,6 +51,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let resolved = Resolved::new(&loaded.deployment)?;
     let prepared = Prepared::new(&resolved)?;
+    prepared.check_predictions(&resolved)?;
     let folder = &resolved.deployment.output;
     let file = folder.join("deployment.json");
     let plan = plan::plan(&resolved, &prepared, &file, globals.level())?;

@@ -9,7 +9,6 @@ use clap::{Args, Parser, ValueEnum};
 use geometry::files::ReadOptions;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
-use viewquality::{Predictor, Selection};
 
 use crate::inputs;
 use crate::plan::{Dealing, Resolved};
@@ -125,22 +124,15 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let deployment = &resolved.deployment;
-    let config = &deployment.quality;
-    let file = config.table.as_ref().ok_or("there is no quality.table");
-    let file = file.or_fail(ExitKind::Config)?;
-    let table = inputs::quality_table(file, prepared.model.n_parts())?;
-    let selection = Selection {
-        subject: config.subject.clone().unwrap_or_default(),
-        action: config.action.clone().unwrap_or_default(),
-        frame_offset: config.frame_offset,
-        ..Selection::default()
-    };
-    let predictor = Predictor::from_table(&table, selection, &deployment.cameras[view].name);
-    let n_workers = Dealing::new(&prepared.pairs, deployment.fuse.workers).n_workers;
+    let predictor = prepared
+        .predictor(resolved, view)?
+        .ok_or("there is no quality.table")
+        .or_fail(ExitKind::Config)?;
+    let workers = resolved.deployment.fuse.workers;
+    let n_workers = Dealing::new(&prepared.pairs, workers).n_workers;
     let job = quality::Job {
         view,
-        predictor: predictor.map_err(|error| inputs::in_file(file, &error))?,
+        predictor,
         frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
         n_consumers: n_workers + 1, // and record
         patience: resolved.patience(),

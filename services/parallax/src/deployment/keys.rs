@@ -97,11 +97,25 @@ const KEYS: &[(&str, &str)] = &[
         "quality.table",
         "expected errors: subject, action, frame, camera, then one per part, pixels",
     ),
-    ("quality.subject", "subject in that table"),
-    ("quality.action", "action in that table"),
+    (
+        "quality.subject",
+        "subject in that table; not set where it names none",
+    ),
+    (
+        "quality.action",
+        "action in that table; not set where it names none",
+    ),
+    (
+        "quality.views",
+        "what cameras are called in that table, { camera = \"name\" }; by their own names without it",
+    ),
     (
         "quality.frame_offset",
-        "frame in that table = frame of the footage + this",
+        "number of the footage's frame 0 in that table",
+    ),
+    (
+        "quality.frame_step",
+        "frames of that table per frame of the footage",
     ),
     (
         "fuse.energy",
@@ -122,7 +136,7 @@ const KEYS: &[(&str, &str)] = &[
     ),
     (
         "fuse.tau",
-        "expected error that switches a part off: none, humaneva, umpm, or one per part, pixels of the footage",
+        "expected error that switches a part off: none, humaneva, humaneva-median, umpm, umpm-median, one per part or { file = ... }, pixels of the footage",
     ),
     (
         "fuse.facing",

@@ -21,7 +21,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     cameras(it)?;
     capture(&it.capture)?;
     pose(&it.pose)?;
-    quality(&it.quality)?;
+    quality(it)?;
     fuse(it)?;
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
@@ -93,19 +93,17 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
     not_negative("pose.min_separation", it.min_separation)
 }
 
-fn quality(it: &quality::Config) -> Result<(), Complaint> {
-    for (key, value) in [
-        ("quality.subject", &it.subject),
-        ("quality.action", &it.action),
-    ] {
+fn quality(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.quality;
+    for name in it.views.keys() {
         demand(
-            it.table.is_none() || value.is_some(),
-            key,
-            "not given",
-            "the name that quality.table uses",
+            deployment.cameras.iter().any(|it| it.name == *name),
+            "quality.views",
+            &format!("{name:?}"),
+            "the name of a [[camera]] of this file",
         )?;
     }
-    Ok(())
+    demand(it.frame_step > 0, "quality.frame_step", "0", "at least 1")
 }
 
 fn fuse(deployment: &Deployment) -> Result<(), Complaint> {

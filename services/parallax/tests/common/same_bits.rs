@@ -18,6 +18,8 @@ pub(crate) struct OneProcess {
     pub(crate) settings: EstimatorSettings,
     /// Size of its frames, which are turned upright; the pictures as they are without it.
     pub(crate) upright_size: Option<[u32; 2]>,
+    /// Expected errors of the parts in a frame of a view, if there are any.
+    pub(crate) sigma_px: Option<fn(frame: usize, view: usize) -> Vec<f32>>,
 }
 
 impl OneProcess {
@@ -46,13 +48,16 @@ impl OneProcess {
                 Some(Rgb8View::new(width, height, it).unwrap())
             });
             let images: Vec<_> = images.collect();
-            let estimate = estimator.estimate(&images, &vec![None; n_views]);
+            let sigma = (0..n_views).map(|view| Some(self.sigma_px?(frame, view)));
+            let estimate = estimator.estimate(&images, &sigma.collect::<Vec<_>>());
             n_placed += estimate.skeleton.joints.iter().flatten().count();
             assert_same_skeleton(&pose3d[frame], frame, &estimate);
             for (view, it) in views.iter().enumerate() {
                 let line = &pose2d[frame * n_views + view];
                 let layout = estimator.plans()[view].layout();
                 it.assert_same(line, [frame, view], &estimate, layout);
+                let sigma = self.sigma_px.map(|it| it(frame, view));
+                assert_eq!(line["sigma_px"], json!(sigma), "frame {frame}, view {view}");
             }
         }
         assert!(
