@@ -3,7 +3,7 @@
 use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
-use crate::commands::{calib, config, detect, fuse_frame, model, run, service};
+use crate::commands::{calib, config, deployments, detect, fuse_frame, model, run, service};
 use crate::exit::EXIT_CODES;
 
 const LONG_ABOUT: &str = "\
@@ -88,6 +88,10 @@ pub(crate) enum Command {
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),
+    /// Show which deployments run, and what dead ones have left in shared memory.
+    Status(deployments::StatusArguments),
+    /// Remove what dead deployments have left in shared memory.
+    Clean(deployments::CleanArguments),
     /// Become one process of a deployment; `run` does this.
     #[command(hide = true)]
     Service(service::Arguments),

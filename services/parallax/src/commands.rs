@@ -2,6 +2,7 @@
 
 pub(crate) mod calib;
 pub(crate) mod config;
+pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod fuse_frame;
 pub(crate) mod model;
@@ -26,6 +27,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Model(it) => model::run(&it),
         Command::Calib(it) => calib::run(&it),
         Command::Config(it) => config::run(&it),
+        Command::Status(it) => deployments::status(&it),
+        Command::Clean(it) => deployments::clean(&it),
         Command::Service(it) => service::run(&it),
     }
 }

@@ -23,6 +23,7 @@ mod launch;
 mod log;
 mod process;
 mod progress;
+mod remains;
 mod stop;
 
 pub use bus::{Bus, BusError, Topic};
@@ -41,6 +42,7 @@ pub use payload::{Element, Header, Message};
 pub use process::{Service, raise_file_limit, run_service};
 pub use progress::Progress;
 pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
+pub use remains::{Remains, deployments};
 pub use service::PortError;
 pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};

@@ -17,8 +17,8 @@ use rustix::io::Errno;
 use crate::bus::prepare;
 use crate::{BusError, ExitKind, Fault, Namespace};
 
-const SHARED_MEMORY: &str = "/dev/shm";
-const LOCK_FILE: &str = "lock";
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+pub(crate) const LOCK_FILE: &str = "lock";
 /// How long the processes of a killed supervisor are given to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
 const DYING_PAUSE: Duration = Duration::from_millis(20);
@@ -191,7 +191,7 @@ fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
 }
 
 /// Names and process ids of the processes that are registered and alive.
-fn alive(config: &Config) -> Vec<String> {
+pub(crate) fn alive(config: &Config) -> Vec<String> {
     let mut alive = Vec::new();
     let listed = Node::<ipc::Service>::list(config, |state| {
         if let NodeState::Alive(node) = state {
@@ -229,7 +229,7 @@ fn wipe(namespace: &Namespace) -> Result<(), LockError> {
     Ok(())
 }
 
-fn entries(directory: &Path) -> Result<Vec<PathBuf>, LockError> {
+pub(crate) fn entries(directory: &Path) -> Result<Vec<PathBuf>, LockError> {
     let failed = |source| LockError::File {
         path: directory.to_owned(),
         source,

@@ -67,11 +67,13 @@ impl Namespace {
     ///
     /// [`NamespaceError`].
     pub fn new(deployment: &str) -> Result<Self, NamespaceError> {
+        Self::below(deployment, &Self::usual_base())
+    }
+
+    /// The directory below which [`Self::new`] puts the deployments of this user.
+    pub fn usual_base() -> PathBuf {
         let user = rustix::process::getuid().as_raw();
-        Self::below(
-            deployment,
-            &Path::new("/dev/shm").join(format!("px-{user}")),
-        )
+        Path::new("/dev/shm").join(format!("px-{user}"))
     }
 
     /// The namespace of `deployment` below a directory of the caller's choice.

@@ -41,7 +41,7 @@ pub(crate) struct Entry {
 }
 
 /// Keys in the order in which they are shown.
-const KEYS: &[(&str, &str)] = &[
+pub(super) const KEYS: &[(&str, &str)] = &[
     (
         "name",
         "name of the deployment: its processes share memory under it",

@@ -29,12 +29,19 @@ impl Loaded {
             file: file.to_owned(),
             source,
         })?;
+        Self::parse(&text, file, set)
+    }
+
+    /// The same of a text.
+    ///
+    /// * `file`: where it stands.
+    fn parse(text: &str, file: &Path, set: &[String]) -> Result<Self, ConfigError> {
         let malformed = |error: &toml::de::Error| {
-            let place = place(file, &text, error.span());
+            let place = place(file, text, error.span());
             ConfigError::explain(place, error.message())
         };
-        let mut deployment: Deployment = toml::from_str(&text).map_err(|it| malformed(&it))?;
-        let in_file: Table = toml::from_str(&text).map_err(|it| malformed(&it))?;
+        let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
+        let in_file: Table = toml::from_str(text).map_err(|it| malformed(&it))?;
         let on_command_line = overrides(set)?;
         if !on_command_line.is_empty() {
             let mut table = in_file.clone();
@@ -45,7 +52,7 @@ impl Loaded {
         }
         deployment.resolve(&base(file));
         rules::check(&deployment).map_err(|complaint| ConfigError::Value {
-            place: place(file, &text, span_of(&text, &complaint.key)),
+            place: place(file, text, span_of(text, &complaint.key)),
             key: complaint.key,
             got: complaint.got,
             expected: complaint.expected,
@@ -156,6 +163,9 @@ fn merge(table: &mut Table, over: Table) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
+    use super::super::keys::KEYS;
     use super::*;
 
     const SHORT: &str = r#"
@@ -272,6 +282,53 @@ workers = 2
     fn a_file_that_is_not_there_is_named() {
         let error = Loaded::read(Path::new("/nowhere/d.toml"), &[]).unwrap_err();
         assert!(error.to_string().contains("/nowhere/d.toml"));
+    }
+
+    /// Whether a text and an option are taken; what is refused is said with its place.
+    fn is_taken(text: &str, set: &str) -> bool {
+        let file = Path::new("deployment.toml");
+        match Loaded::parse(text, file, &[set.to_owned()]) {
+            Ok(loaded) => {
+                assert!(loaded.entries().is_ok());
+                true
+            }
+            Err(error) => {
+                let said = error.to_string();
+                let begin = ["deployment.toml", "--set"];
+                assert!(begin.iter().any(|it| said.starts_with(it)), "{said}");
+                assert!(!said.contains('\n'), "{said}");
+                false
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_deployment_or_an_error_with_its_place(text: String, set: String) {
+            is_taken(&text, &set);
+        }
+
+        #[test]
+        fn a_changed_deployment_is_one_or_an_error_with_its_place(
+            at in 0..SHORT.len(),
+            n in 0_usize..6,
+            to in "[a-z0-9=\\[\\]{}.,\"'\n -]{0,8}",
+        ) {
+            let mut text = SHORT.to_owned();
+            text.replace_range(at..(at + n).min(SHORT.len()), &to);
+            is_taken(&text, "fuse.workers=3");
+        }
+
+        #[test]
+        fn any_value_of_a_known_key_is_taken_or_refused(
+            key in prop::sample::select(KEYS.iter().map(|it| it.0).collect::<Vec<_>>()),
+            value in prop::sample::select(vec![
+                "-1", "0", "1", "99999999999", "1e308", "nan", "-inf", "''", "'x'", "[]", "[1]",
+                "[nan]", "{}", "[[1]]", "{ file = 3 }", "{ a = 'b' }", "true", "1979-05-27", "=",
+            ]),
+        ) {
+            is_taken(SHORT, &format!("{key}={value}"));
+        }
     }
 
     #[test]

@@ -1,0 +1,110 @@
+//! `parallax status` and `parallax clean`: what runs, and what dead runs left in shared memory.
+
+use std::process::ExitCode;
+
+use clap::Args;
+use runtime::{ExitKind, Failure, Namespace, Remains, deployments};
+use serde_json::{Value, json};
+
+use crate::output;
+
+/// How to show what is there.
+#[derive(Debug, Args)]
+pub(crate) struct StatusArguments {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What to remove.
+#[derive(Debug, Args)]
+pub(crate) struct CleanArguments {
+    /// Names of dead deployments; all of them if none is given.
+    names: Vec<String>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Shows the deployments of this user.
+pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
+    let found = deployments(&Namespace::usual_base())?;
+    if arguments.json {
+        let all: Vec<Value> = found.iter().map(describe).collect();
+        output::json(&json!({ "schema_version": 1, "deployments": all }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if found.is_empty() {
+        output::message("no deployment runs, and none has left anything behind");
+    }
+    for it in &found {
+        let name = it.namespace.name();
+        let how = match it.supervisor {
+            Some(pid) => format!("runs (process {pid}), {} processes", it.processes.len()),
+            None if it.processes.is_empty() => "dead: `parallax clean` removes it".to_owned(),
+            None => format!("dead, but for {}", it.processes.join(", ")),
+        };
+        output::line(format_args!("{name:<32} {:>10}  {how}", size(it)))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Removes what dead deployments of this user left behind; those that run are left alone.
+pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
+    let found = deployments(&Namespace::usual_base())?;
+    for name in &arguments.names {
+        if !found.iter().any(|it| it.namespace.name() == name) {
+            let message = format!("there is nothing of a deployment {name:?}");
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+    }
+    let is_meant = |it: &&Remains| match &arguments.names[..] {
+        [] => it.supervisor.is_none(),
+        names => names.iter().any(|name| name == it.namespace.name()),
+    };
+    let (mut removed, mut failed) = (Vec::new(), Vec::new());
+    for it in found.iter().filter(is_meant) {
+        match it.remove() {
+            Ok(()) => removed.push(it),
+            Err(error) => failed.push((it.namespace.name(), error.to_string())),
+        }
+    }
+    for (_, why) in &failed {
+        output::message(format_args!("error: {why}"));
+    }
+    if arguments.json {
+        let removed: Vec<Value> = removed.into_iter().map(describe).collect();
+        let failed = failed
+            .iter()
+            .map(|(name, why)| json!({ "name": name, "why": why }));
+        let failed: Vec<Value> = failed.collect();
+        output::json(&json!({ "schema_version": 1, "removed": removed, "failed": failed }))?;
+    } else {
+        for it in removed {
+            output::line(format_args!(
+                "removed {}, {}",
+                it.namespace.name(),
+                size(it)
+            ))?;
+        }
+    }
+    Ok(if failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(ExitKind::Run.status())
+    })
+}
+
+fn describe(it: &Remains) -> Value {
+    json!({
+        "name": it.namespace.name(),
+        "supervisor": it.supervisor,
+        "processes": it.processes,
+        "files": it.n_files,
+        "bytes": it.bytes,
+    })
+}
+
+fn size(it: &Remains) -> String {
+    format!("{:.1} MB", it.bytes as f64 / 1e6)
+}
