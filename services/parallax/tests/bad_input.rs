@@ -327,7 +327,7 @@ fn thresholds() {
                     "deployment.toml",
                     "workers = 2",
                     "workers = 2\ntau = [1, 2]",
-                )
+                );
             },
             arguments: DRY,
             code: 3,
