@@ -182,8 +182,6 @@ pub(crate) fn plan(
     let processes = processes(resolved, prepared, file);
     let names = processes.iter().map(|it| it.name.clone()).collect();
     let settings = &resolved.deployment.supervise;
-    let hang_limit = Duration::from_secs(resolved.deployment.hang_limit_s());
-    let patient = Policy::default();
     Ok(Plan {
         executable: executable()?,
         namespace: Namespace::new(&resolved.deployment.name)?,
@@ -194,10 +192,8 @@ pub(crate) fn plan(
         policy: Policy {
             max_restarts: settings.max_restarts as usize,
             restart_window: Duration::from_secs(settings.restart_window_s),
-            hang_limit,
-            // Who is stopped stands still as well, and should be called what it is.
-            silence_limit: patient.silence_limit.min(hang_limit),
-            ..patient
+            hang_limit: Duration::from_secs(resolved.deployment.hang_limit_s()),
+            ..Policy::default()
         },
         log,
     })

@@ -78,9 +78,13 @@ fn who_is_too_slow_answers_fewer_frames_and_the_same_in_all_views() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let told = Told::new(&case, &ended);
     assert!(told.view(0, "dropped") > 5, "{:#}", told.report["views"]);
-    // Once every view has found its cadence.
-    let n_late = told.lines.len() / 2;
-    assert!(2 * told.n_with_all() > n_late, "{:#}", told.report["views"]);
+    // A machine that is too loaded for a dozen answers gives the views no time to find their cadence.
+    let (n_all, n_lines) = (told.n_with_all(), told.lines.len());
+    assert!(
+        n_lines < 25 || 3 * n_all > n_lines,
+        "{:#}",
+        told.report["views"]
+    );
 }
 
 #[test]

@@ -155,8 +155,13 @@ impl Watch {
             (still > policy.startup_limit).then_some(Death::NeverBegan { waited: still })
         } else if silent > policy.silence_limit {
             Some(Death::Silent { still: silent })
+        } else if still <= policy.hang_limit {
+            None
+        } else if silent > still / 2 {
+            // Who is stopped stands still as well, and is called what it is.
+            Some(Death::Silent { still: silent })
         } else {
-            (still > policy.hang_limit).then_some(Death::Hung { still })
+            Some(Death::Hung { still })
         }
     }
 
