@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use kernels::{
-    FeatureMap, FilterBank, HogShape, HogWorkspace, Isa, Planes, Rgb8View, Template, hog, reduce,
-    resize,
+    FeatureMap, FilterBank, HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace,
+    Template, hog, reduce, resize,
 };
 use rayon::prelude::*;
 
@@ -31,6 +31,7 @@ struct Workspace {
 struct Chain {
     image: Planes,
     halved: Planes,
+    shrink: ShrinkWorkspace,
     hog: HogWorkspace,
     /// Padded features of every level of the chain.
     features: Vec<Vec<f32>>,
@@ -106,10 +107,10 @@ impl Extractor {
             chain.features.resize_with(levels.len(), Vec::new);
             for (octave, level) in levels.enumerate() {
                 if octave == 0 {
-                    let [width, height] = level.image_size;
-                    resize(image, width, height, &mut chain.image);
+                    let size = level.image_size;
+                    resize(self.isa, image, size, &mut chain.shrink, &mut chain.image);
                 } else {
-                    reduce(&chain.image, &mut chain.halved);
+                    reduce(self.isa, &chain.image, &mut chain.shrink, &mut chain.halved);
                     std::mem::swap(&mut chain.image, &mut chain.halved);
                 }
                 let features = &mut chain.features[octave];

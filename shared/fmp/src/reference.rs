@@ -5,7 +5,8 @@
 //! which give the same answers but for rounding; springs are per child type only.
 
 use kernels::{
-    HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce, resize, transform_f64,
+    HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce_by_taps, resize_by_taps,
+    transform_f64,
 };
 
 use crate::{Edge, Layout, LevelLayout, Model, Placement, Spring, Springs};
@@ -20,12 +21,10 @@ pub fn pyramid(model: &Model, layout: &Layout, image: Rgb8View<'_>) -> Vec<Plane
     let interval = model.spec().interval;
     let mut images: Vec<Planes> = Vec::with_capacity(layout.levels.len());
     for (level, it) in layout.levels.iter().enumerate() {
-        let mut out = Planes::default();
-        match level.checked_sub(interval) {
-            None => resize(image, it.image_size[0], it.image_size[1], &mut out),
-            Some(above) => reduce(&images[above], &mut out),
-        }
-        images.push(out);
+        images.push(match level.checked_sub(interval) {
+            None => resize_by_taps(image, it.image_size),
+            Some(above) => reduce_by_taps(&images[above]),
+        });
     }
     images
 }

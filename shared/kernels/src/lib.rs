@@ -9,6 +9,7 @@
 )]
 
 mod correlate;
+mod dispatch;
 mod envelope;
 mod gradient;
 mod hog;
@@ -23,6 +24,8 @@ pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
-pub use planes::{Planes, reduce, reduced, resize};
+pub use planes::{
+    Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize, resize_by_taps,
+};
 pub use spring::Spring;
 pub use vote::{ChildScores, Found, Grid, ROW_ALIGN, VoteRule, VoteWorkspace, spread};

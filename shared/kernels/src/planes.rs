@@ -4,7 +4,14 @@
 //! histogram bin, so both functions add their products in exactly the order of the reference
 //! programs: down the columns first, tap after tap, then along the rows.
 
-use crate::Rgb8View;
+mod reduce;
+mod reference;
+mod resize;
+
+use crate::dispatch::dispatch;
+use crate::{Isa, Rgb8View};
+
+pub use reference::{reduce_by_taps, resize_by_taps};
 
 /// Three planes of samples, 0..255, `[plane][row][col]`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -35,6 +42,15 @@ impl Planes {
         &self.data[(plane * self.height + y) * self.width..][..self.width]
     }
 
+    /// One row of all three planes.
+    #[inline(always)]
+    fn rows_mut(&mut self, y: usize) -> [&mut [f64]; 3] {
+        let (n, plane) = (self.width, self.width * self.height);
+        let (first, rest) = self.data.split_at_mut(plane);
+        let (second, third) = rest.split_at_mut(plane);
+        [first, second, third].map(|it| &mut it[y * n..][..n])
+    }
+
     fn row_mut(&mut self, plane: usize, y: usize) -> &mut [f64] {
         &mut self.data[(plane * self.height + y) * self.width..][..self.width]
     }
@@ -60,87 +76,46 @@ impl Planes {
     }
 }
 
-/// The input samples that one output sample is the weighted sum of.
-#[derive(Debug, Clone)]
-struct Taps {
-    first: usize,
-    weights: Vec<f64>,
+/// Buffers of [`resize`] and [`reduce`], used again from image to image.
+#[derive(Debug, Default)]
+pub struct ShrinkWorkspace {
+    down: resize::Taps,
+    along: resize::Taps,
+    /// A row after the vertical pass.
+    line: Vec<f64>,
 }
 
-/// Taps of an area average from `from` to `to` samples.
+/// Makes `out` the area average of `image` at `[width, height]` pixels.
 ///
-/// Output `d` covers the input interval `[d inv, (d + 1) inv)`, `inv = from / to`; partly covered
-/// samples count by their share, shares up to 1e-3 are dropped.
-fn area_taps(from: usize, to: usize) -> Vec<Taps> {
-    let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
-    let taps_of = |d: usize| {
-        let begin = d as f64 * inverse;
-        let end = begin + inverse;
-        let (whole, last) = (begin.ceil() as usize, end.floor() as usize);
-        let mut taps = Taps {
-            first: whole,
-            weights: Vec::new(),
-        };
-        if whole as f64 - begin > 1e-3 {
-            taps.first = whole - 1;
-            taps.weights.push((whole as f64 - begin) * scale);
-        }
-        taps.weights
-            .extend(std::iter::repeat_n(scale, last.saturating_sub(whole)));
-        if end - last as f64 > 1e-3 && last < from {
-            taps.weights.push((end - last as f64) * scale);
-        }
-        taps
-    };
-    (0..to).map(taps_of).collect()
-}
-
-/// Makes `out` the area average of `image` at `width` x `height` pixels.
-///
-/// The reference programs' `resize`: bit for bit.
+/// The reference programs' `resize`, and [`resize_by_taps`]: bit for bit.
 ///
 /// # Panics
 ///
 /// If the new size is zero or larger than the image's.
-pub fn resize(image: Rgb8View<'_>, width: usize, height: usize, out: &mut Planes) {
+pub fn resize(
+    isa: Isa,
+    image: Rgb8View<'_>,
+    [width, height]: [usize; 2],
+    workspace: &mut ShrinkWorkspace,
+    out: &mut Planes,
+) {
+    check_resize(image, [width, height]);
+    out.reshape(width, height);
+    dispatch(
+        isa,
+        resize::Resize {
+            image,
+            workspace,
+            out,
+        },
+    );
+}
+
+fn check_resize(image: Rgb8View<'_>, [width, height]: [usize; 2]) {
     assert!(
         (1..=image.width()).contains(&width) && (1..=image.height()).contains(&height),
         "resize only makes images smaller"
     );
-    out.reshape(width, height);
-    let stride = 3 * image.width();
-    let down = area_taps(image.height(), height);
-    let along = area_taps(image.width(), width);
-    // The fourth sample of the last pixel is read and not used.
-    let mut column_sums = vec![0.0; stride + 1];
-    for (y, taps) in down.iter().enumerate() {
-        let sums = &mut column_sums[..stride];
-        sums.fill(0.0);
-        for (row, &weight) in taps.weights.iter().enumerate() {
-            let samples = &image.data()[(taps.first + row) * stride..][..stride];
-            for (sum, &sample) in sums.iter_mut().zip(samples) {
-                *sum += weight * f64::from(sample);
-            }
-        }
-        average_along(&column_sums, &along, y, out);
-    }
-}
-
-/// The second pass of [`resize`], on one interleaved row of column sums.
-fn average_along(column_sums: &[f64], along: &[Taps], y: usize, out: &mut Planes) {
-    let plane = out.width * out.height;
-    for (x, taps) in along.iter().enumerate() {
-        let mut pixel = [0.0; 4];
-        let samples = column_sums[3 * taps.first..].windows(4).step_by(3);
-        for (&weight, samples) in taps.weights.iter().zip(samples) {
-            for (sum, sample) in pixel.iter_mut().zip(samples) {
-                *sum += weight * sample;
-            }
-        }
-        for (colour, sample) in pixel[..3].iter().enumerate() {
-            out.data[colour * plane + y * out.width + x] = *sample;
-        }
-    }
 }
 
 /// Side of the image that [`reduce`] makes of `side` samples: half, rounded away from zero.
@@ -150,33 +125,20 @@ pub fn reduced(side: usize) -> usize {
 
 /// Makes `out` the image at half size: five binomial taps, then every second sample.
 ///
-/// The reference programs' `reduce`, borders included: bit for bit.
+/// The reference programs' `reduce`, borders included, and [`reduce_by_taps`]: bit for bit.
 ///
 /// # Panics
 ///
 /// If a side is shorter than 5 pixels.
-pub fn reduce(image: &Planes, out: &mut Planes) {
-    assert!(image.width.min(image.height) >= 5, "five taps");
+pub fn reduce(isa: Isa, image: &Planes, workspace: &mut ShrinkWorkspace, out: &mut Planes) {
+    check_reduce(image);
     out.reshape(reduced(image.width), reduced(image.height));
-    let mut middle = vec![0.0; image.width];
-    for plane in 0..3 {
-        for y in 0..out.height {
-            let row = |back: isize| image.row(plane, (2 * y).wrapping_add_signed(back));
-            let border = Border::of(y, out.height, image.height);
-            reduce_down(row, border, &mut middle);
-            let target = out.row_mut(plane, y);
-            let n = target.len();
-            for (x, value) in target.iter_mut().enumerate() {
-                let at = |back: isize| middle[(2 * x).wrapping_add_signed(back)];
-                *value = match Border::of(x, n, middle.len()) {
-                    Border::First => first(at(0), at(1), at(2)),
-                    Border::Inside => inside([at(-2), at(-1), at(0), at(1), at(2)]),
-                    Border::Folded => folded(at(-2), at(-1), at(0), at(1)),
-                    Border::Last => first(at(0), at(-1), at(-2)),
-                };
-            }
-        }
-    }
+    let line = &mut workspace.line;
+    dispatch(isa, reduce::Reduce { image, line, out });
+}
+
+fn check_reduce(image: &Planes) {
+    assert!(image.width.min(image.height) >= 5, "five taps");
 }
 
 /// Which taps an output sample of [`reduce`] has.
@@ -200,46 +162,113 @@ impl Border {
     }
 }
 
-fn reduce_down<'a>(row: impl Fn(isize) -> &'a [f64], border: Border, out: &mut [f64]) {
-    let n = out.len();
-    match border {
-        Border::First => {
-            let (a, b, c) = (&row(0)[..n], &row(1)[..n], &row(2)[..n]);
-            for (x, it) in out.iter_mut().enumerate() {
-                *it = first(a[x], b[x], c[x]);
-            }
-        }
-        Border::Last => {
-            let (a, b, c) = (&row(0)[..n], &row(-1)[..n], &row(-2)[..n]);
-            for (x, it) in out.iter_mut().enumerate() {
-                *it = first(a[x], b[x], c[x]);
-            }
-        }
-        Border::Folded => {
-            let (a, b, c, d) = (&row(-2)[..n], &row(-1)[..n], &row(0)[..n], &row(1)[..n]);
-            for (x, it) in out.iter_mut().enumerate() {
-                *it = folded(a[x], b[x], c[x], d[x]);
-            }
-        }
-        Border::Inside => {
-            let (a, b, c) = (&row(-2)[..n], &row(-1)[..n], &row(0)[..n]);
-            let (d, e) = (&row(1)[..n], &row(2)[..n]);
-            for (x, it) in out.iter_mut().enumerate() {
-                *it = inside([a[x], b[x], c[x], d[x], e[x]]);
-            }
-        }
-    }
-}
-
+#[inline(always)]
 fn first(edge: f64, second: f64, third: f64) -> f64 {
     edge * 0.6875 + second * 0.25 + third * 0.0625
 }
 
+#[inline(always)]
 fn inside(s: [f64; 5]) -> f64 {
     s[0] * 0.0625 + s[1] * 0.25 + s[2] * 0.375 + s[3] * 0.25 + s[4] * 0.0625
 }
 
 /// Taps (1, 4, 6, 5) / 16 on the four last samples, added from the last to the first.
+#[inline(always)]
 fn folded(a: f64, b: f64, c: f64, last: f64) -> f64 {
     last * 0.3125 + c * 0.375 + b * 0.25 + a * 0.0625
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn noise(seed: u64, n: usize) -> Vec<u8> {
+        let mut state = seed | 1;
+        let bytes = std::iter::repeat_with(|| {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 56) as u8
+        });
+        bytes.take(n).collect()
+    }
+
+    /// An image that was something else before.
+    fn used() -> Planes {
+        Planes::from_samples(3, 5, vec![f64::NAN; 45])
+    }
+
+    proptest! {
+        #[test]
+        fn every_instruction_set_resizes_as_the_readable_form_does(
+            size in [1..70_usize, 1..50_usize],
+            share in [0.0..1.0_f64, 0.0..1.0_f64],
+            misaligned in 0..16_usize,
+            seed in any::<u64>(),
+        ) {
+            let [width, height] = size;
+            // Shares near 1 are those of the pyramid.
+            let smaller = |it: usize, share: f64| ((it as f64 * share.sqrt()).round() as usize).max(1);
+            let to = [smaller(width, share[0]), smaller(height, share[1])];
+            let bytes = noise(seed, misaligned + 3 * width * height);
+            let image = Rgb8View::new(width, height, &bytes[misaligned..]).unwrap();
+            let want = resize_by_taps(image, to);
+            let mut workspace = ShrinkWorkspace::default();
+            for isa in Isa::available() {
+                for _ in 0..2 {
+                    let mut got = used();
+                    resize(isa, image, to, &mut workspace, &mut got);
+                    prop_assert!(got == want, "{:?}", isa);
+                }
+            }
+        }
+
+        #[test]
+        fn every_instruction_set_reduces_as_the_readable_form_does(
+            size in [5..70_usize, 5..30_usize],
+            seed in any::<u64>(),
+        ) {
+            let samples = noise(seed, 3 * size[0] * size[1]);
+            let samples = samples.into_iter().map(|it| f64::from(it) / 1.1).collect();
+            let image = Planes::from_samples(size[0], size[1], samples);
+            let want = reduce_by_taps(&image);
+            let mut workspace = ShrinkWorkspace::default();
+            for isa in Isa::available() {
+                let mut got = used();
+                reduce(isa, &image, &mut workspace, &mut got);
+                prop_assert!(got == want, "{:?}", isa);
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_image_stays_flat() {
+        let bytes = [77; 3 * 23 * 31];
+        let image = Rgb8View::new(23, 31, &bytes).unwrap();
+        let mut out = used();
+        let mut workspace = ShrinkWorkspace::default();
+        resize(Isa::best(), image, [17, 12], &mut workspace, &mut out);
+        assert_eq!([out.width(), out.height()], [17, 12]);
+        assert!(out.data().iter().all(|it| (it - 77.0).abs() < 1e-9));
+        let mut half = used();
+        reduce(Isa::best(), &out, &mut workspace, &mut half);
+        assert_eq!([half.width(), half.height()], [9, 6]);
+        assert!(half.data().iter().all(|it| (it - 77.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn the_same_size_copies_the_pixels() {
+        let bytes = noise(3, 3 * 9 * 7);
+        let image = Rgb8View::new(9, 7, &bytes).unwrap();
+        let mut out = used();
+        let mut workspace = ShrinkWorkspace::default();
+        resize(Isa::best(), image, [9, 7], &mut workspace, &mut out);
+        for (at, pixel) in bytes.chunks_exact(3).enumerate() {
+            for (plane, sample) in pixel.iter().enumerate() {
+                assert_eq!(out.row(plane, at / 9)[at % 9], f64::from(*sample));
+            }
+        }
+    }
 }

@@ -1,0 +1,148 @@
+//! The area average, a row of pixels at a time.
+
+use super::{Planes, ShrinkWorkspace};
+use crate::Rgb8View;
+use crate::dispatch::Body;
+
+/// Taps of all output samples of one axis, equally many each.
+#[derive(Debug, Default)]
+pub(super) struct Taps {
+    /// Taps of an output sample.
+    n: usize,
+    /// The first input sample of every output sample.
+    first: Vec<usize>,
+    /// `n` weights per output sample; zero where it has fewer taps.
+    weights: Vec<f64>,
+}
+
+impl Taps {
+    /// Taps of an area average from `from` to `to` samples: those of the reference, in its order,
+    /// with zeros before or after them.
+    fn cover(&mut self, from: usize, to: usize) {
+        let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
+        // A sample that is covered partly on both sides of those that are covered whole.
+        self.n = (inverse.ceil() as usize + 1).min(from);
+        self.first.clear();
+        self.weights.clear();
+        for d in 0..to {
+            let begin = d as f64 * inverse;
+            let end = begin + inverse;
+            let (whole, last) = (begin.ceil() as usize, end.floor() as usize);
+            let before = whole as f64 - begin > 1e-3;
+            let first = (whole - usize::from(before)).min(from - self.n);
+            let weight = |sample: usize| {
+                if before && sample + 1 == whole {
+                    (whole as f64 - begin) * scale
+                } else if (whole..last).contains(&sample) {
+                    scale
+                } else if sample == last && end - last as f64 > 1e-3 {
+                    (end - last as f64) * scale
+                } else {
+                    0.0
+                }
+            };
+            self.first.push(first);
+            self.weights.extend((first..first + self.n).map(weight));
+        }
+    }
+}
+
+pub(super) struct Resize<'a> {
+    pub(super) image: Rgb8View<'a>,
+    pub(super) workspace: &'a mut ShrinkWorkspace,
+    /// Has its new size already.
+    pub(super) out: &'a mut Planes,
+}
+
+impl Body for Resize<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            image,
+            workspace,
+            out,
+        } = self;
+        let ShrinkWorkspace { down, along, line } = workspace;
+        down.cover(image.height(), out.height);
+        along.cover(image.width(), out.width);
+        let stride = 3 * image.width();
+        line.clear();
+        // The fourth sample of the last pixel is read and not used.
+        line.resize(stride + 1, 0.0);
+        for y in 0..out.height {
+            let rows = &image.data()[down.first[y] * stride..];
+            let weights = &down.weights[y * down.n..][..down.n];
+            sum_down(rows, weights, &mut line[..stride]);
+            match along.n {
+                1 => sum_along::<1>(line, along, y, out),
+                2 => sum_along::<2>(line, along, y, out),
+                3 => sum_along::<3>(line, along, y, out),
+                _ => sum_many_along(line, along, y, out),
+            }
+        }
+    }
+}
+
+/// Weighted sums of the columns of the rows that `rows` begins with.
+#[inline(always)]
+fn sum_down(rows: &[u8], weights: &[f64], out: &mut [f64]) {
+    let n = out.len();
+    let row = |it: usize| &rows[it * n..][..n];
+    match *weights {
+        [a] | [a, 0.0] | [a, 0.0, 0.0] => {
+            for (out, it) in out.iter_mut().zip(row(0)) {
+                *out = a * f64::from(*it);
+            }
+        }
+        [a, b] | [a, b, 0.0] => {
+            for (out, (p, q)) in out.iter_mut().zip(row(0).iter().zip(row(1))) {
+                *out = a * f64::from(*p) + b * f64::from(*q);
+            }
+        }
+        [a, b, c] => {
+            let rows = row(0).iter().zip(row(1)).zip(row(2));
+            for (out, ((p, q), r)) in out.iter_mut().zip(rows) {
+                *out = a * f64::from(*p) + b * f64::from(*q) + c * f64::from(*r);
+            }
+        }
+        _ => {
+            out.fill(0.0);
+            for (at, &weight) in weights.iter().enumerate() {
+                for (out, it) in out.iter_mut().zip(row(at)) {
+                    *out += weight * f64::from(*it);
+                }
+            }
+        }
+    }
+}
+
+/// Weighted sums along one interleaved row of column sums; lanes are the colours of a pixel.
+#[inline(always)]
+fn sum_along<const N: usize>(line: &[f64], along: &Taps, y: usize, out: &mut Planes) {
+    let [red, green, blue] = out.rows_mut(y);
+    let targets = red.iter_mut().zip(green).zip(blue);
+    let (weights, _) = along.weights.as_chunks::<N>();
+    for (((red, green), blue), (weights, &first)) in targets.zip(weights.iter().zip(&along.first)) {
+        let samples = &line[3 * first..][..=3 * N];
+        let mut pixel = [0.0; 4];
+        for (tap, weight) in weights.iter().enumerate() {
+            for (lane, sum) in pixel.iter_mut().enumerate() {
+                *sum += weight * samples[3 * tap + lane];
+            }
+        }
+        [*red, *green, *blue, _] = pixel;
+    }
+}
+
+/// As [`sum_along`], for any number of taps.
+#[inline(always)]
+fn sum_many_along(line: &[f64], along: &Taps, y: usize, out: &mut Planes) {
+    for (colour, target) in out.rows_mut(y).into_iter().enumerate() {
+        let weights = along.weights.chunks_exact(along.n);
+        for (target, (weights, first)) in target.iter_mut().zip(weights.zip(&along.first)) {
+            let samples = line[3 * first + colour..].iter().step_by(3);
+            let taps = weights.iter().zip(samples);
+            *target = taps.fold(0.0, |sum, (weight, sample)| sum + weight * sample);
+        }
+    }
+}
