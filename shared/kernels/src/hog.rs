@@ -3,15 +3,24 @@
 //! A cell has 18 contrast-sensitive orientations, 9 contrast-insensitive ones, 4 texture energies
 //! and one channel that is 1 in the padding and 0 inside.
 
+mod fast;
 mod reference;
+#[cfg(test)]
 mod single;
+mod votes;
 
+use crate::dispatch::dispatch;
+use crate::gradient::N_ORIENTATIONS;
+use crate::{Isa, Planes};
+
+pub use fast::HogWorkspace;
 pub use reference::hog_f64;
-pub use single::{HogWorkspace, hog};
 
 /// Channels of a cell.
 pub const N_CHANNELS: usize = 32;
 
+/// Number of orientations without their sign.
+const N_UNSIGNED: usize = N_ORIENTATIONS / 2;
 /// Upper limit of a normalised histogram entry.
 const CLIP: f64 = 0.2;
 /// Added to the energy of a block, so that flat blocks have a norm.
@@ -42,6 +51,63 @@ impl HogShape {
             cols.saturating_sub(2) + 2 * self.pad[1],
         ]
     }
+
+    /// Fills the padding of a map of `cells`, and returns the size of what is inside, if anything.
+    fn pad_map(&self, cells: [usize; 2], map: &mut [[f32; N_CHANNELS]]) -> Option<[usize; 2]> {
+        let [pad_rows, pad_cols] = self.pad;
+        let [inner_rows, inner_cols] = cells.map(|it| it.saturating_sub(2));
+        let mut padding = [0.0; N_CHANNELS];
+        padding[N_CHANNELS - 1] = 1.0;
+        let lines = map.chunks_exact_mut((inner_cols + 2 * pad_cols).max(1));
+        for (y, line) in lines.enumerate() {
+            if (pad_rows..pad_rows + inner_rows).contains(&y) {
+                line[..pad_cols].fill(padding);
+                line[pad_cols + inner_cols..].fill(padding);
+            } else {
+                line.fill(padding);
+            }
+        }
+        (inner_rows > 0 && inner_cols > 0).then_some([inner_rows, inner_cols])
+    }
+}
+
+/// Writes the features of `image` with their padding.
+///
+/// As [`hog_f64`]: the orientation of every gradient is decided in double precision, and everything
+/// after it is single precision, so the values differ by rounding only. A cell's votes are added up
+/// per block of pixels between four cell centres first, then over the cell's four blocks.
+///
+/// * `out`: `rows x cols x N_CHANNELS` of [`HogShape::map_size`]; overwritten.
+///
+/// # Panics
+///
+/// If `out` has another size, or a side of the image is shorter than 3 pixels.
+pub fn hog(
+    isa: Isa,
+    image: &Planes,
+    shape: HogShape,
+    workspace: &mut HogWorkspace,
+    out: &mut [f32],
+) {
+    let [rows, cols] = shape.map_size(image.width(), image.height());
+    assert_eq!(
+        out.len(),
+        rows * cols * N_CHANNELS,
+        "one cell per map entry"
+    );
+    assert!(
+        image.width().min(image.height()) >= 3,
+        "central differences"
+    );
+    dispatch(
+        isa,
+        fast::Hog {
+            image,
+            shape,
+            workspace,
+            out,
+        },
+    );
 }
 
 /// Where a pixel votes along one axis: the cell before it and the shares of that cell and the next.
@@ -68,50 +134,74 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{Isa, Planes};
 
     const SHAPE: HogShape = HogShape {
         cell_px: 4,
         pad: [3, 4],
     };
 
-    /// Images of sixteen grey levels, so that equal gradients and flat regions are common.
-    fn images() -> impl Strategy<Value = Planes> {
-        (12..45_usize, 12..45_usize, any::<u64>()).prop_map(|(width, height, seed)| {
+    /// Images of sixteen grey levels `step` apart, so that equal gradients and flat regions are
+    /// common.
+    fn images_of(step: f64) -> impl Strategy<Value = Planes> {
+        (3..75_usize, 3..45_usize, any::<u64>()).prop_map(move |(width, height, seed)| {
             let mut state = seed | 1;
             let data = std::iter::repeat_with(|| {
                 state = state
                     .wrapping_mul(6364136223846793005)
                     .wrapping_add(1442695040888963407);
-                ((state >> 60) * 17) as f64
+                (state >> 60) as f64 * step
             });
             Planes::from_samples(width, height, data.take(3 * width * height).collect())
         })
     }
 
-    fn single(isa: Isa, image: &Planes) -> Vec<f32> {
-        let [rows, cols] = SHAPE.map_size(image.width(), image.height());
-        let mut out = vec![f32::NAN; rows * cols * N_CHANNELS];
-        hog(isa, image, SHAPE, &mut HogWorkspace::default(), &mut out);
-        out
+    fn images() -> impl Strategy<Value = Planes> {
+        images_of(17.0)
+    }
+
+    /// Half of them with samples that are not exact, as in a resized image.
+    fn all_images() -> impl Strategy<Value = Planes> {
+        prop_oneof![images(), images_of(17.0 / 1.1)]
+    }
+
+    fn shapes() -> impl Strategy<Value = HogShape> {
+        let cell_px = prop_oneof![Just(4_usize), 2..9_usize];
+        let shape = |(cell_px, rows, cols)| HogShape {
+            cell_px,
+            pad: [rows, cols],
+        };
+        (cell_px, 0..4_usize, 0..6_usize).prop_map(shape)
     }
 
     proptest! {
         #[test]
-        fn single_precision_differs_from_the_reference_by_rounding_only(image in images()) {
-            let want = hog_f64(&image, SHAPE);
-            let got = single(Isa::best(), &image);
+        fn single_precision_differs_from_the_reference_by_rounding_only(
+            image in all_images(),
+            shape in shapes(),
+        ) {
+            let want = hog_f64(&image, shape);
+            let got = single::hog_f32(&image, shape);
             prop_assert_eq!(want.len(), got.len());
             for (want, got) in want.iter().zip(&got) {
                 prop_assert!((want - f64::from(*got)).abs() < 2e-6, "{} {}", want, got);
             }
         }
 
+        /// Two images after each other, so that nothing of the first may be left behind.
         #[test]
-        fn every_instruction_set_gives_the_same_bits(image in images()) {
-            let want = single(Isa::available()[0], &image);
+        fn every_instruction_set_gives_the_bits_of_the_readable_form(
+            images in [all_images(), all_images()],
+            shape in shapes(),
+            misaligned in 0..16_usize,
+        ) {
             for isa in Isa::available() {
-                prop_assert_eq!(&single(isa, &image), &want, "{:?}", isa);
+                let mut workspace = HogWorkspace::default();
+                for image in &images {
+                    let want = single::hog_f32(image, shape);
+                    let mut got = vec![f32::NAN; misaligned + want.len()];
+                    hog(isa, image, shape, &mut workspace, &mut got[misaligned..]);
+                    prop_assert!(got[misaligned..] == want, "{:?}", isa);
+                }
             }
         }
 

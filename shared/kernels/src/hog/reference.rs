@@ -1,10 +1,8 @@
 //! The features in double precision, written to be read.
 
-use super::{CLIP, FLAT, HogShape, N_CHANNELS, TEXTURE, Vote};
+use super::{CLIP, FLAT, HogShape, N_CHANNELS, N_UNSIGNED, TEXTURE, Vote};
 use crate::Planes;
-use crate::gradient::{GradientRow, N_ORIENTATIONS};
-
-const N_UNSIGNED: usize = N_ORIENTATIONS / 2;
+use crate::gradient::{N_ORIENTATIONS, gradient};
 
 /// Features of `image` with their padding, `rows x cols x N_CHANNELS` of [`HogShape::map_size`].
 ///
@@ -43,20 +41,19 @@ type Histogram = [f64; N_ORIENTATIONS];
 
 fn histograms(image: &Planes, cell_px: usize, [rows, cols]: [usize; 2]) -> Vec<Histogram> {
     let mut all = vec![[0.0; N_ORIENTATIONS]; rows * cols];
-    let mut gradients = GradientRow::default();
     for y in 1..(rows * cell_px).saturating_sub(1) {
-        gradients.compute(image, y.min(image.height() - 2));
         let down = Vote::of(y, cell_px);
         for x in 1..(cols * cell_px).saturating_sub(1) {
-            let pixel = x.min(image.width() - 2);
-            let length = gradients.squared[pixel].sqrt();
+            let pixel = [y.min(image.height() - 2), x.min(image.width() - 2)];
+            let (squared, bin) = gradient(image, pixel[0], pixel[1]);
+            let length = squared.sqrt();
             let along = Vote::of(x, cell_px);
             for (dy, share_y) in down.share.iter().enumerate() {
                 for (dx, share_x) in along.share.iter().enumerate() {
                     let (y, x) = (down.cell + dy, along.cell + dx);
                     if (1..=rows).contains(&y) && (1..=cols).contains(&x) {
                         let cell = &mut all[(y - 1) * cols + x - 1];
-                        cell[gradients.bin[pixel] as usize] += share_x * share_y * length;
+                        cell[bin] += share_x * share_y * length;
                     }
                 }
             }

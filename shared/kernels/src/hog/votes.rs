@@ -1,0 +1,124 @@
+//! Votes of pixels for the cells around them.
+//!
+//! The centres of four neighbouring cells are the corners of a block of `cell_px x cell_px` pixels
+//! that vote for these four cells and no others. A block sums up its votes, one pixel after the
+//! other, with one vector of four shares per pixel; then every cell adds up what its four blocks
+//! have for it.
+
+use super::Vote;
+use crate::Planes;
+use crate::gradient::{N_ORIENTATIONS, gradients};
+
+/// Votes of one row of blocks.
+#[derive(Debug, Default)]
+pub(super) struct Votes {
+    cell_px: usize,
+    n_blocks: usize,
+    /// Shares of the pixels of a block, `[row][col]`, in the cells of its corners.
+    shares: Vec<[f32; 4]>,
+    /// Gradients of a row of pixels, from the first pixel of the first block; length 0 where no
+    /// pixel votes.
+    lengths: Vec<f32>,
+    bins: Vec<u32>,
+    /// Sums, `N_ORIENTATIONS x n_blocks`: upper left, upper right, lower left, lower right.
+    sums: Vec<[f32; 4]>,
+}
+
+impl Votes {
+    pub(super) fn prepare(&mut self, cell_px: usize, cols: usize) {
+        self.cell_px = cell_px;
+        self.n_blocks = cols + 1;
+        let first = cell_px / 2;
+        let pixels = (first..first + cell_px).map(|it| Vote::of(it, cell_px).share);
+        self.shares.clear();
+        for [up, down] in pixels.clone().map(|it| it.map(|it| it as f32)) {
+            for [left, right] in pixels.clone().map(|it| it.map(|it| it as f32)) {
+                self.shares
+                    .push([left * up, right * up, left * down, right * down]);
+            }
+        }
+        self.lengths.clear();
+        self.lengths.resize(self.n_blocks * cell_px, 0.0);
+        self.bins.clear();
+        self.bins.resize(self.n_blocks * cell_px, 0);
+        self.sums.clear();
+        self.sums.resize(N_ORIENTATIONS * self.n_blocks, [0.0; 4]);
+    }
+
+    /// Sums up the votes of the `block`th row of blocks, the first of which lies half outside.
+    #[inline(always)]
+    pub(super) fn count(&mut self, image: &Planes, block: usize, [rows, cols]: [usize; 2]) {
+        self.sums.fill([0.0; 4]);
+        let before = self.cell_px.div_ceil(2);
+        for row in 0..self.cell_px {
+            // Counted from `before` rows above the image.
+            let y = block * self.cell_px + row;
+            if y <= before || y > before + rows * self.cell_px - 2 {
+                continue;
+            }
+            if y - before <= image.height() - 2 {
+                self.take_gradients(image, y - before, cols);
+            }
+            self.add_row(row);
+        }
+    }
+
+    /// Gradients of row `y`; the last one inside the image stands for those that lie behind it.
+    #[inline(always)]
+    fn take_gradients(&mut self, image: &Planes, y: usize, cols: usize) {
+        let before = self.cell_px.div_ceil(2);
+        gradients(
+            image,
+            y,
+            &mut self.lengths[before + 1..],
+            &mut self.bins[before + 1..],
+        );
+        let inside = before + image.width() - 1;
+        let voting = before + cols * self.cell_px - 1;
+        let (length, bin) = (self.lengths[inside - 1], self.bins[inside - 1]);
+        if inside < voting {
+            self.lengths[inside..voting].fill(length);
+            self.bins[inside..voting].fill(bin);
+        }
+        self.lengths[voting..].fill(0.0);
+    }
+
+    #[inline(always)]
+    fn add_row(&mut self, row: usize) {
+        let n = self.cell_px;
+        let shares = &self.shares[row * n..][..n];
+        let blocks = self.lengths.chunks_exact(n).zip(self.bins.chunks_exact(n));
+        for (block, (lengths, bins)) in blocks.enumerate() {
+            for ((shares, length), bin) in shares.iter().zip(lengths).zip(bins) {
+                let sums = &mut self.sums[*bin as usize * self.n_blocks + block];
+                for (sum, share) in sums.iter_mut().zip(shares) {
+                    *sum += share * length;
+                }
+            }
+        }
+    }
+
+    /// Adds what the cells above this row of blocks get from it; `N_ORIENTATIONS x stride`.
+    #[inline(always)]
+    pub(super) fn add_upper(&self, cells: &mut [f32], stride: usize) {
+        let lines = cells.chunks_exact_mut(stride);
+        for (cells, sums) in lines.zip(self.sums.chunks_exact(self.n_blocks)) {
+            let pairs = sums.iter().zip(&sums[1..]);
+            for (cell, ([_, a, _, _], [b, _, _, _])) in cells.iter_mut().zip(pairs) {
+                *cell += a + b;
+            }
+        }
+    }
+
+    /// Puts what the cells below this row of blocks get from it; `N_ORIENTATIONS x stride`.
+    #[inline(always)]
+    pub(super) fn put_lower(&self, cells: &mut [f32], stride: usize) {
+        let lines = cells.chunks_exact_mut(stride);
+        for (cells, sums) in lines.zip(self.sums.chunks_exact(self.n_blocks)) {
+            let pairs = sums.iter().zip(&sums[1..]);
+            for (cell, ([_, _, _, a], [_, _, b, _])) in cells.iter_mut().zip(pairs) {
+                *cell = a + b;
+            }
+        }
+    }
+}
