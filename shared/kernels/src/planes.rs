@@ -83,6 +83,8 @@ pub struct ShrinkWorkspace {
     along: resize::Taps,
     /// A row after the vertical pass.
     line: Vec<f64>,
+    /// A row after both passes of [`resize`], colours together; the fourth has no meaning.
+    pixels: Vec<[f64; 4]>,
 }
 
 /// Makes `out` the area average of `image` at `[width, height]` pixels.

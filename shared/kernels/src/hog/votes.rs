@@ -87,13 +87,17 @@ impl Votes {
     fn add_row(&mut self, row: usize) {
         let n = self.cell_px;
         let shares = &self.shares[row * n..][..n];
+        if let Ok(shares) = shares.try_into() {
+            // The cell size of all published models, unrolled.
+            let (lengths, _) = self.lengths.as_chunks::<4>();
+            let (bins, _) = self.bins.as_chunks::<4>();
+            return add_blocks::<4>(shares, lengths, bins, &mut self.sums);
+        }
         let blocks = self.lengths.chunks_exact(n).zip(self.bins.chunks_exact(n));
         for (block, (lengths, bins)) in blocks.enumerate() {
             for ((shares, length), bin) in shares.iter().zip(lengths).zip(bins) {
                 let sums = &mut self.sums[*bin as usize * self.n_blocks + block];
-                for (sum, share) in sums.iter_mut().zip(shares) {
-                    *sum += share * length;
-                }
+                *sums = add_pixel(*sums, *shares, *length);
             }
         }
     }
@@ -121,4 +125,28 @@ impl Votes {
             }
         }
     }
+}
+
+#[inline(always)]
+fn add_blocks<const N: usize>(
+    shares: &[[f32; 4]; N],
+    lengths: &[[f32; N]],
+    bins: &[[u32; N]],
+    sums: &mut [[f32; 4]],
+) {
+    let n_blocks = lengths.len();
+    for (block, (lengths, bins)) in lengths.iter().zip(bins).enumerate() {
+        for at in 0..N {
+            let sums = &mut sums[bins[at] as usize * n_blocks + block];
+            *sums = add_pixel(*sums, shares[at], lengths[at]);
+        }
+    }
+}
+
+#[inline(always)]
+fn add_pixel(mut sums: [f32; 4], shares: [f32; 4], length: f32) -> [f32; 4] {
+    for corner in 0..4 {
+        sums[corner] += shares[corner] * length;
+    }
+    sums
 }

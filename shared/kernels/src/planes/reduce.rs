@@ -63,9 +63,8 @@ fn sum_along(line: &[f64], out: &mut [f64]) {
     out[0] = first(line[0], line[1], line[2]);
     // Output `x` begins two samples before sample `2 x`.
     let (pairs, _) = line.as_chunks::<2>();
-    let after = line[4..].iter().step_by(2);
-    let middle = pairs.iter().zip(&pairs[1..]).zip(after);
-    for (out, (([a, b], [c, d]), e)) in out[1..n_out - 1].iter_mut().zip(middle) {
+    let middle = pairs.iter().zip(&pairs[1..]).zip(&pairs[2..]);
+    for (out, (([a, b], [c, d]), [e, _])) in out[1..].iter_mut().zip(middle) {
         *out = inside([*a, *b, *c, *d, *e]);
     }
     if n_out > 2 && Border::of(n_out - 2, n_out, n_in) == Border::Folded {

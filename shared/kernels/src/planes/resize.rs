@@ -62,23 +62,30 @@ impl Body for Resize<'_> {
             workspace,
             out,
         } = self;
-        let ShrinkWorkspace { down, along, line } = workspace;
+        let ShrinkWorkspace {
+            down,
+            along,
+            line,
+            pixels,
+        } = workspace;
         down.cover(image.height(), out.height);
         along.cover(image.width(), out.width);
         let stride = 3 * image.width();
         line.clear();
         // The fourth sample of the last pixel is read and not used.
         line.resize(stride + 1, 0.0);
+        pixels.resize(out.width, [0.0; 4]);
         for y in 0..out.height {
             let rows = &image.data()[down.first[y] * stride..];
             let weights = &down.weights[y * down.n..][..down.n];
             sum_down(rows, weights, &mut line[..stride]);
             match along.n {
-                1 => sum_along::<1>(line, along, y, out),
-                2 => sum_along::<2>(line, along, y, out),
-                3 => sum_along::<3>(line, along, y, out),
-                _ => sum_many_along(line, along, y, out),
+                1 => sum_along::<1>(line, along, pixels),
+                2 => sum_along::<2>(line, along, pixels),
+                3 => sum_along::<3>(line, along, pixels),
+                _ => sum_many_along(line, along, pixels),
             }
+            split_colours(pixels, out.rows_mut(y));
         }
     }
 }
@@ -118,11 +125,9 @@ fn sum_down(rows: &[u8], weights: &[f64], out: &mut [f64]) {
 
 /// Weighted sums along one interleaved row of column sums; lanes are the colours of a pixel.
 #[inline(always)]
-fn sum_along<const N: usize>(line: &[f64], along: &Taps, y: usize, out: &mut Planes) {
-    let [red, green, blue] = out.rows_mut(y);
-    let targets = red.iter_mut().zip(green).zip(blue);
+fn sum_along<const N: usize>(line: &[f64], along: &Taps, out: &mut [[f64; 4]]) {
     let (weights, _) = along.weights.as_chunks::<N>();
-    for (((red, green), blue), (weights, &first)) in targets.zip(weights.iter().zip(&along.first)) {
+    for (out, (weights, &first)) in out.iter_mut().zip(weights.iter().zip(&along.first)) {
         let samples = &line[3 * first..][..=3 * N];
         let mut pixel = [0.0; 4];
         for (tap, weight) in weights.iter().enumerate() {
@@ -130,19 +135,29 @@ fn sum_along<const N: usize>(line: &[f64], along: &Taps, y: usize, out: &mut Pla
                 *sum += weight * samples[3 * tap + lane];
             }
         }
-        [*red, *green, *blue, _] = pixel;
+        *out = pixel;
+    }
+}
+
+#[inline(always)]
+fn split_colours(pixels: &[[f64; 4]], [red, green, blue]: [&mut [f64]; 3]) {
+    let targets = red.iter_mut().zip(green).zip(blue);
+    for (((red, green), blue), pixel) in targets.zip(pixels) {
+        [*red, *green, *blue, _] = *pixel;
     }
 }
 
 /// As [`sum_along`], for any number of taps.
 #[inline(always)]
-fn sum_many_along(line: &[f64], along: &Taps, y: usize, out: &mut Planes) {
-    for (colour, target) in out.rows_mut(y).into_iter().enumerate() {
-        let weights = along.weights.chunks_exact(along.n);
-        for (target, (weights, first)) in target.iter_mut().zip(weights.zip(&along.first)) {
-            let samples = line[3 * first + colour..].iter().step_by(3);
-            let taps = weights.iter().zip(samples);
-            *target = taps.fold(0.0, |sum, (weight, sample)| sum + weight * sample);
+fn sum_many_along(line: &[f64], along: &Taps, out: &mut [[f64; 4]]) {
+    let weights = along.weights.chunks_exact(along.n);
+    for (out, (weights, first)) in out.iter_mut().zip(weights.zip(&along.first)) {
+        let samples = line[3 * first..].windows(4).step_by(3);
+        *out = [0.0; 4];
+        for (weight, samples) in weights.iter().zip(samples) {
+            for (sum, sample) in out.iter_mut().zip(samples) {
+                *sum += weight * sample;
+            }
         }
     }
 }
