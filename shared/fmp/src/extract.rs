@@ -1,13 +1,11 @@
 //! From pixels to the responses of every filter on every level.
 
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use kernels::{
-    FeatureMap, FilterBank, HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace,
-    Template, hog, reduce, resize,
-};
-use rayon::prelude::*;
+use kernels::{FilterBank, Isa, Rgb8View, Template};
 
+use crate::features::{Features, Source};
 use crate::{Layout, Model};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
@@ -17,24 +15,7 @@ pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
     bank: FilterBank,
-    workspaces: Mutex<Vec<Workspace>>,
-}
-
-/// Images and features of one frame; one chain per level of the first octave.
-#[derive(Debug, Default)]
-struct Workspace {
-    chains: Vec<Chain>,
-}
-
-/// The levels that come from one resized image by halving it again and again.
-#[derive(Debug, Default)]
-struct Chain {
-    image: Planes,
-    halved: Planes,
-    shrink: ShrinkWorkspace,
-    hog: HogWorkspace,
-    /// Padded features of every level of the chain.
-    features: Vec<Vec<f32>>,
+    workspaces: Mutex<Vec<Features>>,
 }
 
 impl Extractor {
@@ -86,72 +67,62 @@ impl Extractor {
             "layout of this model"
         );
         assert!(out.len() >= layout.n_responses(), "one value per response");
-        let mut workspaces = lock(&self.workspaces);
-        let mut workspace = workspaces.pop().unwrap_or_default();
-        drop(workspaces);
-        self.compute_features(image, layout, &mut workspace);
-        self.correlate(layout, &workspace, out);
-        lock(&self.workspaces).push(workspace);
-    }
-
-    fn compute_features(&self, image: Rgb8View<'_>, layout: &Layout, workspace: &mut Workspace) {
         let spec = self.model.spec();
-        let shape = HogShape {
+        let source = Source {
+            isa: self.isa,
+            image,
+            layout,
+            interval: spec.interval,
             cell_px: spec.cell_px,
-            pad: layout.pad.map(|it| it + 1),
         };
-        let n_chains = spec.interval.min(layout.levels.len());
-        workspace.chains.resize_with(n_chains, Chain::default);
-        let fill = |(first, chain): (usize, &mut Chain)| {
-            let levels = layout.levels[first..].iter().step_by(spec.interval);
-            chain.features.resize_with(levels.len(), Vec::new);
-            for (octave, level) in levels.enumerate() {
-                if octave == 0 {
-                    let size = level.image_size;
-                    resize(self.isa, image, size, &mut chain.shrink, &mut chain.image);
-                } else {
-                    reduce(self.isa, &chain.image, &mut chain.shrink, &mut chain.halved);
-                    std::mem::swap(&mut chain.image, &mut chain.halved);
-                }
-                let features = &mut chain.features[octave];
-                features.resize(level.padded[0] * level.padded[1] * crate::N_CHANNELS, 0.0);
-                hog(self.isa, &chain.image, shape, &mut chain.hog, features);
-            }
+        let mut features = lock(&self.workspaces).pop().unwrap_or_default();
+        features.begin(&source);
+        let n_jobs = layout.levels.len() * self.bank.n_panels();
+        let out = &mut out[..layout.n_responses()];
+        if n_jobs > 0 {
+            self.correlate(&source, &features, 0..n_jobs, out);
+        }
+        lock(&self.workspaces).push(features);
+    }
+
+    /// Computes the responses of some jobs, a job being one panel on one level.
+    ///
+    /// * `out`: of these jobs only.
+    fn correlate(
+        &self,
+        source: &Source<'_>,
+        features: &Features,
+        jobs: Range<usize>,
+        out: &mut [f32],
+    ) {
+        if jobs.len() < 2 {
+            let (level, panel) = self.job(jobs.start);
+            let it = &source.layout.levels[level];
+            let map = features.of_level(source, level);
+            return self.bank.correlate(panel, map, [it.rows, it.cols], out);
+        }
+        let middle = jobs.start.midpoint(jobs.end);
+        let start = |job| {
+            let (level, panel) = self.job(job);
+            let it = &source.layout.levels[level];
+            it.offset + self.bank.filters(panel).start * it.rows * it.cols
         };
+        let (first, second) = out.split_at_mut(start(middle) - start(jobs.start));
+        let (before, after) = (jobs.start..middle, middle..jobs.end);
         if in_pool() {
-            workspace.chains.par_iter_mut().enumerate().for_each(fill);
+            rayon::join(
+                || self.correlate(source, features, before, first),
+                || self.correlate(source, features, after, second),
+            );
         } else {
-            workspace.chains.iter_mut().enumerate().for_each(fill);
+            self.correlate(source, features, before, first);
+            self.correlate(source, features, after, second);
         }
     }
 
-    fn correlate(&self, layout: &Layout, workspace: &Workspace, out: &mut [f32]) {
-        let interval = self.model.spec().interval;
-        let mut jobs = Vec::with_capacity(layout.levels.len() * self.bank.n_panels());
-        let mut rest = out;
-        for level in 0..layout.levels.len() {
-            let map = layout.levels[level].rows * layout.levels[level].cols;
-            for panel in 0..self.bank.n_panels() {
-                let (maps, after) = rest.split_at_mut(self.bank.filters(panel).len() * map);
-                jobs.push((level, panel, maps));
-                rest = after;
-            }
-        }
-        let run = |(level, panel, maps): (usize, usize, &mut [f32])| {
-            let it = &layout.levels[level];
-            let features = FeatureMap {
-                rows: it.padded[0],
-                cols: it.padded[1],
-                cells: &workspace.chains[level % interval].features[level / interval],
-            };
-            self.bank
-                .correlate(panel, features, [it.rows, it.cols], maps);
-        };
-        if in_pool() {
-            jobs.into_par_iter().for_each(run);
-        } else {
-            jobs.into_iter().for_each(run);
-        }
+    /// The level and the panel of a job.
+    fn job(&self, job: usize) -> (usize, usize) {
+        (job / self.bank.n_panels(), job % self.bank.n_panels())
     }
 }
 

@@ -9,6 +9,7 @@ pub mod files;
 pub mod reference;
 
 mod extract;
+mod features;
 mod layout;
 mod model;
 mod pose;

@@ -1,0 +1,79 @@
+//! From the second frame on the extractor asks for no memory. A test binary of its own, so that
+//! nobody else allocates meanwhile.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::alloc::System;
+use std::sync::Arc;
+
+use fmp::{Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec};
+use kernels::Rgb8View;
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+const SIZE: [usize; 2] = [90, 110];
+
+/// Thirty filters of two sizes on one part, ten levels per octave.
+fn model() -> Arc<Model> {
+    let filter = |side: usize| Filter {
+        rows: side,
+        cols: side,
+        weights: vec![0.1; side * side * N_CHANNELS],
+    };
+    let spec = ModelSpec {
+        name: "thirty filters".to_owned(),
+        parts: vec![PartSpec {
+            name: "root".to_owned(),
+            filter_of_type: (0..30).collect(),
+            edge: None,
+        }],
+        filters: [vec![filter(5); 15], vec![filter(4); 15]].concat(),
+        root_bias: 0.0,
+        interval: 10,
+        cell_px: 4,
+        threshold: 0.0,
+        mirror: None,
+    };
+    Arc::new(Model::new(spec).unwrap())
+}
+
+/// Allocations and reallocations of frames that come after the first two.
+fn allocations(n_frames: usize) -> usize {
+    let model = model();
+    let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();
+    let extractor = Extractor::new(model);
+    let frames: Vec<Vec<u8>> = (0..n_frames + 2)
+        .map(|seed| {
+            (0..3 * SIZE[0] * SIZE[1])
+                .map(|it| (it * it % (211 + seed)) as u8)
+                .collect()
+        })
+        .collect();
+    let mut values = vec![0.0; layout.n_responses()];
+    let mut respond = |frame: &[u8]| {
+        let image = Rgb8View::new(SIZE[0], SIZE[1], frame).unwrap();
+        extractor.responses(image, &layout, &mut values);
+    };
+    frames[..2].iter().for_each(|it| respond(it));
+    let region = Region::new(ALLOCATOR);
+    frames[2..].iter().for_each(|it| respond(it));
+    let change = region.change();
+    change.allocations + change.reallocations
+}
+
+/// One test, because two would run side by side.
+#[test]
+fn frames_after_the_first_ask_for_no_memory() {
+    assert_eq!(allocations(3), 0, "on one thread");
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(3)
+        .build()
+        .unwrap();
+    assert_eq!(pool.install(|| allocations(3)), 0, "in a pool");
+    // The counter counts.
+    let region = Region::new(ALLOCATOR);
+    let some = std::hint::black_box(vec![1_u8; 100]);
+    assert!(region.change().allocations > 0);
+    drop(some);
+}
