@@ -260,6 +260,19 @@ mod tests {
         assert!(half.data().iter().all(|it| (it - 77.0).abs() < 1e-9));
     }
 
+    /// Rows so long that some samples are covered by less than a thousandth, others by a little more.
+    #[test]
+    fn shares_about_a_thousandth_are_dropped_or_kept_as_in_the_readable_form() {
+        for (from, to) in [(2003, 2001), (2001, 1009), (1030, 1029)] {
+            let bytes = noise(from as u64, 3 * from);
+            let image = Rgb8View::new(from, 1, &bytes).unwrap();
+            let mut out = used();
+            let mut workspace = ShrinkWorkspace::default();
+            resize(Isa::best(), image, [to, 1], &mut workspace, &mut out);
+            assert!(out == resize_by_taps(image, [to, 1]), "{from} to {to}");
+        }
+    }
+
     #[test]
     fn the_same_size_copies_the_pixels() {
         let bytes = noise(3, 3 * 9 * 7);
