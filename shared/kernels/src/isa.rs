@@ -38,6 +38,17 @@ impl Isa {
         Self(Kind::Portable)
     }
 
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Kind::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => "avx-512",
+        }
+    }
+
     /// All of them, slowest first; for tests and comparisons.
     pub fn available() -> Vec<Self> {
         let mut all = vec![Self(Kind::Portable)];

@@ -15,6 +15,7 @@ mod gradient;
 mod hog;
 mod image;
 mod isa;
+mod peak;
 mod planes;
 mod spring;
 mod vote;
@@ -24,6 +25,7 @@ pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
+pub use peak::Peak;
 pub use planes::{
     Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize, resize_by_taps,
 };

@@ -1,0 +1,139 @@
+//! What every stage would take if it did nothing but its arithmetic, at the machine's peak.
+
+use fmp::{LevelLayout, N_CHANNELS, Springs};
+use kernels::{Isa, Peak};
+use serde::Serialize;
+
+use crate::clock::Clock;
+use crate::readable::Ranges;
+use crate::stages::Stage;
+use crate::workload::Workload;
+
+/// Milliseconds on one thread.
+pub(crate) struct Floors {
+    shrink: f64,
+    hog: f64,
+    filters: f64,
+    votes: f64,
+    /// What they were measured by.
+    pub(crate) peaks: Peaks,
+}
+
+/// Single values that one thread computes in a nanosecond.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Peaks {
+    pub(crate) isa: &'static str,
+    pub(crate) multiply_add: f64,
+    pub(crate) max_plus: f64,
+}
+
+impl Floors {
+    /// Counts operations, and measures the peaks beside the stages.
+    pub(crate) fn new(workload: &Workload, ranges: &Ranges, isa: Isa, quick: bool) -> Self {
+        let [multiply_add, max_plus] =
+            [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(it, isa, quick));
+        let peaks = Peaks {
+            isa: isa.name(),
+            multiply_add: multiply_add * 1e-6,
+            max_plus: max_plus * 1e-6,
+        };
+        Self {
+            peaks,
+            shrink: shrinking(workload) / multiply_add,
+            hog: describing(workload) / multiply_add,
+            filters: products(workload) / multiply_add,
+            votes: candidates(workload, ranges) / max_plus,
+        }
+    }
+
+    pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
+        let extract = self.shrink + self.hog + self.filters;
+        match stage {
+            Stage::Shrink => Some(self.shrink),
+            Stage::Hog => Some(self.hog),
+            Stage::Filters => Some(self.filters),
+            Stage::Extract => Some(extract),
+            Stage::Votes | Stage::Best | Stage::Iteration => Some(self.votes),
+            Stage::Frame => Some(extract + self.votes),
+            Stage::Backtrack => None,
+        }
+    }
+}
+
+/// Single values that one thread computes in a millisecond.
+fn per_ms(peak: Peak, isa: Isa, quick: bool) -> f64 {
+    let clock = Clock::new(1, quick);
+    let mut n = 0;
+    let times = clock.measure(|| n = peak.run(isa, if quick { 10 } else { 3000 }));
+    n as f64 / times.min
+}
+
+fn pixels(it: &LevelLayout) -> f64 {
+    (it.image_size[0] * it.image_size[1]) as f64
+}
+
+/// Multiplications and additions of resizing and halving, in halves of a double value.
+fn shrinking(workload: &Workload) -> f64 {
+    let [width, height] = workload.layout.image_size.map(|it| it as f64);
+    let level = |(at, it): (usize, &LevelLayout)| {
+        let [w, h] = it.image_size.map(|it| it as f64);
+        let taps = if at < workload.model.spec().interval {
+            let overlapped = |from: f64, to: f64| if from > to { from / to + 1.0 } else { 1.0 };
+            h * width * overlapped(height, h) + h * w * overlapped(width, w)
+        } else {
+            (2.0 + 1.0) * 5.0 * w * h
+        };
+        3.0 * taps * 2.0 * 2.0
+    };
+    workload.layout.levels.iter().enumerate().map(level).sum()
+}
+
+/// Per pixel the gradient in three planes and nine scalar products compared, in double; four
+/// shares. Per cell 27 values under four norms.
+fn describing(workload: &Workload) -> f64 {
+    let per_pixel = 2.0 * (3.0 * 9.0 + 9.0 * 7.0 + 10.0) + 4.0 * 2.0;
+    let cell = (workload.model.spec().cell_px as f64).powi(2);
+    let per_cell = 27.0 * 4.0 * 3.0;
+    let levels = workload.layout.levels.iter();
+    levels
+        .map(|it| pixels(it) * (per_pixel + per_cell / cell))
+        .sum()
+}
+
+/// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of 8 or 10
+/// cells a side multiplied point by point (without the transforms).
+fn products(workload: &Workload) -> f64 {
+    let per_cell = |side: usize| {
+        let tiled = [8, 10].into_iter().filter(|tile| *tile > side);
+        let tiled = tiled.map(|tile| (tile as f64 / (tile + 1 - side) as f64).powi(2));
+        tiled.fold((side * side) as f64, f64::min) * N_CHANNELS as f64
+    };
+    let filters = workload.model.spec().filters.iter();
+    let filters: f64 = filters.map(|it| per_cell(it.rows.max(it.cols))).sum();
+    let levels = workload.layout.levels.iter();
+    levels.map(|it| (it.rows * it.cols) as f64 * filters).sum()
+}
+
+/// Candidates of both passes of every transform in the window outside of which none can win, and
+/// of the choice among the child's types.
+fn candidates(workload: &Workload, ranges: &Ranges) -> f64 {
+    let window = |range: f64, quadratic: f64, side: usize| {
+        (2.0 * (range / quadratic).sqrt() + 1.0).min(side as f64)
+    };
+    let mut total = 0.0;
+    for it in &workload.layout.levels {
+        let cells = (it.rows * it.cols) as f64;
+        for (part, ranges) in workload.model.spec().parts.iter().zip(ranges) {
+            let Some(edge) = &part.edge else { continue };
+            let Springs::PerChildType(springs) = &edge.springs else {
+                continue;
+            };
+            for (spring, range) in springs.iter().zip(ranges) {
+                total += cells * window(*range, spring.w[0], it.cols);
+                total += cells * window(*range, spring.w[2], it.rows);
+            }
+            total += cells * (edge.bias.len() * springs.len()) as f64;
+        }
+    }
+    total
+}

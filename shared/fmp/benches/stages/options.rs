@@ -1,0 +1,77 @@
+//! What the caller asks for.
+
+use kernels::Isa;
+
+use crate::stages::Stage;
+
+/// See `scripts/bench --help`.
+#[derive(Debug, Default)]
+pub(crate) struct Options {
+    pub(crate) quick: bool,
+    pub(crate) json: bool,
+    pub(crate) record: bool,
+    /// Empty: all of them.
+    stages: Vec<String>,
+    images: Vec<String>,
+    isas: Vec<String>,
+    pub(crate) threads: Vec<usize>,
+    pub(crate) commit: String,
+}
+
+impl Options {
+    /// The text of the error says what is wrong.
+    pub(crate) fn parse(mut args: impl Iterator<Item = String>) -> Result<Self, String> {
+        let mut options = Self {
+            commit: "unknown".to_owned(),
+            ..Self::default()
+        };
+        while let Some(arg) = args.next() {
+            let mut value = || args.next().ok_or_else(|| format!("{arg} needs a value"));
+            match arg.as_str() {
+                "--test" => options.quick = true,
+                "--json" => options.json = true,
+                "--record" => options.record = true,
+                "--stage" => options.stages.push(value()?),
+                "--image" => options.images.push(value()?),
+                "--isa" => options.isas.push(value()?),
+                "--threads" => {
+                    let n = value()?.parse();
+                    options
+                        .threads
+                        .push(n.map_err(|it| format!("--threads: {it}"))?);
+                }
+                "--commit" => options.commit = value()?,
+                // What cargo adds of its own.
+                "--bench" => {}
+                other => return Err(format!("unknown option {other}: see scripts/bench --help")),
+            }
+        }
+        if options.threads.is_empty() {
+            let n = std::thread::available_parallelism().map_or(1, usize::from);
+            options.threads = if options.quick {
+                vec![1, 2]
+            } else {
+                vec![1, 2, n]
+            };
+            options.threads.dedup();
+        }
+        Ok(options)
+    }
+
+    pub(crate) fn wants_stage(&self, stage: Stage) -> bool {
+        let name = stage.name();
+        self.stages.is_empty() || self.stages.iter().any(|it| name.starts_with(it.as_str()))
+    }
+
+    pub(crate) fn wants_image(&self, name: &str) -> bool {
+        self.images.is_empty() || self.images.iter().any(|it| it == name)
+    }
+
+    /// The portable one is slow where it lacks the multiply-add, so it must be asked for.
+    pub(crate) fn wants_isa(&self, isa: Isa) -> bool {
+        if self.isas.is_empty() {
+            return self.quick || isa.name() != "portable" || Isa::available().len() == 1;
+        }
+        self.isas.iter().any(|it| it == isa.name())
+    }
+}

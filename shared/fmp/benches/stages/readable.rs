@@ -1,0 +1,99 @@
+//! What the readable reference takes, on one thread, and how wide the scores of the parts range.
+
+use std::hint::black_box;
+
+use fmp::{Model, Springs, reference};
+
+use crate::clock::Clock;
+use crate::stages::Stage;
+use crate::workload::Workload;
+
+/// Milliseconds of the reference, and what the floors need to know of the scores.
+pub(crate) struct Readable {
+    shrink: f64,
+    hog: f64,
+    filters: f64,
+    votes: f64,
+    pub(crate) ranges: Ranges,
+}
+
+/// Largest less smallest score of every part and type, votes of the part's children included, on
+/// one level.
+pub(crate) type Ranges = Vec<Vec<f64>>;
+
+impl Readable {
+    /// Runs it once. Filters and votes run on one level, the first of the second octave, and are
+    /// scaled up by its share of the cells.
+    pub(crate) fn measure(workload: &Workload) -> Self {
+        let Workload { model, layout, .. } = workload;
+        let clock = Clock::new(1, true);
+        let mut images = Vec::new();
+        let shrink = clock.measure(|| images = reference::pyramid(model, layout, workload.image()));
+        let mut features = Vec::new();
+        let hog = clock.measure(|| {
+            let maps = images
+                .iter()
+                .map(|it| reference::features(model, layout, it));
+            features = maps.collect();
+        });
+        let at = model.spec().interval.min(layout.levels.len() - 1);
+        let level = &layout.levels[at];
+        let size = [level.rows, level.cols];
+        let mut responses = Vec::new();
+        let filters =
+            clock.measure(|| responses = reference::responses(model, level, &features[at]));
+        let votes = clock.measure(|| drop(black_box(reference::solve(model, &responses, size))));
+        let cells = |it: &fmp::LevelLayout| (it.rows * it.cols) as f64;
+        let share = layout.levels.iter().map(cells).sum::<f64>() / cells(level);
+        Self {
+            shrink: shrink.min,
+            hog: hog.min,
+            filters: filters.min * share,
+            votes: votes.min * share,
+            ranges: ranges(model, &responses, size),
+        }
+    }
+
+    /// What the reference takes for a stage, if it has such a stage.
+    pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
+        let extract = self.shrink + self.hog + self.filters;
+        match stage {
+            Stage::Shrink => Some(self.shrink),
+            Stage::Hog => Some(self.hog),
+            Stage::Filters => Some(self.filters),
+            Stage::Extract => Some(extract),
+            Stage::Votes | Stage::Best => Some(self.votes),
+            Stage::Frame => Some(extract + self.votes),
+            Stage::Backtrack | Stage::Iteration => None,
+        }
+    }
+}
+
+fn ranges(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Ranges {
+    let parts = &model.spec().parts;
+    let own = |part: &fmp::PartSpec| {
+        let filters = part.filter_of_type.iter();
+        filters.map(|&it| responses[it].clone()).collect::<Vec<_>>()
+    };
+    let mut scores: Vec<_> = parts.iter().map(own).collect();
+    for part in (1..parts.len()).rev() {
+        let Some(edge) = &parts[part].edge else {
+            continue;
+        };
+        if matches!(edge.springs, Springs::PerTypePair(_)) {
+            continue;
+        }
+        let votes = reference::votes(edge, &scores[part], size);
+        for (scores, vote) in scores[edge.parent].iter_mut().zip(votes) {
+            for (score, vote) in scores.iter_mut().zip(vote.score) {
+                *score += vote;
+            }
+        }
+    }
+    let range = |plane: &Vec<f64>| {
+        let largest = plane.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        largest - plane.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let of_part = |planes: &Vec<Vec<f64>>| planes.iter().map(range).collect();
+    scores.iter().map(of_part).collect()
+}

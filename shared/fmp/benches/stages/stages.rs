@@ -1,0 +1,189 @@
+//! The stages, each on buffers that are there already.
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use fmp::{Extractor, Responses, Solver};
+use kernels::{HogShape, HogWorkspace, Isa, Planes, ShrinkWorkspace, hog, reduce, resize};
+use rayon::prelude::*;
+
+use crate::clock::Clock;
+use crate::options::Options;
+use crate::workload::{OtherView, Workload};
+
+/// Milliseconds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Times {
+    pub(crate) min: f64,
+    pub(crate) median: f64,
+}
+
+impl Times {
+    fn less(self, other: Self) -> Self {
+        Self {
+            min: (self.min - other.min).max(0.0),
+            median: (self.median - other.median).max(0.0),
+        }
+    }
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stage {
+    Shrink,
+    Hog,
+    Filters,
+    Extract,
+    Votes,
+    Backtrack,
+    Best,
+    Frame,
+    Iteration,
+}
+
+impl Stage {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Shrink => "resize+reduce",
+            Self::Hog => "hog",
+            Self::Filters => "filters",
+            Self::Extract => "responses",
+            Self::Votes => "votes",
+            Self::Backtrack => "backtrack",
+            Self::Best => "best",
+            Self::Frame => "frame",
+            Self::Iteration => "iteration",
+        }
+    }
+}
+
+/// One workload on one instruction set and a number of threads.
+pub(crate) struct Bench<'a> {
+    workload: &'a Workload,
+    isa: Isa,
+    extractor: Extractor,
+    solver: Solver,
+    levels: Vec<u16>,
+    pool: Option<rayon::ThreadPool>,
+}
+
+impl<'a> Bench<'a> {
+    pub(crate) fn new(workload: &'a Workload, isa: Isa, threads: usize) -> Self {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        Self {
+            extractor: Extractor::on(isa, Arc::clone(&workload.model)),
+            solver: Solver::on(isa, Arc::clone(&workload.model)),
+            levels: (0..workload.layout.levels.len() as u16).collect(),
+            pool: (threads > 1).then(|| pool.build().unwrap()),
+            workload,
+            isa,
+        }
+    }
+
+    /// Measures the stages that are wanted.
+    pub(crate) fn run(&self, clock: &Clock, options: &Options) -> Vec<(Stage, Times)> {
+        match &self.pool {
+            Some(pool) => pool.install(|| self.run_here(clock, options)),
+            None => self.run_here(clock, options),
+        }
+    }
+
+    fn run_here(&self, clock: &Clock, options: &Options) -> Vec<(Stage, Times)> {
+        let wants = |stages: &[Stage]| stages.iter().any(|it| options.wants_stage(*it));
+        let mut all = Vec::new();
+        let layout = &self.workload.layout;
+        let mut values = vec![0.0; layout.n_responses()];
+        let mut extract = || {
+            let image = self.workload.image();
+            self.extractor.responses(image, layout, &mut values);
+        };
+        if wants(&[Stage::Shrink, Stage::Hog, Stage::Filters]) {
+            all.push((Stage::Shrink, self.shrink(clock)));
+            all.push((Stage::Hog, self.hog(clock)));
+        }
+        if wants(&[Stage::Filters, Stage::Extract, Stage::Frame]) {
+            all.push((Stage::Extract, clock.measure(&mut extract)));
+        } else {
+            extract();
+        }
+        if let [(_, shrink), (_, hog), (_, extract)] = all[..] {
+            all.insert(2, (Stage::Filters, extract.less(shrink).less(hog)));
+        }
+        let evidence = Responses::new(layout, &values, &self.levels);
+        if wants(&[Stage::Votes, Stage::Backtrack, Stage::Best]) {
+            let votes = clock.measure(|| self.votes(&evidence));
+            let best = clock.measure(|| drop(black_box(self.solver.best(&evidence, None))));
+            all.push((Stage::Votes, votes));
+            all.push((Stage::Backtrack, best.less(votes)));
+            all.push((Stage::Best, best));
+        }
+        if wants(&[Stage::Iteration]) {
+            let view = OtherView::new(layout);
+            let fuse = || drop(black_box(self.solver.best(&evidence, Some(&view))));
+            all.push((Stage::Iteration, clock.measure(fuse)));
+        }
+        if wants(&[Stage::Frame]) {
+            let times = clock.measure(|| {
+                let image = self.workload.image();
+                self.extractor.responses(image, layout, &mut values);
+                let evidence = Responses::new(layout, &values, &self.levels);
+                black_box(self.solver.best(&evidence, None));
+            });
+            all.push((Stage::Frame, times));
+        }
+        all.retain(|it| options.wants_stage(it.0));
+        all
+    }
+
+    fn shrink(&self, clock: &Clock) -> Times {
+        let n_chains = self.workload.model.spec().interval;
+        let mut chains: Vec<_> = (0..n_chains.min(self.levels.len()))
+            .map(|first| (first, <[Planes; 2]>::default(), ShrinkWorkspace::default()))
+            .collect();
+        let shrink = |(first, [image, halved], workspace): &mut (usize, [Planes; 2], _)| {
+            let levels = self.workload.layout.levels[*first..].iter();
+            for (octave, level) in levels.step_by(n_chains).enumerate() {
+                if octave == 0 {
+                    let whole = self.workload.image();
+                    resize(self.isa, whole, level.image_size, workspace, image);
+                } else {
+                    reduce(self.isa, image, workspace, halved);
+                    std::mem::swap(image, halved);
+                }
+            }
+        };
+        clock.measure(|| match &self.pool {
+            Some(_) => chains.par_iter_mut().for_each(shrink),
+            None => chains.iter_mut().for_each(shrink),
+        })
+    }
+
+    fn hog(&self, clock: &Clock) -> Times {
+        let Workload { model, layout, .. } = self.workload;
+        let images = fmp::reference::pyramid(model, layout, self.workload.image());
+        let shape = HogShape {
+            cell_px: model.spec().cell_px,
+            pad: layout.pad.map(|it| it + 1),
+        };
+        let level = |(image, level): (Planes, &fmp::LevelLayout)| {
+            let n = level.padded[0] * level.padded[1] * fmp::N_CHANNELS;
+            (image, vec![0.0; n], HogWorkspace::default())
+        };
+        let mut levels: Vec<_> = images.into_iter().zip(&layout.levels).map(level).collect();
+        let describe = |(image, map, workspace): &mut (Planes, Vec<f32>, HogWorkspace)| {
+            hog(self.isa, image, shape, workspace, map);
+        };
+        clock.measure(|| match &self.pool {
+            Some(_) => levels.par_iter_mut().for_each(describe),
+            None => levels.iter_mut().for_each(describe),
+        })
+    }
+
+    fn votes(&self, evidence: &Responses<'_>) {
+        let vote = |&level: &u16| drop(black_box(self.solver.root_scores(evidence, level, None)));
+        match &self.pool {
+            Some(_) => self.levels.par_iter().for_each(vote),
+            None => self.levels.iter().for_each(vote),
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! What the machine could do at most, to hold the kernels against.
+
+use crate::dispatch::{Body, dispatch};
+use crate::isa::{Isa, Kind};
+
+/// A loop that does nothing but one kind of arithmetic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Peak {
+    /// `sum = sum a + b` in single precision: the filters.
+    MultiplyAdd,
+    /// `best = max(best, score + cost)` in single precision: the votes.
+    MaxPlus,
+}
+
+/// Sums or maxima that are under way at once, and share a value.
+const CHAINS: usize = 9;
+/// Values that a round goes through; they lie in the first cache.
+const VALUES: usize = 256;
+
+impl Peak {
+    /// Runs the loop, and returns the number of single values that it computed.
+    ///
+    /// Without a fused multiply-add in the instruction set the multiplication and the addition are
+    /// two operations, that are counted as one.
+    ///
+    /// * `rounds`: a microsecond each, or less.
+    pub fn run(self, isa: Isa, rounds: usize) -> u64 {
+        match isa.0 {
+            Kind::Portable => self.run_on::<4, false>(isa, rounds),
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => self.run_on::<8, true>(isa, rounds),
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => self.run_on::<16, true>(isa, rounds),
+        }
+    }
+
+    fn run_on<const LANES: usize, const FUSED: bool>(self, isa: Isa, rounds: usize) -> u64 {
+        match self {
+            Self::MultiplyAdd => {
+                dispatch(isa, MultiplyAdd::<LANES, FUSED> { rounds });
+            }
+            Self::MaxPlus => dispatch(isa, MaxPlus::<LANES> { rounds }),
+        }
+        (rounds * VALUES * CHAINS * LANES) as u64
+    }
+}
+
+struct MultiplyAdd<const LANES: usize, const FUSED: bool> {
+    rounds: usize,
+}
+
+impl<const LANES: usize, const FUSED: bool> Body for MultiplyAdd<LANES, FUSED> {
+    #[inline(always)]
+    fn run(self) {
+        let term = |sum: f32, value: f32, weight: f32| {
+            if FUSED {
+                value.mul_add(weight, sum)
+            } else {
+                sum + value * weight
+            }
+        };
+        rounds::<LANES>(self.rounds, 0.0, term);
+    }
+}
+
+struct MaxPlus<const LANES: usize> {
+    rounds: usize,
+}
+
+impl<const LANES: usize> Body for MaxPlus<LANES> {
+    #[inline(always)]
+    fn run(self) {
+        let larger = |best: f32, score: f32, cost: f32| {
+            let score = score + cost;
+            if score > best { score } else { best }
+        };
+        rounds::<LANES>(self.rounds, f32::NEG_INFINITY, larger);
+    }
+}
+
+/// Folds rows of values into one row per weight.
+#[inline(always)]
+fn rounds<const LANES: usize>(n: usize, start: f32, fold: impl Fn(f32, f32, f32) -> f32) {
+    let weights = std::hint::black_box([0.125_f32; CHAINS]);
+    let values = std::hint::black_box([[1.0_f32; LANES]; VALUES]);
+    for _ in 0..n {
+        let mut folded = [[start; LANES]; CHAINS];
+        for value in &values {
+            for (folded, weight) in folded.iter_mut().zip(weights) {
+                for (folded, value) in folded.iter_mut().zip(value) {
+                    *folded = fold(*folded, *value, weight);
+                }
+            }
+        }
+        std::hint::black_box(&folded);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_rounds_are_more_operations() {
+        for isa in Isa::available() {
+            for peak in [Peak::MultiplyAdd, Peak::MaxPlus] {
+                let [one, three] = [1, 3].map(|rounds| peak.run(isa, rounds));
+                assert!(one > 0 && three == 3 * one);
+            }
+        }
+    }
+}
