@@ -12,10 +12,12 @@ pub enum Peak {
     MaxPlus,
 }
 
-/// Sums or maxima that are under way at once, and share a value.
-const CHAINS: usize = 9;
-/// Values that a round goes through; they lie in the first cache.
-const VALUES: usize = 256;
+/// Values that share a weight, and weights that share a value: their product is the number of sums
+/// or maxima that are under way at once, and fits the registers of all instruction sets.
+const ROWS: usize = 5;
+const WEIGHTS: usize = 2;
+/// Steps of a round; its values lie in the first cache.
+const STEPS: usize = 50;
 
 impl Peak {
     /// Runs the loop, and returns the number of single values that it computed.
@@ -41,7 +43,7 @@ impl Peak {
             }
             Self::MaxPlus => dispatch(isa, MaxPlus::<LANES> { rounds }),
         }
-        (rounds * VALUES * CHAINS * LANES) as u64
+        (rounds * STEPS * ROWS * WEIGHTS * LANES) as u64
     }
 }
 
@@ -78,17 +80,19 @@ impl<const LANES: usize> Body for MaxPlus<LANES> {
     }
 }
 
-/// Folds rows of values into one row per weight.
+/// Folds rows of values into one row per weight and place of the row in a step.
 #[inline(always)]
 fn rounds<const LANES: usize>(n: usize, start: f32, fold: impl Fn(f32, f32, f32) -> f32) {
-    let weights = std::hint::black_box([0.125_f32; CHAINS]);
-    let values = std::hint::black_box([[1.0_f32; LANES]; VALUES]);
+    let weights = std::hint::black_box([0.125_f32; WEIGHTS]);
+    let values = std::hint::black_box([[[1.0_f32; LANES]; ROWS]; STEPS]);
     for _ in 0..n {
-        let mut folded = [[start; LANES]; CHAINS];
-        for value in &values {
-            for (folded, weight) in folded.iter_mut().zip(weights) {
-                for (folded, value) in folded.iter_mut().zip(value) {
-                    *folded = fold(*folded, *value, weight);
+        let mut folded = [[[start; LANES]; WEIGHTS]; ROWS];
+        for step in &values {
+            for (folded, value) in folded.iter_mut().zip(step) {
+                for (folded, weight) in folded.iter_mut().zip(weights) {
+                    for (folded, value) in folded.iter_mut().zip(value) {
+                        *folded = fold(*folded, *value, weight);
+                    }
                 }
             }
         }

@@ -64,7 +64,7 @@ impl Floors {
 fn per_ms(peak: Peak, isa: Isa, quick: bool) -> f64 {
     let clock = Clock::new(1, quick);
     let mut n = 0;
-    let times = clock.measure(|| n = peak.run(isa, if quick { 10 } else { 3000 }));
+    let times = clock.measure(|| n = peak.run(isa, if quick { 300 } else { 3000 }));
     n as f64 / times.min
 }
 

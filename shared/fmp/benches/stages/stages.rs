@@ -16,6 +16,8 @@ use crate::workload::{OtherView, Workload};
 pub(crate) struct Times {
     pub(crate) min: f64,
     pub(crate) median: f64,
+    /// Processor time of all threads, smallest.
+    pub(crate) cpu: f64,
 }
 
 impl Times {
@@ -23,6 +25,7 @@ impl Times {
         Self {
             min: (self.min - other.min).max(0.0),
             median: (self.median - other.median).max(0.0),
+            cpu: (self.cpu - other.cpu).max(0.0),
         }
     }
 }

@@ -30,6 +30,7 @@ pub(crate) struct Row {
     threads: usize,
     min_ms: f64,
     median_ms: f64,
+    cpu_ms: f64,
     floor_ms: Option<f64>,
     percent_of_floor: Option<f64>,
     times_readable: Option<f64>,
@@ -58,6 +59,7 @@ impl Row {
             threads,
             min_ms: times.min,
             median_ms: times.median,
+            cpu_ms: times.cpu,
             floor_ms: None,
             percent_of_floor: None,
             times_readable: None,
@@ -87,7 +89,7 @@ impl fmt::Display for Row {
         };
         write!(
             f,
-            "| {:7} | {:>6} | {:13} | {:8} | {:>7} | {:>8.3} | {:>8.3} | {:>8} | {:>10} | {:>10} | {:>9} | {:>5} |",
+            "| {:7} | {:>6} | {:13} | {:8} | {:>7} | {:>8.3} | {:>8.3} | {:>8.3} | {:>8} | {:>10} | {:>10} | {:>9} | {:>5} |",
             self.image,
             format!("{0}x{0}", self.filter),
             self.stage,
@@ -95,6 +97,7 @@ impl fmt::Display for Row {
             self.threads,
             self.min_ms,
             self.median_ms,
+            self.cpu_ms,
             shown(self.floor_ms, 3),
             shown(self.percent_of_floor, 0),
             shown(self.times_readable, 1),
@@ -133,10 +136,10 @@ impl Table {
     }
 
     pub(crate) fn head(&self) -> String {
-        let names = "| image   | filter | stage         | isa      | threads |   min ms |   median \
+        let names = "| image   | filter | stage         | isa      | threads |   min ms |   median |   cpu ms \
                      | floor ms | % of floor | x readable | x authors | x PBD |";
         format!(
-            "commit {}, {}\n\n{names}\n|---|---|---|---|---|---|---|---|---|---|---|---|",
+            "commit {}, {}\n\n{names}\n|---|---|---|---|---|---|---|---|---|---|---|---|---|",
             self.commit, self.machine
         )
     }
