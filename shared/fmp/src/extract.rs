@@ -76,7 +76,12 @@ impl Extractor {
             cell_px: spec.cell_px,
         };
         let mut features = lock(&self.workspaces).pop().unwrap_or_default();
-        features.begin(&source);
+        let n_threads = if in_pool() {
+            rayon::current_num_threads()
+        } else {
+            1
+        };
+        features.begin(&source, n_threads);
         let n_jobs = layout.levels.len() * self.bank.n_panels();
         let out = &mut out[..layout.n_responses()];
         if n_jobs > 0 {

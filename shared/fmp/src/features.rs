@@ -20,6 +20,15 @@ pub(crate) struct Source<'a> {
     pub(crate) cell_px: usize,
 }
 
+impl Source<'_> {
+    fn shape(&self) -> HogShape {
+        HogShape {
+            cell_px: self.cell_px,
+            pad: self.layout.pad.map(|it| it + 1),
+        }
+    }
+}
+
 /// Features of all levels, with the buffers that they are made in.
 ///
 /// The levels that come from one resized image by halving it again and again are a chain; chains
@@ -29,34 +38,45 @@ pub(crate) struct Source<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Features {
     chains: Vec<Chain>,
+    /// One per thread: the last one put back is the first one taken, and still in the cache.
+    arenas: Mutex<Vec<Arena>>,
 }
 
 #[derive(Debug, Default)]
 struct Chain {
-    buffers: Mutex<Buffers>,
     /// Padded features of every level of the chain.
-    maps: OnceLock<Vec<Vec<f32>>>,
+    maps: OnceLock<Maps>,
+    /// What they are made in.
+    spare: Mutex<Maps>,
 }
 
+type Maps = Vec<Vec<f32>>;
+
+/// What is needed while a chain is computed.
 #[derive(Debug, Default)]
-struct Buffers {
+struct Arena {
     image: Planes,
     halved: Planes,
     shrink: ShrinkWorkspace,
     hog: HogWorkspace,
-    /// What [`Chain::maps`] is made in.
-    maps: Vec<Vec<f32>>,
 }
 
 impl Features {
     /// Forgets the last image.
-    pub(crate) fn begin(&mut self, source: &Source<'_>) {
+    ///
+    /// * `n_threads`: how many will ask for features at once.
+    pub(crate) fn begin(&mut self, source: &Source<'_>, n_threads: usize) {
         let n_chains = source.interval.min(source.layout.levels.len());
         self.chains.resize_with(n_chains, Chain::default);
         for chain in &mut self.chains {
             if let Some(maps) = chain.maps.take() {
-                lock(&chain.buffers).maps = maps;
+                *lock(&chain.spare) = maps;
             }
+        }
+        let mut arenas = lock(&self.arenas);
+        arenas.resize_with(n_threads.min(n_chains), Arena::default);
+        for arena in arenas.iter_mut() {
+            arena.reserve(source);
         }
     }
 
@@ -64,9 +84,14 @@ impl Features {
     pub(crate) fn of_level(&self, source: &Source<'_>, level: usize) -> FeatureMap<'_> {
         let first = level % source.interval;
         let chain = &self.chains[first];
-        let maps = chain
-            .maps
-            .get_or_init(|| lock(&chain.buffers).fill(source, first));
+        let maps = chain.maps.get_or_init(|| {
+            let mut maps = std::mem::take(&mut *lock(&chain.spare));
+            let arena = lock(&self.arenas).pop();
+            let mut arena = arena.unwrap_or_default();
+            arena.fill(source, first, &mut maps);
+            lock(&self.arenas).push(arena);
+            maps
+        });
         let [rows, cols] = source.layout.levels[level].padded;
         FeatureMap {
             rows,
@@ -76,28 +101,32 @@ impl Features {
     }
 }
 
-impl Buffers {
+impl Arena {
+    /// Makes room for every chain, so that it does not matter which one comes here.
+    fn reserve(&mut self, source: &Source<'_>) {
+        let [width, height] = source.layout.image_size;
+        self.image.reserve(width, height);
+        self.halved.reserve(width.div_ceil(2), height.div_ceil(2));
+        self.shrink.reserve(width, height);
+        self.hog.reserve(width, height, source.shape());
+    }
+
     /// Features of the levels `first`, `first + interval` and so on.
-    fn fill(&mut self, source: &Source<'_>, first: usize) -> Vec<Vec<f32>> {
+    fn fill(&mut self, source: &Source<'_>, first: usize, maps: &mut Maps) {
         let Source { isa, layout, .. } = *source;
-        let shape = HogShape {
-            cell_px: source.cell_px,
-            pad: layout.pad.map(|it| it + 1),
-        };
         let levels = layout.levels[first..].iter().step_by(source.interval);
-        let mut maps = std::mem::take(&mut self.maps);
         maps.resize_with(levels.len(), Vec::new);
-        for (octave, (level, map)) in levels.zip(&mut maps).enumerate() {
+        // Images take turns in the two buffers, which keep their places for the next chain.
+        let (mut image, mut other) = (&mut self.image, &mut self.halved);
+        for (octave, (level, map)) in levels.zip(maps).enumerate() {
             if octave == 0 {
-                let size = level.image_size;
-                resize(isa, source.image, size, &mut self.shrink, &mut self.image);
+                resize(isa, source.image, level.image_size, &mut self.shrink, image);
             } else {
-                reduce(isa, &self.image, &mut self.shrink, &mut self.halved);
-                std::mem::swap(&mut self.image, &mut self.halved);
+                reduce(isa, image, &mut self.shrink, other);
+                std::mem::swap(&mut image, &mut other);
             }
             map.resize(level.padded[0] * level.padded[1] * crate::N_CHANNELS, 0.0);
-            hog(isa, &self.image, shape, &mut self.hog, map);
+            hog(isa, image, source.shape(), &mut self.hog, map);
         }
-        maps
     }
 }

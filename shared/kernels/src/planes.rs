@@ -55,6 +55,12 @@ impl Planes {
         &mut self.data[(plane * self.height + y) * self.width..][..self.width]
     }
 
+    /// Makes room for an image of this size.
+    pub fn reserve(&mut self, width: usize, height: usize) {
+        let n = 3 * width * height;
+        self.data.reserve_exact(n.saturating_sub(self.data.len()));
+    }
+
     /// Gives the image another size; samples are unspecified after it.
     fn reshape(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
@@ -85,6 +91,18 @@ pub struct ShrinkWorkspace {
     line: Vec<f64>,
     /// A row after both passes of [`resize`], colours together; the fourth has no meaning.
     pixels: Vec<[f64; 4]>,
+}
+
+impl ShrinkWorkspace {
+    /// Makes room for everything that can be made of an image of this size.
+    pub fn reserve(&mut self, width: usize, height: usize) {
+        self.down.reserve(height);
+        self.along.reserve(width);
+        self.line.clear();
+        self.line.reserve(3 * width + 1);
+        self.pixels.clear();
+        self.pixels.reserve(width);
+    }
 }
 
 /// Makes `out` the area average of `image` at `[width, height]` pixels.

@@ -1,7 +1,7 @@
 //! The stages, each on buffers that are there already.
 
 use std::hint::black_box;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use fmp::{Extractor, Responses, Solver};
 use kernels::{HogShape, HogWorkspace, Isa, Planes, ShrinkWorkspace, hog, reduce, resize};
@@ -60,6 +60,14 @@ impl Stage {
     }
 }
 
+/// What one thread needs for images and features.
+#[derive(Default)]
+struct Arena {
+    images: [Planes; 2],
+    shrink: ShrinkWorkspace,
+    hog: HogWorkspace,
+}
+
 /// One workload on one instruction set and a number of threads.
 pub(crate) struct Bench<'a> {
     workload: &'a Workload,
@@ -101,8 +109,9 @@ impl<'a> Bench<'a> {
             self.extractor.responses(image, layout, &mut values);
         };
         if wants(&[Stage::Shrink, Stage::Hog, Stage::Filters]) {
-            all.push((Stage::Shrink, self.shrink(clock)));
-            all.push((Stage::Hog, self.hog(clock)));
+            let shrink = self.images(clock, false);
+            all.push((Stage::Shrink, shrink));
+            all.push((Stage::Hog, self.images(clock, true).less(shrink)));
         }
         if wants(&[Stage::Filters, Stage::Extract, Stage::Frame]) {
             all.push((Stage::Extract, clock.measure(&mut extract)));
@@ -138,47 +147,57 @@ impl<'a> Bench<'a> {
         all
     }
 
-    fn shrink(&self, clock: &Clock) -> Times {
-        let n_chains = self.workload.model.spec().interval;
-        let mut chains: Vec<_> = (0..n_chains.min(self.levels.len()))
-            .map(|first| (first, <[Planes; 2]>::default(), ShrinkWorkspace::default()))
-            .collect();
-        let shrink = |(first, [image, halved], workspace): &mut (usize, [Planes; 2], _)| {
-            let levels = self.workload.layout.levels[*first..].iter();
-            for (octave, level) in levels.step_by(n_chains).enumerate() {
-                if octave == 0 {
-                    let whole = self.workload.image();
-                    resize(self.isa, whole, level.image_size, workspace, image);
-                } else {
-                    reduce(self.isa, image, workspace, halved);
-                    std::mem::swap(image, halved);
-                }
-            }
-        };
-        clock.measure(|| match &self.pool {
-            Some(_) => chains.par_iter_mut().for_each(shrink),
-            None => chains.iter_mut().for_each(shrink),
-        })
-    }
-
-    fn hog(&self, clock: &Clock) -> Times {
+    /// Images of all levels, and their features if they are wanted: level after level in the same
+    /// buffers, as the extractor does it.
+    fn images(&self, clock: &Clock, features: bool) -> Times {
         let Workload { model, layout, .. } = self.workload;
-        let images = fmp::reference::pyramid(model, layout, self.workload.image());
+        let interval = model.spec().interval;
         let shape = HogShape {
             cell_px: model.spec().cell_px,
             pad: layout.pad.map(|it| it + 1),
         };
-        let level = |(image, level): (Planes, &fmp::LevelLayout)| {
-            let n = level.padded[0] * level.padded[1] * fmp::N_CHANNELS;
-            (image, vec![0.0; n], HogWorkspace::default())
+        let n_threads = self
+            .pool
+            .as_ref()
+            .map_or(1, rayon::ThreadPool::current_num_threads);
+        let arenas: Vec<_> = (0..n_threads)
+            .map(|_| Mutex::new(Arena::default()))
+            .collect();
+        let maps = layout.levels.iter().map(|it| it.padded[0] * it.padded[1]);
+        let maps = maps.map(|it| Mutex::new(vec![0.0; it * fmp::N_CHANNELS]));
+        let maps: Vec<_> = maps.collect();
+        let chain = |first: usize| {
+            let mut arena = arenas[rayon::current_thread_index().unwrap_or(0)]
+                .lock()
+                .unwrap();
+            let Arena {
+                images: [image, halved],
+                shrink,
+                hog: workspace,
+            } = &mut *arena;
+            for level in (first..layout.levels.len()).step_by(interval) {
+                if level < interval {
+                    let size = layout.levels[level].image_size;
+                    resize(self.isa, self.workload.image(), size, shrink, image);
+                } else {
+                    reduce(self.isa, image, shrink, halved);
+                    std::mem::swap(image, halved);
+                }
+                if features {
+                    hog(
+                        self.isa,
+                        image,
+                        shape,
+                        workspace,
+                        &mut maps[level].lock().unwrap(),
+                    );
+                }
+            }
         };
-        let mut levels: Vec<_> = images.into_iter().zip(&layout.levels).map(level).collect();
-        let describe = |(image, map, workspace): &mut (Planes, Vec<f32>, HogWorkspace)| {
-            hog(self.isa, image, shape, workspace, map);
-        };
+        let n_chains = interval.min(layout.levels.len());
         clock.measure(|| match &self.pool {
-            Some(_) => levels.par_iter_mut().for_each(describe),
-            None => levels.iter_mut().for_each(describe),
+            Some(_) => (0..n_chains).into_par_iter().for_each(chain),
+            None => (0..n_chains).for_each(chain),
         })
     }
 

@@ -23,6 +23,13 @@ pub struct HogWorkspace {
 }
 
 impl HogWorkspace {
+    /// Makes room for images up to this size.
+    pub fn reserve(&mut self, width: usize, height: usize, shape: HogShape) {
+        let [_, cols] = shape.cells(width, height);
+        self.prepare(stride(cols));
+        self.votes.prepare(shape.cell_px, cols);
+    }
+
     fn prepare(&mut self, stride: usize) {
         let fit = |it: &mut Vec<f32>, n: usize| {
             it.clear();
@@ -35,6 +42,11 @@ impl HogWorkspace {
             fit(it, stride);
         }
     }
+}
+
+/// Length of a row of cells in memory: lanes that begin at the last cell still lie inside.
+fn stride(cols: usize) -> usize {
+    cols.next_multiple_of(LANES) + LANES
 }
 
 pub(super) struct Hog<'a> {
@@ -58,8 +70,7 @@ impl Body for Hog<'_> {
         let Some([inner_rows, inner_cols]) = shape.pad_map([rows, cols], map) else {
             return;
         };
-        // Lanes that begin at the last cell still lie inside of a row.
-        let stride = cols.next_multiple_of(LANES) + LANES;
+        let stride = stride(cols);
         workspace.prepare(stride);
         workspace.votes.prepare(shape.cell_px, cols);
         let map_cols = inner_cols + 2 * shape.pad[1];

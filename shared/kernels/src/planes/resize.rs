@@ -16,6 +16,14 @@ pub(super) struct Taps {
 }
 
 impl Taps {
+    pub(super) fn reserve(&mut self, from: usize) {
+        self.first.clear();
+        self.first.reserve(from);
+        // `(ceil(from / to) + 1) to` of them at most.
+        self.weights.clear();
+        self.weights.reserve(3 * from);
+    }
+
     /// Taps of an area average from `from` to `to` samples: those of the reference, in its order,
     /// with zeros before or after them.
     fn cover(&mut self, from: usize, to: usize) {
