@@ -23,7 +23,7 @@ pub(crate) struct Axis {
 }
 
 /// Cells by which a window is wider than exact arithmetic asks for; with the excess in
-/// [`spread`](crate::spread), rounding cannot make a candidate outside of it tie with the best inside.
+/// `Ends::spread`, rounding cannot make a candidate outside of it tie with the best inside.
 const SLACK: f64 = 1e-3;
 
 /// Where the children lie that can be best for a parent, on one axis.
@@ -105,6 +105,19 @@ impl Reach {
         first..((last + 1).clamp(0, n) as usize).max(first)
     }
 
+    /// The offsets at which one of the parents of a block can have its best child.
+    ///
+    /// Some of the others then have none there: an offset may lead beside the grid, but never
+    /// further than the block is long.
+    pub(crate) fn offsets(&self, block: Range<usize>) -> Range<isize> {
+        let (p, last) = (block.start, block.end - 1);
+        // From one parent to the next neither end of the window moves back, nor by more than one
+        // cell: the ends seen from the parent fall.
+        let first = self.window(last).start as isize - last as isize;
+        let end = self.window(p).end as isize - p as isize;
+        first..end.max(first)
+    }
+
     /// As above where the best place `centre` lies beside the grid.
     #[inline(never)]
     fn beside_the_grid(&self, centre: f64) -> (isize, isize) {
@@ -139,6 +152,27 @@ mod tests {
             for v in (0..n).filter(|v| !window.contains(v)) {
                 prop_assert!(score(v) + spread < most + 1e-4);
             }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_offsets_of_a_block_are_those_of_all_its_windows(
+            (n, first, len) in (1..60_usize).prop_flat_map(|n| (Just(n), 0..n, 1..17_usize)),
+            (quadratic, linear) in (0.005..0.5, -0.5..0.5),
+            anchor in -70..70_i32,
+            spread in prop_oneof![9 => 0.0..3.0_f32, 1 => Just(f32::INFINITY)],
+        ) {
+            let axis = Axis { quadratic, linear, anchor };
+            let (reach, block) = (axis.reach(n, spread), first..n.min(first + len));
+            let offsets = reach.offsets(block.clone());
+            for p in block.clone() {
+                let window = reach.window(p);
+                let window = window.start as isize - p as isize..window.end as isize - p as isize;
+                prop_assert!(offsets.start <= window.start && window.end <= offsets.end);
+            }
+            let [first, last] = [block.start, block.end - 1].map(|it| it as isize);
+            prop_assert!(offsets.start >= -last && offsets.end <= n as isize - first);
         }
     }
 

@@ -5,23 +5,37 @@
 //! transform looks at every candidate in a window outside of which none can win, instead of walking
 //! a lower envelope: cells are independent then, so lanes are cells.
 
+mod buffer;
+mod ends;
 mod fast;
+mod lanes;
+mod own;
 #[cfg(test)]
 mod reference;
+mod stretch;
 mod trace;
 
 use crate::isa::{Isa, Kind};
 use crate::spring::Spring;
 
+pub use buffer::ScoreBuffer;
 pub use fast::VoteWorkspace;
+pub use own::OwnScores;
 pub use trace::Found;
 
 /// Scores are kept in rows of a multiple of this many cells.
-pub const ROW_ALIGN: usize = 16;
+const ROW_ALIGN: usize = 16;
 
-/// The size of score planes: `types x rows x stride`, of which the first `cols` of a row count.
+/// Rows of a plane that are worked on together.
+const BLOCK: usize = 8;
+
+/// Rows of minus infinity between planes, so that a block may look beside the grid.
+const MARGIN: usize = BLOCK - 1;
+
+/// The size of score planes, and how they lie in memory: `margin, plane, margin, plane, .., margin`.
 ///
-/// The cells after them hold minus infinity.
+/// A plane has `rows` rows of a length that is rounded up, of which the first `cols` cells count.
+/// The other cells, and those of the margins, hold minus infinity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     /// Height, cells.
@@ -31,19 +45,34 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Length of a row in memory: `cols`, rounded up to [`ROW_ALIGN`].
+    /// Length of a row in memory.
     pub fn stride(&self) -> usize {
         self.cols.next_multiple_of(ROW_ALIGN)
     }
 
-    /// Length of a plane in memory.
-    pub fn plane(&self) -> usize {
-        self.rows * self.stride()
+    /// Length in memory of some planes, each with the margin before it.
+    pub fn len(&self, n_planes: usize) -> usize {
+        n_planes * (MARGIN + self.rows) * self.stride()
     }
 
-    /// Where a cell lies in its plane.
-    pub fn at(&self, y: usize, x: usize) -> usize {
-        y * self.stride() + x
+    /// Length in memory of the margin after the last plane.
+    pub fn margin(&self) -> usize {
+        MARGIN * self.stride()
+    }
+
+    /// Whether there are no cells.
+    pub fn is_empty(&self) -> bool {
+        self.rows == 0 || self.cols == 0
+    }
+
+    /// Where a cell of a plane lies in memory.
+    pub fn at(&self, plane: usize, y: usize, x: usize) -> usize {
+        (plane * (MARGIN + self.rows) + MARGIN + y) * self.stride() + x
+    }
+
+    /// The rows of one of some planes.
+    pub fn plane<'a>(&self, planes: &'a [f32], plane: usize) -> &'a [f32] {
+        &planes[self.at(plane, 0, 0)..][..self.rows * self.stride()]
     }
 }
 
@@ -52,9 +81,9 @@ impl Grid {
 pub struct ChildScores<'a> {
     /// Size of the planes.
     pub grid: Grid,
-    /// One plane per type; no NaN.
+    /// One plane per type and the margin after the last one; no NaN.
     pub planes: &'a [f32],
-    /// [`spread`] of every plane.
+    /// Spread of every plane, as [`OwnScores::write`] and [`VoteRule::cast`] return it.
     pub spreads: &'a [f32],
 }
 
@@ -103,7 +132,8 @@ impl VoteRule {
     /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
     /// where `s(p, v)` adds the vertical part of the spring first, then the horizontal one.
     ///
-    /// * `parent`: one plane per parent type.
+    /// * `parent`: one plane per parent type, without the margin after the last one; `spreads` gets
+    ///   the spread of each.
     ///
     /// # Panics
     ///
@@ -112,21 +142,19 @@ impl VoteRule {
         &self,
         isa: Isa,
         child: ChildScores<'_>,
-        parent: &mut [f32],
+        (parent, spreads): (&mut [f32], &mut [f32]),
         workspace: &mut VoteWorkspace,
     ) {
         self.check(child);
-        let grid = child.grid;
-        assert_eq!(
-            parent.len(),
-            self.choices.len() * grid.plane(),
-            "parent planes"
-        );
-        if grid.plane() == 0 {
+        let n_types = self.choices.len();
+        assert_eq!(parent.len(), child.grid.len(n_types), "parent planes");
+        assert_eq!(spreads.len(), n_types, "one spread per parent plane");
+        if child.grid.is_empty() {
             return;
         }
+        let parent = (parent, spreads);
         match isa.0 {
-            Kind::Portable => fast::cast(self, child, parent, workspace),
+            Kind::Portable => fast::cast::<[f32; 4]>(self, child, parent, workspace),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: an `Isa` of this kind only exists where AVX2 and FMA were detected.
             Kind::Avx2 => unsafe {
@@ -141,50 +169,14 @@ impl VoteRule {
     }
 
     fn check(&self, child: ChildScores<'_>) {
-        let size = child.grid.plane();
-        assert_eq!(
-            child.planes.len(),
-            self.n_child_types * size,
-            "child planes"
-        );
+        let size = child.grid.len(self.n_child_types) + child.grid.margin();
+        assert_eq!(child.planes.len(), size, "child planes");
         assert_eq!(
             child.spreads.len(),
             self.n_child_types,
             "one spread per child plane"
         );
     }
-}
-
-/// Largest difference between two scores of a plane, and a little more.
-///
-/// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision can
-/// add to or take from a difference. Infinite if some are minus infinity, NaN if all are: both ask for the whole plane to be searched.
-pub fn spread(grid: Grid, plane: &[f32]) -> f32 {
-    let (mut least, mut most) = ([f32::INFINITY; ROW_ALIGN], [f32::NEG_INFINITY; ROW_ALIGN]);
-    for row in plane.chunks_exact(grid.stride().max(1)) {
-        let (chunks, rest) = row[..grid.cols].as_chunks::<ROW_ALIGN>();
-        for chunk in chunks {
-            for lane in 0..ROW_ALIGN {
-                least[lane] = if chunk[lane] < least[lane] {
-                    chunk[lane]
-                } else {
-                    least[lane]
-                };
-                most[lane] = if chunk[lane] > most[lane] {
-                    chunk[lane]
-                } else {
-                    most[lane]
-                };
-            }
-        }
-        for (lane, &it) in rest.iter().enumerate() {
-            least[lane] = least[lane].min(it);
-            most[lane] = most[lane].max(it);
-        }
-    }
-    let most = most.into_iter().fold(f32::NEG_INFINITY, f32::max);
-    let least = least.into_iter().fold(f32::INFINITY, f32::min);
-    (most - least) + 1e-5 * (most.abs() + least.abs())
 }
 
 #[cfg(test)]

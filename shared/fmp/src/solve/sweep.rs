@@ -1,6 +1,6 @@
 //! All votes on one level, from the leaves to the root, and the way back.
 
-use kernels::{ChildScores, Grid, VoteWorkspace, spread};
+use kernels::{ChildScores, Grid, Isa, OwnScores, ScoreBuffer, VoteWorkspace};
 
 use super::{Extra, Root, Solver};
 use crate::{Model, Placement, Pose, Responses};
@@ -8,9 +8,10 @@ use crate::{Model, Placement, Pose, Responses};
 /// Score planes of one level, used again from level to level.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    /// One plane per part and type, part by part; their children's votes are added.
-    planes: Vec<f32>,
-    /// See [`kernels::spread`]; one per plane.
+    /// One plane per part and type, part by part, and the margin after the last one; their
+    /// children's votes are added.
+    planes: ScoreBuffer,
+    /// One per plane.
     spreads: Vec<f32>,
     /// Whether the part's own score has been written.
     begun: Vec<bool>,
@@ -36,11 +37,12 @@ struct Problem<'a> {
     extra: Option<&'a dyn Extra>,
     level: usize,
     grid: Grid,
+    isa: Isa,
 }
 
 impl<'a> Problem<'a> {
     fn new(
-        model: &'a Model,
+        solver: &'a Solver,
         evidence: &'a Responses<'a>,
         extra: Option<&'a dyn Extra>,
         level: u16,
@@ -48,7 +50,8 @@ impl<'a> Problem<'a> {
         let level = usize::from(level);
         let it = &evidence.layout().levels[level];
         Self {
-            model,
+            model: &solver.model,
+            isa: solver.isa,
             evidence,
             extra,
             level,
@@ -84,10 +87,12 @@ impl<'a> Sweep<'a> {
         workspace: &'a mut Workspace,
     ) -> Self {
         let model = &*solver.model;
-        let problem = Problem::new(model, evidence, extra, level);
+        let problem = Problem::new(solver, evidence, extra, level);
         let grid = problem.grid;
         let n_planes = first_plane(model, model.n_parts());
-        workspace.planes.resize(n_planes * grid.plane(), 0.0);
+        workspace.planes.resize(grid.len(n_planes) + grid.margin());
+        let margin = &mut workspace.planes.scores_mut()[grid.len(n_planes)..];
+        margin.fill(f32::NEG_INFINITY);
         workspace.spreads.resize(n_planes, 0.0);
         workspace.begun.clear();
         workspace.begun.resize(model.n_parts(), false);
@@ -96,23 +101,18 @@ impl<'a> Sweep<'a> {
             let edge = model.spec().parts[part].edge.as_ref();
             if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
                 workspace.begin(&problem, edge.parent);
-                let planes = first_plane(model, part)..first_plane(model, part + 1);
-                let (before, child) = workspace.planes.split_at_mut(planes.start * grid.plane());
-                let child = &child[..planes.len() * grid.plane()];
-                let spreads = &mut workspace.spreads[planes];
-                for (to, plane) in spreads
-                    .iter_mut()
-                    .zip(child.chunks_exact(grid.plane().max(1)))
-                {
-                    *to = spread(grid, plane);
-                }
+                let [of_parent, of_child] = [edge.parent, part]
+                    .map(|it| first_plane(model, it)..first_plane(model, it + 1));
+                let planes = workspace.planes.scores_mut();
+                let (before, child) = planes.split_at_mut(grid.len(of_child.start));
+                let (spreads, of_child_spreads) = workspace.spreads.split_at_mut(of_child.start);
                 let child = ChildScores {
                     grid,
-                    planes: child,
-                    spreads,
+                    planes: &child[..grid.len(of_child.len()) + grid.margin()],
+                    spreads: &of_child_spreads[..of_child.len()],
                 };
-                let first = first_plane(model, edge.parent) * grid.plane();
-                let parent = &mut before[first..][..model.n_types(edge.parent) * grid.plane()];
+                let parent = &mut before[grid.len(of_parent.start)..grid.len(of_parent.end)];
+                let parent = (parent, &mut spreads[of_parent]);
                 rule.cast(solver.isa, child, parent, &mut workspace.votes);
             }
         }
@@ -140,10 +140,10 @@ impl<'a> Sweep<'a> {
     pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
         let bias = self.solver.model.spec().root_bias as f32;
         let planes = self.planes(0);
+        let n_types = self.solver.model.n_types(0);
         let cells = (0..self.grid.rows).flat_map(|y| (0..self.grid.cols).map(move |x| (y, x)));
         cells.map(move |(y, x)| {
-            let of_type = planes.chunks_exact(self.grid.plane());
-            let scores = of_type.map(|plane| plane[self.grid.at(y, x)] + bias);
+            let scores = (0..n_types).map(|it| planes[self.grid.at(it, y, x)] + bias);
             let first = (0, f32::NEG_INFINITY);
             let (mixture, score) = scores
                 .enumerate()
@@ -186,10 +186,11 @@ impl<'a> Sweep<'a> {
         })
     }
 
+    /// The part's planes and the margin after them.
     fn planes(&self, part: usize) -> &[f32] {
         let model = &*self.solver.model;
-        let size = self.grid.plane();
-        &self.workspace.planes[first_plane(model, part) * size..][..model.n_types(part) * size]
+        let [first, end] = [part, part + 1].map(|it| self.grid.len(first_plane(model, it)));
+        &self.workspace.planes.scores()[first..end + self.grid.margin()]
     }
 }
 
@@ -201,27 +202,16 @@ impl Workspace {
         }
         let (model, grid) = (problem.model, problem.grid);
         let term = problem.position_term(part, &mut self.term);
-        let first = first_plane(model, part) * grid.plane();
-        let planes = self.planes[first..].chunks_exact_mut(grid.plane().max(1));
-        for (mixture, plane) in planes.take(model.n_types(part)).enumerate() {
-            let map = problem.responses(part, mixture);
-            let constant = problem.extra.map(|it| it.of_type(part, mixture));
-            let lines = plane.chunks_exact_mut(grid.stride());
-            for (y, (line, map)) in lines.zip(map.chunks_exact(grid.cols)).enumerate() {
-                let (line, padding) = line.split_at_mut(grid.cols);
-                padding.fill(f32::NEG_INFINITY);
-                line.copy_from_slice(map);
-                if let Some(term) = term {
-                    for (score, term) in line.iter_mut().zip(&term[y * grid.cols..]) {
-                        *score += term;
-                    }
-                }
-                if let Some(constant) = constant {
-                    for score in line {
-                        *score += constant;
-                    }
-                }
-            }
+        let first = first_plane(model, part);
+        for mixture in 0..model.n_types(part) {
+            let own = OwnScores {
+                map: problem.responses(part, mixture),
+                term,
+                constant: problem.extra.map(|it| it.of_type(part, mixture)),
+            };
+            let plane = first + mixture;
+            let scores = &mut self.planes.scores_mut()[grid.len(plane)..grid.len(plane + 1)];
+            self.spreads[plane] = own.write(problem.isa, grid, scores);
         }
     }
 }
@@ -234,7 +224,7 @@ pub(super) fn score(
     extra: Option<&dyn Extra>,
 ) -> f32 {
     let model = &*solver.model;
-    let problem = Problem::new(model, evidence, extra, pose.level);
+    let problem = Problem::new(solver, evidence, extra, pose.level);
     let grid = problem.grid;
     assert_eq!(pose.parts.len(), model.n_parts(), "a pose of this model");
     let mut buffer = Vec::new();

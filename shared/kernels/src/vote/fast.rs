@@ -1,93 +1,37 @@
-//! Lanes are cells of the parent; every lane looks at its candidates in the reference's order.
+//! Lanes are cells of the parent; every lane looks at its candidates in the order of their offsets.
 
-use std::ops::Range;
+use std::hint::black_box;
 
-use super::{ChildScores, Grid, ROW_ALIGN, VoteRule};
-use crate::spring::Axis;
+use super::buffer::ScoreBuffer;
+use super::ends::Ends;
+use super::lanes::Lanes;
+use super::stretch::Stretch;
+use super::{BLOCK, ChildScores, Grid, ROW_ALIGN, VoteRule};
 
 /// Buffers of [`VoteRule::cast`], used again from call to call.
 #[derive(Debug, Default)]
 pub struct VoteWorkspace {
     stretches: Vec<Stretch>,
-    /// A row after the vertical pass, with room for candidates that lie outside on both sides.
-    row: Vec<f32>,
-    /// A row of every transform.
-    transformed: Vec<f32>,
+    /// A block of rows after the vertical pass, with room for candidates beside the grid.
+    middle: ScoreBuffer,
+    /// A block of rows of every transform.
+    transformed: ScoreBuffer,
+    /// Of every plane of the parent.
+    ends: Vec<Ends>,
 }
 
-/// One transform on one grid.
-#[derive(Debug, Default, Clone)]
-struct Stretch {
-    /// The child's plane.
-    plane: usize,
-    /// All of the plane is minus infinity.
-    impossible: bool,
-    down: Offsets,
-    along: Offsets,
-    /// Children that the vertical pass tries, for every row.
-    windows: Vec<Range<usize>>,
-    /// Offsets that the horizontal pass tries, for every run of [`ROW_ALIGN`] cells.
-    runs: Vec<Range<isize>>,
-}
-
-/// What a spring adds at the offsets that are tried on any cell.
-#[derive(Debug, Default, Clone)]
-struct Offsets {
-    first: isize,
-    scores: Vec<f32>,
-}
-
-impl Offsets {
-    fn cover(&mut self, axis: Axis, offsets: Range<isize>) {
-        self.first = offsets.start;
-        self.scores.clear();
-        self.scores.extend(offsets.map(|it| axis.score(it)));
-    }
-
-    #[inline(always)]
-    fn of(&self, offsets: Range<isize>) -> &[f32] {
-        let start = (offsets.start - self.first) as usize;
-        &self.scores[start..][..(offsets.end - offsets.start) as usize]
-    }
-}
-
-fn union(a: Range<isize>, b: Range<isize>) -> Range<isize> {
-    a.start.min(b.start)..a.end.max(b.end)
-}
-
-impl Stretch {
-    fn prepare(&mut self, grid: Grid, (down, along): (Axis, Axis), spread: f32) {
-        self.impossible = spread.is_nan();
-        let offsets = |window: &Range<usize>, p: usize| {
-            window.start as isize - p as isize..window.end as isize - p as isize
-        };
-        let reach = down.reach(grid.rows, spread);
-        self.windows.clear();
-        self.windows.extend((0..grid.rows).map(|p| reach.window(p)));
-        let all = self.windows.iter().enumerate();
-        let all = all.map(|(p, window)| offsets(window, p));
-        self.down.cover(down, all.reduce(union).unwrap_or(0..0));
-        let reach = along.reach(grid.cols, spread);
-        self.runs.clear();
-        for first in (0..grid.cols).step_by(ROW_ALIGN) {
-            let cells = first..grid.cols.min(first + ROW_ALIGN);
-            let run = cells.map(|p| offsets(&reach.window(p), p));
-            self.runs.push(run.reduce(union).unwrap_or(0..0));
-        }
-        let all = self.runs.iter().cloned().reduce(union);
-        self.along.cover(along, all.unwrap_or(0..0));
-    }
-}
+/// The parent's planes and what becomes of their spreads.
+type Parent<'a> = (&'a mut [f32], &'a mut [f32]);
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 pub(super) fn avx2(
     rule: &VoteRule,
     child: ChildScores<'_>,
-    parent: &mut [f32],
+    parent: Parent<'_>,
     workspace: &mut VoteWorkspace,
 ) {
-    cast(rule, child, parent, workspace);
+    cast::<std::arch::x86_64::__m256>(rule, child, parent, workspace);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -95,112 +39,213 @@ pub(super) fn avx2(
 pub(super) fn avx512(
     rule: &VoteRule,
     child: ChildScores<'_>,
-    parent: &mut [f32],
+    parent: Parent<'_>,
     workspace: &mut VoteWorkspace,
 ) {
-    cast(rule, child, parent, workspace);
+    cast::<std::arch::x86_64::__m512>(rule, child, parent, workspace);
 }
 
 #[inline(always)]
-pub(super) fn cast(
+pub(super) fn cast<V: Lanes>(
     rule: &VoteRule,
     child: ChildScores<'_>,
-    parent: &mut [f32],
+    (parent, spreads): Parent<'_>,
     workspace: &mut VoteWorkspace,
 ) {
     let grid = child.grid;
-    let stride = grid.stride();
-    let VoteWorkspace {
-        stretches,
-        row,
-        transformed,
-    } = workspace;
-    stretches.resize_with(rule.springs.len(), Stretch::default);
-    for (stretch, (plane, spring)) in stretches.iter_mut().zip(&rule.springs) {
-        stretch.plane = *plane;
-        stretch.prepare(grid, (spring.y(), spring.x()), child.spreads[*plane]);
+    workspace.prepare(rule, child);
+    for first in (0..grid.rows).step_by(BLOCK) {
+        let work = Block {
+            rule,
+            child,
+            first,
+            n: BLOCK.min(grid.rows - first),
+        };
+        if work.n > BLOCK / 2 {
+            work.cast::<V, BLOCK>(parent, workspace);
+        } else {
+            work.cast::<V, { BLOCK / 2 }>(parent, workspace);
+        }
     }
-    // A run tries all offsets at which one of its cells has a candidate, so the others look at
-    // most one run past the ends of the row.
-    row.clear();
-    row.resize(stride + 2 * ROW_ALIGN, f32::NEG_INFINITY);
-    transformed.clear();
-    transformed.resize(stretches.len() * stride, f32::NEG_INFINITY);
-    for y in 0..grid.rows {
-        for (stretch, out) in stretches.iter().zip(transformed.chunks_exact_mut(stride)) {
-            if !stretch.impossible {
-                let plane = &child.planes[stretch.plane * grid.plane()..][..grid.plane()];
-                stretch_down(stretch, (plane, stride), y, &mut row[ROW_ALIGN..]);
-                stretch_along(stretch, row, out);
+    for (spread, ends) in spreads.iter_mut().zip(&workspace.ends) {
+        *spread = ends.spread();
+    }
+}
+
+impl VoteWorkspace {
+    #[inline(always)]
+    fn prepare(&mut self, rule: &VoteRule, child: ChildScores<'_>) {
+        let grid = child.grid;
+        let n_springs = rule.springs.len();
+        if self.stretches.len() < n_springs {
+            self.stretches.resize_with(n_springs, Stretch::default);
+        }
+        self.transformed.resize(n_springs * BLOCK * grid.stride());
+        let blocks = self.transformed.scores_mut();
+        let blocks = blocks.chunks_exact_mut(BLOCK * grid.stride());
+        let stretches = self.stretches.iter_mut().zip(blocks);
+        for ((stretch, block), (plane, spring)) in stretches.zip(&rule.springs) {
+            stretch.prepare(grid, *plane, spring, child.spreads[*plane]);
+            if stretch.impossible {
+                block.fill(f32::NEG_INFINITY);
             }
         }
-        let rows = parent.chunks_exact_mut(grid.plane());
-        for (choices, plane) in rule.choices.iter().zip(rows) {
-            add_best(choices, transformed, &mut plane[y * stride..][..stride]);
-        }
+        self.middle.resize(BLOCK * middle_stride(grid));
+        self.middle.scores_mut().fill(f32::NEG_INFINITY);
+        self.ends.clear();
+        self.ends.resize(rule.choices.len(), Ends::NONE);
     }
 }
 
-type Run = [f32; ROW_ALIGN];
+/// Length of a row between the passes: a run tries all offsets at which one of its cells has a
+/// candidate, so the others look at most one run past the ends of the row.
+fn middle_stride(grid: Grid) -> usize {
+    grid.stride() + 2 * ROW_ALIGN
+}
 
-const IMPOSSIBLE: Run = [f32::NEG_INFINITY; ROW_ALIGN];
+/// Some rows of the parent, all of which try the same offsets.
+#[derive(Clone, Copy)]
+struct Block<'a> {
+    rule: &'a VoteRule,
+    child: ChildScores<'a>,
+    first: usize,
+    /// Number of rows.
+    n: usize,
+}
 
-/// Replaces `best` by `score + constant` where that is larger.
-#[inline(always)]
-fn raise(best: &mut Run, score: &Run, constant: f32) {
-    for lane in 0..ROW_ALIGN {
-        let score = score[lane] + constant;
-        best[lane] = if score > best[lane] {
-            score
-        } else {
-            best[lane]
+impl Block<'_> {
+    /// Casts the votes for the block, computing `R` rows of which the last may not exist.
+    #[inline(always)]
+    fn cast<V: Lanes, const R: usize>(&self, parent: &mut [f32], workspace: &mut VoteWorkspace) {
+        let grid = self.child.grid;
+        let VoteWorkspace {
+            stretches,
+            middle,
+            transformed,
+            ends,
+        } = workspace;
+        let size = BLOCK * grid.stride();
+        let blocks = transformed.scores_mut().chunks_exact_mut(size);
+        for (stretch, out) in stretches.iter().zip(blocks) {
+            if !stretch.impossible {
+                self.stretch_down::<V, R>(stretch, middle.scores_mut());
+                self.stretch_along::<V, R>(stretch, middle.scores(), out);
+            }
+        }
+        let transformed = transformed.scores();
+        for (l, (choices, ends)) in self.rule.choices.iter().zip(ends).enumerate() {
+            let rows = &mut parent[grid.at(l, self.first, 0)..][..self.n * grid.stride()];
+            self.add_best::<V, R>(choices, transformed, (rows, ends));
+        }
+    }
+
+    #[inline(always)]
+    fn stretch_down<V: Lanes, const R: usize>(&self, stretch: &Stretch, middle: &mut [f32]) {
+        let grid = self.child.grid;
+        let stride = grid.stride();
+        let (offset, scores) = stretch.down.of_block(self.first / BLOCK);
+        let top = grid.at(stretch.plane, self.first, 0);
+        let top = top.wrapping_add_signed(offset * stride as isize);
+        let lines = &self.child.planes[top..][..(scores.len() + R - 1) * stride];
+        assert!(
+            grid.cols.next_multiple_of(V::N) <= stride,
+            "rows are padded"
+        );
+        let load = |row: usize, x: usize| {
+            debug_assert!(row + 1 < scores.len() + R && x < grid.cols, "a candidate");
+            // SAFETY: the row is one of `lines`, and a register that begins left of the grid's last
+            // column ends within the row.
+            unsafe { V::load_at(lines, row * stride + x) }
         };
+        let one = V::splat(black_box(1.0));
+        let (pairs, single) = scores.as_chunks::<2>();
+        for x in (0..grid.cols).step_by(V::N) {
+            let mut best = [V::splat(f32::NEG_INFINITY); R];
+            for (step, [score, next]) in pairs.iter().enumerate() {
+                let (score, next) = (V::splat(*score), V::splat(*next));
+                // A row holds the candidates of one parent at this offset, and of the parent before
+                // it at the next one.
+                let mut candidates = load(2 * step, x);
+                for (r, best) in best.iter_mut().enumerate() {
+                    *best = candidates.plus(one, score).max(*best);
+                    candidates = load(2 * step + r + 1, x);
+                    *best = candidates.plus(one, next).max(*best);
+                }
+            }
+            for score in single {
+                let score = V::splat(*score);
+                for (r, best) in best.iter_mut().enumerate() {
+                    let candidates = load(2 * pairs.len() + r, x);
+                    *best = candidates.plus(one, score).max(*best);
+                }
+            }
+            for (r, best) in best.into_iter().enumerate() {
+                best.store(&mut middle[r * middle_stride(grid) + ROW_ALIGN + x..]);
+            }
+        }
     }
-}
 
-#[inline(always)]
-fn stretch_down(stretch: &Stretch, (plane, stride): (&[f32], usize), y: usize, out: &mut [f32]) {
-    let window = stretch.windows[y].clone();
-    let offsets = window.start as isize - y as isize..window.end as isize - y as isize;
-    let scores = stretch.down.of(offsets);
-    let lines = &plane[window.start * stride..window.end * stride];
-    let (out, _) = out[..stride].as_chunks_mut::<ROW_ALIGN>();
-    for (run, out) in out.iter_mut().enumerate() {
-        let mut best = IMPOSSIBLE;
-        for (line, &score) in lines.chunks_exact(stride).zip(scores) {
-            let (line, _) = line.as_chunks::<ROW_ALIGN>();
-            raise(&mut best, &line[run], score);
+    #[inline(always)]
+    fn stretch_along<V: Lanes, const R: usize>(
+        &self,
+        stretch: &Stretch,
+        middle: &[f32],
+        out: &mut [f32],
+    ) {
+        let grid = self.child.grid;
+        let one = V::splat(black_box(1.0));
+        let stride = middle_stride(grid);
+        assert!(middle.len() >= R * stride, "R rows");
+        for x in (0..grid.cols).step_by(V::N) {
+            let (offset, scores) = stretch.along.of_block(x / ROW_ALIGN);
+            let first = (ROW_ALIGN + x).wrapping_add_signed(offset);
+            assert!(
+                first + scores.len() + V::N <= stride + 1,
+                "offsets end beside the grid"
+            );
+            let mut best = [V::splat(f32::NEG_INFINITY); R];
+            for (at, score) in scores.iter().enumerate() {
+                let score = V::splat(*score);
+                for (r, best) in best.iter_mut().enumerate() {
+                    // SAFETY: `middle` has R rows, and the assertion above keeps `at` inside of one.
+                    let candidates = unsafe { V::load_at(middle, r * stride + first + at) };
+                    *best = candidates.plus(one, score).max(*best);
+                }
+            }
+            for (r, best) in best.into_iter().enumerate() {
+                best.store(&mut out[r * grid.stride() + x..]);
+            }
         }
-        *out = best;
     }
-}
 
-#[inline(always)]
-fn stretch_along(stretch: &Stretch, row: &[f32], out: &mut [f32]) {
-    let (out, _) = out.as_chunks_mut::<ROW_ALIGN>();
-    for (run, (offsets, out)) in stretch.runs.iter().zip(out).enumerate() {
-        let first = (run * ROW_ALIGN + ROW_ALIGN).wrapping_add_signed(offsets.start);
-        let scores = stretch.along.of(offsets.clone());
-        let mut best = IMPOSSIBLE;
-        for (candidates, &score) in row[first..].array_windows::<ROW_ALIGN>().zip(scores) {
-            raise(&mut best, candidates, score);
+    #[inline(always)]
+    fn add_best<V: Lanes, const R: usize>(
+        &self,
+        choices: &[(usize, f32)],
+        transformed: &[f32],
+        (rows, ends): (&mut [f32], &mut Ends),
+    ) {
+        let grid = self.child.grid;
+        let stride = grid.stride();
+        let one = V::splat(black_box(1.0));
+        let mut seen = ends.load::<V>();
+        for x in (0..grid.cols).step_by(V::N) {
+            let mut best = [V::splat(f32::NEG_INFINITY); R];
+            for &(spring, bias) in choices {
+                let bias = V::splat(bias);
+                let block = &transformed[spring * BLOCK * stride..][..BLOCK * stride];
+                for (r, best) in best.iter_mut().enumerate() {
+                    let scores = V::load(&block[r * stride + x..]);
+                    *best = scores.plus(one, bias).max(*best);
+                }
+            }
+            for (best, row) in best.into_iter().zip(rows.chunks_exact_mut(stride)) {
+                let row = &mut row[x..];
+                let sum = V::load(row).plus(one, best);
+                sum.store(row);
+                seen = Ends::see(seen, sum, grid.cols - x);
+            }
         }
-        *out = best;
-    }
-}
-
-#[inline(always)]
-fn add_best(choices: &[(usize, f32)], transformed: &[f32], out: &mut [f32]) {
-    let stride = out.len();
-    let (out, _) = out.as_chunks_mut::<ROW_ALIGN>();
-    for (run, out) in out.iter_mut().enumerate() {
-        let mut best = IMPOSSIBLE;
-        for &(spring, bias) in choices {
-            let (line, _) = transformed[spring * stride..][..stride].as_chunks::<ROW_ALIGN>();
-            raise(&mut best, &line[run], bias);
-        }
-        for lane in 0..ROW_ALIGN {
-            out[lane] += best[lane];
-        }
+        ends.store(seen);
     }
 }

@@ -8,13 +8,7 @@ pub(super) fn cast(rule: &VoteRule, grid: Grid, child: &[f32], parent: &mut [f32
     let transformed: Vec<_> = rule
         .springs
         .iter()
-        .map(|(child_type, spring)| {
-            transform(
-                grid,
-                &child[child_type * grid.plane()..][..grid.plane()],
-                spring,
-            )
-        })
+        .map(|(child_type, spring)| transform(grid, (child, *child_type), spring))
         .collect();
     for (l, choices) in rule.choices.iter().enumerate() {
         for y in 0..grid.rows {
@@ -22,31 +16,34 @@ pub(super) fn cast(rule: &VoteRule, grid: Grid, child: &[f32], parent: &mut [f32
                 let vote = choices
                     .iter()
                     .fold(f32::NEG_INFINITY, |best, &(spring, bias)| {
-                        best.max(transformed[spring][grid.at(y, x)] + bias)
+                        best.max(transformed[spring][y * grid.cols + x] + bias)
                     });
-                parent[l * grid.plane() + grid.at(y, x)] += vote;
+                parent[grid.at(l, y, x)] += vote;
             }
         }
     }
 }
 
-/// The distance transform of one plane: down the columns, then along the rows.
-fn transform(grid: Grid, plane: &[f32], spring: &Spring) -> Vec<f32> {
-    let mut middle = vec![f32::NEG_INFINITY; grid.plane()];
+/// The distance transform of one plane, `rows x cols`: down the columns, then along the rows.
+fn transform(grid: Grid, (planes, plane): (&[f32], usize), spring: &Spring) -> Vec<f32> {
+    let mut middle = vec![f32::NEG_INFINITY; grid.rows * grid.cols];
     let mut out = middle.clone();
     for x in 0..grid.cols {
         for p in 0..grid.rows {
+            let best = &mut middle[p * grid.cols + x];
             for v in 0..grid.rows {
-                let score = plane[grid.at(v, x)] + spring.y().score(v as isize - p as isize);
-                middle[grid.at(p, x)] = score.max(middle[grid.at(p, x)]);
+                let score =
+                    planes[grid.at(plane, v, x)] + spring.y().score(v as isize - p as isize);
+                *best = score.max(*best);
             }
         }
     }
     for y in 0..grid.rows {
         for p in 0..grid.cols {
+            let best = &mut out[y * grid.cols + p];
             for v in 0..grid.cols {
-                let score = middle[grid.at(y, v)] + spring.x().score(v as isize - p as isize);
-                out[grid.at(y, p)] = score.max(out[grid.at(y, p)]);
+                let score = middle[y * grid.cols + v] + spring.x().score(v as isize - p as isize);
+                *best = score.max(*best);
             }
         }
     }

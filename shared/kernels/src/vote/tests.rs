@@ -16,8 +16,10 @@ struct Case {
 
 impl Case {
     fn spreads(&self) -> Vec<f32> {
-        let planes = self.child.chunks_exact(self.grid.plane().max(1));
-        planes.map(|it| spread(self.grid, it)).collect()
+        let planes = 0..self.child.len() / self.grid.len(1).max(1);
+        planes
+            .map(|it| spread(self.grid, &self.child, it))
+            .collect()
     }
 
     fn scores<'a>(&'a self, spreads: &'a [f32]) -> ChildScores<'a> {
@@ -28,22 +30,44 @@ impl Case {
         }
     }
 
-    fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> Vec<f32> {
+    /// The parent's planes and their spreads after the votes.
+    fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> (Vec<f32>, Vec<f32>) {
         let mut parent = self.parent.clone();
+        let mut of_parent = vec![-1.0; self.rule.choices.len()];
         let spreads = self.spreads();
+        let child = self.scores(&spreads);
         self.rule
-            .cast(isa, self.scores(&spreads), &mut parent, workspace);
-        parent
+            .cast(isa, child, (&mut parent, &mut of_parent), workspace);
+        (parent, of_parent)
     }
 
+    /// Planes in memory, without the margin after the last one.
     fn padded(grid: Grid, dense: &[f32]) -> Vec<f32> {
         let mut all = Vec::new();
-        for row in dense.chunks_exact(grid.cols) {
-            all.extend_from_slice(row);
-            all.resize(all.len() + grid.stride() - grid.cols, f32::NEG_INFINITY);
+        for plane in dense.chunks_exact(grid.rows * grid.cols) {
+            all.resize(all.len() + grid.margin(), f32::NEG_INFINITY);
+            for row in plane.chunks_exact(grid.cols) {
+                all.extend_from_slice(row);
+                all.resize(all.len() + grid.stride() - grid.cols, f32::NEG_INFINITY);
+            }
         }
         all
     }
+}
+
+/// The spread of a plane, by its definition.
+fn spread(grid: Grid, planes: &[f32], plane: usize) -> f32 {
+    let cells = (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| grid.at(plane, y, x)));
+    let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+    for cell in cells {
+        (least, most) = (least.min(planes[cell]), most.max(planes[cell]));
+    }
+    (most - least) + 1e-5 * (most.abs() + least.abs())
+}
+
+/// Equal, or both not a number.
+fn same(a: f32, b: f32) -> bool {
+    a == b || (a.is_nan() && b.is_nan())
 }
 
 fn springs() -> impl Strategy<Value = Spring> {
@@ -107,7 +131,7 @@ fn cases(
                             choices.collect(),
                         ),
                         grid,
-                        child: Case::padded(grid, &child),
+                        child: with_margin(grid, &child),
                         parent: Case::padded(grid, &parent),
                     }
                 },
@@ -124,7 +148,35 @@ proptest! {
         reference::cast(&case.rule, case.grid, &case.child, &mut want);
         let mut workspace = VoteWorkspace::default();
         for isa in Isa::available() {
-            prop_assert_eq!(&case.cast(isa, &mut workspace), &want, "{:?}", isa);
+            let (parent, spreads) = case.cast(isa, &mut workspace);
+            prop_assert_eq!(&parent, &want, "{:?}", isa);
+            for (l, it) in spreads.into_iter().enumerate() {
+                prop_assert!(same(it, spread(case.grid, &want, l)), "{:?}", isa);
+            }
+        }
+    }
+
+    #[test]
+    fn own_scores_are_sums_cell_by_cell(
+        (grid, map, term) in (1..12_usize, 1..40_usize).prop_flat_map(|(rows, cols)| {
+            let cells = rows * cols;
+            (Just(Grid { rows, cols }), vec(scores(), cells), vec(scores(), cells))
+        }),
+        with_term: bool,
+        constant in prop::option::of(scores()),
+    ) {
+        let sum = |cell: usize| {
+            let score = if with_term { map[cell] + term[cell] } else { map[cell] };
+            constant.map_or(score, |it| score + it)
+        };
+        let want: Vec<f32> = (0..map.len()).map(sum).collect();
+        let want = Case::padded(grid, &want);
+        let own = OwnScores { map: &map, term: with_term.then_some(&term), constant };
+        for isa in Isa::available() {
+            let mut plane = vec![f32::NAN; grid.len(1)];
+            let found = own.write(isa, grid, &mut plane);
+            prop_assert_eq!(&plane, &want, "{:?}", isa);
+            prop_assert!(same(found, spread(grid, &want, 0)), "{:?}", isa);
         }
     }
 
@@ -132,22 +184,22 @@ proptest! {
     fn a_workspace_remembers_nothing(a in cases(1..9, 1..40), b in cases(1..9, 1..40)) {
         let mut used = VoteWorkspace::default();
         a.cast(Isa::best(), &mut used);
-        let fresh = b.cast(Isa::best(), &mut VoteWorkspace::default());
-        prop_assert_eq!(b.cast(Isa::best(), &mut used), fresh);
+        let fresh = b.cast(Isa::best(), &mut VoteWorkspace::default()).0;
+        prop_assert_eq!(b.cast(Isa::best(), &mut used).0, fresh);
     }
 
     #[test]
     fn a_trace_finds_what_was_cast_and_the_first_of_equals(case in cases(1..12, 1..20)) {
-        let after = case.cast(Isa::best(), &mut VoteWorkspace::default());
+        let after = case.cast(Isa::best(), &mut VoteWorkspace::default()).0;
         let (grid, spreads) = (case.grid, case.spreads());
         for l in 0..case.rule.choices.len() {
             for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| (y, x))) {
-                let at = l * grid.plane() + grid.at(y, x);
+                let at = grid.at(l, y, x);
                 let found = case.rule.trace(case.scores(&spreads), l, [y, x]);
                 let vote = found.map_or(f32::NEG_INFINITY, |it| it.score);
                 prop_assert_eq!(case.parent[at] + vote, after[at]);
                 let Some(found) = found else { continue };
-                let score = case.child[found.child_type * grid.plane() + grid.at(found.y, found.x)];
+                let score = case.child[grid.at(found.child_type, found.y, found.x)];
                 let again = case.rule.vote(score, [l, found.child_type], [y, x], [found.y, found.x]);
                 prop_assert!(again >= found.score);
                 let first = first_by_hand(&case, l, [y, x]);
@@ -163,12 +215,12 @@ fn first_by_hand(case: &Case, l: usize, [y, x]: [usize; 2]) -> (usize, usize, us
     let mut best = (f32::NEG_INFINITY, (0, 0, 0));
     for &(spring, bias) in &rule.choices[l] {
         let (k, spring) = &rule.springs[spring];
-        let plane = &case.child[k * grid.plane()..][..grid.plane()];
         let mut of_plane = (f32::NEG_INFINITY, (0, 0, 0));
         for cx in 0..grid.cols {
             let mut of_column = (f32::NEG_INFINITY, 0);
             for cy in 0..grid.rows {
-                let score = plane[grid.at(cy, cx)] + spring.y().score(cy as isize - y as isize);
+                let score =
+                    case.child[grid.at(*k, cy, cx)] + spring.y().score(cy as isize - y as isize);
                 if score > of_column.0 {
                     of_column = (score, cy);
                 }
@@ -185,15 +237,11 @@ fn first_by_hand(case: &Case, l: usize, [y, x]: [usize; 2]) -> (usize, usize, us
     best.1
 }
 
-#[test]
-fn the_spread_leaves_the_row_padding_out() {
-    let grid = Grid { rows: 2, cols: 3 };
-    let plane = Case::padded(grid, &[1.0, 4.0, 2.0, -3.0, 0.0, 1.0]);
-    assert!((7.0..7.001).contains(&spread(grid, &plane)));
-    let grid = Grid { rows: 1, cols: 18 };
-    let mut row = [1.0; 18];
-    (row[5], row[17]) = (9.0, -2.0);
-    assert!((11.0..11.001).contains(&spread(grid, &Case::padded(grid, &row))));
+/// Planes in memory, with the margin after the last one.
+fn with_margin(grid: Grid, dense: &[f32]) -> Vec<f32> {
+    let mut all = Case::padded(grid, dense);
+    all.resize(all.len() + grid.margin(), f32::NEG_INFINITY);
+    all
 }
 
 #[test]
@@ -203,17 +251,16 @@ fn an_impossible_child_makes_its_parent_impossible() {
         w: [0.1, 0.0, 0.1, 0.0],
         anchor: [0, 0],
     };
-    let rule = VoteRule::new(1, vec![(0, spring)], vec![vec![(0, 0.5)]]);
-    let child = vec![f32::NEG_INFINITY; grid.plane()];
-    let mut parent = Case::padded(grid, &[1.0; 6]);
-    let spreads = [spread(grid, &child)];
-    let mut workspace = VoteWorkspace::default();
-    let scores = ChildScores {
+    let case = Case {
+        rule: VoteRule::new(1, vec![(0, spring)], vec![vec![(0, 0.5)]]),
         grid,
-        planes: &child,
-        spreads: &spreads,
+        child: with_margin(grid, &[f32::NEG_INFINITY; 6]),
+        parent: Case::padded(grid, &[1.0; 6]),
     };
-    rule.cast(Isa::best(), scores, &mut parent, &mut workspace);
+    let mut workspace = VoteWorkspace::default();
+    let (parent, spreads) = case.cast(Isa::best(), &mut workspace);
     assert!(parent.iter().all(|&it| it == f32::NEG_INFINITY));
-    assert_eq!(rule.trace(scores, 0, [1, 1]), None);
+    assert!(spreads[0].is_nan());
+    let spreads = case.spreads();
+    assert_eq!(case.rule.trace(case.scores(&spreads), 0, [1, 1]), None);
 }

@@ -41,7 +41,7 @@ impl VoteRule {
         let mut best: Option<Found> = None;
         for &(spring, bias) in &self.choices[parent_type] {
             let (child_type, spring) = &self.springs[spring];
-            let plane = &child.planes[child_type * grid.plane()..][..grid.plane()];
+            let plane = (child.planes, *child_type);
             let Some((score, [y, x])) =
                 best_child(grid, plane, spring, child.spreads[*child_type], at)
             else {
@@ -87,7 +87,7 @@ impl VoteRule {
 /// The best child of one plane for a parent at `at`, and its `[row, column]`.
 fn best_child(
     grid: Grid,
-    plane: &[f32],
+    (planes, plane): (&[f32], usize),
     spring: &Spring,
     spread: f32,
     at: [usize; 2],
@@ -99,7 +99,8 @@ fn best_child(
     for x in cols {
         let (mut column, mut row) = (f32::NEG_INFINITY, 0);
         for y in rows.clone() {
-            let score = plane[grid.at(y, x)] + spring.y().score(y as isize - at[0] as isize);
+            let score =
+                planes[grid.at(plane, y, x)] + spring.y().score(y as isize - at[0] as isize);
             if score > column {
                 (column, row) = (score, y);
             }

@@ -1,0 +1,56 @@
+//! The least and the largest score of a plane, kept while it is written.
+
+use super::ROW_ALIGN;
+use super::lanes::Lanes;
+
+/// Least and largest score seen, lane by lane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ends {
+    least: [f32; ROW_ALIGN],
+    most: [f32; ROW_ALIGN],
+}
+
+impl Ends {
+    /// Nothing has been seen.
+    pub(super) const NONE: Self = Self {
+        least: [f32::INFINITY; ROW_ALIGN],
+        most: [f32::NEG_INFINITY; ROW_ALIGN],
+    };
+
+    #[inline(always)]
+    pub(super) fn load<V: Lanes>(&self) -> [V; 2] {
+        [V::load(&self.least), V::load(&self.most)]
+    }
+
+    #[inline(always)]
+    pub(super) fn store<V: Lanes>(&mut self, [least, most]: [V; 2]) {
+        least.store(&mut self.least);
+        most.store(&mut self.most);
+    }
+
+    /// Adds the scores of the first `n` lanes, the others holding minus infinity.
+    #[inline(always)]
+    pub(super) fn see<V: Lanes>([least, most]: [V; 2], scores: V, n: usize) -> [V; 2] {
+        let counted = if n < V::N {
+            scores.first(n, V::splat(f32::INFINITY))
+        } else {
+            scores
+        };
+        [counted.min(least), scores.max(most)]
+    }
+
+    /// Largest difference between two scores, and a little more.
+    ///
+    /// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision
+    /// can add to or take from a difference. Infinite if some are minus infinity, NaN if all are:
+    /// both ask for the whole plane to be searched.
+    #[inline(always)]
+    pub(super) fn spread(&self) -> f32 {
+        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        for lane in 0..ROW_ALIGN {
+            least = least.min(self.least[lane]);
+            most = most.max(self.most[lane]);
+        }
+        (most - least) + 1e-5 * (most.abs() + least.abs())
+    }
+}
