@@ -21,7 +21,7 @@ pub use layout::{ImageTooSmall, Layout, LevelLayout};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 pub use pose::{Placement, Pose};
 pub use responses::Responses;
-pub use solve::{CandidateSettings, Extra, Solver};
+pub use solve::{Again, Bounds, CandidateSettings, Extra, Solver};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
 /// texture energies, 1 that is set in the padding only.

@@ -1,6 +1,6 @@
 //! What every filter answers at every cell: the evidence of one image.
 
-use crate::Layout;
+use crate::{Bounds, Layout};
 
 /// Responses of all filters on the levels that are offered.
 ///
@@ -10,6 +10,7 @@ pub struct Responses<'a> {
     layout: &'a Layout,
     values: &'a [f32],
     levels: &'a [u16],
+    bounds: Option<&'a Bounds>,
 }
 
 impl<'a> Responses<'a> {
@@ -33,7 +34,32 @@ impl<'a> Responses<'a> {
             layout,
             values,
             levels,
+            bounds: None,
         }
+    }
+
+    /// The same, with what [`Solver::bounds`](crate::Solver::bounds) says of them: whoever needs the
+    /// bounds then takes these instead of computing them.
+    ///
+    /// # Panics
+    ///
+    /// If the bounds are another layout's.
+    #[must_use]
+    pub fn with_bounds(self, bounds: &'a Bounds) -> Self {
+        assert_eq!(
+            bounds.n_levels(),
+            self.layout.levels.len(),
+            "bounds of this layout"
+        );
+        Self {
+            bounds: Some(bounds),
+            ..self
+        }
+    }
+
+    /// The bounds that came with the responses.
+    pub fn bounds(&self) -> Option<&'a Bounds> {
+        self.bounds
     }
 
     /// Where the cells lie.

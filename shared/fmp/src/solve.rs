@@ -1,29 +1,49 @@
 //! The exact solution of the tree: votes from the leaves to the root, then back.
 
+mod again;
+mod bounds;
 mod distinct;
 mod suppress;
 mod sweep;
 
-use std::sync::{Arc, Mutex};
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use kernels::{Isa, VoteRule};
 use rayon::prelude::*;
 
-use self::sweep::{Sweep, Workspace};
+use self::sweep::{Problem, Sweep, Workspace};
 use crate::extract::{in_pool, lock};
 use crate::{Edge, Model, Pose, Responses, Spring, Springs};
+pub use again::Again;
+pub use bounds::Bounds;
 
 /// Terms that another view adds to the score of a part (the `xi` and `lambda` of eq. 3).
 ///
 /// Both are optional per part; a part without them is scored by this view alone.
 pub trait Extra: Sync {
-    /// Adds this part's position term to `score`, `rows x cols` of the level, the same for every type.
+    /// Adds this part's position term to the scores of some cells, the same for every type.
     ///
     /// Returns `false`, and leaves `score` alone, if the part has none.
-    fn add_position(&self, part: usize, level: usize, score: &mut [f32]) -> bool;
+    ///
+    /// * `score`: of the cells of the level from `first` on, in row-major order. The term of a cell
+    ///   does not depend on which others are asked for.
+    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool;
 
     /// Score added to every placement of this type of the part.
     fn of_type(&self, part: usize, mixture: usize) -> f32;
+
+    /// An upper bound of what both terms together can add to any placement of the part: what lets
+    /// [`Again`] leave levels out. Infinite where none is known.
+    fn max_gain(&self, _part: usize) -> f32 {
+        f32::INFINITY
+    }
+
+    /// What the part's terms depend on, besides what stays the same during the life of an [`Again`]:
+    /// equal keys mean equal terms. `None` where they may always be others.
+    fn key(&self, _part: usize) -> Option<u64> {
+        None
+    }
 }
 
 /// Which placements [`Solver::candidates`] returns.
@@ -52,7 +72,11 @@ pub struct Solver {
     isa: Isa,
     /// How every part votes; `None` for the root.
     rules: Vec<Option<VoteRule>>,
+    /// Number of score planes before those of every part, and of all.
+    first_planes: Vec<usize>,
     workspaces: Mutex<Vec<Workspace>>,
+    /// One list of part scores for every caller of [`Self::score`].
+    scores: Mutex<Vec<Vec<f32>>>,
 }
 
 /// A placement of the root and the score of the best tree that hangs on it.
@@ -77,11 +101,17 @@ impl Solver {
             let edge = model.spec().parts[part].edge.as_ref()?;
             Some(rule(edge, model.n_types(edge.parent), model.n_types(part)))
         };
+        let mut first_planes = vec![0];
+        for part in 0..model.n_parts() {
+            first_planes.push(first_planes[part] + model.n_types(part));
+        }
         Self {
             rules: (0..model.n_parts()).map(rule_of).collect(),
+            first_planes,
             isa,
             model,
             workspaces: Mutex::default(),
+            scores: Mutex::default(),
         }
     }
 
@@ -115,22 +145,25 @@ impl Solver {
         levels: &[u16],
         extra: Option<&dyn Extra>,
     ) -> Option<Pose> {
-        let highest = Mutex::new(f32::NEG_INFINITY);
-        let poses = self.sweep_levels(evidence, levels, extra, |sweep| {
-            let root = sweep.best_root()?;
-            let mut highest = lock(&highest);
-            if root.score < *highest {
-                return None;
-            }
-            *highest = root.score;
-            drop(highest);
-            sweep.backtrack(root)
-        });
-        let better = |a: Pose, b: Pose| {
-            let wins = b.score > a.score || (b.score == a.score && b.level < a.level);
-            if wins { b } else { a }
+        self.check(evidence);
+        let search = Search {
+            solver: self,
+            evidence,
+            extra,
+            best: Mutex::new(None),
         };
-        poses.into_iter().flatten().reduce(better)
+        let run = |&level: &u16| {
+            if evidence.levels().binary_search(&level).is_ok() {
+                let bytes = Problem::new(self, evidence, extra, level).bytes();
+                search.look_at(level, self.workspace(bytes), &|_, it| self.put_back(it));
+            }
+        };
+        if in_pool() {
+            levels.par_iter().for_each(run);
+        } else {
+            levels.iter().for_each(run);
+        }
+        search.finish(&|_, it| self.put_back(it))
     }
 
     /// The score of the best tree at every cell of the root, `rows x cols` of the level.
@@ -160,7 +193,37 @@ impl Solver {
     /// If the evidence is another model's, or the pose does not lie on its level.
     pub fn score(&self, evidence: &Responses<'_>, pose: &Pose, extra: Option<&dyn Extra>) -> f32 {
         self.check(evidence);
-        sweep::score(self, evidence, pose, extra)
+        let problem = Problem::new(self, evidence, extra, pose.level);
+        let mut scores = lock(&self.scores).pop().unwrap_or_default();
+        let score = sweep::score(&problem, pose, &mut scores);
+        lock(&self.scores).push(scores);
+        score
+    }
+
+    /// The planes of a part.
+    fn planes(&self, part: usize) -> Range<usize> {
+        self.first_planes[part]..self.first_planes[part + 1]
+    }
+
+    fn root_bias(&self) -> f32 {
+        self.model.spec().root_bias as f32
+    }
+
+    /// A workspace that fits `bytes` of planes as closely as any that is there, or the largest.
+    fn workspace(&self, bytes: usize) -> Workspace {
+        let mut pool = lock(&self.workspaces);
+        let fit = |it: &Workspace| {
+            let held = it.bytes();
+            (held < bytes, held.abs_diff(bytes))
+        };
+        let closest = (0..pool.len()).min_by_key(|&it| fit(&pool[it]));
+        let mut found = closest.map_or_else(Workspace::default, |it| pool.swap_remove(it));
+        found.forget();
+        found
+    }
+
+    fn put_back(&self, workspace: Workspace) {
+        lock(&self.workspaces).push(workspace);
     }
 
     fn check(&self, evidence: &Responses<'_>) {
@@ -182,9 +245,10 @@ impl Solver {
         self.check(evidence);
         let run = |&level: &u16| {
             evidence.levels().binary_search(&level).ok()?;
-            let mut workspace = lock(&self.workspaces).pop().unwrap_or_default();
-            let answered = answer(&Sweep::run(self, evidence, level, extra, &mut workspace));
-            lock(&self.workspaces).push(workspace);
+            let problem = Problem::new(self, evidence, extra, level);
+            let mut workspace = self.workspace(problem.bytes());
+            let answered = answer(&Sweep::run(&problem, &mut workspace));
+            self.put_back(workspace);
             Some(answered)
         };
         if in_pool() {
@@ -192,6 +256,73 @@ impl Solver {
         } else {
             levels.iter().filter_map(run).collect()
         }
+    }
+}
+
+/// A search for the best root over levels, which may be looked at in any order, side by side.
+struct Search<'a> {
+    solver: &'a Solver,
+    evidence: &'a Responses<'a>,
+    extra: Option<&'a dyn Extra>,
+    /// The best root so far, and the workspace in which its tree can be followed.
+    best: Mutex<Option<(Root, Workspace)>>,
+}
+
+/// Takes the workspace of a level back.
+type PutBack<'a> = dyn Fn(u16, Workspace) + Sync + 'a;
+
+impl Search<'_> {
+    /// Whether a level whose roots score `upper` at most can hold a better root than the best so far.
+    fn could_win(&self, upper: f64) -> bool {
+        let best = lock(&self.best);
+        !best
+            .as_ref()
+            .is_some_and(|(it, _)| upper < f64::from(it.score))
+    }
+
+    /// Whether a root of this score on this level would be the best so far.
+    fn wins(&self, score: f32, level: u16) -> bool {
+        let best = lock(&self.best);
+        let beats = |(it, _): &(Root, Workspace)| {
+            score > it.score || (score == it.score && level < it.level)
+        };
+        score > f32::NEG_INFINITY && best.as_ref().is_none_or(beats)
+    }
+
+    /// Solves a level.
+    fn look_at(&self, level: u16, mut workspace: Workspace, put_back: &PutBack<'_>) {
+        let problem = Problem::new(self.solver, self.evidence, self.extra, level);
+        let sweep = Sweep::run(&problem, &mut workspace);
+        let root = if self.wins(sweep.highest(), level) {
+            sweep.best_root()
+        } else {
+            None
+        };
+        let Some(root) = root else {
+            return put_back(level, workspace);
+        };
+        let mut best = lock(&self.best);
+        let beaten = |(it, _): &(Root, Workspace)| root.best_first(it).is_lt();
+        let loser = if best.as_ref().is_none_or(beaten) {
+            best.replace((root, workspace))
+                .map(|(it, of)| (it.level, of))
+        } else {
+            Some((level, workspace))
+        };
+        drop(best);
+        if let Some((level, workspace)) = loser {
+            put_back(level, workspace);
+        }
+    }
+
+    /// The best tree.
+    fn finish(self, put_back: &PutBack<'_>) -> Option<Pose> {
+        let best = self.best.into_inner();
+        let (root, workspace) = best.unwrap_or_else(PoisonError::into_inner)?;
+        let problem = Problem::new(self.solver, self.evidence, self.extra, root.level);
+        let pose = Sweep::of(&problem, &workspace).backtrack(root);
+        put_back(root.level, workspace);
+        pose
     }
 }
 

@@ -19,6 +19,7 @@ use crate::isa::{Isa, Kind};
 use crate::spring::Spring;
 
 pub use buffer::ScoreBuffer;
+pub use ends::Span;
 pub use fast::VoteWorkspace;
 pub use own::OwnScores;
 pub use trace::Found;
@@ -83,8 +84,8 @@ pub struct ChildScores<'a> {
     pub grid: Grid,
     /// One plane per type and the margin after the last one; no NaN.
     pub planes: &'a [f32],
-    /// Spread of every plane, as [`OwnScores::write`] and [`VoteRule::cast`] return it.
-    pub spreads: &'a [f32],
+    /// Least and largest score of every plane.
+    pub spans: &'a [Span],
 }
 
 /// How a child votes: which springs it may hang on, and what each pair of types is worth.
@@ -132,8 +133,8 @@ impl VoteRule {
     /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
     /// where `s(p, v)` adds the vertical part of the spring first, then the horizontal one.
     ///
-    /// * `parent`: one plane per parent type, without the margin after the last one; `spreads` gets
-    ///   the spread of each.
+    /// * `parent`: one plane per parent type, without the margin after the last one; `spans` gets
+    ///   the least and the largest score of each.
     ///
     /// # Panics
     ///
@@ -142,17 +143,17 @@ impl VoteRule {
         &self,
         isa: Isa,
         child: ChildScores<'_>,
-        (parent, spreads): (&mut [f32], &mut [f32]),
+        (parent, spans): (&mut [f32], &mut [Span]),
         workspace: &mut VoteWorkspace,
     ) {
         self.check(child);
         let n_types = self.choices.len();
         assert_eq!(parent.len(), child.grid.len(n_types), "parent planes");
-        assert_eq!(spreads.len(), n_types, "one spread per parent plane");
+        assert_eq!(spans.len(), n_types, "one span per parent plane");
         if child.grid.is_empty() {
             return;
         }
-        let parent = (parent, spreads);
+        let parent = (parent, spans);
         match isa.0 {
             Kind::Portable => fast::cast::<[f32; 4]>(self, child, parent, workspace),
             #[cfg(target_arch = "x86_64")]
@@ -172,9 +173,9 @@ impl VoteRule {
         let size = child.grid.len(self.n_child_types) + child.grid.margin();
         assert_eq!(child.planes.len(), size, "child planes");
         assert_eq!(
-            child.spreads.len(),
+            child.spans.len(),
             self.n_child_types,
-            "one spread per child plane"
+            "one span per child plane"
         );
     }
 }

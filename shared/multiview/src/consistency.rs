@@ -105,14 +105,15 @@ impl<'a> Consistency<'a> {
 }
 
 impl Extra for Consistency<'_> {
-    fn add_position(&self, part: usize, level: usize, score: &mut [f32]) -> bool {
+    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let Some(term) = self.terms[part].filter(|it| !it.is_constant()) else {
             return false;
         };
         let plan = self.pair_terms.pair.views[self.target].plan;
         let scale2 = plan.scale(level).powi(2);
         let alpha = self.pair_terms.settings.alpha;
-        for (score, cell) in score.iter_mut().zip(plan.cells(part, level)) {
+        let cells = &plan.cells(part, level)[first..];
+        for (score, cell) in score.iter_mut().zip(cells) {
             *score -= (alpha * term.distance2(*cell, scale2)) as f32;
         }
         true
@@ -133,6 +134,40 @@ impl Extra for Consistency<'_> {
         };
         (self.pair_terms.settings.beta * joint) as f32
     }
+
+    fn max_gain(&self, part: usize) -> f32 {
+        let position = if self.terms[part].is_none() || self.pair_terms.settings.alpha >= 0.0 {
+            // Distances only cost.
+            0.0
+        } else {
+            f32::INFINITY
+        };
+        let plan = self.pair_terms.pair.views[self.target].plan;
+        let types = 0..plan.model().n_types(part);
+        let types = types.map(|mixture| self.of_type(part, mixture));
+        position + types.fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    fn key(&self, part: usize) -> Option<u64> {
+        let is_active = self.pair_terms.is_active(self.target, part);
+        let partner = self.pair_terms.partner(part);
+        Some(if is_active {
+            support_key(self.support, partner)
+        } else {
+            NO_SUPPORT
+        })
+    }
+}
+
+/// The key of a part whose support adds nothing.
+pub(crate) const NO_SUPPORT: u64 = u64::MAX;
+
+/// All of a support that the terms of one pair can depend on.
+pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
+    let at = support.parts[part];
+    let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);
+    let level = u64::from(support.level);
+    fields.into_iter().fold(level, |key, it| key << 16 | it)
 }
 
 /// For every part of one view the part of the other view that shows the same limb.

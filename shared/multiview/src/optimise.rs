@@ -70,7 +70,8 @@ pub struct PairEstimate {
 /// Under [`EnergyKind::Released`] every solution is taken, whatever its score, as in the authors'
 /// program, until both views have moved by `epsilon_px` at most; a cycle ends at the cap on iterations.
 ///
-/// * `evidence`: the responses of either view, where they lie.
+/// * `evidence`: the responses of either view, where they lie; with their bounds
+///   ([`Responses::with_bounds`]), if they are solved more than once.
 pub fn estimate_pair(
     solver: &Solver,
     settings: &Settings,
@@ -96,10 +97,16 @@ fn paper(
     let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
     let mut between = terms.between(&poses[0], &poses[1]);
     let mut target = 1 - initial_support(pair, &poses);
+    let mut again = evidence.map(|it| solver.again(it));
     let (mut iterations, mut converged) = (Vec::new(), false);
     for iteration in 0..settings.max_iterations {
         let consistency = Consistency::new(&terms, target, &poses[1 - target]);
-        let found = solver.best(evidence[target], Some(&consistency));
+        let found = again[target].best(&consistency, Some(&poses[target]));
+        debug_assert_eq!(
+            found,
+            solver.best(evidence[target], Some(&consistency)),
+            "shortcuts change nothing"
+        );
         let better = found.and_then(|pose| {
             let score = own_score(solver, evidence[target], &pose);
             let term = match target {
@@ -147,10 +154,17 @@ fn released_pair(
     let released = ReleasedPair::new(settings, pair, start.exchanged);
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut target = 1 - initial_support(pair, &poses);
+    let mut again = evidence.map(|it| solver.again(it));
     let (mut iterations, mut converged) = (Vec::<Iteration>::new(), false);
     for _ in 0..settings.max_iterations {
         let terms = ReleasedTerms::new(&released, target, &poses[1 - target]);
-        let Some(pose) = solver.best(evidence[target], Some(&terms)) else {
+        let found = again[target].best(&terms, Some(&poses[target]));
+        debug_assert_eq!(
+            found,
+            solver.best(evidence[target], Some(&terms)),
+            "shortcuts change nothing"
+        );
+        let Some(pose) = found else {
             break;
         };
         let moved_px = mean_movement(pair, target, &poses[target], &pose);

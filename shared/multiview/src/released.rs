@@ -8,7 +8,7 @@
 use fmp::{Extra, Pose};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::consistency::counterparts;
+use crate::consistency::{NO_SUPPORT, counterparts, support_key};
 use crate::heat_map::heat_map;
 use crate::{Compatibility, PairInput, Settings};
 
@@ -80,15 +80,15 @@ impl<'a> ReleasedTerms<'a> {
 }
 
 impl Extra for ReleasedTerms<'_> {
-    fn add_position(&self, part: usize, level: usize, score: &mut [f32]) -> bool {
+    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let Some(Line::Across(ends)) = self.lines[part] else {
             return false;
         };
         let layout = self.released.pair.views[self.target].plan.layout();
         let it = &layout.levels[level];
         let heat = heat_map(ends, layout.image_size, it.rows, it.cols);
-        for (score, heat) in score.iter_mut().zip(heat) {
-            *score += (self.released.settings.alpha * f64::from(heat)) as f32;
+        for (score, heat) in score.iter_mut().zip(&heat[first..]) {
+            *score += (self.released.settings.alpha * f64::from(*heat)) as f32;
         }
         true
     }
@@ -103,6 +103,26 @@ impl Extra for ReleasedTerms<'_> {
             }
             _ => 0.0,
         }
+    }
+
+    fn max_gain(&self, part: usize) -> f32 {
+        let heat = match self.lines[part] {
+            // Heat lies between 0 and 1.
+            Some(Line::Across(_)) => (self.released.settings.alpha as f32).max(0.0),
+            _ => 0.0,
+        };
+        let plan = self.released.pair.views[self.target].plan;
+        let types = 0..plan.model().n_types(part);
+        let types = types.map(|mixture| self.of_type(part, mixture));
+        heat + types.fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    fn key(&self, part: usize) -> Option<u64> {
+        let partner = self.released.counterpart[part];
+        Some(match self.lines[part] {
+            Some(_) => support_key(self.support, partner),
+            None => NO_SUPPORT,
+        })
     }
 }
 

@@ -103,12 +103,26 @@ impl FuseStep {
         };
         let (candidate_a, exchanged_a) = start[first]?;
         let (candidate_b, exchanged_b) = start[second]?;
+        let bounds = evidence.map(|it| match it.bounds() {
+            Some(_) => None,
+            None => Some(self.solver.bounds(it)),
+        });
+        let evidence = [0, 1].map(|it| match &bounds[it] {
+            Some(bounds) => evidence[it].with_bounds(bounds),
+            None => *evidence[it],
+        });
         let hypothesis = |exchanged: bool| {
             let start = PairStart {
                 candidates: [candidate_a, candidate_b],
                 exchanged,
             };
-            estimate_pair(&self.solver, &self.settings, &input, evidence, start)
+            estimate_pair(
+                &self.solver,
+                &self.settings,
+                &input,
+                evidence.each_ref(),
+                start,
+            )
         };
         let mirrored = self.plans[first].model().spec().mirror.is_some();
         let hypotheses = if self.settings.facing && mirrored {

@@ -1,9 +1,9 @@
 //! All votes on one level, from the leaves to the root, and the way back.
 
-use kernels::{ChildScores, Grid, Isa, OwnScores, ScoreBuffer, VoteWorkspace};
+use kernels::{ChildScores, Grid, OwnScores, ScoreBuffer, Span, VoteWorkspace};
 
 use super::{Extra, Root, Solver};
-use crate::{Model, Placement, Pose, Responses};
+use crate::{Placement, Pose, Responses};
 
 /// Score planes of one level, used again from level to level.
 #[derive(Debug, Default)]
@@ -12,9 +12,17 @@ pub(super) struct Workspace {
     /// children's votes are added.
     planes: ScoreBuffer,
     /// One per plane.
-    spreads: Vec<f32>,
+    spans: Vec<Span>,
+    /// The level whose planes these are, if they may serve again.
+    level: Option<u16>,
+    /// What every part's terms depended on.
+    keys: Vec<Option<u64>>,
+    /// Whether a part's planes of before can stay: all terms of its sub-tree are those of before.
+    stays: Vec<bool>,
     /// Whether the part's own score has been written.
     begun: Vec<bool>,
+    /// Sum over the parts of the largest score that each has by itself.
+    own: f64,
     /// A part's position term, `rows x cols`.
     term: Vec<f32>,
     votes: VoteWorkspace,
@@ -31,27 +39,24 @@ pub(super) struct Sweep<'a> {
 
 /// What there is to solve on a level.
 #[derive(Clone, Copy)]
-struct Problem<'a> {
-    model: &'a Model,
+pub(super) struct Problem<'a> {
+    solver: &'a Solver,
     evidence: &'a Responses<'a>,
     extra: Option<&'a dyn Extra>,
-    level: usize,
+    level: u16,
     grid: Grid,
-    isa: Isa,
 }
 
 impl<'a> Problem<'a> {
-    fn new(
+    pub(super) fn new(
         solver: &'a Solver,
         evidence: &'a Responses<'a>,
         extra: Option<&'a dyn Extra>,
         level: u16,
     ) -> Self {
-        let level = usize::from(level);
-        let it = &evidence.layout().levels[level];
+        let it = &evidence.layout().levels[usize::from(level)];
         Self {
-            model: &solver.model,
-            isa: solver.isa,
+            solver,
             evidence,
             extra,
             level,
@@ -63,69 +68,84 @@ impl<'a> Problem<'a> {
     }
 
     fn responses(&self, part: usize, mixture: usize) -> &'a [f32] {
-        let filter = self.model.spec().parts[part].filter_of_type[mixture];
-        self.evidence.map(self.level, filter)
+        let filter = self.solver.model.spec().parts[part].filter_of_type[mixture];
+        self.evidence.map(usize::from(self.level), filter)
     }
 
-    /// The part's position term, `rows x cols`, if it has one.
-    fn position_term<'b>(&self, part: usize, buffer: &'b mut Vec<f32>) -> Option<&'b [f32]> {
+    /// The part's position term at the cells from `first` on, if it has one.
+    fn position_term<'b>(
+        &self,
+        part: usize,
+        first: usize,
+        buffer: &'b mut [f32],
+    ) -> Option<&'b [f32]> {
         let extra = self.extra?;
-        buffer.clear();
-        buffer.resize(self.grid.rows * self.grid.cols, 0.0);
-        extra
-            .add_position(part, self.level, buffer)
-            .then_some(buffer)
+        buffer.fill(0.0);
+        let level = usize::from(self.level);
+        let has_one = extra.add_position(part, level, first, buffer);
+        has_one.then_some(buffer)
+    }
+
+    /// Memory that the planes of the level need, bytes.
+    pub(super) fn bytes(&self) -> usize {
+        let n_planes = self.solver.first_planes[self.solver.model.n_parts()];
+        (self.grid.len(n_planes) + self.grid.margin()) * size_of::<f32>()
     }
 }
 
 impl<'a> Sweep<'a> {
-    pub(super) fn run(
-        solver: &'a Solver,
-        evidence: &Responses<'_>,
-        level: u16,
-        extra: Option<&dyn Extra>,
-        workspace: &'a mut Workspace,
-    ) -> Self {
-        let model = &*solver.model;
-        let problem = Problem::new(solver, evidence, extra, level);
-        let grid = problem.grid;
-        let n_planes = first_plane(model, model.n_parts());
-        workspace.planes.resize(grid.len(n_planes) + grid.margin());
-        let margin = &mut workspace.planes.scores_mut()[grid.len(n_planes)..];
-        margin.fill(f32::NEG_INFINITY);
-        workspace.spreads.resize(n_planes, 0.0);
-        workspace.begun.clear();
-        workspace.begun.resize(model.n_parts(), false);
-        for part in (0..model.n_parts()).rev() {
-            workspace.begin(&problem, part);
-            let edge = model.spec().parts[part].edge.as_ref();
-            if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
-                workspace.begin(&problem, edge.parent);
-                let [of_parent, of_child] = [edge.parent, part]
-                    .map(|it| first_plane(model, it)..first_plane(model, it + 1));
+    /// Casts all votes, but for those that the workspace still holds.
+    pub(super) fn run(problem: &Problem<'a>, workspace: &'a mut Workspace) -> Self {
+        let (solver, grid) = (problem.solver, problem.grid);
+        workspace.prepare(problem);
+        for part in (0..solver.model.n_parts()).rev() {
+            workspace.begin(problem, part);
+            let edge = solver.model.spec().parts[part].edge.as_ref();
+            if let (Some(edge), Some(rule)) = (edge, &solver.rules[part])
+                && !workspace.stays[edge.parent]
+            {
+                workspace.begin(problem, edge.parent);
+                let [of_parent, of_child] = [edge.parent, part].map(|it| solver.planes(it));
                 let planes = workspace.planes.scores_mut();
                 let (before, child) = planes.split_at_mut(grid.len(of_child.start));
-                let (spreads, of_child_spreads) = workspace.spreads.split_at_mut(of_child.start);
+                let (spans, of_child_spans) = workspace.spans.split_at_mut(of_child.start);
                 let child = ChildScores {
                     grid,
                     planes: &child[..grid.len(of_child.len()) + grid.margin()],
-                    spreads: &of_child_spreads[..of_child.len()],
+                    spans: &of_child_spans[..of_child.len()],
                 };
                 let parent = &mut before[grid.len(of_parent.start)..grid.len(of_parent.end)];
-                let parent = (parent, &mut spreads[of_parent]);
+                let parent = (parent, &mut spans[of_parent]);
                 rule.cast(solver.isa, child, parent, &mut workspace.votes);
             }
         }
+        Self::of(problem, workspace)
+    }
+
+    /// Looks at a level on which the votes have been cast.
+    pub(super) fn of(problem: &Problem<'a>, workspace: &'a Workspace) -> Self {
         Self {
-            solver,
-            level,
-            grid,
+            solver: problem.solver,
+            level: problem.level,
+            grid: problem.grid,
             workspace,
         }
     }
 
     pub(super) fn level(&self) -> u16 {
         self.level
+    }
+
+    /// The score of the best root of the level.
+    pub(super) fn highest(&self) -> f32 {
+        let spans = &self.workspace.spans[self.solver.planes(0)];
+        let most = spans.iter().map(|it| it.most + self.solver.root_bias());
+        most.fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Sum over the parts of the largest score that each has by itself, if all are new.
+    pub(super) fn own(&self) -> f64 {
+        self.workspace.own
     }
 
     /// The best root of the level: first cell in row-major order, then first type.
@@ -138,7 +158,7 @@ impl<'a> Sweep<'a> {
 
     /// The best type of the root at every cell, in row-major order.
     pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
-        let bias = self.solver.model.spec().root_bias as f32;
+        let bias = self.solver.root_bias();
         let planes = self.planes(0);
         let n_types = self.solver.model.n_types(0);
         let cells = (0..self.grid.rows).flat_map(|y| (0..self.grid.cols).map(move |x| (y, x)));
@@ -166,11 +186,10 @@ impl<'a> Sweep<'a> {
         for part in 1..model.n_parts() {
             let edge = model.spec().parts[part].edge.as_ref()?;
             let parent: Placement = parts[edge.parent];
-            let planes = first_plane(model, part)..first_plane(model, part + 1);
             let child = ChildScores {
                 grid: self.grid,
                 planes: self.planes(part),
-                spreads: &self.workspace.spreads[planes],
+                spans: &self.workspace.spans[self.solver.planes(part)],
             };
             let found = self.solver.rules[part].as_ref()?.trace(
                 child,
@@ -188,47 +207,78 @@ impl<'a> Sweep<'a> {
 
     /// The part's planes and the margin after them.
     fn planes(&self, part: usize) -> &[f32] {
-        let model = &*self.solver.model;
-        let [first, end] = [part, part + 1].map(|it| self.grid.len(first_plane(model, it)));
+        let planes = self.solver.planes(part);
+        let [first, end] = [planes.start, planes.end].map(|it| self.grid.len(it));
         &self.workspace.planes.scores()[first..end + self.grid.margin()]
     }
 }
 
 impl Workspace {
+    /// Memory held by the planes, bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.planes.bytes()
+    }
+
+    /// Makes sure that nothing of before serves again.
+    pub(super) fn forget(&mut self) {
+        self.level = None;
+    }
+
+    fn prepare(&mut self, problem: &Problem<'_>) {
+        let (solver, grid) = (problem.solver, problem.grid);
+        let n_parts = solver.model.n_parts();
+        let n_planes = solver.first_planes[n_parts];
+        self.planes.resize(grid.len(n_planes) + grid.margin());
+        let margin = &mut self.planes.scores_mut()[grid.len(n_planes)..];
+        margin.fill(f32::NEG_INFINITY);
+        self.spans.resize(n_planes, Span::NONE);
+        self.term.resize(grid.rows * grid.cols, 0.0);
+        self.own = 0.0;
+        self.keys.resize(n_parts, None);
+        self.stays.clear();
+        let same_level = self.level.replace(problem.level) == Some(problem.level);
+        for (part, before) in self.keys.iter_mut().enumerate() {
+            let key = problem.extra.and_then(|it| it.key(part));
+            let same = std::mem::replace(before, key) == key && key.is_some();
+            self.stays.push(same_level && same);
+        }
+        for part in (0..n_parts).rev() {
+            if let Some(edge) = &solver.model.spec().parts[part].edge {
+                self.stays[edge.parent] &= self.stays[part];
+            }
+        }
+        self.begun.clear();
+        self.begun.extend_from_slice(&self.stays);
+    }
+
     /// Writes the part's own score, unless that has been done on this level.
     fn begin(&mut self, problem: &Problem<'_>, part: usize) {
         if std::mem::replace(&mut self.begun[part], true) {
             return;
         }
-        let (model, grid) = (problem.model, problem.grid);
-        let term = problem.position_term(part, &mut self.term);
-        let first = first_plane(model, part);
-        for mixture in 0..model.n_types(part) {
+        let (solver, grid) = (problem.solver, problem.grid);
+        let term = problem.position_term(part, 0, &mut self.term);
+        let mut most = f32::NEG_INFINITY;
+        for (mixture, plane) in solver.planes(part).enumerate() {
             let own = OwnScores {
                 map: problem.responses(part, mixture),
                 term,
                 constant: problem.extra.map(|it| it.of_type(part, mixture)),
             };
-            let plane = first + mixture;
             let scores = &mut self.planes.scores_mut()[grid.len(plane)..grid.len(plane + 1)];
-            self.spreads[plane] = own.write(problem.isa, grid, scores);
+            self.spans[plane] = own.write(solver.isa, grid, scores);
+            most = most.max(self.spans[plane].most);
         }
+        self.own += f64::from(most.max(0.0));
     }
 }
 
 /// See [`Solver::score`].
-pub(super) fn score(
-    solver: &Solver,
-    evidence: &Responses<'_>,
-    pose: &Pose,
-    extra: Option<&dyn Extra>,
-) -> f32 {
+pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -> f32 {
+    let (solver, grid) = (problem.solver, problem.grid);
     let model = &*solver.model;
-    let problem = Problem::new(solver, evidence, extra, pose.level);
-    let grid = problem.grid;
     assert_eq!(pose.parts.len(), model.n_parts(), "a pose of this model");
-    let mut buffer = Vec::new();
-    let mut own = |part: usize| {
+    let own = |part: usize| {
         let (at, mixture) = (pose.parts[part], usize::from(pose.parts[part].mixture));
         assert!(
             usize::from(at.y) < grid.rows && usize::from(at.x) < grid.cols,
@@ -236,11 +286,14 @@ pub(super) fn score(
         );
         let cell = usize::from(at.y) * grid.cols + usize::from(at.x);
         let response = problem.responses(part, mixture)[cell];
-        let term = problem.position_term(part, &mut buffer);
-        let score = term.map_or(response, |term| response + term[cell]);
+        let mut term = [0.0];
+        let term = problem.position_term(part, cell, &mut term);
+        let score = term.map_or(response, |term| response + term[0]);
+        let extra = problem.extra;
         extra.map_or(score, |it| score + it.of_type(part, mixture))
     };
-    let mut scores: Vec<f32> = (0..model.n_parts()).map(&mut own).collect();
+    scores.clear();
+    scores.extend((0..model.n_parts()).map(own));
     for part in (1..model.n_parts()).rev() {
         let edge = model.spec().parts[part].edge.as_ref();
         if let (Some(edge), Some(rule)) = (edge, &solver.rules[part]) {
@@ -251,12 +304,7 @@ pub(super) fn score(
             scores[edge.parent] += vote;
         }
     }
-    scores[0] + model.spec().root_bias as f32
-}
-
-/// Number of planes before those of `part`.
-fn first_plane(model: &Model, part: usize) -> usize {
-    (0..part).map(|it| model.n_types(it)).sum()
+    scores[0] + solver.root_bias()
 }
 
 fn placement(y: usize, x: usize, mixture: usize) -> Placement {

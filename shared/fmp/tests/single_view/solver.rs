@@ -44,7 +44,7 @@ fn energy(model: &Model, evidence: &Responses<'_>, pose: &Pose, extra: Option<&d
         sum += f64::from(evidence.map(level, spec.filter_of_type[mixture])[cell]);
         if let Some(extra) = extra {
             let mut term = vec![0.0; it.rows * it.cols];
-            extra.add_position(part, level, &mut term);
+            extra.add_position(part, level, 0, &mut term);
             sum += f64::from(term[cell]) + f64::from(extra.of_type(part, mixture));
         }
         let Some(edge) = &spec.edge else { continue };

@@ -3,6 +3,33 @@
 use super::ROW_ALIGN;
 use super::lanes::Lanes;
 
+/// The least and the largest score of a plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// The least one.
+    pub least: f32,
+    /// The largest one.
+    pub most: f32,
+}
+
+impl Span {
+    /// Of no scores.
+    pub const NONE: Self = Self {
+        least: f32::INFINITY,
+        most: f32::NEG_INFINITY,
+    };
+
+    /// Largest difference between two scores, and a little more.
+    ///
+    /// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision
+    /// can add to or take from a difference. Infinite if some are minus infinity, NaN if all are:
+    /// both ask for the whole plane to be searched.
+    #[inline(always)]
+    pub(crate) fn spread(self) -> f32 {
+        (self.most - self.least) + 1e-5 * (self.most.abs() + self.least.abs())
+    }
+}
+
 /// Least and largest score seen, lane by lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ends {
@@ -39,18 +66,13 @@ impl Ends {
         [counted.min(least), scores.max(most)]
     }
 
-    /// Largest difference between two scores, and a little more.
-    ///
-    /// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision
-    /// can add to or take from a difference. Infinite if some are minus infinity, NaN if all are:
-    /// both ask for the whole plane to be searched.
     #[inline(always)]
-    pub(super) fn spread(&self) -> f32 {
+    pub(super) fn span(&self) -> Span {
         let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
         for lane in 0..ROW_ALIGN {
             least = least.min(self.least[lane]);
             most = most.max(self.most[lane]);
         }
-        (most - least) + 1e-5 * (most.abs() + least.abs())
+        Span { least, most }
     }
 }

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use super::buffer::ScoreBuffer;
-use super::ends::Ends;
+use super::ends::{Ends, Span};
 use super::lanes::Lanes;
 use super::stretch::Stretch;
 use super::{BLOCK, ChildScores, Grid, ROW_ALIGN, VoteRule};
@@ -20,8 +20,8 @@ pub struct VoteWorkspace {
     ends: Vec<Ends>,
 }
 
-/// The parent's planes and what becomes of their spreads.
-type Parent<'a> = (&'a mut [f32], &'a mut [f32]);
+/// The parent's planes and what becomes of their spans.
+type Parent<'a> = (&'a mut [f32], &'a mut [Span]);
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
@@ -49,7 +49,7 @@ pub(super) fn avx512(
 pub(super) fn cast<V: Lanes>(
     rule: &VoteRule,
     child: ChildScores<'_>,
-    (parent, spreads): Parent<'_>,
+    (parent, spans): Parent<'_>,
     workspace: &mut VoteWorkspace,
 ) {
     let grid = child.grid;
@@ -67,8 +67,8 @@ pub(super) fn cast<V: Lanes>(
             work.cast::<V, { BLOCK / 2 }>(parent, workspace);
         }
     }
-    for (spread, ends) in spreads.iter_mut().zip(&workspace.ends) {
-        *spread = ends.spread();
+    for (span, ends) in spans.iter_mut().zip(&workspace.ends) {
+        *span = ends.span();
     }
 }
 
@@ -85,7 +85,7 @@ impl VoteWorkspace {
         let blocks = blocks.chunks_exact_mut(BLOCK * grid.stride());
         let stretches = self.stretches.iter_mut().zip(blocks);
         for ((stretch, block), (plane, spring)) in stretches.zip(&rule.springs) {
-            stretch.prepare(grid, *plane, spring, child.spreads[*plane]);
+            stretch.prepare(grid, *plane, spring, child.spans[*plane].spread());
             if stretch.impossible {
                 block.fill(f32::NEG_INFINITY);
             }

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use super::ends::Ends;
+use super::ends::{Ends, Span};
 use super::lanes::Lanes;
 use super::{Grid, MARGIN};
 use crate::isa::{Isa, Kind};
@@ -19,14 +19,14 @@ pub struct OwnScores<'a> {
 }
 
 impl OwnScores<'_> {
-    /// Writes a plane and the margin before it, and returns the plane's spread.
+    /// Writes a plane and the margin before it, and returns the plane's span.
     ///
     /// * `plane`: [`Grid::len`] of one plane.
     ///
     /// # Panics
     ///
     /// If the lengths disagree.
-    pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> f32 {
+    pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> Span {
         let cells = grid.rows * grid.cols;
         assert_eq!(self.map.len(), cells, "one response per cell");
         assert!(
@@ -35,7 +35,7 @@ impl OwnScores<'_> {
         );
         assert_eq!(plane.len(), grid.len(1), "one plane");
         if grid.is_empty() {
-            return 0.0;
+            return Span::NONE;
         }
         match isa.0 {
             Kind::Portable => write::<[f32; 4]>(self, grid, plane),
@@ -51,18 +51,18 @@ impl OwnScores<'_> {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> f32 {
+fn avx2(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
     write::<std::arch::x86_64::__m256>(own, grid, plane)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn avx512(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> f32 {
+fn avx512(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
     write::<std::arch::x86_64::__m512>(own, grid, plane)
 }
 
 #[inline(always)]
-fn write<V: Lanes>(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> f32 {
+fn write<V: Lanes>(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
     let (margin, plane) = plane.split_at_mut(MARGIN * grid.stride());
     margin.fill(f32::NEG_INFINITY);
     let (one, impossible) = (V::splat(black_box(1.0)), V::splat(f32::NEG_INFINITY));
@@ -92,7 +92,7 @@ fn write<V: Lanes>(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> f32 {
         }
     }
     ends.store(seen);
-    ends.spread()
+    ends.span()
 }
 
 /// Loads scores of which the first `n` count; there may be no others.

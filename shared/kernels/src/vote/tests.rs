@@ -15,27 +15,25 @@ struct Case {
 }
 
 impl Case {
-    fn spreads(&self) -> Vec<f32> {
+    fn spans(&self) -> Vec<Span> {
         let planes = 0..self.child.len() / self.grid.len(1).max(1);
-        planes
-            .map(|it| spread(self.grid, &self.child, it))
-            .collect()
+        planes.map(|it| span(self.grid, &self.child, it)).collect()
     }
 
-    fn scores<'a>(&'a self, spreads: &'a [f32]) -> ChildScores<'a> {
+    fn scores<'a>(&'a self, spans: &'a [Span]) -> ChildScores<'a> {
         ChildScores {
             grid: self.grid,
             planes: &self.child,
-            spreads,
+            spans,
         }
     }
 
-    /// The parent's planes and their spreads after the votes.
-    fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> (Vec<f32>, Vec<f32>) {
+    /// The parent's planes and their spans after the votes.
+    fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> (Vec<f32>, Vec<Span>) {
         let mut parent = self.parent.clone();
-        let mut of_parent = vec![-1.0; self.rule.choices.len()];
-        let spreads = self.spreads();
-        let child = self.scores(&spreads);
+        let mut of_parent = vec![Span::NONE; self.rule.choices.len()];
+        let spans = self.spans();
+        let child = self.scores(&spans);
         self.rule
             .cast(isa, child, (&mut parent, &mut of_parent), workspace);
         (parent, of_parent)
@@ -55,19 +53,17 @@ impl Case {
     }
 }
 
-/// The spread of a plane, by its definition.
-fn spread(grid: Grid, planes: &[f32], plane: usize) -> f32 {
+/// The least and the largest score of a plane, by definition.
+fn span(grid: Grid, planes: &[f32], plane: usize) -> Span {
     let cells = (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| grid.at(plane, y, x)));
-    let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+    let Span {
+        mut least,
+        mut most,
+    } = Span::NONE;
     for cell in cells {
         (least, most) = (least.min(planes[cell]), most.max(planes[cell]));
     }
-    (most - least) + 1e-5 * (most.abs() + least.abs())
-}
-
-/// Equal, or both not a number.
-fn same(a: f32, b: f32) -> bool {
-    a == b || (a.is_nan() && b.is_nan())
+    Span { least, most }
 }
 
 fn springs() -> impl Strategy<Value = Spring> {
@@ -148,10 +144,10 @@ proptest! {
         reference::cast(&case.rule, case.grid, &case.child, &mut want);
         let mut workspace = VoteWorkspace::default();
         for isa in Isa::available() {
-            let (parent, spreads) = case.cast(isa, &mut workspace);
+            let (parent, spans) = case.cast(isa, &mut workspace);
             prop_assert_eq!(&parent, &want, "{:?}", isa);
-            for (l, it) in spreads.into_iter().enumerate() {
-                prop_assert!(same(it, spread(case.grid, &want, l)), "{:?}", isa);
+            for (l, it) in spans.into_iter().enumerate() {
+                prop_assert_eq!(it, span(case.grid, &want, l), "{:?}", isa);
             }
         }
     }
@@ -176,7 +172,7 @@ proptest! {
             let mut plane = vec![f32::NAN; grid.len(1)];
             let found = own.write(isa, grid, &mut plane);
             prop_assert_eq!(&plane, &want, "{:?}", isa);
-            prop_assert!(same(found, spread(grid, &want, 0)), "{:?}", isa);
+            prop_assert_eq!(found, span(grid, &want, 0), "{:?}", isa);
         }
     }
 
@@ -191,11 +187,11 @@ proptest! {
     #[test]
     fn a_trace_finds_what_was_cast_and_the_first_of_equals(case in cases(1..12, 1..20)) {
         let after = case.cast(Isa::best(), &mut VoteWorkspace::default()).0;
-        let (grid, spreads) = (case.grid, case.spreads());
+        let (grid, spans) = (case.grid, case.spans());
         for l in 0..case.rule.choices.len() {
             for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| (y, x))) {
                 let at = grid.at(l, y, x);
-                let found = case.rule.trace(case.scores(&spreads), l, [y, x]);
+                let found = case.rule.trace(case.scores(&spans), l, [y, x]);
                 let vote = found.map_or(f32::NEG_INFINITY, |it| it.score);
                 prop_assert_eq!(case.parent[at] + vote, after[at]);
                 let Some(found) = found else { continue };
@@ -258,9 +254,9 @@ fn an_impossible_child_makes_its_parent_impossible() {
         parent: Case::padded(grid, &[1.0; 6]),
     };
     let mut workspace = VoteWorkspace::default();
-    let (parent, spreads) = case.cast(Isa::best(), &mut workspace);
+    let (parent, spans) = case.cast(Isa::best(), &mut workspace);
     assert!(parent.iter().all(|&it| it == f32::NEG_INFINITY));
-    assert!(spreads[0].is_nan());
-    let spreads = case.spreads();
-    assert_eq!(case.rule.trace(case.scores(&spreads), 0, [1, 1]), None);
+    assert!(spans[0].spread().is_nan());
+    let spans = case.spans();
+    assert_eq!(case.rule.trace(case.scores(&spans), 0, [1, 1]), None);
 }

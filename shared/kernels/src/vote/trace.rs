@@ -43,7 +43,7 @@ impl VoteRule {
             let (child_type, spring) = &self.springs[spring];
             let plane = (child.planes, *child_type);
             let Some((score, [y, x])) =
-                best_child(grid, plane, spring, child.spreads[*child_type], at)
+                best_child(grid, plane, spring, child.spans[*child_type].spread(), at)
             else {
                 continue;
             };

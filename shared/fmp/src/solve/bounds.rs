@@ -1,0 +1,98 @@
+//! What every level can offer at most: the start of exact pruning.
+
+use super::{Extra, Solver};
+use crate::{Responses, Springs};
+
+/// For every level of a layout the score of its best pose without the terms of other views.
+///
+/// With terms that add at most a known gain, a level whose bound stays below the score of some pose
+/// cannot hold the best one, and need not be looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds(Vec<Bound>);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bound {
+    /// Score of the best pose.
+    best: f32,
+    /// More than any sum on the way to a score can be, terms of other views not counted.
+    size: f64,
+}
+
+impl Bounds {
+    /// Number of levels, offered or not.
+    pub fn n_levels(&self) -> usize {
+        self.0.len()
+    }
+
+    /// More than any pose on a level can score under terms that add at most `gain` (the sum over the
+    /// parts, and that of its absolute values), unless it scores less than `lowest`. Not finite: nothing is known.
+    ///
+    /// Rounding is monotone, so a computed score never exceeds the one computed with every term at
+    /// its bound. That one and the sum made here differ by rounding alone: the way to a score has
+    /// eight sums per part, each of which, if the score is not below `lowest`, lies between `lowest`
+    /// less all that can be added to it and all that can be added; both ways of summing are off by
+    /// at most half an ulp of that per sum. The factor below is four times as large.
+    pub(super) fn upper(
+        &self,
+        level: u16,
+        (gain, sizes): (f64, f64),
+        lowest: f32,
+        n_parts: usize,
+    ) -> f64 {
+        let it = self.0[usize::from(level)];
+        let size = it.size + sizes + f64::from(lowest.max(-f32::MAX)).abs();
+        let rounding = 8.0 * n_parts as f64 * f64::from(f32::EPSILON) * 4.0 * size;
+        f64::from(it.best) + gain + rounding
+    }
+}
+
+impl Solver {
+    /// The bounds of the offered levels: one solution without extra terms.
+    ///
+    /// # Panics
+    ///
+    /// If the evidence is another model's.
+    pub fn bounds(&self, evidence: &Responses<'_>) -> Bounds {
+        let unknown = Bound {
+            best: f32::INFINITY,
+            size: 0.0,
+        };
+        let mut bounds = vec![unknown; evidence.layout().levels.len()];
+        let votes = self.most_of_edges();
+        let found = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
+            let bound = Bound {
+                best: sweep.highest(),
+                size: sweep.own() + votes,
+            };
+            (sweep.level(), bound)
+        });
+        for (level, bound) in found {
+            bounds[usize::from(level)] = bound;
+        }
+        Bounds(bounds)
+    }
+
+    /// All that springs and biases can add to a score.
+    fn most_of_edges(&self) -> f64 {
+        let parts = self.model.spec().parts.iter();
+        let of_edge = parts.filter_map(|it| it.edge.as_ref()).map(|edge| {
+            let springs: Vec<_> = match &edge.springs {
+                Springs::PerChildType(all) => all.iter().collect(),
+                Springs::PerTypePair(all) => all.iter().flatten().flatten().collect(),
+            };
+            let spring = springs.into_iter().map(|it| {
+                let [xx, x, yy, y] = it.w;
+                x * x / (4.0 * xx) + y * y / (4.0 * yy)
+            });
+            let bias = edge.bias.iter().flatten().copied().fold(0.0, f64::max);
+            bias + spring.fold(0.0, f64::max)
+        });
+        of_edge.sum::<f64>() + self.model.spec().root_bias.abs()
+    }
+
+    /// Upper bound of what the terms can add to a pose, and the sum of the bounds' absolute values.
+    pub(super) fn max_gain(&self, extra: &dyn Extra) -> (f64, f64) {
+        let gains = (0..self.model.n_parts()).map(|part| f64::from(extra.max_gain(part)));
+        gains.fold((0.0, 0.0), |sums, it| (sums.0 + it, sums.1 + it.abs()))
+    }
+}

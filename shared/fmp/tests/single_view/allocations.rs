@@ -1,0 +1,81 @@
+//! The solver takes no memory from frame to frame but for its answers.
+
+use std::sync::Arc;
+
+use fmp::Solver;
+
+use crate::common::{Evidence, Noise, tree};
+
+/// Allocations of this thread during `call`.
+fn allocations(call: impl FnOnce()) -> u64 {
+    allocation_counter::measure(call).count_total
+}
+
+#[test]
+fn solving_allocates_the_answer_only() {
+    let mut noise = Noise(1);
+    let model = tree(&mut noise, 8);
+    let sizes = [[40, 50], [37, 46], [20, 25], [9, 12]];
+    let solver = Solver::new(Arc::clone(&model));
+    for round in 0..6 {
+        let evidence = Evidence::new(&mut noise, &model, &sizes);
+        let view = evidence.view();
+        let found = solver.best(&view, None).unwrap();
+        let count = allocations(|| drop(solver.best(&view, None)));
+        let again = allocations(|| {
+            solver.score(&view, &found, None);
+        });
+        if round > 0 {
+            assert_eq!([count, again], [1, 0]);
+        }
+    }
+}
+
+/// Terms that take no memory.
+struct Unmoved;
+
+impl fmp::Extra for Unmoved {
+    fn add_position(&self, part: usize, _: usize, first: usize, score: &mut [f32]) -> bool {
+        for (cell, it) in score.iter_mut().enumerate() {
+            *it -= ((first + cell + part) % 7) as f32 * 0.01;
+        }
+        true
+    }
+
+    fn of_type(&self, _: usize, _: usize) -> f32 {
+        0.0
+    }
+
+    fn max_gain(&self, _: usize) -> f32 {
+        0.0
+    }
+
+    fn key(&self, part: usize) -> Option<u64> {
+        // The first parts may always be others.
+        (part > 3).then_some(1)
+    }
+}
+
+#[test]
+fn solving_again_allocates_the_answer_only() {
+    let mut noise = Noise(2);
+    let model = tree(&mut noise, 8);
+    let sizes = [[40, 50], [37, 46], [20, 25], [9, 12]];
+    let solver = Solver::new(Arc::clone(&model));
+    for round in 0..6 {
+        let evidence = Evidence::new(&mut noise, &model, &sizes);
+        let view = evidence.view();
+        let bounds = solver.bounds(&view);
+        let view = view.with_bounds(&bounds);
+        let mut again = solver.again(&view);
+        let mut guess = solver.best(&view, None);
+        for _ in 0..3 {
+            let mut found = None;
+            let count = allocations(|| found = again.best(&Unmoved, guess.as_ref()));
+            if round > 2 {
+                assert_eq!(count, 1);
+            }
+            guess = found;
+        }
+    }
+}
