@@ -2,7 +2,8 @@
 //!
 //! Reading order: [`Model`] (what was trained), [`Layout`] (where the cells of the feature pyramid
 //! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
-//! which finds the best tree of parts exactly, and [`Pose`], its answer.
+//! which finds the best tree of parts exactly, and [`Pose`], its answer; [`Again`] solves the same
+//! evidence under changing terms with less work.
 #![forbid(unsafe_code)]
 
 pub mod files;

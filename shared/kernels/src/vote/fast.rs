@@ -73,6 +73,16 @@ pub(super) fn cast<V: Lanes>(
 }
 
 impl VoteWorkspace {
+    /// Candidates that the last [`VoteRule::cast`] on a grid of this size looked at.
+    pub fn n_candidates(&self, rule: &VoteRule, grid: Grid) -> usize {
+        let stretches = self.stretches.iter().take(rule.springs.len());
+        let of_spring = stretches.map(|it| {
+            let down = it.down.n_candidates(grid.rows, BLOCK) * grid.cols;
+            down + it.along.n_candidates(grid.cols, ROW_ALIGN) * grid.rows
+        });
+        of_spring.sum()
+    }
+
     #[inline(always)]
     fn prepare(&mut self, rule: &VoteRule, child: ChildScores<'_>) {
         let grid = child.grid;

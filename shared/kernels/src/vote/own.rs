@@ -65,34 +65,53 @@ fn avx512(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
 fn write<V: Lanes>(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
     let (margin, plane) = plane.split_at_mut(MARGIN * grid.stride());
     margin.fill(f32::NEG_INFINITY);
-    let (one, impossible) = (V::splat(black_box(1.0)), V::splat(f32::NEG_INFINITY));
+    let sum = Sum {
+        own,
+        one: V::splat(black_box(1.0)),
+        constant: own.constant.map(V::splat),
+    };
     let mut ends = Ends::NONE;
     let mut seen = ends.load::<V>();
+    let whole = grid.cols - grid.cols % V::N;
     for (y, line) in plane.chunks_exact_mut(grid.stride()).enumerate() {
+        let (line, rest) = line.split_at_mut(whole);
         for (run, out) in line.chunks_exact_mut(V::N).enumerate() {
-            let x = run * V::N;
-            let n = grid.cols.saturating_sub(x).min(V::N);
-            if n == 0 {
-                impossible.store(out);
-                continue;
-            }
-            let at = y * grid.cols + x;
-            let mut scores = load::<V>(own.map, at, n);
-            if let Some(term) = own.term {
-                scores = scores.plus(one, load(term, at, n));
-            }
-            if let Some(constant) = own.constant {
-                scores = scores.plus(one, V::splat(constant));
-            }
-            if n < V::N {
-                scores = scores.first(n, impossible);
+            let at = y * grid.cols + run * V::N;
+            let scores = sum.of(|from| V::load(&from[at..]));
+            scores.store(out);
+            seen = Ends::see(seen, scores, V::N);
+        }
+        let n = grid.cols - whole;
+        for (run, out) in rest.chunks_exact_mut(V::N).enumerate() {
+            let mut scores = V::splat(f32::NEG_INFINITY);
+            if run == 0 && n > 0 {
+                let at = y * grid.cols + whole;
+                scores = sum.of(|from| load(from, at, n)).first(n, scores);
+                seen = Ends::see(seen, scores, n);
             }
             scores.store(out);
-            seen = Ends::see(seen, scores, n);
         }
     }
     ends.store(seen);
     ends.span()
+}
+
+/// How the scores of a register are summed.
+struct Sum<'a, V> {
+    own: &'a OwnScores<'a>,
+    one: V,
+    constant: Option<V>,
+}
+
+impl<V: Lanes> Sum<'_, V> {
+    #[inline(always)]
+    fn of(&self, load: impl Fn(&[f32]) -> V) -> V {
+        let mut scores = load(self.own.map);
+        if let Some(term) = self.own.term {
+            scores = scores.plus(self.one, load(term));
+        }
+        self.constant.map_or(scores, |it| scores.plus(self.one, it))
+    }
 }
 
 /// Loads scores of which the first `n` count; there may be no others.

@@ -44,6 +44,16 @@ impl Pass {
         self.scores.extend(all.map(|offset| axis.score(offset)));
     }
 
+    /// Candidates that all parents of a line try.
+    pub(super) fn n_candidates(&self, n: usize, block: usize) -> usize {
+        let parents = (0..n).step_by(block).map(|first| block.min(n - first));
+        let offsets = self.blocks.iter().map(|it| (it.end - it.start) as usize);
+        parents
+            .zip(offsets)
+            .map(|(parents, offsets)| parents * offsets)
+            .sum()
+    }
+
     /// The first offset that a block tries, and what the spring adds at this and the following ones.
     #[inline(always)]
     pub(super) fn of_block(&self, block: usize) -> (isize, &[f32]) {

@@ -1,0 +1,170 @@
+//! The best pose of 26 parts with six types each, on all levels of images of 172 x 224 and 640 x 480
+//! pixels in which one person stands out: by the view alone, and as one step of the alternation
+//! between two views, with and without shortcuts, with all terms changed and with one in five.
+#![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
+#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use fmp::{
+    Edge, Extra, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Responses, Solver, Spring,
+    Springs,
+};
+use kernels::Isa;
+
+const N_PARTS: usize = 26;
+const N_TYPES: usize = 6;
+
+fn main() {
+    let model = Arc::new(Model::new(spec()).unwrap());
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(2)
+        .build()
+        .unwrap();
+    for [width, height] in [[172, 224], [640, 480]] {
+        let layout = Layout::new(&model, width, height).unwrap();
+        let values = planted(&layout);
+        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
+        let evidence = Responses::new(&layout, &values, &levels);
+        println!("{width} x {height}, {} levels", levels.len());
+        for isa in Isa::available() {
+            let solver = Solver::on(isa, Arc::clone(&model));
+            let alone = fastest(|| drop(black_box(solver.best(&evidence, None))));
+            println!("  {isa:?}: alone, one thread {alone:6.2} ms");
+        }
+        let solver = Solver::new(Arc::clone(&model));
+        steps(&solver, &evidence, "one thread ");
+        pool.install(|| steps(&solver, &evidence, "two threads"));
+    }
+}
+
+fn steps(solver: &Solver, evidence: &Responses<'_>, threads: &str) {
+    let best = solver.best(evidence, None).unwrap();
+    let bounds = solver.bounds(evidence);
+    let evidence = evidence.with_bounds(&bounds);
+    let line = |part: usize| f32::from(best.parts[part].y) + 0.4;
+    let terms = |round: usize, unchanged: bool| Lines {
+        layout: evidence.layout(),
+        rows: (0..N_PARTS).map(line).collect(),
+        round: (0..N_PARTS)
+            .map(|part| if unchanged && part % 5 != 0 { 0 } else { round })
+            .collect(),
+    };
+    let mut round = 0;
+    let full = fastest(|| {
+        round += 1;
+        drop(black_box(
+            solver.best(&evidence, Some(&terms(round, false))),
+        ));
+    });
+    let mut again = solver.again(&evidence);
+    let mut least = [full; 2];
+    for (least, unchanged) in least.iter_mut().zip([false, true]) {
+        *least = fastest(|| {
+            round += 1;
+            let terms = terms(round, unchanged);
+            drop(black_box(again.best(&terms, Some(&best))));
+        });
+    }
+    let [pruned, kept] = least;
+    println!(
+        "  {threads}: one step {full:6.2} ms; pruned to {} levels {pruned:6.2} ms; and with four \
+         of five terms unchanged {kept:6.2} ms",
+        again.n_levels()
+    );
+}
+
+/// Least time of many runs, milliseconds.
+fn fastest(mut call: impl FnMut()) -> f64 {
+    let time = |_| {
+        let begin = Instant::now();
+        call();
+        begin.elapsed().as_secs_f64() * 1e3
+    };
+    (0..15).map(time).fold(f64::INFINITY, f64::min)
+}
+
+/// A level line through every part, from which distance costs.
+struct Lines<'a> {
+    layout: &'a Layout,
+    rows: Vec<f32>,
+    round: Vec<usize>,
+}
+
+impl Extra for Lines<'_> {
+    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
+        let cols = self.layout.levels[level].cols;
+        let line = self.rows[part] + (self.round[part] % 3) as f32 * 0.25;
+        for (cell, it) in score.iter_mut().enumerate() {
+            let off = ((first + cell) / cols) as f32 - line;
+            *it -= 0.002 * off * off;
+        }
+        true
+    }
+
+    fn of_type(&self, _: usize, mixture: usize) -> f32 {
+        0.002 * mixture as f32
+    }
+
+    fn max_gain(&self, _: usize) -> f32 {
+        0.002 * (N_TYPES - 1) as f32
+    }
+
+    fn key(&self, part: usize) -> Option<u64> {
+        Some(self.round[part] as u64 % 3)
+    }
+}
+
+/// A tree of limbs: every part hangs on the one before it, or five before it.
+fn spec() -> ModelSpec {
+    let part = |part: usize| {
+        let spring = |k: usize| Spring {
+            w: [0.012 + 0.004 * k as f64, 0.002, 0.02, -0.003],
+            anchor: [k as i32 - 3, 1],
+        };
+        let edge = (part > 0).then(|| Edge {
+            parent: part.saturating_sub(if part.is_multiple_of(5) { 5 } else { 1 }),
+            bias: vec![vec![0.0; N_TYPES]; N_TYPES],
+            springs: Springs::PerChildType((0..N_TYPES).map(spring).collect()),
+        });
+        PartSpec {
+            name: format!("part {part}"),
+            filter_of_type: (part * N_TYPES..(part + 1) * N_TYPES).collect(),
+            edge,
+        }
+    };
+    let filter = Filter {
+        rows: 5,
+        cols: 5,
+        weights: vec![0.0; 25 * N_CHANNELS],
+    };
+    ModelSpec {
+        name: "limbs".to_owned(),
+        parts: (0..N_PARTS).map(part).collect(),
+        filters: vec![filter; N_PARTS * N_TYPES],
+        root_bias: 0.0,
+        interval: 10,
+        cell_px: 4,
+        threshold: 0.0,
+        mirror: None,
+    }
+}
+
+/// Noise as spread as trained responses are, and one place on one level where all parts respond.
+fn planted(layout: &Layout) -> Vec<f32> {
+    let mut noise = 1_u64;
+    let mut next = || {
+        noise = noise.wrapping_mul(6364136223846793005).wrapping_add(1);
+        (noise >> 40) as f32 / (1 << 24) as f32 * 0.3
+    };
+    let mut values: Vec<f32> = (0..layout.n_responses()).map(|_| next()).collect();
+    let level = layout.levels.len() / 3;
+    let it = &layout.levels[level];
+    for filter in 0..N_PARTS * N_TYPES {
+        let map = &mut values[layout.map_range(level, filter)];
+        map[it.rows / 2 * it.cols + it.cols / 2] += 0.3;
+    }
+    values
+}
