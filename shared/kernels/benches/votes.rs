@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use kernels::{
-    ChildScores, Grid, Isa, OwnScores, ScoreBuffer, Span, Spring, VoteRule, VoteWorkspace,
-    max_plus_peak, transform_f64,
+    ChildScores, Grid, Isa, OwnScores, Peak, ScoreBuffer, Span, Spring, VoteRule, VoteWorkspace,
+    transform_f64,
 };
 
 const N_TYPES: usize = 6;
@@ -16,7 +16,7 @@ const GRIDS: [[usize; 2]; 4] = [[58, 45], [30, 24], [122, 162], [62, 82]];
 fn main() {
     let rule = rule();
     for isa in Isa::available() {
-        let peak = (0..20).map(|_| rate(|| max_plus_peak(isa, 100_000)));
+        let peak = (0..20).map(|_| rate(|| Peak::MaxPlus.run(isa, 2_000) as usize));
         let peak = peak.fold(0.0, f64::max);
         println!("{isa:?}: {peak:.1} candidates/ns in registers");
         for [rows, cols] in GRIDS {

@@ -30,6 +30,4 @@ pub use planes::{
     Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize, resize_by_taps,
 };
 pub use spring::Spring;
-pub use vote::{
-    ChildScores, Found, Grid, OwnScores, ScoreBuffer, Span, VoteRule, VoteWorkspace, max_plus_peak,
-};
+pub use vote::{ChildScores, Found, Grid, OwnScores, ScoreBuffer, Span, VoteRule, VoteWorkspace};

@@ -10,7 +10,6 @@ mod ends;
 mod fast;
 mod lanes;
 mod own;
-mod peak;
 #[cfg(test)]
 mod reference;
 mod stretch;
@@ -23,7 +22,6 @@ pub use buffer::ScoreBuffer;
 pub use ends::Span;
 pub use fast::VoteWorkspace;
 pub use own::OwnScores;
-pub use peak::max_plus_peak;
 pub use trace::Found;
 
 /// Scores are kept in rows of a multiple of this many cells.

@@ -148,8 +148,8 @@ impl OtherView {
 }
 
 impl Extra for OtherView {
-    fn add_position(&self, _part: usize, level: usize, score: &mut [f32]) -> bool {
-        for (score, term) in score.iter_mut().zip(&self.maps[level]) {
+    fn add_position(&self, _part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
+        for (score, term) in score.iter_mut().zip(&self.maps[level][first..]) {
             *score += term;
         }
         true
