@@ -5,7 +5,7 @@ mod common;
 
 use common::started::signal;
 use common::{Case, Ended};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 const LIVE: &str = "[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
                     [capture]\nupright = false\nmode = \"realtime\"\n";
@@ -51,13 +51,6 @@ impl Told {
     fn view(&self, view: usize, key: &str) -> u64 {
         self.report["views"][view][key].as_u64().unwrap()
     }
-
-    /// Results that have all of three views.
-    fn n_with_all(&self) -> usize {
-        let all = json!(["a", "b", "c"]);
-        let with = self.lines.iter().filter(|it| it["views_present"] == all);
-        with.count()
-    }
 }
 
 #[test]
@@ -72,20 +65,19 @@ fn who_keeps_up_loses_nothing() {
 }
 
 #[test]
-fn who_is_too_slow_answers_fewer_frames_and_the_same_in_all_views() {
-    let more = format!("{LIVE}{PACED}size = [240, 320]\n");
-    let case = Case::new("slow", &[80; 3], &more);
+fn who_is_too_slow_answers_fewer_frames_and_every_one_is_counted() {
+    // More frames a second than any machine answers. That slow views take the same ones is a law of
+    // `join::Cadence`, tested there; how soon they get to it is a matter of the machine's load.
+    let hurried = PACED.replace("= 20", "= 200");
+    let more = format!("{LIVE}{hurried}size = [240, 320]\n");
+    let case = Case::new("slow", &[300; 3], &more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let told = Told::new(&case, &ended);
-    assert!(told.view(0, "dropped") > 5, "{:#}", told.report["views"]);
-    // A machine that is too loaded for a dozen answers gives the views no time to find their cadence.
-    let (n_all, n_lines) = (told.n_with_all(), told.lines.len());
-    assert!(
-        n_lines < 25 || 3 * n_all > n_lines,
-        "{:#}",
-        told.report["views"]
-    );
+    for view in 0..3 {
+        assert!(told.view(view, "dropped") > 5, "{:#}", told.report["views"]);
+    }
+    assert!(!told.lines.is_empty(), "{:#}", told.report["views"]);
 }
 
 #[test]
