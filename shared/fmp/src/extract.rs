@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use kernels::{FilterBank, Isa, Rgb8View, Template};
+use kernels::{CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template};
 
 use crate::features::{Features, Source};
 use crate::{Layout, Model};
@@ -16,6 +16,8 @@ pub struct Extractor {
     isa: Isa,
     bank: FilterBank,
     workspaces: Mutex<Vec<Features>>,
+    /// One for each thread that ever answered at the same time as others.
+    buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 
 impl Extractor {
@@ -40,6 +42,7 @@ impl Extractor {
             isa,
             bank,
             workspaces: Mutex::default(),
+            buffers: Mutex::default(),
         }
     }
 
@@ -82,53 +85,86 @@ impl Extractor {
             1
         };
         features.begin(&source, n_threads);
-        let n_jobs = layout.levels.len() * self.bank.n_panels();
+        let everything = Part {
+            levels: 0..layout.levels.len(),
+            panels: 0..self.bank.n_panels(),
+        };
+        let share = if in_pool() {
+            self.work(layout, &everything) / (SHARES * n_threads)
+        } else {
+            usize::MAX
+        };
         let out = &mut out[..layout.n_responses()];
-        if n_jobs > 0 {
-            self.correlate(&source, &features, 0..n_jobs, out);
-        }
+        self.correlate((&source, &features), everything, share, out);
         lock(&self.workspaces).push(features);
     }
 
-    /// Computes the responses of some jobs, a job being one panel on one level.
+    /// Computes the responses of a part, in smaller ones side by side while it is more than a
+    /// share of the work.
     ///
-    /// * `out`: of these jobs only.
+    /// * `out`: of this part only.
     fn correlate(
         &self,
-        source: &Source<'_>,
-        features: &Features,
-        jobs: Range<usize>,
+        (source, features): (&Source<'_>, &Features),
+        part: Part,
+        share: usize,
         out: &mut [f32],
     ) {
-        if jobs.len() < 2 {
-            let (level, panel) = self.job(jobs.start);
-            let it = &source.layout.levels[level];
-            let map = features.of_level(source, level);
-            return self.bank.correlate(panel, map, [it.rows, it.cols], out);
-        }
-        let middle = jobs.start.midpoint(jobs.end);
-        let start = |job| {
-            let (level, panel) = self.job(job);
-            let it = &source.layout.levels[level];
-            it.offset + self.bank.filters(panel).start * it.rows * it.cols
-        };
-        let (first, second) = out.split_at_mut(start(middle) - start(jobs.start));
-        let (before, after) = (jobs.start..middle, middle..jobs.end);
-        if in_pool() {
+        let layout = source.layout;
+        if self.work(layout, &part) > share
+            && let Some([first, second]) = self.halves(layout, &part)
+        {
+            let (out, rest) = out.split_at_mut(self.work(layout, &first));
             rayon::join(
-                || self.correlate(source, features, before, first),
-                || self.correlate(source, features, after, second),
+                || self.correlate((source, features), first, share, out),
+                || self.correlate((source, features), second, share, rest),
             );
-        } else {
-            self.correlate(source, features, before, first);
-            self.correlate(source, features, after, second);
+            return;
         }
+        let levels = part.levels.map(|level| Level {
+            map: features.of_level(source, level),
+            size: [layout.levels[level].rows, layout.levels[level].cols],
+        });
+        let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
+        self.bank.correlate(part.panels, levels, out, &mut buffers);
+        lock(&self.buffers).push(buffers);
     }
 
-    /// The level and the panel of a job.
-    fn job(&self, job: usize) -> (usize, usize) {
-        (job / self.bank.n_panels(), job % self.bank.n_panels())
+    /// Number of responses.
+    fn work(&self, layout: &Layout, part: &Part) -> usize {
+        let levels = layout.levels[part.levels.clone()].iter();
+        let area: usize = levels.map(|it| it.rows * it.cols).sum();
+        area * self.bank.filters(part.panels.clone()).len()
     }
+
+    /// Levels that have about half the work, and the others; of one level, the panels.
+    fn halves(&self, layout: &Layout, part: &Part) -> Option<[Part; 2]> {
+        let Range { start, end } = part.levels;
+        let cut = |levels: Range<usize>, panels: Range<usize>| Part { levels, panels };
+        if end - start > 1 {
+            let half = self.work(layout, part) / 2;
+            let heavy =
+                |it: &usize| self.work(layout, &cut(start..*it, part.panels.clone())) >= half;
+            let middle = (start + 1..end - 1).find(heavy).unwrap_or(end - 1);
+            let panels = part.panels.clone();
+            return Some([cut(start..middle, panels.clone()), cut(middle..end, panels)]);
+        }
+        let Range { start, end } = part.panels;
+        let middle = usize::midpoint(start, end);
+        let levels = part.levels.clone();
+        (start < middle).then(|| [cut(levels.clone(), start..middle), cut(levels, middle..end)])
+    }
+}
+
+/// Parts that a thread's work is cut into at least, so that others can help it.
+const SHARES: usize = 4;
+
+/// Some levels and filters, whose responses lie without gaps.
+#[derive(Debug, Clone)]
+struct Part {
+    levels: Range<usize>,
+    /// All of them, unless there is one level only.
+    panels: Range<usize>,
 }
 
 /// Whether the caller runs inside a rayon pool, and so has asked for its threads to be used.

@@ -1,20 +1,28 @@
-//! Responses of many filters on one feature map: the bulk of the arithmetic.
+//! Responses of many filters on feature maps: the bulk of the arithmetic.
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
+mod points;
 mod reference;
+mod sums;
+#[cfg(test)]
+mod tests;
+mod winograd;
 
 use std::ops::Range;
 
 use crate::N_CHANNELS;
-use crate::isa::{Isa, Kind};
+use crate::isa::Isa;
+use crate::simd::{Kernel, ROW, Row, Simd};
+use sums::{Stretch, Sums, put, sums};
+use winograd::{Answer, Form, Pending};
 
 pub use reference::correlate_f64;
 
 /// Most filters in a panel.
-const PANEL: usize = 32;
+const N_LANES: usize = ROW;
+/// Pairs of points of the tiles that a map can be cut into, the smallest first.
+const FORMS: [usize; 2] = [3, 4];
+/// Sides of the filters that tiles are offered for, cells.
+const TILED_SIDES: std::ops::RangeInclusive<usize> = 3..=6;
 
 /// A template over feature cells, as it is offered to [`FilterBank::new`].
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +46,15 @@ pub struct FeatureMap<'a> {
     pub cells: &'a [f32],
 }
 
+/// A feature map and the number of places that filters are tried at.
+#[derive(Debug, Clone, Copy)]
+pub struct Level<'a> {
+    /// The features.
+    pub map: FeatureMap<'a>,
+    /// Size `[rows, cols]` of every response map.
+    pub size: [usize; 2],
+}
+
 /// Filters in single precision, laid out for [`correlate`](Self::correlate).
 #[derive(Debug, Clone)]
 pub struct FilterBank {
@@ -49,10 +66,28 @@ pub struct FilterBank {
 #[derive(Debug, Clone)]
 struct Panel {
     filters: Range<usize>,
-    rows: usize,
-    cols: usize,
-    /// `rows x cols x N_CHANNELS x PANEL`, filter fastest; zero where there is no filter.
-    weights: Vec<f32>,
+    /// Size `[rows, cols]` of a filter.
+    filter: [usize; 2],
+    /// `rows x cols x N_CHANNELS`, a filter in each lane; zero where there is no filter.
+    direct: Vec<Row>,
+    /// The same transformed for each of [`FORMS`], `area x N_CHANNELS`; empty where not offered.
+    tiles: [Vec<Row>; FORMS.len()],
+}
+
+/// Buffers of [`FilterBank::correlate`], used again from call to call.
+#[derive(Debug, Default)]
+pub struct CorrelateWorkspace {
+    pending: [Pending; FORMS.len()],
+    row: Vec<Row>,
+}
+
+/// How the responses of a level are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// As the definition says.
+    Direct,
+    /// In tiles, by an index into [`FORMS`].
+    Tiles(usize),
 }
 
 impl FilterBank {
@@ -71,23 +106,15 @@ impl FilterBank {
                 n_taps,
                 "one weight per channel of a cell"
             );
-            let fits = panels.last().is_some_and(|it| {
-                [it.rows, it.cols] == [filter.rows, filter.cols] && it.filters.len() < PANEL
-            });
-            if !fits {
-                panels.push(Panel {
-                    filters: index..index,
-                    rows: filter.rows,
-                    cols: filter.cols,
-                    weights: vec![0.0; n_taps * PANEL],
-                });
-            }
-            if let Some(panel) = panels.last_mut() {
-                let lane = panel.filters.len();
-                panel.filters.end = index + 1;
-                let lanes = panel.weights[lane..].iter_mut().step_by(PANEL);
-                for (packed, weight) in lanes.zip(filter.weights) {
-                    *packed = *weight as f32;
+            let size = [filter.rows, filter.cols];
+            match panels.last_mut() {
+                Some(last) if last.filter == size && last.filters.len() < N_LANES => {
+                    last.push(filter.weights);
+                }
+                _ => {
+                    let mut panel = Panel::new(index, size);
+                    panel.push(filter.weights);
+                    panels.push(panel);
                 }
             }
         }
@@ -99,159 +126,242 @@ impl FilterBank {
         self.panels.len()
     }
 
-    /// The filters of a panel.
-    pub fn filters(&self, panel: usize) -> Range<usize> {
-        self.panels[panel].filters.clone()
-    }
-
-    /// Writes the responses of one panel's filters.
-    ///
-    /// `out[f][y][x] = sum over rows r, columns c, channels k of map[y + r][x + c][k] w_f[r][c][k]`,
-    /// added in this order, each product with a fused multiply-add: the same bits on every
-    /// instruction set.
-    ///
-    /// * `out`: `filters x rows x cols`; overwritten.
+    /// The filters of some panels.
     ///
     /// # Panics
     ///
-    /// If the map is too small for `rows x cols` placements, or the lengths disagree.
-    pub fn correlate(&self, panel: usize, map: FeatureMap<'_>, size: [usize; 2], out: &mut [f32]) {
-        let panel = &self.panels[panel];
-        let [rows, cols] = size;
-        assert_eq!(
-            out.len(),
-            panel.filters.len() * rows * cols,
-            "one map per filter"
-        );
-        assert_eq!(
-            map.cells.len(),
-            map.rows * map.cols * N_CHANNELS,
-            "full feature map"
-        );
-        assert!(
-            rows + panel.rows <= map.rows + 1 && cols + panel.cols <= map.cols + 1,
-            "all placements lie on the map"
-        );
-        match self.isa.0 {
-            Kind::Portable => reference::correlate(panel, map, size, out),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX2 and FMA were detected.
-            Kind::Avx2 => unsafe { avx2::correlate(panel, map, size, out) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX-512 F and VL were detected.
-            Kind::Avx512 => unsafe { avx512::correlate(panel, map, size, out) },
+    /// If there are no such panels.
+    pub fn filters(&self, panels: Range<usize>) -> Range<usize> {
+        let panels = &self.panels[panels];
+        let first = panels.first().map_or(0, |it| it.filters.start);
+        first..panels.last().map_or(0, |it| it.filters.end)
+    }
+
+    /// Writes the responses of the filters of some panels on some levels.
+    ///
+    /// `out[l][f][y][x] = sum over rows r, columns c, channels k of map_l[y + r][x + c][k] w_f[r][c][k]`
+    ///
+    /// to within `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`, the
+    /// maximum over the cells less than 10 away from those under the filter and `c` from
+    /// [`Self::error_factor`]: filters of 3 to 6 cells a side are tried on a tile of the map at once
+    /// (Winograd), others and those on very small maps as the formula says. Which way is taken
+    /// depends on sizes only, and every response adds in the same order whatever else is asked for
+    /// and on whatever instruction set: the same bits always.
+    ///
+    /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
+    /// * Allocates nothing once `workspace` was used.
+    ///
+    /// # Panics
+    ///
+    /// If a map is too small for its placements, or the lengths disagree.
+    #[expect(
+        single_use_lifetimes,
+        reason = "an argument of type `impl Trait` cannot do without a name"
+    )]
+    pub fn correlate<'a>(
+        &self,
+        panels: Range<usize>,
+        levels: impl Iterator<Item = Level<'a>> + Clone,
+        out: &mut [f32],
+        workspace: &mut CorrelateWorkspace,
+    ) {
+        let n_filters = self.filters(panels.clone()).len();
+        let panels = &self.panels[panels];
+        let mut n = 0;
+        for Level { map, size } in levels.clone() {
+            assert_eq!(
+                map.cells.len(),
+                map.rows * map.cols * N_CHANNELS,
+                "full feature map"
+            );
+            let room = |filter: [usize; 2]| {
+                size[0] + filter[0] <= map.rows + 1 && size[1] + filter[1] <= map.cols + 1
+            };
+            assert!(
+                panels.iter().all(|it| room(it.filter)),
+                "all placements lie on the map"
+            );
+            n += n_filters * size[0] * size[1];
+        }
+        assert_eq!(out.len(), n, "one map per level and filter");
+        workspace.pending.iter_mut().for_each(Pending::clear);
+        self.isa.run(Correlate {
+            panels,
+            n_filters,
+            levels,
+            out,
+            workspace,
+        });
+    }
+
+    /// How far from exact a response of [`Self::correlate`] can be, as the factor in its bound.
+    ///
+    /// With `u = 2^-24` and `N` roundings on the longest way from an input to a response, each of
+    /// the products that are added is off by a factor `(1 + u)^N - 1 <= N u / (1 - N u)` at most
+    /// (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed., §3.1). The direct sum has
+    /// one rounding per product and one for the weight; in a tile the sums of absolute products are
+    /// larger by a factor that follows from the matrices, once per axis.
+    pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
+        let filter = self.panels[panel].filter;
+        let (roundings, growth) = match way(filter, size) {
+            Way::Direct => (filter[0] * filter[1] * N_CHANNELS + 1, 1.0),
+            Way::Tiles(form) => {
+                let points = Form::new(FORMS[form], filter).points;
+                let growth = filter.map(|side| points.amplification(side));
+                (points.roundings() + N_CHANNELS, growth[0] * growth[1])
+            }
+        };
+        let relative = roundings as f64 * f64::from(f32::EPSILON) / 2.0;
+        relative / (1.0 - relative) * growth
+    }
+}
+
+impl Panel {
+    fn new(first: usize, filter: [usize; 2]) -> Self {
+        let n_taps = filter[0] * filter[1] * N_CHANNELS;
+        let tiled = filter.iter().all(|side| TILED_SIDES.contains(side));
+        let rows = |it: usize| {
+            let area = if tiled {
+                Form::new(FORMS[it], filter).area()
+            } else {
+                0
+            };
+            vec![Row::ZERO; area * N_CHANNELS]
+        };
+        Self {
+            filters: first..first,
+            filter,
+            direct: vec![Row::ZERO; n_taps],
+            tiles: std::array::from_fn(rows),
+        }
+    }
+
+    fn push(&mut self, weights: &[f64]) {
+        let lane = self.filters.len();
+        self.filters.end += 1;
+        for (row, weight) in self.direct.iter_mut().zip(weights) {
+            row.0[lane] = *weight as f32;
+        }
+        for (n_pairs, rows) in FORMS.into_iter().zip(&mut self.tiles) {
+            if !rows.is_empty() {
+                let transformed = Form::new(n_pairs, self.filter).of_filter(self.filter, weights);
+                for (row, weight) in rows.iter_mut().zip(transformed) {
+                    row.0[lane] = weight as f32;
+                }
+            }
+        }
+    }
+}
+
+/// The cheapest way by the number of products, and what a tile costs beside.
+fn way(filter: [usize; 2], size: [usize; 2]) -> Way {
+    let direct = filter[0] * filter[1] * N_CHANNELS * size[0] * size[1];
+    let mut best = (direct, Way::Direct);
+    if filter.iter().all(|side| TILED_SIDES.contains(side)) {
+        for (it, n_pairs) in FORMS.into_iter().enumerate() {
+            let form = Form::new(n_pairs, filter);
+            let [down, across] = form.tiles(size);
+            let cost = form.area() * (N_CHANNELS + TRANSFORMS) * down * across;
+            if cost < best.0 {
+                best = (cost, Way::Tiles(it));
+            }
+        }
+    }
+    best.1
+}
+
+/// What both transforms of a value cost, in products; by measurement.
+const TRANSFORMS: usize = 10;
+
+struct Correlate<'a, I> {
+    panels: &'a [Panel],
+    /// Of all panels.
+    n_filters: usize,
+    levels: I,
+    out: &'a mut [f32],
+    workspace: &'a mut CorrelateWorkspace,
+}
+
+impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let first_filter = self.panels.first().map_or(0, |it| it.filters.start);
+        for panels in self.panels.chunk_by(|a, b| a.filter == b.filter) {
+            let forms = FORMS.map(|it| Form::new(it, panels[0].filter));
+            let mut at = 0;
+            for level in self.levels.clone() {
+                let place = (at, level.size);
+                at += self.n_filters * level.size[0] * level.size[1];
+                match way(panels[0].filter, level.size) {
+                    Way::Direct => {
+                        let out = &mut self.out[place.0..];
+                        let row = &mut self.workspace.row;
+                        direct(simd, (panels, first_filter), level, out, row);
+                    }
+                    Way::Tiles(it) => {
+                        let mut answer = Answer {
+                            form: &forms[it],
+                            form_idx: it,
+                            panels,
+                            first_filter,
+                            out: self.out,
+                        };
+                        let pending = &mut self.workspace.pending[it];
+                        winograd::take(simd, pending, &mut answer, level.map, place);
+                    }
+                }
+            }
+            for (it, pending) in self.workspace.pending.iter_mut().enumerate() {
+                let mut answer = Answer {
+                    form: &forms[it],
+                    form_idx: it,
+                    panels,
+                    first_filter,
+                    out: self.out,
+                };
+                winograd::flush(simd, pending, &mut answer);
+            }
+        }
+    }
+}
+
+/// All responses of a level as the definition says.
+#[inline(always)]
+fn direct<S: Simd>(
+    simd: S,
+    (panels, first_filter): (&[Panel], usize),
+    Level { map, size }: Level<'_>,
+    out: &mut [f32],
+    row: &mut Vec<Row>,
+) {
+    let plane = size[0] * size[1];
+    let (cells, _) = map.cells.as_chunks::<N_CHANNELS>();
+    // Registers are written whole.
+    row.resize(row.len().max(size[1] + N_LANES), Row::ZERO);
+    for panel in panels {
+        for y in 0..size[0] {
+            for block in blocks(size[1], S::BLOCK) {
+                let job = Sums {
+                    cells: &cells[y * map.cols + block.start..],
+                    stride: map.cols,
+                    filter_cols: panel.filter[1],
+                    weights: &panel.direct,
+                };
+                sums(simd, block.len(), &job, &mut row[block]);
+            }
+            let to = Stretch {
+                at: (panel.filters.start - first_filter) * plane + y * size[1],
+                plane,
+                n_filters: panel.filters.len(),
+            };
+            put(simd, row, size[1], to, out);
         }
     }
 }
 
 /// Splits `total` cells into blocks of at most `largest`, as equal as they can be.
+#[inline(always)]
 fn blocks(total: usize, largest: usize) -> impl Iterator<Item = Range<usize>> {
     let n = total.div_ceil(largest);
     (0..n).map(move |it| it * total / n..(it + 1) * total / n)
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    /// Numbers in -1..1 that look random and depend on the seed only.
-    fn noise(seed: u64, n: usize) -> Vec<f64> {
-        let mut state = seed.wrapping_mul(2654435761) | 1;
-        std::iter::repeat_with(|| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
-        })
-        .take(n)
-        .collect()
-    }
-
-    fn all_responses(bank: &FilterBank, map: FeatureMap<'_>, size: [usize; 2]) -> Vec<Vec<f32>> {
-        let panel = |it| {
-            let mut out = vec![f32::NAN; bank.filters(it).len() * size[0] * size[1]];
-            bank.correlate(it, map, size, &mut out);
-            out
-        };
-        (0..bank.n_panels()).map(panel).collect()
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(60))]
-
-        /// Up to 70 columns and 70 filters of mixed sizes, so that every remainder occurs.
-        #[test]
-        fn every_instruction_set_gives_the_same_bits(
-            cols in 1..70_usize,
-            rows in 1..4_usize,
-            sizes in prop::collection::vec((1..4_usize, 1..4_usize, 1..35_usize), 1..4),
-            seed in any::<u64>(),
-        ) {
-            let filters: Vec<_> = sizes
-                .iter()
-                .flat_map(|&(rows, cols, n)| std::iter::repeat_n((rows, cols), n))
-                .enumerate()
-                .map(|(it, (r, c))| (r, c, noise(seed ^ it as u64, r * c * N_CHANNELS)))
-                .collect();
-            let templates: Vec<_> = filters
-                .iter()
-                .map(|(rows, cols, weights)| Template { rows: *rows, cols: *cols, weights })
-                .collect();
-            let (map_rows, map_cols) = (rows + 3, cols + 3);
-            let cells = noise(!seed, map_rows * map_cols * N_CHANNELS);
-            let cells: Vec<_> = cells.iter().map(|&it| it as f32).collect();
-            let map = FeatureMap { rows: map_rows, cols: map_cols, cells: &cells };
-            let all = Isa::available();
-            let want = all_responses(&FilterBank::new(all[0], &templates), map, [rows, cols]);
-            for isa in all {
-                let bank = FilterBank::new(isa, &templates);
-                prop_assert_eq!(&all_responses(&bank, map, [rows, cols]), &want, "{:?}", isa);
-            }
-            let cells: Vec<_> = cells.iter().map(|&it| f64::from(it)).collect();
-            for (filter, got) in templates.iter().zip(want.concat().chunks(rows * cols)) {
-                let want = correlate_f64(*filter, [map_rows, map_cols], &cells, [rows, cols]);
-                for (want, got) in want.iter().zip(got) {
-                    prop_assert!((want - f64::from(*got)).abs() < 1e-4);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_single_weight_copies_its_channel() {
-        let mut weights = vec![0.0; 2 * 3 * N_CHANNELS];
-        weights[(3 + 2) * N_CHANNELS + 7] = 2.0;
-        let template = Template {
-            rows: 2,
-            cols: 3,
-            weights: &weights,
-        };
-        let bank = FilterBank::new(Isa::best(), &[template]);
-        let cells: Vec<_> = (0..4 * 5 * N_CHANNELS).map(|it| it as f32).collect();
-        let map = FeatureMap {
-            rows: 4,
-            cols: 5,
-            cells: &cells,
-        };
-        let mut out = [f32::NAN; 9];
-        bank.correlate(0, map, [3, 3], &mut out);
-        for (at, got) in out.iter().enumerate() {
-            let (y, x) = (at / 3 + 1, at % 3 + 2);
-            assert_eq!(*got, 2.0 * cells[(y * 5 + x) * N_CHANNELS + 7]);
-        }
-    }
-
-    #[test]
-    fn blocks_cover_everything_once_and_evenly() {
-        for total in 0..70 {
-            let all: Vec<_> = blocks(total, 14).collect();
-            assert!(all.iter().all(|it| (1..=14).contains(&it.len())));
-            assert_eq!(
-                all.into_iter().flatten().collect::<Vec<_>>(),
-                (0..total).collect::<Vec<_>>()
-            );
-        }
-    }
 }

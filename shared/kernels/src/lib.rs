@@ -17,10 +17,11 @@ mod image;
 mod isa;
 mod peak;
 mod planes;
+mod simd;
 mod spring;
 mod vote;
 
-pub use correlate::{FeatureMap, FilterBank, Template, correlate_f64};
+pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};

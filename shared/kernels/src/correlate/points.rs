@@ -1,0 +1,220 @@
+//! The matrices of Toom-Cook correlation, made from the points that it interpolates at.
+
+/// Most values in a line of a tile.
+pub(super) const MAX_TILE: usize = 10;
+/// Most pairs of points.
+const MAX_PAIRS: usize = 4;
+
+/// Points `0, p, -p, q, -q, .., infinity` for tiles of `2 pairs + 2` values, as polynomials.
+///
+/// Correlating `d` with `g` is the transpose of multiplying polynomials, which is done by values at
+/// points: `y = A^T ((G g) . (B^T d))` with `A` and `G` the powers of the points (Winograd,
+/// *Arithmetic Complexity of Computations*, 1980; Lavin & Gray, *Fast Algorithms for Convolutional
+/// Neural Networks*, 2016). The rows of `B^T` hold the coefficients of the polynomials that vanish
+/// at all other points, and the divisors go to `G`, which meets double precision only. With
+/// `w(z) = (z - p^2)(z - q^2)..` and `v_p(z) = w(z) / (z - p^2)` the rows are
+/// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`:
+/// even and odd values of a line never meet but in the last addition.
+///
+/// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` and `1`, `5/2`,
+/// `5/4`, `1/4`. Of all sets of halves, thirds, quarters and so on up to 4 that were tried for tiles
+/// of 10 the last gives the smallest [`amplification`](Self::amplification); the usual `1`, `2`,
+/// `1/2`, `4` is 17 times worse.
+#[derive(Debug, Clone)]
+pub(super) struct Points {
+    pub(super) n_pairs: usize,
+    /// The positive points.
+    pub(super) positive: [f32; MAX_PAIRS],
+    /// Coefficients of `w`, lowest first; that of the highest power is 1.
+    pub(super) whole: [f32; MAX_PAIRS],
+    /// Coefficients of `v_p`, as `whole`.
+    pub(super) without: [[f32; MAX_PAIRS]; MAX_PAIRS],
+    /// `powers[i][k] = positive[k]^i`.
+    pub(super) powers: [[f32; MAX_PAIRS]; MAX_TILE],
+}
+
+impl Points {
+    /// Points for tiles of 8 (3 pairs) or 10 (4 pairs).
+    pub(super) fn new(n_pairs: usize) -> Self {
+        let points: &[f32] = match n_pairs {
+            3 => &[1.0, 2.0, 0.5],
+            _ => &[1.0, 2.5, 1.25, 0.25],
+        };
+        let mut all = Self {
+            n_pairs,
+            positive: [0.0; MAX_PAIRS],
+            whole: [0.0; MAX_PAIRS],
+            without: [[0.0; MAX_PAIRS]; MAX_PAIRS],
+            powers: [[0.0; MAX_PAIRS]; MAX_TILE],
+        };
+        all.positive[..n_pairs].copy_from_slice(points);
+        all.whole = product(points.iter().copied());
+        for k in 0..n_pairs {
+            let others = points.iter().enumerate().filter(|(it, _)| *it != k);
+            all.without[k] = product(others.map(|(_, point)| *point));
+            for (i, powers) in all.powers.iter_mut().enumerate() {
+                powers[k] = points[k].powi(i as i32);
+            }
+        }
+        all
+    }
+
+    /// Values in a line of a tile.
+    pub(super) fn tile(&self) -> usize {
+        2 * self.n_pairs + 2
+    }
+
+    /// The finite points in the order of the transformed values.
+    fn finite(&self) -> Vec<f64> {
+        let pairs = self.positive[..self.n_pairs]
+            .iter()
+            .map(|&it| f64::from(it));
+        std::iter::once(0.0)
+            .chain(pairs.flat_map(|it| [it, -it]))
+            .collect()
+    }
+
+    /// `G`, `tile x taps`: what a line of a filter is multiplied with.
+    pub(super) fn of_filter(&self, taps: usize) -> Vec<Vec<f64>> {
+        let points = self.finite();
+        let row = |p: &f64| {
+            let others = points.iter().filter(|it| *it != p);
+            let divisor: f64 = others.map(|it| p - it).product();
+            (0..taps).map(|it| p.powi(it as i32) / divisor).collect()
+        };
+        let last = (0..taps).map(|it| f64::from(it + 1 == taps)).collect();
+        points.iter().map(row).chain([last]).collect()
+    }
+
+    /// `B^T`, `tile x tile`: what a line of cells is multiplied with.
+    fn of_cells(&self) -> Vec<Vec<f64>> {
+        let n = self.tile();
+        let mut rows = vec![vec![0.0; n]; n];
+        let highest = |coefficients: &[f32], degree: usize| {
+            let low = coefficients[..degree].iter().map(|&it| f64::from(it));
+            low.chain([1.0]).collect::<Vec<_>>()
+        };
+        for (j, value) in highest(&self.whole, self.n_pairs).into_iter().enumerate() {
+            rows[0][2 * j] = value;
+            rows[n - 1][2 * j + 1] = value;
+        }
+        for k in 0..self.n_pairs {
+            let without = highest(&self.without[k], self.n_pairs - 1);
+            for (j, value) in without.into_iter().enumerate() {
+                for (row, sign) in [(1 + 2 * k, 1.0), (2 + 2 * k, -1.0)] {
+                    rows[row][2 * j + 2] = value;
+                    rows[row][2 * j + 1] = sign * f64::from(self.positive[k]) * value;
+                }
+            }
+        }
+        rows
+    }
+
+    /// `A^T`, `placements x tile`: what a line of products is multiplied with.
+    fn of_products(&self, placements: usize) -> Vec<Vec<f64>> {
+        let row = |i: usize| {
+            let finite = self.finite().into_iter().map(|p| p.powi(i as i32));
+            finite.chain([f64::from(i + 1 == placements)]).collect()
+        };
+        (0..placements).map(row).collect()
+    }
+
+    /// By how much the terms of the sums are larger than those of the direct sum, at most:
+    /// the largest over placements `i` and taps `c` of `sum over a, j of |A_ij| |G_jc| |B_ja|`.
+    pub(super) fn amplification(&self, taps: usize) -> f64 {
+        let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());
+        let g = self.of_filter(taps);
+        let sums: Vec<f64> = b
+            .iter()
+            .map(|row| row.iter().map(|it| it.abs()).sum())
+            .collect();
+        let of = |row: &Vec<f64>, c: usize| -> f64 {
+            let terms = row.iter().zip(&g).zip(&sums);
+            terms.map(|((a, g), sum)| (a * g[c]).abs() * sum).sum()
+        };
+        let all = a.iter().flat_map(|row| (0..taps).map(move |c| of(row, c)));
+        all.fold(0.0, f64::max)
+    }
+
+    /// Roundings on the longest way from a cell and a weight to a response, but for the additions
+    /// over channels: both lines of cells, the transformed weight, both lines of products.
+    pub(super) fn roundings(&self) -> usize {
+        2 * self.n_pairs + 1 + 2 * (self.n_pairs + 1)
+    }
+}
+
+/// Coefficients of the product of `z - p^2`, lowest first.
+fn product(points: impl Iterator<Item = f32>) -> [f32; MAX_PAIRS] {
+    let mut all = [0.0; MAX_PAIRS + 1];
+    all[0] = 1.0;
+    for p in points {
+        for it in (0..=MAX_PAIRS).rev() {
+            let lower = if it == 0 { 0.0 } else { all[it - 1] };
+            all[it] = lower - p * p * all[it];
+        }
+    }
+    [all[0], all[1], all[2], all[3]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Interpolation is exact: placement `i` meets tap `c` on cell `i + c` and on no other.
+    #[test]
+    fn the_matrices_correlate() {
+        for n_pairs in [3, 4] {
+            let points = Points::new(n_pairs);
+            for taps in 3..=6 {
+                let placements = points.tile() + 1 - taps;
+                let (a, b) = (points.of_products(placements), points.of_cells());
+                let g = points.of_filter(taps);
+                for (i, c, cell) in indices(placements, taps, points.tile()) {
+                    let terms = (0..points.tile()).map(|j| a[i][j] * g[j][c] * b[j][cell]);
+                    let want = f64::from(i + c == cell);
+                    assert!((terms.sum::<f64>() - want).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    fn indices(a: usize, b: usize, c: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+        (0..a * b * c).map(move |it| (it / (b * c), it / c % b, it % c))
+    }
+
+    /// Else the bound would have to count their roundings.
+    #[test]
+    fn all_constants_are_exact_in_single_precision() {
+        for n_pairs in [3, 4] {
+            let points = Points::new(n_pairs);
+            let exact: Vec<f64> = points.positive[..n_pairs]
+                .iter()
+                .map(|&p| f64::from(p))
+                .collect();
+            for (k, p) in exact.iter().enumerate() {
+                for (i, powers) in points.powers.iter().enumerate() {
+                    assert_eq!(f64::from(powers[k]), p.powi(i as i32));
+                }
+                let at = |z: f64, coefficients: &[f32]| {
+                    let terms = coefficients.iter().enumerate();
+                    terms
+                        .map(|(i, &c)| f64::from(c) * z.powi(i as i32))
+                        .sum::<f64>()
+                };
+                let whole = at(p * p, &points.whole[..n_pairs]) + p.powi(2 * n_pairs as i32);
+                assert_eq!(whole, 0.0);
+                for other in exact.iter().filter(|it| *it != p) {
+                    let rest = at(other * other, &points.without[k][..n_pairs - 1]);
+                    assert_eq!(rest + other.powi(2 * n_pairs as i32 - 2), 0.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn larger_tiles_amplify_more() {
+        let of = |n_pairs| Points::new(n_pairs).amplification(5);
+        assert!((of(3) - 39.6).abs() < 0.1, "{}", of(3));
+        assert!((of(4) - 171.9).abs() < 0.1, "{}", of(4));
+    }
+}

@@ -1,0 +1,110 @@
+//! Sums of products of a few cells with 32 filters: the loop that all the arithmetic is in.
+
+use std::borrow::Borrow;
+
+use super::N_LANES;
+use crate::N_CHANNELS;
+use crate::simd::{Row, Simd};
+
+/// A filter's rows over the rows of a map, or one product per channel of transformed tiles.
+pub(super) struct Sums<'a, C> {
+    /// Begins with the cell under the first filter cell of the first sum.
+    pub(super) cells: &'a [C],
+    /// Cells from one row of the map to the next.
+    pub(super) stride: usize,
+    /// Cells in a row of the filter.
+    pub(super) filter_cols: usize,
+    /// `filter rows x filter_cols x N_CHANNELS` rows of [`N_LANES`] filters.
+    pub(super) weights: &'a [Row],
+}
+
+/// Writes the sums at `n` neighbouring cells, 1 to `S::BLOCK`, all filters of a cell together.
+///
+/// Each starts at zero and adds row by row, cell by cell, channel by channel.
+#[inline(always)]
+pub(super) fn sums<S: Simd, C: Borrow<[f32; N_CHANNELS]>>(
+    simd: S,
+    n: usize,
+    job: &Sums<'_, C>,
+    out: &mut [Row],
+) {
+    for lane in (0..N_LANES).step_by(2 * S::LANES) {
+        match n {
+            1 => block::<S, C, 1>(simd, job, lane, out),
+            2 => block::<S, C, 2>(simd, job, lane, out),
+            3 => block::<S, C, 3>(simd, job, lane, out),
+            4 => block::<S, C, 4>(simd, job, lane, out),
+            5 => block::<S, C, 5>(simd, job, lane, out),
+            6 => block::<S, C, 6>(simd, job, lane, out),
+            7 if S::BLOCK >= 7 => block::<S, C, 7>(simd, job, lane, out),
+            8 if S::BLOCK >= 8 => block::<S, C, 8>(simd, job, lane, out),
+            9 if S::BLOCK >= 9 => block::<S, C, 9>(simd, job, lane, out),
+            10 if S::BLOCK >= 10 => block::<S, C, 10>(simd, job, lane, out),
+            11 if S::BLOCK >= 11 => block::<S, C, 11>(simd, job, lane, out),
+            12 if S::BLOCK >= 12 => block::<S, C, 12>(simd, job, lane, out),
+            13 if S::BLOCK >= 13 => block::<S, C, 13>(simd, job, lane, out),
+            14 if S::BLOCK >= 14 => block::<S, C, 14>(simd, job, lane, out),
+            _ => unreachable!("a block of at most {} cells, got {n}", S::BLOCK),
+        }
+    }
+}
+
+#[inline(always)]
+fn block<S: Simd, C: Borrow<[f32; N_CHANNELS]>, const N: usize>(
+    simd: S,
+    job: &Sums<'_, C>,
+    lane: usize,
+    out: &mut [Row],
+) {
+    let mut sums = [[simd.splat(0.0); 2]; N];
+    let rows = job.weights.chunks_exact(job.filter_cols * N_CHANNELS);
+    for (r, weights) in rows.enumerate() {
+        let (weights, _) = weights.as_chunks::<N_CHANNELS>();
+        let cells = &job.cells[r * job.stride..];
+        for (weights, cells) in weights.iter().zip(cells.windows(N)) {
+            for (k, weight) in weights.iter().enumerate() {
+                let low = simd.load(&weight.0[lane..]);
+                let high = simd.load(&weight.0[lane + S::LANES..]);
+                for (sum, cell) in sums.iter_mut().zip(cells) {
+                    let cell = simd.splat(cell.borrow()[k]);
+                    sum[0] = simd.mul_add(cell, low, sum[0]);
+                    sum[1] = simd.mul_add(cell, high, sum[1]);
+                }
+            }
+        }
+    }
+    for (sum, out) in sums.iter().zip(&mut out[..N]) {
+        simd.store(sum[0], &mut out.0[lane..]);
+        simd.store(sum[1], &mut out.0[lane + S::LANES..]);
+    }
+}
+
+/// A stretch of a row in the maps of consecutive filters.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// Where it begins in the map of the first filter.
+    pub(super) at: usize,
+    /// Values from the map of one filter to that of the next.
+    pub(super) plane: usize,
+    /// At most [`N_LANES`].
+    pub(super) n_filters: usize,
+}
+
+/// Writes values that lie filter by filter for each cell of a stretch cell by cell for each filter.
+///
+/// * `cells`: those of the stretch, and up to `S::LANES - 1` more that do not matter.
+#[inline(always)]
+pub(super) fn put<S: Simd>(simd: S, cells: &[Row], n: usize, to: Stretch, out: &mut [f32]) {
+    for x in (0..n).step_by(S::LANES) {
+        let width = S::LANES.min(n - x);
+        for lane in (0..to.n_filters).step_by(S::LANES) {
+            let columns = simd.transposed(&cells[x..], lane);
+            for (it, column) in columns.as_ref().iter().enumerate() {
+                if lane + it < to.n_filters {
+                    let at = to.at + (lane + it) * to.plane + x;
+                    simd.store_some(*column, &mut out[at..at + width]);
+                }
+            }
+        }
+    }
+}

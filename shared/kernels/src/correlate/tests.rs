@@ -1,0 +1,281 @@
+//! Every instruction set against the readable version, to the bit; that against the definition.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Numbers in -1..1 that look random and depend on the seed only.
+fn noise(seed: u64, n: usize) -> Vec<f64> {
+    let mut state = seed.wrapping_mul(2654435761) | 1;
+    std::iter::repeat_with(|| {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 40) as f64 / (1_u64 << 23) as f64 - 1.0
+    })
+    .take(n)
+    .collect()
+}
+
+/// Filters of given sizes, and maps with a ring of cells that only some of them reach.
+struct Problem {
+    filters: Vec<([usize; 2], Vec<f64>)>,
+    maps: Vec<([usize; 2], Vec<f32>)>,
+    /// The largest filter.
+    largest: [usize; 2],
+}
+
+impl Problem {
+    fn new(filters: &[([usize; 2], usize)], sizes: &[[usize; 2]], seed: u64) -> Self {
+        let largest = [0, 1].map(|axis| filters.iter().map(|it| it.0[axis]).max().unwrap_or(1));
+        let filters = filters
+            .iter()
+            .flat_map(|(size, n)| std::iter::repeat_n(*size, *n))
+            .enumerate()
+            .map(|(it, size)| {
+                (
+                    size,
+                    noise(seed ^ it as u64, size[0] * size[1] * N_CHANNELS),
+                )
+            })
+            .collect();
+        let maps = sizes.iter().enumerate().map(|(it, size)| {
+            let area = (size[0] + largest[0] - 1) * (size[1] + largest[1] - 1);
+            let cells = noise(!seed ^ it as u64, area * N_CHANNELS);
+            (*size, cells.into_iter().map(|it| it as f32).collect())
+        });
+        Self {
+            filters,
+            maps: maps.collect(),
+            largest,
+        }
+    }
+
+    fn templates(&self) -> Vec<Template<'_>> {
+        self.filters
+            .iter()
+            .map(|(size, weights)| Template {
+                rows: size[0],
+                cols: size[1],
+                weights,
+            })
+            .collect()
+    }
+
+    fn levels(&self) -> impl Iterator<Item = Level<'_>> + Clone {
+        self.maps.iter().map(|(size, cells)| Level {
+            map: FeatureMap {
+                rows: size[0] + self.largest[0] - 1,
+                cols: size[1] + self.largest[1] - 1,
+                cells,
+            },
+            size: *size,
+        })
+    }
+
+    /// Responses `levels x filters` of some panels.
+    fn responses(&self, bank: &FilterBank, panels: Range<usize>) -> Vec<Vec<f32>> {
+        let n_filters = bank.filters(panels.clone()).len();
+        let areas: Vec<_> = self
+            .maps
+            .iter()
+            .map(|(size, _)| size[0] * size[1])
+            .collect();
+        let mut out = vec![f32::NAN; n_filters * areas.iter().sum::<usize>()];
+        bank.correlate(
+            panels,
+            self.levels(),
+            &mut out,
+            &mut CorrelateWorkspace::default(),
+        );
+        let mut rest = &out[..];
+        let each = areas
+            .iter()
+            .flat_map(|area| std::iter::repeat_n(*area, n_filters));
+        each.map(|area| {
+            rest.split_off(..area)
+                .map(<[f32]>::to_vec)
+                .unwrap_or_default()
+        })
+        .collect()
+    }
+
+    fn reference(&self) -> Vec<Vec<f32>> {
+        let of = |level: Level<'_>| {
+            let all = self.templates().into_iter();
+            let all = all.map(|it| (way([it.rows, it.cols], level.size), it));
+            all.map(|(way, it)| reference::correlate(way, it, level))
+                .collect::<Vec<_>>()
+        };
+        self.levels().flat_map(of).collect()
+    }
+}
+
+/// The largest absolute cell of each channel less than ten cells away from those of a placement.
+fn largest_near(level: Level<'_>, filter: [usize; 2], at: [usize; 2]) -> [f64; N_CHANNELS] {
+    let near =
+        |axis: usize, n: usize| at[axis].saturating_sub(9)..n.min(at[axis] + filter[axis] + 9);
+    let mut all = [0.0_f64; N_CHANNELS];
+    for y in near(0, level.map.rows) {
+        for x in near(1, level.map.cols) {
+            let cell = &level.map.cells[(y * level.map.cols + x) * N_CHANNELS..];
+            for (largest, value) in all.iter_mut().zip(cell) {
+                *largest = largest.max(f64::from(value.abs()));
+            }
+        }
+    }
+    all
+}
+
+/// All responses keep the bound of [`FilterBank::correlate`]; returns the largest share of it.
+fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64 {
+    let mut got = got.iter();
+    let mut largest = 0.0_f64;
+    for level in problem.levels() {
+        let cells: Vec<_> = level.map.cells.iter().map(|&it| f64::from(it)).collect();
+        for (index, filter) in problem.templates().into_iter().enumerate() {
+            let map_size = [level.map.rows, level.map.cols];
+            let want = correlate_f64(filter, map_size, &cells, level.size);
+            let panels = 0..bank.n_panels();
+            let panel = panels
+                .clone()
+                .find(|&it| bank.filters(it..it + 1).contains(&index));
+            let factor = bank.error_factor(panel.unwrap_or(0), level.size);
+            let sums: Vec<f64> = (0..N_CHANNELS)
+                .map(|k| {
+                    filter.weights[k..]
+                        .iter()
+                        .step_by(N_CHANNELS)
+                        .map(|w| w.abs())
+                        .sum()
+                })
+                .collect();
+            let got = got.next().map_or(&[][..], |it| it);
+            assert_eq!(got.len(), want.len());
+            for (at, (got, want)) in got.iter().zip(want).enumerate() {
+                let place = [at / level.size[1], at % level.size[1]];
+                let near = largest_near(level, [filter.rows, filter.cols], place);
+                let bound = factor * near.iter().zip(&sums).map(|(x, w)| x * w).sum::<f64>();
+                largest = largest.max((f64::from(*got) - want).abs() / bound);
+            }
+        }
+    }
+    largest
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Up to 70 columns and 40 filters of mixed sizes, so that every remainder occurs.
+    #[test]
+    fn every_instruction_set_gives_the_bits_of_the_readable_version(
+        sizes in prop::collection::vec([1..12_usize, 1..70_usize], 1..4),
+        filters in prop::collection::vec(([1..8_usize, 1..8_usize], 1..20_usize), 1..3),
+        seed in any::<u64>(),
+    ) {
+        let problem = Problem::new(&filters, &sizes, seed);
+        let want = problem.reference();
+        for isa in Isa::available() {
+            let bank = FilterBank::new(isa, &problem.templates());
+            let got = problem.responses(&bank, 0..bank.n_panels());
+            prop_assert!(got == want, "{:?}", isa);
+        }
+    }
+
+    /// Also where large terms cancel, which is where a tile is worst.
+    #[test]
+    fn responses_are_as_exact_as_they_are_said_to_be(
+        size in [1..30_usize, 1..30_usize],
+        filter in [1..8_usize, 1..8_usize],
+        seed in any::<u64>(),
+        large in 0..3_u32,
+    ) {
+        let mut problem = Problem::new(&[(filter, 3)], &[size], seed);
+        for (_, cells) in &mut problem.maps {
+            for cell in cells { *cell += 10_f32.powi(large as i32) - 1.0; }
+        }
+        let bank = FilterBank::new(Isa::best(), &problem.templates());
+        let got = problem.responses(&bank, 0..bank.n_panels());
+        let share = share_of_bound(&problem, &bank, &got);
+        prop_assert!(share <= 1.0, "{share}");
+    }
+}
+
+/// Tiles of other levels and panels never change a response.
+#[test]
+fn it_does_not_matter_what_is_asked_for_together() {
+    let sizes = [[21, 30], [7, 9], [1, 1], [40, 13], [2, 50]];
+    let problem = Problem::new(&[([5, 5], 70), ([6, 4], 3), ([2, 2], 40)], &sizes, 3);
+    let bank = FilterBank::new(Isa::best(), &problem.templates());
+    let together = problem.responses(&bank, 0..bank.n_panels());
+    let n = problem.filters.len();
+    for panel in 0..bank.n_panels() {
+        let alone = problem.responses(&bank, panel..panel + 1);
+        let filters = bank.filters(panel..panel + 1);
+        for (level, got) in alone.chunks(filters.len()).enumerate() {
+            let want = &together[level * n..][filters.clone()];
+            assert!(got == want, "level {level}, filters {filters:?}");
+        }
+    }
+}
+
+/// A bound for the worst case is far from what noise does, but not farther than this.
+#[test]
+fn the_bound_is_not_out_of_all_proportion() {
+    for filter in [[1, 1], [4, 4], [5, 5], [6, 6]] {
+        let problem = Problem::new(&[(filter, 8)], &[[24, 24]], 7);
+        let bank = FilterBank::new(Isa::best(), &problem.templates());
+        let got = problem.responses(&bank, 0..bank.n_panels());
+        let share = share_of_bound(&problem, &bank, &got);
+        assert!(share > 2e-5, "{filter:?}: {share}");
+    }
+}
+
+#[test]
+fn a_single_weight_copies_its_channel() {
+    let mut weights = vec![0.0; 2 * 3 * N_CHANNELS];
+    weights[(3 + 2) * N_CHANNELS + 7] = 2.0;
+    let template = Template {
+        rows: 2,
+        cols: 3,
+        weights: &weights,
+    };
+    let bank = FilterBank::new(Isa::best(), &[template]);
+    let cells: Vec<_> = (0..4 * 5 * N_CHANNELS).map(|it| it as f32).collect();
+    let map = FeatureMap {
+        rows: 4,
+        cols: 5,
+        cells: &cells,
+    };
+    let mut out = [f32::NAN; 9];
+    let level = Level { map, size: [3, 3] };
+    let mut workspace = CorrelateWorkspace::default();
+    bank.correlate(0..1, std::iter::once(level), &mut out, &mut workspace);
+    for (at, got) in out.iter().enumerate() {
+        let (y, x) = (at / 3 + 1, at % 3 + 2);
+        assert_eq!(*got, 2.0 * cells[(y * 5 + x) * N_CHANNELS + 7]);
+    }
+}
+
+/// The sizes at which each way is taken, so that a change of the rule shows.
+#[test]
+fn the_way_depends_on_sizes_only() {
+    assert_eq!(way([2, 5], [100, 100]), Way::Direct);
+    assert_eq!(way([7, 7], [100, 100]), Way::Direct);
+    assert_eq!(way([5, 5], [1, 1]), Way::Direct);
+    assert_eq!(way([5, 5], [8, 8]), Way::Tiles(0));
+    assert_eq!(way([5, 5], [12, 12]), Way::Tiles(1));
+    assert_eq!(way([6, 6], [100, 100]), Way::Tiles(1));
+}
+
+#[test]
+fn blocks_cover_everything_once_and_evenly() {
+    for total in 0..70 {
+        let all: Vec<_> = blocks(total, 14).collect();
+        assert!(all.iter().all(|it| (1..=14).contains(&it.len())));
+        assert_eq!(
+            all.into_iter().flatten().collect::<Vec<_>>(),
+            (0..total).collect::<Vec<_>>()
+        );
+    }
+}
