@@ -16,6 +16,7 @@ mod models;
 mod multi_view;
 mod parse_set;
 mod single_view;
+mod tiles;
 
 use std::path::{Path, PathBuf};
 

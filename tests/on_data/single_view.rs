@@ -227,6 +227,10 @@ fn the_distance_transform_matches_its_vector() {
     assert_eq!(off, 0.0);
 }
 
+/// How far a score may be from that of the authors' program, whose sums are plain and in double
+/// precision; 9.9e-6 was measured.
+const SCORES: f64 = 2e-5;
+
 /// Compares the shipped path with what the authors' program printed for a whole image.
 fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>) {
     let theirs = json(&shared.join(format!("reference/single_view/{name}.json")));
@@ -242,9 +246,10 @@ fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>)
         Some(u64::from(pose.level) + 1),
         "{name}"
     );
-    assert!(off.abs() < 1e-5, "{name}: score {off:e}");
+    println!("{name}: score {off:.1e}, best scores of the levels {level_off:.1e}");
+    assert!(off.abs() < SCORES, "{name}: score {off:e}");
     assert!(
-        level_off < 1e-5,
+        level_off < SCORES,
         "{name}: best scores of the levels {level_off:e}"
     );
     assert!(
@@ -284,7 +289,7 @@ fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>)
     );
     for (ours, theirs) in ours.iter().zip(kept) {
         let off = f64::from(ours.score) - theirs["score"].as_f64().unwrap();
-        assert!(off.abs() < 1e-5, "{name}: {off:e} after suppression");
+        assert!(off.abs() < SCORES, "{name}: {off:e} after suppression");
     }
 }
 

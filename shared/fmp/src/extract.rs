@@ -28,6 +28,16 @@ impl Extractor {
 
     /// As [`Self::new`], for a given instruction set; the responses are the same on all.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
+        Self::with(FilterBank::new, isa, model)
+    }
+
+    /// As [`Self::new`], but every response is the plain sum of its products: slower, and there to
+    /// compare with. See [`FilterBank::correlate`] for how far apart they can be.
+    pub fn direct(model: Arc<Model>) -> Self {
+        Self::with(FilterBank::direct, Isa::best(), model)
+    }
+
+    fn with(pack: fn(Isa, &[Template<'_>]) -> FilterBank, isa: Isa, model: Arc<Model>) -> Self {
         let filters = model.spec().filters.iter();
         let templates: Vec<_> = filters
             .map(|it| Template {
@@ -36,7 +46,7 @@ impl Extractor {
                 weights: &it.weights,
             })
             .collect();
-        let bank = FilterBank::new(isa, &templates);
+        let bank = pack(isa, &templates);
         Self {
             model,
             isa,

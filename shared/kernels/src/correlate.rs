@@ -97,6 +97,20 @@ impl FilterBank {
     ///
     /// If a template has no cells or another number of weights than its size says.
     pub fn new(isa: Isa, filters: &[Template<'_>]) -> Self {
+        Self::pack(isa, filters, true)
+    }
+
+    /// As [`Self::new`], but all responses are sums as the definition says: slower, and there to
+    /// compare with.
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::new`].
+    pub fn direct(isa: Isa, filters: &[Template<'_>]) -> Self {
+        Self::pack(isa, filters, false)
+    }
+
+    fn pack(isa: Isa, filters: &[Template<'_>], tiled: bool) -> Self {
         let mut panels: Vec<Panel> = Vec::new();
         for (index, filter) in filters.iter().enumerate() {
             let n_taps = filter.rows * filter.cols * N_CHANNELS;
@@ -112,7 +126,7 @@ impl FilterBank {
                     last.push(filter.weights);
                 }
                 _ => {
-                    let mut panel = Panel::new(index, size);
+                    let mut panel = Panel::new(index, size, tiled);
                     panel.push(filter.weights);
                     panels.push(panel);
                 }
@@ -203,7 +217,7 @@ impl FilterBank {
     /// larger by a factor that follows from the matrices, once per axis.
     pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
         let filter = self.panels[panel].filter;
-        let (roundings, growth) = match way(filter, size) {
+        let (roundings, growth) = match self.panels[panel].way(size) {
             Way::Direct => (filter[0] * filter[1] * N_CHANNELS + 1, 1.0),
             Way::Tiles(form) => {
                 let points = Form::new(FORMS[form], filter).points;
@@ -217,9 +231,9 @@ impl FilterBank {
 }
 
 impl Panel {
-    fn new(first: usize, filter: [usize; 2]) -> Self {
+    fn new(first: usize, filter: [usize; 2], tiled: bool) -> Self {
         let n_taps = filter[0] * filter[1] * N_CHANNELS;
-        let tiled = filter.iter().all(|side| TILED_SIDES.contains(side));
+        let tiled = tiled && filter.iter().all(|side| TILED_SIDES.contains(side));
         let rows = |it: usize| {
             let area = if tiled {
                 Form::new(FORMS[it], filter).area()
@@ -234,6 +248,22 @@ impl Panel {
             direct: vec![Row::ZERO; n_taps],
             tiles: std::array::from_fn(rows),
         }
+    }
+
+    /// The cheapest way by the number of products, and what a tile costs beside.
+    fn way(&self, size: [usize; 2]) -> Way {
+        let mut best = (self.direct.len() * size[0] * size[1], Way::Direct);
+        for (it, n_pairs) in FORMS.into_iter().enumerate() {
+            if !self.tiles[it].is_empty() {
+                let form = Form::new(n_pairs, self.filter);
+                let [down, across] = form.tiles(size);
+                let cost = form.area() * (N_CHANNELS + TRANSFORMS) * down * across;
+                if cost < best.0 {
+                    best = (cost, Way::Tiles(it));
+                }
+            }
+        }
+        best.1
     }
 
     fn push(&mut self, weights: &[f64]) {
@@ -251,23 +281,6 @@ impl Panel {
             }
         }
     }
-}
-
-/// The cheapest way by the number of products, and what a tile costs beside.
-fn way(filter: [usize; 2], size: [usize; 2]) -> Way {
-    let direct = filter[0] * filter[1] * N_CHANNELS * size[0] * size[1];
-    let mut best = (direct, Way::Direct);
-    if filter.iter().all(|side| TILED_SIDES.contains(side)) {
-        for (it, n_pairs) in FORMS.into_iter().enumerate() {
-            let form = Form::new(n_pairs, filter);
-            let [down, across] = form.tiles(size);
-            let cost = form.area() * (N_CHANNELS + TRANSFORMS) * down * across;
-            if cost < best.0 {
-                best = (cost, Way::Tiles(it));
-            }
-        }
-    }
-    best.1
 }
 
 /// What both transforms of a value cost, in products; by measurement.
@@ -292,7 +305,7 @@ impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
             for level in self.levels.clone() {
                 let place = (at, level.size);
                 at += self.n_filters * level.size[0] * level.size[1];
-                match way(panels[0].filter, level.size) {
+                match panels[0].way(level.size) {
                     Way::Direct => {
                         let out = &mut self.out[place.0..];
                         let row = &mut self.workspace.row;

@@ -16,10 +16,11 @@ const MAX_PAIRS: usize = 4;
 /// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`:
 /// even and odd values of a line never meet but in the last addition.
 ///
-/// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` and `1`, `5/2`,
-/// `5/4`, `1/4`. Of all sets of halves, thirds, quarters and so on up to 4 that were tried for tiles
-/// of 10 the last gives the smallest [`amplification`](Self::amplification); the usual `1`, `2`,
-/// `1/2`, `4` is 17 times worse.
+/// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` for tiles of 8 and
+/// `1`, `5/2`, `5/4`, `5/16` for tiles of 10. Of the sets of fractions up to 4 that were tried for
+/// the latter, this one is within a twentieth of the smallest [`amplification`](Self::amplification)
+/// (`1/4` in place of `5/16`), and its measured error is smaller by a third; the usual `1`, `2`,
+/// `1/2`, `4` amplifies 4 times as much.
 #[derive(Debug, Clone)]
 pub(super) struct Points {
     pub(super) n_pairs: usize,
@@ -38,7 +39,7 @@ impl Points {
     pub(super) fn new(n_pairs: usize) -> Self {
         let points: &[f32] = match n_pairs {
             3 => &[1.0, 2.0, 0.5],
-            _ => &[1.0, 2.5, 1.25, 0.25],
+            _ => &[1.0, 2.5, 1.25, 0.3125],
         };
         let mut all = Self {
             n_pairs,
@@ -215,6 +216,6 @@ mod tests {
     fn larger_tiles_amplify_more() {
         let of = |n_pairs| Points::new(n_pairs).amplification(5);
         assert!((of(3) - 39.6).abs() < 0.1, "{}", of(3));
-        assert!((of(4) - 171.9).abs() < 0.1, "{}", of(4));
+        assert!((of(4) - 179.7).abs() < 0.1, "{}", of(4));
     }
 }

@@ -100,10 +100,14 @@ impl Problem {
         .collect()
     }
 
+    fn way(filter: [usize; 2], size: [usize; 2]) -> Way {
+        Panel::new(0, filter, true).way(size)
+    }
+
     fn reference(&self) -> Vec<Vec<f32>> {
         let of = |level: Level<'_>| {
             let all = self.templates().into_iter();
-            let all = all.map(|it| (way([it.rows, it.cols], level.size), it));
+            let all = all.map(|it| (Self::way([it.rows, it.cols], level.size), it));
             all.map(|(way, it)| reference::correlate(way, it, level))
                 .collect::<Vec<_>>()
         };
@@ -260,12 +264,12 @@ fn a_single_weight_copies_its_channel() {
 /// The sizes at which each way is taken, so that a change of the rule shows.
 #[test]
 fn the_way_depends_on_sizes_only() {
-    assert_eq!(way([2, 5], [100, 100]), Way::Direct);
-    assert_eq!(way([7, 7], [100, 100]), Way::Direct);
-    assert_eq!(way([5, 5], [1, 1]), Way::Direct);
-    assert_eq!(way([5, 5], [8, 8]), Way::Tiles(0));
-    assert_eq!(way([5, 5], [12, 12]), Way::Tiles(1));
-    assert_eq!(way([6, 6], [100, 100]), Way::Tiles(1));
+    assert_eq!(Problem::way([2, 5], [100, 100]), Way::Direct);
+    assert_eq!(Problem::way([7, 7], [100, 100]), Way::Direct);
+    assert_eq!(Problem::way([5, 5], [1, 1]), Way::Direct);
+    assert_eq!(Problem::way([5, 5], [8, 8]), Way::Tiles(0));
+    assert_eq!(Problem::way([5, 5], [12, 12]), Way::Tiles(1));
+    assert_eq!(Problem::way([6, 6], [100, 100]), Way::Tiles(1));
 }
 
 #[test]
