@@ -1,6 +1,7 @@
 //! Responses of 156 filters of 4x4, 5x5 and 6x6 cells on all levels of images of 172 x 224 and
 //! 640 x 480 pixels, one thread: milliseconds of its processor time, operations of the definition
-//! per second, and their share of the multiply-add peak measured beside them.
+//! per second, their share of the multiply-add peak measured beside them, and how much longer plain
+//! sums take.
 //!
 //! `cargo bench -p kernels --bench responses [repetitions]`
 #![expect(clippy::print_stdout, reason = "a bench says what it measured")]
@@ -94,11 +95,18 @@ fn measure(isa: Isa, image: [usize; 2], side: usize, repetitions: usize) {
     let area: usize = sizes.iter().map(|[rows, cols]| rows * cols).sum();
     let mut out = vec![0.0; area * N_FILTERS];
     let mut workspace = CorrelateWorkspace::default();
-    let panels = 0..bank.n_panels();
-    let seconds = least(repetitions, || {
-        bank.correlate(panels.clone(), levels.clone(), &mut out, &mut workspace);
-        black_box(&mut out);
-    });
+    let mut seconds = |bank: &FilterBank, repetitions| {
+        least(repetitions, || {
+            let panels = 0..bank.n_panels();
+            bank.correlate(panels, levels.clone(), &mut out, &mut workspace);
+            black_box(&mut out);
+        })
+    };
+    let plain = seconds(
+        &FilterBank::direct(isa, &templates),
+        repetitions.div_ceil(4),
+    );
+    let seconds = seconds(&bank, repetitions);
     let operations = 2.0 * Peak::MultiplyAdd.run(isa, 1) as f64 * 20_000.0;
     let peak = operations
         / least(repetitions.min(10), || {
@@ -106,12 +114,13 @@ fn measure(isa: Isa, image: [usize; 2], side: usize, repetitions: usize) {
         });
     let speed = (2 * area * n_taps * N_FILTERS) as f64 / seconds;
     println!(
-        "{isa:?} {}x{}, {side}x{side}: {:8.3} ms, {:7.1} GFLOP/s of the definition, {:5.1} % of {:.1}",
+        "{isa:?} {}x{}, {side}x{side}: {:8.3} ms, {:7.1} GFLOP/s of the definition, {:5.1} % of {:.1}, plain sums {:.1} x",
         image[0],
         image[1],
         seconds * 1e3,
         speed / 1e9,
         100.0 * speed / peak,
-        peak / 1e9
+        peak / 1e9,
+        plain / seconds
     );
 }
