@@ -16,7 +16,7 @@ pub struct Extractor {
     isa: Isa,
     bank: FilterBank,
     workspaces: Mutex<Vec<Features>>,
-    /// One for each thread that ever answered at the same time as others.
+    /// One for each thread.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 
@@ -95,6 +95,14 @@ impl Extractor {
             1
         };
         features.begin(&source, n_threads);
+        let cols = layout.levels.iter().map(|it| it.cols).max().unwrap_or(0);
+        let mut buffers = lock(&self.buffers);
+        let n_buffers = buffers.len().max(n_threads);
+        buffers.resize_with(n_buffers, CorrelateWorkspace::default);
+        for buffer in buffers.iter_mut() {
+            self.bank.reserve(cols, buffer);
+        }
+        drop(buffers);
         let everything = Part {
             levels: 0..layout.levels.len(),
             panels: 0..self.bank.n_panels(),

@@ -151,6 +151,19 @@ impl FilterBank {
         first..panels.last().map_or(0, |it| it.filters.end)
     }
 
+    /// Makes room for levels of up to `cols` placements across: [`Self::correlate`] allocates nothing
+    /// from then on.
+    pub fn reserve(&self, cols: usize, workspace: &mut CorrelateWorkspace) {
+        for panel in &self.panels {
+            for (it, pending) in workspace.pending.iter_mut().enumerate() {
+                if !panel.tiles[it].is_empty() {
+                    pending.prepare(&Form::new(FORMS[it], panel.filter));
+                }
+            }
+        }
+        make_room(&mut workspace.row, cols);
+    }
+
     /// Writes the responses of the filters of some panels on some levels.
     ///
     /// `out[l][f][y][x] = sum over rows r, columns c, channels k of map_l[y + r][x + c][k] w_f[r][c][k]`
@@ -163,7 +176,7 @@ impl FilterBank {
     /// and on whatever instruction set: the same bits always.
     ///
     /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
-    /// * Allocates nothing once `workspace` was used.
+    /// * Allocates nothing once `workspace` was used or has [room](Self::reserve).
     ///
     /// # Panics
     ///
@@ -349,8 +362,7 @@ fn direct<S: Simd>(
 ) {
     let plane = size[0] * size[1];
     let (cells, _) = map.cells.as_chunks::<N_CHANNELS>();
-    // Registers are written whole.
-    row.resize(row.len().max(size[1] + N_LANES), Row::ZERO);
+    make_room(row, size[1]);
     for panel in panels {
         for y in 0..size[0] {
             for block in blocks(size[1], S::BLOCK) {
@@ -370,6 +382,11 @@ fn direct<S: Simd>(
             put(simd, row, size[1], to, out);
         }
     }
+}
+
+/// Room for a row of cells, and some more since registers are read whole.
+fn make_room(row: &mut Vec<Row>, cols: usize) {
+    row.resize(row.len().max(cols + N_LANES), Row::ZERO);
 }
 
 /// Splits `total` cells into blocks of at most `largest`, as equal as they can be.

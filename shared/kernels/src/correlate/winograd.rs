@@ -96,9 +96,9 @@ impl Pending {
     }
 
     /// Makes room; nothing to do from the second time on.
-    fn prepare(&mut self, form: &Form) {
+    pub(super) fn prepare(&mut self, form: &Form) {
         let [rows, cols] = form.placements;
-        self.tiles.reserve(TILES);
+        self.tiles.reserve(TILES.saturating_sub(self.tiles.len()));
         self.cells.resize(form.area() * TILES, Row::ZERO);
         self.products.resize(form.area() * TILES, Row::ZERO);
         self.between.resize(form.area(), Row::ZERO);
