@@ -296,7 +296,7 @@ impl Panel {
     }
 }
 
-/// What both transforms of a value cost, in products; by measurement.
+/// What both transforms of a value cost, in products; an estimate, only used to choose a way.
 const TRANSFORMS: usize = 10;
 
 struct Correlate<'a, I> {
