@@ -228,8 +228,8 @@ fn the_distance_transform_matches_its_vector() {
 }
 
 /// How far a score may be from that of the authors' program, whose sums are plain and in double
-/// precision; 9.9e-6 was measured.
-const SCORES: f64 = 2e-5;
+/// precision; 8.7e-6 was measured, the same on every instruction set.
+const SCORES: f64 = 1e-5;
 
 /// Compares the shipped path with what the authors' program printed for a whole image.
 fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>) {
