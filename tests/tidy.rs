@@ -12,10 +12,12 @@ use std::process::Command;
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
-    &["geometry", "kernels", "messages", "footage", "join"],
+    &[
+        "geometry", "kernels", "messages", "footage", "join", "mat5",
+    ],
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
-    &["pipeline", "evaluation"],
+    &["pipeline", "evaluation", "datasets"],
     &["wire"],
     &[
         "capture",

@@ -1,4 +1,5 @@
 //! What only tests need.
 #![forbid(unsafe_code)]
 
+pub mod mat;
 pub mod npy;

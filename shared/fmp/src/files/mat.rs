@@ -1,6 +1,7 @@
 //! Yang & Ramanan's released models: a MATLAB level 5 file with a struct called `model`.
 
-use super::mat5::{self, ContainerError, Numbers, Structs, Value};
+use mat5::{ContainerError, Numbers, Structs, Value};
+
 use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
 
@@ -125,7 +126,7 @@ impl<'v, 'a> At<'v, 'a> {
         MatError::Size {
             field: self.field.clone(),
             got: match self.value {
-                Value::Numbers(numbers) => numbers.sizes.clone(),
+                Value::Numbers(numbers) => numbers.sizes().to_vec(),
                 _ => Vec::new(),
             },
             expected,
@@ -153,7 +154,7 @@ impl<'v, 'a> At<'v, 'a> {
 
     /// A table of indices, by rows.
     fn table(&self, rows: usize, cols: usize) -> Result<Vec<Vec<usize>>, MatError> {
-        if self.numbers()?.sizes != [rows, cols] {
+        if *self.numbers()?.sizes() != [rows, cols] {
             return Err(self.size(vec![rows, cols]));
         }
         let ids = self.ids()?;
@@ -237,12 +238,12 @@ fn filters(all: &Elements<'_, '_>) -> Result<Vec<Filter>, MatError> {
         .map(|it| {
             let weights = all.get(it, "w")?;
             let numbers = weights.numbers()?;
-            match numbers.sizes[..] {
+            match *numbers.sizes() {
                 [rows, cols, N_CHANNELS] if rows.max(cols) <= Model::MAX_FILTER => {
                     Ok(filter_from_planes(rows, cols, &numbers.values()))
                 }
                 _ => {
-                    let side = |it: usize| numbers.sizes[it].min(Model::MAX_FILTER);
+                    let side = |it: usize| numbers.sizes()[it].min(Model::MAX_FILTER);
                     Err(weights.size(vec![side(0), side(1), N_CHANNELS]))
                 }
             }
@@ -321,7 +322,7 @@ fn part(all: &Elements<'_, '_>, it: usize) -> Result<ReleasedPart, MatError> {
     let n_own = filter_ids.len();
     let springs = all.get(it, "defid")?;
     let ids = springs.ids()?;
-    let sizes = &springs.numbers()?.sizes;
+    let sizes = springs.numbers()?.sizes();
     let per_pair = *sizes == [n_parent, n_own] && (n_parent > 1 || ids.contains(&0));
     let spring_ids = if !per_pair && ids.len() == n_own {
         SpringIds::PerChildType(ids)

@@ -4,7 +4,6 @@ pub mod mat;
 pub mod own;
 pub mod text;
 
-mod mat5;
 mod payload;
 #[cfg(test)]
 pub(crate) mod planted;
@@ -18,7 +17,6 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process;
 
-pub use mat5::ContainerError;
 pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
 pub use tokens::Place;
 
@@ -193,7 +191,7 @@ mod tests {
         let spec = planted::three_parts();
         let text = planted::as_text(&spec);
         assert_eq!(said_of("he.dat", text.as_bytes()), "fine: he");
-        let mat = planted::mat::file("model", &planted::mat::model(&spec), true);
+        let mat = testkit::mat::file("model", &planted::mat::model(&spec), true);
         assert_eq!(said_of("parse.final.txt", &mat), "fine: parse.final");
         let own = own::encode(&Model::new(spec).unwrap()).unwrap();
         assert_eq!(said_of("other.mat", &own), "fine: unnamed");

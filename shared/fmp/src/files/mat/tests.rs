@@ -3,9 +3,10 @@
 use std::error::Error as _;
 
 use proptest::prelude::*;
+use testkit::mat::{Mat, compressed_file, file, number, row};
 
 use super::*;
-use crate::files::planted::mat::{Mat, compressed_file, file, model, number, row};
+use crate::files::planted::mat::model;
 use crate::files::planted::{per_pair, three_parts};
 
 /// One change to a good file.
@@ -95,26 +96,6 @@ fn an_array_whose_sizes_and_values_disagree_is_refused() {
     });
     assert_eq!(said, expected);
 }
-
-#[test]
-fn numbers_of_every_storage_are_read() {
-    let cases: [(u32, &[u8], f64); 9] = [
-        (MI_INT8, &[0xfe], -2.0),
-        (2, &[0xfe], 254.0),
-        (3, &[0xfe, 0xff], -2.0),
-        (4, &[0xfe, 0xff], 65534.0),
-        (5, &[0xfe, 0xff, 0xff, 0xff], -2.0),
-        (6, &[0xfe, 0xff, 0xff, 0xff], 4294967294.0),
-        (7, &[0, 0, 0, 0x3f], 0.5),
-        (9, &[0, 0, 0, 0, 0, 0, 0xe0, 0x3f], 0.5),
-        (12, &[0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff], -2.0),
-    ];
-    for (storage, data, expected) in cases {
-        assert_eq!(mat5::one_number(storage, data), [expected]);
-    }
-}
-
-const MI_INT8: u32 = 1;
 
 #[test]
 fn names_the_field_that_is_wrong() {

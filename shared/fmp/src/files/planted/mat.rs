@@ -1,48 +1,8 @@
-//! Writes a model as a MATLAB level 5 file of release 1.3 or 1.4.
+//! A model as the `model` struct of release 1.3 or 1.4.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
+use testkit::mat::{Mat, number, row};
 
 use crate::{ModelSpec, N_CHANNELS, PartSpec, Springs};
-
-/// A value to be written.
-#[derive(Clone)]
-pub(crate) enum Mat {
-    /// Sizes, and numbers row fastest.
-    Numbers(Vec<usize>, Vec<f64>),
-    /// One row of structs: the fields' names, and all values element by element.
-    Structs(Vec<&'static str>, Vec<Self>),
-    /// One row of cells.
-    Cell(Vec<Self>),
-}
-
-/// The bytes of a file with one variable.
-pub(crate) fn file(name: &str, value: &Mat, compressed: bool) -> Vec<u8> {
-    let variable = matrix(name, value);
-    if compressed {
-        compressed_file(&variable)
-    } else {
-        [header(), variable].concat()
-    }
-}
-
-/// The bytes of a file whose one variable inflates to `variable`.
-pub(crate) fn compressed_file(variable: &[u8]) -> Vec<u8> {
-    let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
-    deflated.write_all(variable).unwrap();
-    let deflated = deflated.finish().unwrap();
-    let tag = [15, deflated.len() as u32].map(u32::to_le_bytes).concat();
-    [header(), tag, deflated].concat()
-}
-
-fn header() -> Vec<u8> {
-    let mut bytes = b"MATLAB 5.0 MAT-file, planted".to_vec();
-    bytes.resize(124, b' ');
-    bytes.extend([0, 1, b'I', b'M']);
-    bytes
-}
 
 /// The `model` struct: release 1.4 (springs per pair, 0 where one never occurs) or 1.3.
 pub(crate) fn model(spec: &ModelSpec) -> Mat {
@@ -135,64 +95,4 @@ fn parent_id(part: &PartSpec) -> f64 {
     part.edge
         .as_ref()
         .map_or(0.0, |edge| edge.parent as f64 + 1.0)
-}
-
-/// A scalar.
-pub(crate) fn number(value: f64) -> Mat {
-    row(vec![value])
-}
-
-/// A row vector.
-pub(crate) fn row(values: Vec<f64>) -> Mat {
-    Mat::Numbers(vec![1, values.len()], values)
-}
-
-fn matrix(name: &str, value: &Mat) -> Vec<u8> {
-    let (class, sizes) = match value {
-        Mat::Cell(values) => (1, vec![1, values.len()]),
-        Mat::Structs(fields, values) => (2, vec![1, values.len() / fields.len()]),
-        Mat::Numbers(sizes, _) => (6, sizes.clone()),
-    };
-    let sizes: Vec<u8> = sizes
-        .iter()
-        .flat_map(|&it| (it as i32).to_le_bytes())
-        .collect();
-    let mut body = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
-    body.extend(element(5, &sizes));
-    body.extend(element(1, name.as_bytes()));
-    match value {
-        Mat::Cell(values) => body.extend(values.iter().flat_map(|it| matrix("", it))),
-        Mat::Structs(fields, values) => {
-            body.extend(element(5, &32_i32.to_le_bytes()));
-            let padded = |it: &&str| format!("{it:\0<32}").into_bytes();
-            body.extend(element(
-                1,
-                &fields.iter().flat_map(padded).collect::<Vec<_>>(),
-            ));
-            body.extend(values.iter().flat_map(|it| matrix("", it)));
-        }
-        Mat::Numbers(_, values) if values.iter().all(|&it| f64::from(it as u8) == it) => {
-            // MATLAB stores numbers in the narrowest type that holds them.
-            let bytes: Vec<u8> = values.iter().map(|&it| it as u8).collect();
-            body.extend(element(2, &bytes));
-        }
-        Mat::Numbers(_, values) => {
-            let bytes: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
-            body.extend(element(9, &bytes));
-        }
-    }
-    element(14, &body)
-}
-
-fn element(kind: u32, data: &[u8]) -> Vec<u8> {
-    if (1..=4).contains(&data.len()) {
-        let mut bytes = (kind | (data.len() as u32) << 16).to_le_bytes().to_vec();
-        bytes.extend(data);
-        bytes.resize(8, 0);
-        return bytes;
-    }
-    let mut bytes = [kind, data.len() as u32].map(u32::to_le_bytes).concat();
-    bytes.extend(data);
-    bytes.resize(bytes.len().next_multiple_of(8), 0);
-    bytes
 }

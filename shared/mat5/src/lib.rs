@@ -1,115 +1,90 @@
-//! MATLAB's level 5 container, as far as model files need it: numbers, structs and cells, compressed or not.
+//! MATLAB's level 5 container, as far as models and annotations need it: numbers, structs and cells, compressed or not.
 //!
 //! Written here because the readers on offer panic on damaged files. Nothing is allocated on a
 //! count's word: every array is a view of bytes that are there.
+//!
+//! ```no_run
+//! let file = std::fs::read("labels.mat")?;
+//! for bytes in &mat5::variables(&file)? {
+//!     let (name, value) = mat5::variable(bytes)?;
+//!     if let mat5::Value::Numbers(numbers) = value {
+//!         println!("{name}: {:?}", numbers.sizes());
+//!     }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
 
-use std::io::{self, Read as _};
+mod error;
+
+use std::io::Read as _;
 
 use flate2::read::ZlibDecoder;
 
-/// Why bytes are not a MATLAB level 5 file.
-#[derive(Debug, thiserror::Error)]
-pub enum ContainerError {
-    /// HDF5, which MATLAB calls version 7.3.
-    #[error("the file is of MATLAB version 7.3: save it again with `save -v7`")]
-    Version73,
-    /// Written on a big-endian machine, or not a MATLAB file.
-    #[error("the header's endian mark is {got:?}, expected \"IM\" (little-endian)")]
-    Endian {
-        /// The two characters.
-        got: String,
-    },
-    /// The file ends too early.
-    #[error("the file ends within {what}: {got} bytes left, {expected} needed")]
-    Ended {
-        /// What was being read.
-        what: &'static str,
-        /// Bytes left.
-        got: usize,
-        /// Bytes needed.
-        expected: usize,
-    },
-    /// A tag names another type than belongs there.
-    #[error("{what} has type {got}, expected {expected}")]
-    Type {
-        /// What was being read.
-        what: &'static str,
-        /// The type's number.
-        got: u32,
-        /// Which would do.
-        expected: &'static str,
-    },
-    /// An array's sizes and its values disagree.
-    #[error("an array of {sizes:?} holds {got} values")]
-    Size {
-        /// Its sizes.
-        sizes: Vec<i32>,
-        /// Values found.
-        got: usize,
-    },
-    /// The file asks for more than a model needs.
-    #[error("the file holds more than {limit} {what}")]
-    TooMuch {
-        /// Of what.
-        what: &'static str,
-        /// How many are accepted.
-        limit: usize,
-    },
-    /// A compressed variable is damaged.
-    #[error("a compressed variable is damaged")]
-    Inflate(#[source] io::Error),
-}
+pub use error::ContainerError;
 
 /// A value in a file, its arrays still as bytes.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value<'a> {
+pub enum Value<'a> {
     /// Real numbers, column-major.
     Numbers(Numbers<'a>),
     /// An array of structs.
     Structs(Structs<'a>),
     /// An array of values of any kind.
     Cell(Vec<Self>),
-    /// Something that no model has: text, sparse or complex numbers, objects.
+    /// Something that is not read: text, sparse or complex numbers, objects.
     Other,
 }
 
 /// An array of real numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Numbers<'a> {
-    /// Sizes; rows first.
-    pub(super) sizes: Vec<usize>,
+pub struct Numbers<'a> {
+    sizes: Vec<usize>,
     storage: u32,
     bytes: &'a [u8],
 }
 
 /// An array of structs.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Structs<'a> {
+pub struct Structs<'a> {
     fields: Vec<String>,
     /// `[element][field]`.
     elements: Vec<Vec<Value<'a>>>,
 }
 
 impl Structs<'_> {
-    pub(super) fn len(&self) -> usize {
+    /// Number of elements.
+    pub fn len(&self) -> usize {
         self.elements.len()
+    }
+
+    /// Whether there is no element.
+    pub fn is_empty(&self) -> bool {
+        self.elements.is_empty()
     }
 }
 
 impl<'a> Structs<'a> {
-    pub(super) fn get(&self, element: usize, field: &str) -> Option<&Value<'a>> {
+    /// A field of an element (from 0); `None` if one of the two is not there.
+    pub fn get(&self, element: usize, field: &str) -> Option<&Value<'a>> {
         let field = self.fields.iter().position(|it| it == field)?;
         self.elements.get(element)?.get(field)
     }
 }
 
 impl Numbers<'_> {
-    pub(super) fn n_values(&self) -> usize {
+    /// Sizes, rows first; at least two.
+    pub fn sizes(&self) -> &[usize] {
+        &self.sizes
+    }
+
+    /// Number of values, the product of the sizes.
+    pub fn n_values(&self) -> usize {
         self.sizes.iter().product()
     }
 
     /// The values, column-major.
-    pub(super) fn values(&self) -> Vec<f64> {
+    pub fn values(&self) -> Vec<f64> {
         match self.storage {
             MI_INT8 => self.each(|[byte]: [u8; 1]| f64::from(byte as i8)),
             MI_UINT8 => self.each(|[byte]: [u8; 1]| f64::from(byte)),
@@ -139,7 +114,7 @@ impl Numbers<'_> {
 /// # Errors
 ///
 /// [`ContainerError`]
-pub(super) fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
+pub fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
     if file.starts_with(b"MATLAB 7.3") {
         return Err(ContainerError::Version73);
     }
@@ -174,7 +149,13 @@ pub(super) fn variables(file: &[u8]) -> Result<Vec<Vec<u8>>, ContainerError> {
 }
 
 /// Reads a variable: its name and its value.
-pub(super) fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
+///
+/// * `bytes`: one of [`variables`].
+///
+/// # Errors
+///
+/// [`ContainerError`]
+pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
     let mut budget = MAX_VALUES;
     let (kind, data) = Bytes(bytes).element("a variable")?;
     expect_type("a variable", kind, &[MI_MATRIX], "14 (matrix)")?;
@@ -182,7 +163,7 @@ pub(super) fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerErr
 }
 
 const HEADER_BYTES: usize = 128;
-/// More than the largest model that [`crate::Model`] accepts at 4 bytes a weight.
+/// More than the largest model that is accepted at 4 bytes a weight.
 const MAX_BYTES: usize = 64 << 20;
 const MAX_VALUES: usize = 1 << 20;
 const MAX_DEPTH: usize = 8;
@@ -444,14 +425,5 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The numbers of an array that is stored like this.
 #[cfg(test)]
-pub(super) fn one_number(storage: u32, bytes: &[u8]) -> Vec<f64> {
-    let sizes = vec![1, 1];
-    Numbers {
-        sizes,
-        storage,
-        bytes,
-    }
-    .values()
-}
+mod tests;
