@@ -9,6 +9,7 @@ mod video;
 
 use std::path::Path;
 
+pub use images::read_image;
 use images::{Images, Still, is_image};
 use listing::Listing;
 use video::Video;

@@ -98,6 +98,17 @@ impl Still {
     }
 }
 
+/// Decodes one image file: its size and its pixels, `width * height * 3` bytes of RGB, row major.
+///
+/// The same pixels that [`Source`](crate::Source) hands out for the file; `path` is a file, never a pattern.
+///
+/// # Errors
+///
+/// [`FootageError`]: absent, empty, damaged or too large; each names the file.
+pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
+    Still::open(path, 1).map(|it| (it.size, it.rgb))
+}
+
 /// Whether the content of a file is that of an image (an empty file of an image's name counts as one).
 pub(super) fn is_image(path: &Path) -> Result<bool, FootageError> {
     use std::io::Read as _;
