@@ -1,0 +1,48 @@
+//! Annotated people: read, judged, turned and mirrored, and their joints as the parts of a model.
+//!
+//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines and gives
+//! [`People`]: those who can be used, and a [`Problem`] for everybody else, with file and row. A
+//! [`Sample`] is one of them with the pixels; a [`SkeletonTable`] turns joints into parts.
+//!
+//! Pixels: the centre of the top-left pixel is `(0, 0)`; the MATLAB files count from 1, which is undone
+//! when they are read.
+//!
+//! # Our own annotation file
+//!
+//! One JSON object a line, one person each; empty lines are passed over:
+//!
+//! ```json
+//! {"image": "photos/7.jpg", "joints": [[31.5, 80.0], null, [40.0, 61.25]], "visible": [true, false, true], "name": "ann"}
+//! ```
+//!
+//! | key | what |
+//! |---|---|
+//! | `image` | path of the image, relative to the annotation file |
+//! | `joints` | `[x, y]` in pixels, or `null` where the joint is not known; the order is that of the skeleton table |
+//! | `visible` | optional, one `true` or `false` a joint; without it, all known joints are visible |
+//! | `name` | optional, no two people of a file may have the same |
+//!
+//! Other keys are refused.
+#![forbid(unsafe_code)]
+
+mod person;
+
+mod check;
+mod lines;
+mod mat_files;
+mod read;
+mod select;
+
+mod picture;
+mod sample;
+
+mod table;
+
+pub use lines::{parse_line, to_line};
+pub use mat_files::{Annotation, MatLayoutError, parse_joints, parse_labels};
+pub use person::{Fault, FaultKind, People, Person, Problem};
+pub use picture::Picture;
+pub use read::{DatasetError, ReadOptions, read};
+pub use sample::Sample;
+pub use select::{SelectError, Selection};
+pub use table::{SkeletonFileError, SkeletonSpec, SkeletonTable, TableError};

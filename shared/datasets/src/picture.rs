@@ -1,0 +1,74 @@
+//! An image that we own.
+
+use std::path::Path;
+
+use footage::{FootageError, Size};
+use kernels::Rgb8View;
+
+/// Interleaved 8-bit RGB, row major, without padding between rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    size: Size,
+    rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// An image of one colour.
+    pub fn filled(size: Size, colour: [u8; 3]) -> Self {
+        Self {
+            size,
+            rgb: colour.repeat(size.width * size.height),
+        }
+    }
+
+    /// Takes pixels over.
+    ///
+    /// * `rgb`: `width * height * 3` bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`ImageSizeError`](kernels::ImageSizeError) if there are more or fewer.
+    pub fn new(size: Size, rgb: Vec<u8>) -> Result<Self, kernels::ImageSizeError> {
+        Rgb8View::new(size.width, size.height, &rgb)?;
+        Ok(Self { size, rgb })
+    }
+
+    /// Decodes an image file, to the same pixels as [`footage::Source`] does for detection.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError`], which names the file.
+    pub fn read(path: &Path) -> Result<Self, FootageError> {
+        let (size, rgb) = footage::read_image(path)?;
+        Ok(Self { size, rgb })
+    }
+
+    /// Width and height, pixels.
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// The bytes: `height x width x 3`.
+    pub fn rgb(&self) -> &[u8] {
+        &self.rgb
+    }
+
+    /// The bytes, to be written.
+    pub fn rgb_mut(&mut self) -> &mut [u8] {
+        &mut self.rgb
+    }
+
+    /// The same pixels, as detection takes them.
+    ///
+    /// # Panics
+    ///
+    /// Never: the number of bytes is checked when a picture is made.
+    #[expect(
+        clippy::expect_used,
+        reason = "the number of bytes is checked when a picture is made"
+    )]
+    pub fn view(&self) -> Rgb8View<'_> {
+        let view = Rgb8View::new(self.size.width, self.size.height, &self.rgb);
+        view.expect("the number of bytes is checked when a picture is made")
+    }
+}

@@ -1,0 +1,239 @@
+//! Which people of a data set are meant: ranges of rows, or names of images.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::io;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+/// Some of the people of a data set.
+///
+/// Written as ranges of rows from 1 (`1-100,150`), or as the path of a list file with a range, a row or
+/// the file name of an image a line. Whatever is named must be there: a slip of the pen in the list of a
+/// test set would otherwise train on it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Selection {
+    rows: Vec<RangeInclusive<usize>>,
+    images: BTreeSet<String>,
+}
+
+/// Why a selection means nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum SelectError {
+    /// Neither ranges nor a list file.
+    #[error("{text:?} is neither rows (1-100,150) nor a file with a list of rows or image names")]
+    NotASelection {
+        /// As the user wrote it.
+        text: String,
+        /// What the operating system says of a file of that name.
+        source: io::Error,
+    },
+    /// A range that ends before it begins, or begins at 0.
+    #[error("the rows {first}-{last} are none: rows count from 1")]
+    BadRange {
+        /// First row.
+        first: usize,
+        /// Last row.
+        last: usize,
+    },
+    /// The list file is empty.
+    #[error("the list {} names nobody", path.display())]
+    EmptyList {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A named image has no people.
+    #[error("{name} of the selection is no image of {}", data.display())]
+    NoSuchImage {
+        /// The image.
+        name: String,
+        /// The data set.
+        data: PathBuf,
+    },
+    /// A range of rows has no people.
+    #[error("the rows {first}-{last} of the selection are none of {}", data.display())]
+    NoSuchRows {
+        /// First row.
+        first: usize,
+        /// Last row.
+        last: usize,
+        /// The data set.
+        data: PathBuf,
+    },
+}
+
+impl Selection {
+    /// Reads a selection as it stands on a command line: ranges of rows, else the path of a list file.
+    ///
+    /// # Errors
+    ///
+    /// [`NotASelection`](SelectError::NotASelection), [`BadRange`](SelectError::BadRange),
+    /// [`EmptyList`](SelectError::EmptyList).
+    pub fn from_argument(text: &str) -> Result<Self, SelectError> {
+        if let Some(rows) = ranges(text) {
+            return Ok(Self {
+                rows: rows?,
+                images: BTreeSet::new(),
+            });
+        }
+        match fs::read_to_string(text) {
+            Ok(list) => Self::from_list(Path::new(text), &list),
+            Err(source) => Err(SelectError::NotASelection {
+                text: text.to_owned(),
+                source,
+            }),
+        }
+    }
+
+    /// Reads the text of a list file.
+    ///
+    /// * `path`: where it is from, for messages.
+    ///
+    /// # Errors
+    ///
+    /// [`BadRange`](SelectError::BadRange), [`EmptyList`](SelectError::EmptyList).
+    pub fn from_list(path: &Path, list: &str) -> Result<Self, SelectError> {
+        let mut selection = Self::default();
+        for line in list.lines().map(str::trim).filter(|it| !it.is_empty()) {
+            match ranges(line) {
+                Some(rows) => selection.rows.extend(rows?),
+                None => {
+                    selection.images.insert(line.to_owned());
+                }
+            }
+        }
+        if selection == Self::default() {
+            return Err(SelectError::EmptyList {
+                path: path.to_owned(),
+            });
+        }
+        Ok(selection)
+    }
+
+    /// Whether a person is meant.
+    ///
+    /// * `row`: from 1.
+    pub fn contains(&self, row: usize, image: &Path) -> bool {
+        let by_name = || {
+            let name = image.file_name().unwrap_or_default().to_string_lossy();
+            self.images.contains(name.as_ref())
+        };
+        self.rows.iter().any(|it| it.contains(&row)) || by_name()
+    }
+
+    /// Checks that every range and every name means somebody.
+    ///
+    /// * `data`: the data set, for messages.
+    /// * `people`: row and image of everybody.
+    pub(crate) fn check(
+        &self,
+        data: &Path,
+        people: &BTreeMap<usize, PathBuf>,
+    ) -> Result<(), SelectError> {
+        for rows in &self.rows {
+            if people.range(rows.clone()).next().is_none() {
+                return Err(SelectError::NoSuchRows {
+                    first: *rows.start(),
+                    last: *rows.end(),
+                    data: data.to_owned(),
+                });
+            }
+        }
+        let names: BTreeSet<_> = people
+            .values()
+            .map(|it| it.file_name().unwrap_or_default().to_string_lossy())
+            .collect();
+        for name in &self.images {
+            if !names.contains(name.as_str()) {
+                return Err(SelectError::NoSuchImage {
+                    name: name.clone(),
+                    data: data.to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Ranges of rows, separated by commas; `None` if the text is something else.
+fn ranges(text: &str) -> Option<Result<Vec<RangeInclusive<usize>>, SelectError>> {
+    let number = |it: &str| it.trim().parse::<usize>().ok();
+    let ranges: Option<Vec<_>> = text
+        .split(',')
+        .map(|it| match it.split_once('-') {
+            Some((first, last)) => Some((number(first)?, number(last)?)),
+            None => number(it).map(|row| (row, row)),
+        })
+        .collect();
+    let checked = ranges?.into_iter().map(|(first, last)| {
+        if first == 0 || last < first {
+            Err(SelectError::BadRange { first, last })
+        } else {
+            Ok(first..=last)
+        }
+    });
+    Some(checked.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows_of(selection: &Selection) -> Vec<usize> {
+        let meant = |it: &usize| selection.contains(*it, Path::new("images/other.jpg"));
+        (0..200).filter(meant).collect()
+    }
+
+    fn people() -> BTreeMap<usize, PathBuf> {
+        BTreeMap::from([
+            (1, PathBuf::from("images/a.jpg")),
+            (3, PathBuf::from("images/b.jpg")),
+        ])
+    }
+
+    #[test]
+    fn ranges_hold_both_of_their_ends() {
+        let selection = Selection::from_argument("3-5, 9").unwrap();
+        assert_eq!(rows_of(&selection), [3, 4, 5, 9]);
+    }
+
+    #[test]
+    fn a_list_names_images_wherever_they_lie_and_rows() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("list.txt");
+        fs::write(&path, " im7.jpg\n\n2-3\n").unwrap();
+        let selection = Selection::from_argument(path.to_str().unwrap()).unwrap();
+        assert_eq!(rows_of(&selection), [2, 3]);
+        assert!(selection.contains(99, Path::new("images/im7.jpg")));
+        assert!(!selection.contains(99, Path::new("im7.jpg/im8.jpg")));
+    }
+
+    #[test]
+    fn what_means_nothing_is_refused() {
+        let said = |text| Selection::from_argument(text).unwrap_err().to_string();
+        assert!(said("5-4").starts_with("the rows 5-4 are none"));
+        assert!(said("0-4").starts_with("the rows 0-4 are none"));
+        assert!(said("no/such/list").starts_with("\"no/such/list\" is neither rows"));
+        let empty = Selection::from_list(Path::new("l"), "\n \n").unwrap_err();
+        assert_eq!(empty.to_string(), "the list l names nobody");
+    }
+
+    #[test]
+    fn what_is_named_must_be_there() {
+        let check = |text: &str| {
+            let selection = Selection::from_list(Path::new("l"), text).unwrap();
+            selection.check(Path::new("set"), &people())
+        };
+        check("1-2\nb.jpg\n3-900").unwrap();
+        assert!(matches!(
+            check("2").unwrap_err(),
+            SelectError::NoSuchRows {
+                first: 2,
+                last: 2,
+                ..
+            }
+        ));
+        let said = check("c.jpg").unwrap_err().to_string();
+        assert_eq!(said, "c.jpg of the selection is no image of set");
+    }
+}

@@ -1,0 +1,365 @@
+//! Which parts a model has, and where they lie between the joints that are annotated.
+
+mod file;
+mod published;
+
+pub use file::SkeletonFileError;
+
+/// A skeleton as it is written: nothing is known to hold yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkeletonSpec {
+    /// Names of the parts.
+    pub names: Vec<String>,
+    /// Parent of every part; `None` for the root, which is part 0.
+    pub parent: Vec<Option<usize>>,
+    /// The part on the other side of the body; a part in the middle is its own.
+    pub mirror: Vec<usize>,
+    /// Joints and weights whose weighted sum is the part, for every part.
+    pub weights: Vec<Vec<(usize, f64)>>,
+    /// Names of the joints, in the order of the annotation.
+    pub joint_names: Vec<String>,
+    /// The joint on the other side of the body; a joint in the middle is its own.
+    pub joint_mirror: Vec<usize>,
+}
+
+/// A skeleton that has been checked: what a model is trained for.
+///
+/// * The parts are a tree: part 0 and only part 0 is the root, every other part comes after its parent.
+/// * Either mirror is its own inverse; that of the parts keeps the tree, and the part on the other side
+///   lies between the joints on the other side. So the parts of a mirrored person are the mirrored
+///   parts.
+/// * The weights of every part add up to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkeletonTable(SkeletonSpec);
+
+/// Why a skeleton was refused. Parts and joints count from 1.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// No part, no joint, or too many parts.
+    #[error("the skeleton has {got} {what}, expected 1 to {max}")]
+    Number {
+        /// Parts or joints.
+        what: &'static str,
+        /// How many there are.
+        got: usize,
+        /// Most that are accepted.
+        max: usize,
+    },
+    /// A list has not one entry a part or a joint.
+    #[error("there are {got} {what}, expected {expected}")]
+    Length {
+        /// Of what.
+        what: &'static str,
+        /// Entries there are.
+        got: usize,
+        /// Entries expected.
+        expected: usize,
+    },
+    /// Two have one name.
+    #[error("{what} {first} and {second} are both called {name:?}")]
+    SameName {
+        /// `parts` or `joints`.
+        what: &'static str,
+        /// From 1.
+        first: usize,
+        /// From 1.
+        second: usize,
+        /// The name.
+        name: String,
+    },
+    /// The first part has a parent, or another has none.
+    #[error(
+        "part {part} ({name}) has {} parent: the first part and only the first is the root",
+        if *.part == 1 { "a" } else { "no" }
+    )]
+    Root {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+    },
+    /// A parent does not come before its child.
+    #[error("part {part} ({name}) has part {parent} as its parent, which does not come before it")]
+    Tree {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+        /// From 1.
+        parent: usize,
+    },
+    /// A mirror that is no exchange.
+    #[error(
+        "the mirror of {what} {index} ({name}) is {other}, but not the other way round or not there"
+    )]
+    Mirror {
+        /// `part` or `joint`.
+        what: &'static str,
+        /// From 1.
+        index: usize,
+        /// Its name.
+        name: String,
+        /// From 1.
+        other: usize,
+    },
+    /// The mirror does not keep the tree.
+    #[error(
+        "the mirror of part {part} ({name}) hangs on another part than the mirror of its parent"
+    )]
+    MirrorTree {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+    },
+    /// A part and its mirror image lie at different places between the joints.
+    #[error(
+        "part {part} ({name}) and its mirror image {other} do not lie between the same joints of either side"
+    )]
+    MirrorWeights {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+        /// Name of its mirror image.
+        other: String,
+    },
+    /// A part names a joint that is not there.
+    #[error("part {part} ({name}) names joint {joint} of {n_joints}")]
+    Joint {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+        /// From 1.
+        joint: usize,
+        /// How many there are.
+        n_joints: usize,
+    },
+    /// The weights of a part do not add up to 1.
+    #[error("the weights of part {part} ({name}) add up to {sum}, expected 1")]
+    Weights {
+        /// From 1.
+        part: usize,
+        /// Its name.
+        name: String,
+        /// Their sum.
+        sum: f64,
+    },
+}
+
+/// How far the sum of weights may be from 1, and weights of the two sides from each other: thirds are
+/// written with a few digits.
+const TOLERANCE: f64 = 1e-3;
+
+impl SkeletonTable {
+    /// Most parts and most joints.
+    pub const MAX: usize = 64;
+
+    /// Checks `spec`.
+    ///
+    /// # Errors
+    ///
+    /// See [`TableError`].
+    pub fn new(spec: SkeletonSpec) -> Result<Self, TableError> {
+        check_lengths(&spec)?;
+        check_names("parts", &spec.names)?;
+        check_names("joints", &spec.joint_names)?;
+        check_tree(&spec)?;
+        check_exchange("part", &spec.mirror, &spec.names)?;
+        check_exchange("joint", &spec.joint_mirror, &spec.joint_names)?;
+        check_weights(&spec)?;
+        check_mirror(&spec)?;
+        Ok(Self(spec))
+    }
+
+    /// What it is made of.
+    pub fn spec(&self) -> &SkeletonSpec {
+        &self.0
+    }
+
+    /// Number of parts.
+    pub fn n_parts(&self) -> usize {
+        self.0.names.len()
+    }
+
+    /// Number of joints.
+    pub fn n_joints(&self) -> usize {
+        self.0.joint_names.len()
+    }
+
+    /// Names of the parts.
+    pub fn names(&self) -> &[String] {
+        &self.0.names
+    }
+
+    /// Parent of every part, which comes before it; `None` for part 0.
+    pub fn parent(&self) -> &[Option<usize>] {
+        &self.0.parent
+    }
+
+    /// The part on the other side of the body.
+    pub fn mirror(&self) -> &[usize] {
+        &self.0.mirror
+    }
+
+    /// Joints and weights of every part; the weights add up to 1.
+    pub fn weights(&self) -> &[Vec<(usize, f64)>] {
+        &self.0.weights
+    }
+
+    /// The joint on the other side of the body.
+    pub fn joint_mirror(&self) -> &[usize] {
+        &self.0.joint_mirror
+    }
+
+    /// The parts of a person.
+    ///
+    /// * `joints`: one a joint of the skeleton, any unit; NaN makes the parts that need it NaN.
+    /// * Returns one point a part, in the unit of the joints.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer joints than [`n_joints`](Self::n_joints).
+    pub fn parts_of(&self, joints: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let part = |weights: &Vec<(usize, f64)>| {
+            weights.iter().fold([0.0; 2], |sum, &(joint, weight)| {
+                [0, 1].map(|axis| sum[axis] + weight * joints[joint][axis])
+            })
+        };
+        self.0.weights.iter().map(part).collect()
+    }
+}
+
+fn check_lengths(spec: &SkeletonSpec) -> Result<(), TableError> {
+    let (n_parts, n_joints) = (spec.names.len(), spec.joint_names.len());
+    for (what, got) in [("parts", n_parts), ("joints", n_joints)] {
+        if !(1..=SkeletonTable::MAX).contains(&got) {
+            let max = SkeletonTable::MAX;
+            return Err(TableError::Number { what, got, max });
+        }
+    }
+    let lists = [
+        ("parents", spec.parent.len(), n_parts),
+        ("mirrors of parts", spec.mirror.len(), n_parts),
+        ("lists of weights", spec.weights.len(), n_parts),
+        ("mirrors of joints", spec.joint_mirror.len(), n_joints),
+    ];
+    match lists.into_iter().find(|it| it.1 != it.2) {
+        None => Ok(()),
+        Some((what, got, expected)) => Err(TableError::Length {
+            what,
+            got,
+            expected,
+        }),
+    }
+}
+
+fn check_names(what: &'static str, names: &[String]) -> Result<(), TableError> {
+    for (second, name) in names.iter().enumerate() {
+        if let Some(first) = names[..second].iter().position(|it| it == name) {
+            return Err(TableError::SameName {
+                what,
+                first: first + 1,
+                second: second + 1,
+                name: name.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_tree(spec: &SkeletonSpec) -> Result<(), TableError> {
+    for (part, parent) in spec.parent.iter().enumerate() {
+        let name = spec.names[part].clone();
+        if parent.is_none() != (part == 0) {
+            return Err(TableError::Root {
+                part: part + 1,
+                name,
+            });
+        }
+        if let Some(parent) = parent.filter(|&it| it >= part) {
+            return Err(TableError::Tree {
+                part: part + 1,
+                name,
+                parent: parent + 1,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_exchange(
+    what: &'static str,
+    mirror: &[usize],
+    names: &[String],
+) -> Result<(), TableError> {
+    for (index, &other) in mirror.iter().enumerate() {
+        if mirror.get(other) != Some(&index) {
+            return Err(TableError::Mirror {
+                what,
+                index: index + 1,
+                name: names[index].clone(),
+                other: other + 1,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_weights(spec: &SkeletonSpec) -> Result<(), TableError> {
+    let n_joints = spec.joint_names.len();
+    for (part, weights) in spec.weights.iter().enumerate() {
+        let name = spec.names[part].clone();
+        if let Some(&(joint, _)) = weights.iter().find(|it| it.0 >= n_joints) {
+            return Err(TableError::Joint {
+                part: part + 1,
+                name,
+                joint: joint + 1,
+                n_joints,
+            });
+        }
+        let sum: f64 = weights.iter().map(|it| it.1).sum();
+        let is_one = (sum - 1.0).abs() <= TOLERANCE;
+        if !is_one {
+            return Err(TableError::Weights {
+                part: part + 1,
+                name,
+                sum,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The mirror keeps the tree, and takes joints of one side to joints of the other.
+fn check_mirror(spec: &SkeletonSpec) -> Result<(), TableError> {
+    let n_joints = spec.joint_names.len();
+    for (part, &other) in spec.mirror.iter().enumerate() {
+        let name = spec.names[part].clone();
+        if spec.parent[other] != spec.parent[part].map(|it| spec.mirror[it]) {
+            return Err(TableError::MirrorTree {
+                part: part + 1,
+                name,
+            });
+        }
+        let mut difference = vec![0.0; n_joints];
+        for &(joint, weight) in &spec.weights[part] {
+            difference[spec.joint_mirror[joint]] += weight;
+        }
+        for &(joint, weight) in &spec.weights[other] {
+            difference[joint] -= weight;
+        }
+        if difference.iter().any(|it| it.abs() > TOLERANCE) {
+            return Err(TableError::MirrorWeights {
+                part: part + 1,
+                name,
+                other: spec.names[other].clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

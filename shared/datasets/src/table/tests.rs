@@ -1,0 +1,190 @@
+//! Laws of skeletons, and everything that is refused.
+
+use std::error::Error as _;
+use std::path::Path;
+
+use proptest::prelude::*;
+use skeleton::PARSE14;
+
+use super::*;
+
+fn upper_body() -> SkeletonTable {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    SkeletonTable::read(&root.join("configs/skeletons/upper-body.toml")).unwrap()
+}
+
+type Change = fn(&mut SkeletonSpec);
+
+/// What is said after one change to the published skeleton.
+fn said_after(change: impl FnOnce(&mut SkeletonSpec)) -> String {
+    let mut spec = SkeletonTable::published().0;
+    change(&mut spec);
+    SkeletonTable::new(spec).unwrap_err().to_string()
+}
+
+#[test]
+fn the_published_skeleton_holds() {
+    let published = SkeletonTable::published();
+    assert_eq!(
+        SkeletonTable::new(published.spec().clone()).as_ref(),
+        Ok(&published)
+    );
+    assert_eq!((published.n_parts(), published.n_joints()), (26, 14));
+}
+
+#[test]
+fn the_upper_body_is_the_upper_body_of_the_published_skeleton() {
+    let (upper, published) = (upper_body(), SkeletonTable::published());
+    assert_eq!(upper.n_parts(), 18);
+    let place = |table: &SkeletonTable, part: usize| {
+        let spec = table.spec();
+        let mut weights: Vec<(String, i64)> = spec.weights[part]
+            .iter()
+            .map(|&(joint, it)| {
+                (
+                    spec.joint_names[joint].clone(),
+                    (it * 1000.0).round() as i64,
+                )
+            })
+            .collect();
+        weights.sort();
+        weights
+    };
+    for (part, name) in upper.names().iter().enumerate() {
+        let same = published.names().iter().position(|it| it == name).unwrap();
+        let parent = |table: &SkeletonTable, part: usize| {
+            table.parent()[part].map(|it| table.names()[it].clone())
+        };
+        assert_eq!(parent(&upper, part), parent(&published, same), "{name}");
+        assert_eq!(place(&upper, part), place(&published, same), "{name}");
+    }
+}
+
+#[test]
+fn what_does_not_hold_is_refused_by_name_and_number() {
+    let cases: [(&str, Change); 12] = [
+        ("the skeleton has 0 parts, expected 1 to 64", |it| {
+            it.names.clear();
+        }),
+        ("there are 25 parents, expected 26", |it| {
+            it.parent.pop();
+        }),
+        ("parts 1 and 3 are both called \"head\"", |it| {
+            it.names[2] = "head".to_owned();
+        }),
+        (
+            "part 1 (head) has a parent: the first part and only the first is the root",
+            |it| it.parent[0] = Some(1),
+        ),
+        (
+            "part 3 (right shoulder) has no parent: the first part and only the first is the root",
+            |it| it.parent[2] = None,
+        ),
+        (
+            "part 3 (right shoulder) has part 3 as its parent, which does not come before it",
+            |it| it.parent[2] = Some(2),
+        ),
+        (
+            "the mirror of part 15 (left shoulder) is 3, but not the other way round or not there",
+            |it| it.mirror[2] = 2,
+        ),
+        (
+            "the mirror of joint 14 (head) is 100, but not the other way round or not there",
+            |it| it.joint_mirror[13] = 99,
+        ),
+        (
+            "the mirror of part 4 (right upper arm) hangs on another part than the mirror of its parent",
+            |it| {
+                it.mirror[2] = 2;
+                it.mirror[14] = 14;
+                it.weights[2] = vec![(12, 1.0)];
+                it.weights[14] = vec![(12, 1.0)];
+            },
+        ),
+        (
+            "part 4 (right upper arm) and its mirror image left upper arm do not lie between the same joints of \
+             either side",
+            |it| it.weights[3] = vec![(8, 0.4), (7, 0.6)],
+        ),
+        ("part 2 (neck) names joint 15 of 14", |it| {
+            it.weights[1] = vec![(14, 1.0)];
+        }),
+        (
+            "the weights of part 2 (neck) add up to 0.9, expected 1",
+            |it| it.weights[1] = vec![(12, 0.9)],
+        ),
+    ];
+    for (expected, change) in cases {
+        assert_eq!(said_after(change), expected);
+    }
+    assert!(said_after(|it| it.weights[1] = vec![(12, f64::NAN)]).contains("add up to NaN"));
+}
+
+#[test]
+fn a_file_that_names_what_is_not_there_is_refused() {
+    const FILE: &str = "joints = [\"a\", \"b\"]\njoint_mirror = [[\"a\", \"b\"]]\n\
+                        [[part]]\nname = \"r\"\njoints = { a = 0.5, b = 0.5 }\n";
+    SkeletonTable::parse(FILE).unwrap();
+    let cases = [
+        (
+            "a = 0.5",
+            "c = 0.5",
+            "the part \"r\" names the joint \"c\", which is not there",
+        ),
+        (
+            "[[\"a\", \"b\"]]",
+            "[[\"a\", \"b\"], [\"b\", \"a\"]]",
+            "the joint \"b\" is in two pairs of `joint_mirror`",
+        ),
+        (
+            "[[\"a\", \"b\"]]",
+            "[[\"a\", \"x\"]]",
+            "`joint_mirror` names the joint \"x\", which is not there",
+        ),
+        (
+            "name = \"r\"",
+            "name = \"r\"\nparent = \"q\"",
+            "the part \"r\" names the part \"q\", which is not there",
+        ),
+        ("a = 0.5", "a = 0.25", "the skeleton was refused"),
+        ("joints = {", "joint = {", "not a skeleton"),
+    ];
+    for (from, to, expected) in cases {
+        let error = SkeletonTable::parse(&FILE.replace(from, to)).unwrap_err();
+        assert_eq!(error.to_string(), expected);
+        let is_outer = expected.starts_with("the skeleton") || expected.starts_with("not a");
+        assert_eq!(error.source().is_some(), is_outer);
+    }
+}
+
+proptest! {
+    #[test]
+    fn parts_come_back_as_the_joints_they_are(
+        joints in prop::collection::vec((-500.0..500.0, -500.0..500.0), 14),
+    ) {
+        let joints: Vec<_> = joints.into_iter().map(|(x, y)| [x, y]).collect();
+        let parts = SkeletonTable::published().parts_of(&joints);
+        prop_assert_eq!(PARSE14.from_parts(&parts), joints);
+    }
+
+    #[test]
+    fn the_parts_of_a_mirrored_person_are_the_mirrored_parts(
+        joints in prop::collection::vec((-500.0..500.0, -500.0..500.0), 14),
+    ) {
+        for table in [SkeletonTable::published(), upper_body()] {
+            let joints: Vec<[f64; 2]> = joints.iter().map(|&(x, y)| [x, y]).collect();
+            let flipped = |it: [f64; 2]| [-it[0], it[1]];
+            let mirrored: Vec<_> = table.joint_mirror().iter().map(|&it| flipped(joints[it])).collect();
+            let parts = table.parts_of(&joints);
+            let expected: Vec<_> = table.mirror().iter().map(|&it| flipped(parts[it])).collect();
+            for (a, b) in table.parts_of(&mirrored).iter().zip(expected) {
+                prop_assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn no_text_makes_it_panic(text: String) {
+        drop(SkeletonTable::parse(&text));
+    }
+}
