@@ -47,6 +47,12 @@ impl Pcp {
         100.0 * self.correct as f64 / self.total as f64
     }
 
+    /// Counts one more.
+    pub fn count(&mut self, is_correct: bool) {
+        self.correct += usize::from(is_correct);
+        self.total += 1;
+    }
+
     /// Adds another image.
     pub fn add(&mut self, other: Self) {
         self.correct += other.correct;
@@ -58,6 +64,21 @@ impl Pcp {
 ///
 /// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, pixels.
 pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp {
+    let sticks = sticks_found(found, truth, rule);
+    Pcp {
+        correct: sticks.iter().filter(|it| **it).count(),
+        total: sticks.len(),
+    }
+}
+
+/// Which of [`PARSE_STICKS`] are found, with half of the true length as the limit.
+///
+/// * `found`, `truth`: the 14 joints of `skeleton::PARSE14`, pixels.
+pub fn sticks_found(
+    found: &[[f64; 2]; 14],
+    truth: &[[f64; 2]; 14],
+    rule: PcpRule,
+) -> [bool; PARSE_STICKS.len()] {
     let end = |joints: &[[f64; 2]; 14], of: &[usize]| {
         let n = of.len() as f64;
         let sum = of.iter().fold([0.0; 2], |sum, &it| {
@@ -66,21 +87,14 @@ pub fn pcp(found: &[[f64; 2]; 14], truth: &[[f64; 2]; 14], rule: PcpRule) -> Pcp
         [sum[0] / n, sum[1] / n]
     };
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    let correct = PARSE_STICKS
-        .iter()
-        .filter(|(_, from, to)| {
-            let limit = 0.5 * distance(end(truth, from), end(truth, to));
-            let errors = [from, to].map(|it| distance(end(found, it), end(truth, it)));
-            match rule {
-                PcpRule::BothEnds => errors.iter().all(|it| *it <= limit),
-                PcpRule::MeanOfEnds => f64::midpoint(errors[0], errors[1]) <= limit,
-            }
-        })
-        .count();
-    Pcp {
-        correct,
-        total: PARSE_STICKS.len(),
-    }
+    PARSE_STICKS.map(|(_, from, to)| {
+        let limit = 0.5 * distance(end(truth, from), end(truth, to));
+        let errors = [from, to].map(|it| distance(end(found, it), end(truth, it)));
+        match rule {
+            PcpRule::BothEnds => errors.iter().all(|it| *it <= limit),
+            PcpRule::MeanOfEnds => f64::midpoint(errors[0], errors[1]) <= limit,
+        }
+    })
 }
 
 #[cfg(test)]
