@@ -12,12 +12,10 @@ use std::process::Command;
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
-    &[
-        "geometry", "kernels", "messages", "footage", "join", "mat5",
-    ],
+    &["geometry", "kernels", "messages", "footage", "join", "mat5"],
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
-    &["pipeline", "evaluation", "datasets"],
+    &["pipeline", "evaluation", "datasets", "modelpage"],
     &["wire"],
     &[
         "capture",

@@ -21,13 +21,17 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print what a model is made of.
+    /// Print what a model is made of, or draw it.
     Show {
         /// The model file.
         file: PathBuf,
         /// Print JSON.
         #[arg(long)]
         json: bool,
+        /// Draw the model into this file instead, one page for a browser: the filters of every part and type, the
+        /// tree with its springs, the biases.
+        #[arg(long, value_name = "FILE", conflicts_with = "json")]
+        html: Option<PathBuf>,
     },
 }
 
@@ -35,7 +39,12 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Import { file, out } => import(file, out),
-        Command::Show { file, json } => show(file, *json),
+        Command::Show {
+            file,
+            html: Some(html),
+            ..
+        } => draw(file, html),
+        Command::Show { file, json, .. } => show(file, *json),
     }
 }
 
@@ -43,6 +52,14 @@ fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {
     let model = inputs::model(file)?;
     fmp::files::write(out, &model).or_fail(ExitKind::Input)?;
     output::message(format_args!("wrote {}", out.display()));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn draw(file: &Path, html: &Path) -> Result<ExitCode, Failure> {
+    let model = inputs::model(file)?;
+    let page = modelpage::html(&model);
+    std::fs::write(html, page).map_err(|error| inputs::in_file(html, &error))?;
+    output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,0 +1,196 @@
+//! The whole body in the types that go together best, as filters and as a tree.
+
+use fmp::Model;
+
+use crate::glyph::CELL;
+use crate::springs::{Ellipse, ellipses, of_pair};
+use crate::svg::{escaped, part_colour, put};
+
+/// Where every part is drawn.
+#[derive(Debug)]
+pub(crate) struct Figure {
+    types: Vec<usize>,
+    /// Top left corner of the filter, cells.
+    corner: Vec<[f64; 2]>,
+    /// The spring of the chosen types; `None` for the root.
+    spring: Vec<Option<Ellipse>>,
+    /// Left, top, width, height of everything, cells.
+    frame: [f64; 4],
+}
+
+/// Pixels per cell of the pictures.
+const SCALE: f64 = 20.0;
+
+impl Figure {
+    pub(crate) fn new(model: &Model) -> Self {
+        let types = best_types(model);
+        let (mut corner, mut spring) = (Vec::new(), Vec::new());
+        for (part, spec) in model.spec().parts.iter().enumerate() {
+            let edge = spec.edge.as_ref();
+            let its = edge.and_then(|it| of_pair(it, types[it.parent], types[part]));
+            let from = edge.map_or([0.0; 2], |it| corner[it.parent]);
+            let offset = its.map_or([0.0; 2], |it| it.centre);
+            corner.push([from[0] + offset[0], from[1] + offset[1]]);
+            spring.push(its);
+        }
+        let mut ends = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        for (part, at) in corner.iter().enumerate() {
+            let filter = model.filter(part, types[part]);
+            for (axis, size) in [filter.cols, filter.rows].into_iter().enumerate() {
+                ends[0][axis] = ends[0][axis].min(at[axis] - 1.0);
+                ends[1][axis] = ends[1][axis].max(at[axis] + size as f64 + 1.0);
+            }
+        }
+        let [[left, top], [right, bottom]] = ends;
+        Self {
+            types,
+            corner,
+            spring,
+            frame: [left, top, right - left, bottom - top],
+        }
+    }
+
+    /// The filters, each where its spring would rest.
+    pub(crate) fn filters(&self, model: &Model) -> String {
+        let mut out = self.open("dark", CELL);
+        for (part, [x, y]) in self.corner.iter().enumerate() {
+            let index = model.spec().parts[part].filter_of_type[self.types[part]];
+            put(
+                &mut out,
+                format_args!(
+                    "<use href=\"#f{index}\" x=\"{:.1}\" y=\"{:.1}\" style=\"mix-blend-mode:lighten\"/>",
+                    x * CELL,
+                    y * CELL
+                ),
+            );
+        }
+        out.push_str("</svg><figcaption>filters</figcaption></figure>\n");
+        out
+    }
+
+    /// The tree, with ellipses for the springs.
+    pub(crate) fn tree(&self, model: &Model) -> String {
+        let mut out = self.open("light", 1.0);
+        let centre = |part: usize| {
+            let filter = model.filter(part, self.types[part]);
+            let [x, y] = self.corner[part];
+            [x + filter.cols as f64 / 2.0, y + filter.rows as f64 / 2.0]
+        };
+        let (mut edges, mut springs, mut nodes) = (String::new(), String::new(), String::new());
+        for (part, spec) in model.spec().parts.iter().enumerate() {
+            let ([x, y], colour) = (centre(part), part_colour(&spec.name));
+            if let (Some(edge), Some(spring)) = (&spec.edge, &self.spring[part]) {
+                let [u, v] = centre(edge.parent);
+                put(
+                    &mut edges,
+                    format_args!(
+                        "<path d=\"M{u:.2} {v:.2}L{x:.2} {y:.2}\" stroke=\"{colour}\" stroke-width=\".14\"/>"
+                    ),
+                );
+                let [rx, ry] = spring.radius;
+                put(
+                    &mut springs,
+                    format_args!(
+                        "<ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" rx=\"{rx:.2}\" ry=\"{ry:.2}\" fill=\"{colour}\" fill-opacity=\".07\" \
+                     stroke=\"{colour}\" stroke-opacity=\".45\" stroke-width=\".05\"/>"
+                    ),
+                );
+                for (_, other) in ellipses(edge) {
+                    let [dx, dy] = [0, 1].map(|it| other.centre[it] - spring.centre[it]);
+                    put(
+                        &mut springs,
+                        format_args!(
+                            "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\".1\" fill=\"{colour}\" fill-opacity=\".5\"/>",
+                            x + dx,
+                            y + dy
+                        ),
+                    );
+                }
+            }
+            put(
+                &mut nodes,
+                format_args!(
+                    "<g><circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\".42\" fill=\"{colour}\"/><text x=\"{x:.2}\" y=\"{:.2}\" \
+                 font-size=\".5\" text-anchor=\"middle\" fill=\"#fff\">{}</text><title>{} {}, type {}</title></g>",
+                    y + 0.18,
+                    part + 1,
+                    part + 1,
+                    escaped(&spec.name),
+                    self.types[part] + 1
+                ),
+            );
+        }
+        out.push_str(&springs);
+        out.push_str(&edges);
+        out.push_str(&nodes);
+        out.push_str("</svg><figcaption>tree and springs</figcaption></figure>\n");
+        out
+    }
+
+    /// * `unit`: of the picture's coordinates, per cell.
+    fn open(&self, class: &str, unit: f64) -> String {
+        let [left, top, width, height] = self.frame;
+        let scale = SCALE.min(560.0 / width.max(1.0));
+        format!(
+            "<figure><svg class=\"{class}\" width=\"{:.0}\" height=\"{:.0}\" viewBox=\"{:.2} {:.2} {:.2} {:.2}\">",
+            width * scale,
+            height * scale,
+            left * unit,
+            top * unit,
+            width * unit,
+            height * unit
+        )
+    }
+}
+
+/// The types whose biases add up to most, exactly: from the leaves to the root and back. The smallest
+/// type wins a tie.
+fn best_types(model: &Model) -> Vec<usize> {
+    let parts = &model.spec().parts;
+    let mut score: Vec<Vec<f64>> = (0..parts.len())
+        .map(|part| vec![0.0; model.n_types(part)])
+        .collect();
+    let mut best_own: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
+    for (part, spec) in parts.iter().enumerate().rev() {
+        let Some(edge) = &spec.edge else { continue };
+        for (parent_type, row) in edge.bias.iter().enumerate() {
+            let own = best(row.iter().zip(&score[part]).map(|(bias, own)| bias + own));
+            score[edge.parent][parent_type] += row[own] + score[part][own];
+            best_own[part].push(own);
+        }
+    }
+    let mut types = vec![best(score[0].iter().copied())];
+    for (part, spec) in parts.iter().enumerate().skip(1) {
+        let parent = spec.edge.as_ref().map_or(0, |it| it.parent);
+        types.push(best_own[part].get(types[parent]).copied().unwrap_or(0));
+    }
+    types
+}
+
+/// Index of the first of the largest values, 0 if there is none.
+fn best(values: impl Iterator<Item = f64>) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (index, value) in values.enumerate() {
+        if value > best.1 {
+            best = (index, value);
+        }
+    }
+    best.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::planted;
+
+    #[test]
+    fn the_types_that_go_together_best_are_drawn() {
+        let mut spec = planted("m");
+        let edge = spec.parts[1].edge.as_mut().unwrap();
+        edge.bias = vec![vec![0.0, 0.1], vec![0.3, f64::NEG_INFINITY]];
+        let edge = spec.parts[2].edge.as_mut().unwrap();
+        edge.bias = vec![vec![0.0, 0.5], vec![0.2, 0.2]];
+        let model = Model::new(spec).unwrap();
+        assert_eq!(best_types(&model), [0, 1, 1], "0.1 + 0.5 beats 0.3 + 0.2");
+    }
+}

@@ -1,0 +1,156 @@
+//! A model as one HTML page that explains it to a person: filters, tree, springs, biases, numbers.
+//!
+//! The page needs nothing but itself: no script, no font, no picture from elsewhere. It is well-formed
+//! XML too, which is how the tests read it.
+#![forbid(unsafe_code)]
+
+mod biases;
+mod figure;
+mod glyph;
+mod springs;
+mod svg;
+
+use fmp::{Model, files::describe};
+
+use figure::Figure;
+use svg::{escaped, put};
+
+/// Draws a model.
+///
+/// * Every filter as a glyph: per cell the positive weights of its nine orientations, as strokes along
+///   the edges that they answer to.
+/// * The whole body twice, in the types that go together best: as filters, and as a tree with the
+///   springs, which are ellipses at a score of [`SPRING_COST`] below the best.
+/// * Per part the springs of all types and the biases of all pairs of types.
+///
+/// Parts and types count from 1, as in everything a user sees.
+pub fn html(model: &Model) -> String {
+    let title = escaped(&model.spec().name);
+    let figure = Figure::new(model);
+    let mut page = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
+    page.push_str("<meta charset=\"utf-8\"/>\n");
+    put(
+        &mut page,
+        format_args!("<title>{title}</title>\n<style>{STYLE}</style>\n"),
+    );
+    put(
+        &mut page,
+        format_args!("</head>\n<body>\n<h1>{title}</h1>\n"),
+    );
+    page.push_str(&numbers(model));
+    page.push_str(&glyph::symbols(model));
+    page.push_str("<h2>The body</h2>\n<div class=\"row\">\n");
+    page.push_str(&figure.filters(model));
+    page.push_str(&figure.tree(model));
+    page.push_str("</div>\n");
+    page.push_str(LEGEND);
+    page.push_str("<h2>The parts</h2>\n");
+    for part in 0..model.n_parts() {
+        page.push_str(&card(model, part));
+    }
+    page.push_str("</body>\n</html>\n");
+    page
+}
+
+/// How much of the score a part loses on the ellipse that is drawn for its spring.
+pub const SPRING_COST: f64 = 0.05;
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { font: 14px/1.45 system-ui, sans-serif; color: #1d2430; background: #f6f7f9; margin: 2em auto; max-width: 78em; padding: 0 1.5em; }
+h1 { font-size: 1.6em; margin: 0 0 .6em; }
+h2 { font-size: 1.2em; margin: 1.6em 0 .6em; }
+h3 { font-size: 1em; margin: 0 0 .5em; }
+h3 small { font-weight: normal; color: #69707d; margin-left: .6em; }
+.numbers { display: flex; flex-wrap: wrap; gap: .6em; margin: 0; padding: 0; list-style: none; }
+.numbers li { background: #fff; border: 1px solid #dfe3e8; border-radius: 6px; padding: .35em .8em; }
+.numbers b { display: block; font-size: 1.15em; }
+.numbers span, figcaption, .legend { color: #69707d; font-size: .86em; }
+.legend { max-width: 62em; }
+.row { display: flex; flex-wrap: wrap; gap: 1.2em; align-items: flex-start; }
+.card { background: #fff; border: 1px solid #dfe3e8; border-radius: 8px; padding: .9em 1.1em; margin: 0 0 .9em; break-inside: avoid; }
+figure { margin: 0; }
+figcaption { margin-top: .25em; text-align: center; }
+svg { display: block; }
+.hidden { position: absolute; width: 0; height: 0; }
+.dark { background: #0d1117; border-radius: 5px; }
+.light { background: #fff; border: 1px solid #e6e9ee; border-radius: 5px; }
+.key { display: inline-block; width: .75em; height: .75em; border-radius: 50%; margin-right: .3em; }
+table.biases { border-collapse: collapse; }
+table.biases td { min-width: 2.7em; height: 1.75em; padding: 0 .2em; text-align: center; font-size: .72em; border: 1px solid #fff; }
+table.biases th { font-size: .72em; font-weight: normal; color: #69707d; padding: 0 .35em; }
+";
+
+const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the filter wants there, the brighter the larger its weight \
+(positive weights of both contrasts and of none, added up, relative to the filter's largest). Left: the filters of the types whose biases \
+add up to most, each part where its spring would rest. Right: the same tree; the ellipse of a part is where its spring costs 0.05, dots are \
+where the other types would rest. Axes of the springs are cells from the parent, whose place is the cross.</p>\n";
+
+fn numbers(model: &Model) -> String {
+    let summary = describe(model);
+    let [rows, cols] = model.max_filter();
+    let [low, high] = summary.bias_range.unwrap_or([0.0; 2]);
+    let kind = if summary.springs_per_pair {
+        "pair of types"
+    } else {
+        "type of the child"
+    };
+    let mirror = if summary.has_mirror {
+        "known"
+    } else {
+        "unknown"
+    };
+    let items = [
+        ("parts", model.n_parts().to_string()),
+        ("filters", summary.n_filters.to_string()),
+        ("largest filter, cells", format!("{rows} \u{d7} {cols}")),
+        ("cell, px", summary.cell_px.to_string()),
+        ("levels an octave", summary.interval.to_string()),
+        ("root bias", format!("{:.4}", summary.root_bias)),
+        ("trained threshold", format!("{:.4}", summary.threshold)),
+        (
+            "detects from",
+            format!("{:.4}", summary.detection_threshold),
+        ),
+        ("biases", format!("{low:.3} to {high:.3}")),
+        ("springs, one a", kind.to_owned()),
+        ("mirror", mirror.to_owned()),
+    ];
+    let mut out = String::from("<ul class=\"numbers\">\n");
+    for (name, value) in items {
+        put(
+            &mut out,
+            format_args!("<li><b>{value}</b><span>{name}</span></li>\n"),
+        );
+    }
+    out.push_str("</ul>\n");
+    out
+}
+
+/// Everything about one part.
+fn card(model: &Model, part: usize) -> String {
+    let spec = &model.spec().parts[part];
+    let n_types = model.n_types(part);
+    let parent = spec.edge.as_ref().map_or("the root".to_owned(), |edge| {
+        let name = escaped(&model.spec().parts[edge.parent].name);
+        format!("hangs on {} {name}", edge.parent + 1)
+    });
+    let s = if n_types == 1 { "" } else { "s" };
+    let mut out = format!(
+        "<section class=\"card\">\n<h3>{} {}<small>{parent}, {n_types} type{s}</small></h3>\n<div class=\"row\">\n",
+        part + 1,
+        escaped(&spec.name)
+    );
+    for mixture in 0..n_types {
+        out.push_str(&glyph::of_type(model, part, mixture));
+    }
+    if let Some(edge) = &spec.edge {
+        out.push_str(&springs::panel(edge));
+        out.push_str(&biases::table(edge));
+    }
+    out.push_str("</div>\n</section>\n");
+    out
+}
+
+#[cfg(test)]
+mod tests;
