@@ -13,6 +13,7 @@ use serde_json::json;
 use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
+use crate::sheet::{Sheet, Skeleton, limbs};
 use crate::{inputs, output};
 
 /// Which images, and how.
@@ -26,7 +27,8 @@ Pixels of the image, the centre of its top-left pixel is (0, 0); types and level
 Examples:
     parallax detect photo.jpg --model parse.mat
     parallax detect folder/ --model parse.mat --threshold -0.5 --json > people.jsonl
-    parallax detect *.png --model parse.mat --overlay drawn/")]
+    parallax detect *.png --model parse.mat --overlay drawn/
+    parallax detect folder/ --model parse.mat --sheet sheet.png")]
 pub(crate) struct Arguments {
     /// Images, or folders of images.
     #[arg(required = true)]
@@ -49,6 +51,10 @@ pub(crate) struct Arguments {
     /// Draw the detections into this folder, as PNG.
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
+    /// Draw thumbnails with the best detection of every image into this file, as PNG; more than 40 images make
+    /// several files, numbered before the ending.
+    #[arg(long, value_name = "FILE")]
+    sheet: Option<PathBuf>,
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
@@ -70,8 +76,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(folder) = &arguments.overlay {
         std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
     }
-    for image in images(&arguments.images)? {
-        detector.one(&image, arguments)?;
+    let images = images(&arguments.images)?;
+    let mut sheet = arguments
+        .sheet
+        .as_ref()
+        .map(|it| Sheet::new(it.clone(), images.len()));
+    for image in &images {
+        detector.one(image, arguments, sheet.as_mut())?;
+    }
+    if let Some(sheet) = sheet {
+        sheet.finish()?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -118,7 +132,12 @@ struct Detector {
 }
 
 impl Detector {
-    fn one(&self, path: &Path, arguments: &Arguments) -> Result<(), Failure> {
+    fn one(
+        &self,
+        path: &Path,
+        arguments: &Arguments,
+        sheet: Option<&mut Sheet>,
+    ) -> Result<(), Failure> {
         let spec = SourceSpec::new(path.to_string_lossy());
         let mut source = Source::open(&spec).or_fail(ExitKind::Input)?;
         let size = source.info().size;
@@ -129,15 +148,41 @@ impl Detector {
         let layout = Layout::new(&self.model, size.width, size.height);
         let layout = layout.map_err(|error| inputs::in_file(path, &error))?;
         let found = self.detect(image, &layout);
+        self.report(path, arguments, &layout, &found)?;
+        if let Some(folder) = &arguments.overlay {
+            let canvas = self.draw(size, rgb, &layout, &found);
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            let file = folder.join(format!("{name}.png"));
+            canvas.save_png(&file).or_fail(ExitKind::Input)?;
+        }
+        if let Some(sheet) = sheet {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let best = found.first().map(|pose| Skeleton {
+                points: pose.centres(&self.model, &layout),
+                limbs: limbs(&self.model),
+                score: pose.score,
+            });
+            sheet.add(&name, size, rgb, best.as_ref())?;
+        }
+        Ok(())
+    }
+
+    fn report(
+        &self,
+        path: &Path,
+        arguments: &Arguments,
+        layout: &Layout,
+        found: &[Pose],
+    ) -> Result<(), Failure> {
         if arguments.json {
             let detections: Vec<_> = found
                 .iter()
-                .map(|pose| Placed::new(pose, &self.model, &layout).json(Some(arguments.joints)))
+                .map(|pose| Placed::new(pose, &self.model, layout).json(Some(arguments.joints)))
                 .collect();
             output::json(&json!({
                 "image": path,
-                "width": size.width,
-                "height": size.height,
+                "width": layout.image_size[0],
+                "height": layout.image_size[1],
                 "detections": detections,
             }))?;
         } else {
@@ -146,20 +191,14 @@ impl Detector {
                 path.display(),
                 found.len()
             ))?;
-            for pose in &found {
-                let [x, y] = pose.centre(&self.model, &layout, 0);
+            for pose in found {
+                let [x, y] = pose.centre(&self.model, layout, 0);
                 output::line(format_args!(
                     "  score {:8.4}  level {:2}  head at ({x:.1}, {y:.1})",
                     pose.score,
                     pose.level + 1
                 ))?;
             }
-        }
-        if let Some(folder) = &arguments.overlay {
-            let canvas = self.draw(size, rgb, &layout, &found);
-            let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            let file = folder.join(format!("{name}.png"));
-            canvas.save_png(&file).or_fail(ExitKind::Input)?;
         }
         Ok(())
     }
