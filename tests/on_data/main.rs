@@ -9,6 +9,7 @@
     reason = "the figures are what these tests are run for"
 )]
 
+mod annotations;
 mod balancing;
 mod calibration;
 mod footage;
