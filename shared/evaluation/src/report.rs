@@ -61,7 +61,7 @@ impl Report {
 
     /// All sticks together.
     pub fn pcp(&self, rule: PcpRule) -> Pcp {
-        sum(self.sticks(rule))
+        sum(self.sticks(rule).iter().copied())
     }
 
     /// Each of [`PARSE_STICKS`].
@@ -80,7 +80,7 @@ impl Report {
     ///
     /// If there is no such share.
     pub fn pck(&self, share: usize) -> Pcp {
-        sum(&self.joints[share])
+        sum(self.joints[share].iter().copied())
     }
 
     /// Each of [`PCK_GROUPS`].
@@ -91,16 +91,16 @@ impl Report {
     ///
     /// If there is no such share.
     pub fn groups(&self, share: usize) -> [Pcp; PCK_GROUPS.len()] {
-        PCK_GROUPS.map(|(_, joints)| sum(joints.iter().map(|&it| &self.joints[share][it])))
+        PCK_GROUPS.map(|(_, joints)| sum(joints.iter().map(|&it| self.joints[share][it])))
     }
 }
 
 const RULES: [PcpRule; 2] = [PcpRule::MeanOfEnds, PcpRule::BothEnds];
 
-fn sum(counts: impl IntoIterator<Item = &Pcp>) -> Pcp {
+fn sum(counts: impl IntoIterator<Item = Pcp>) -> Pcp {
     let mut total = Pcp::default();
     for count in counts {
-        total.add(*count);
+        total.add(count);
     }
     total
 }
@@ -128,7 +128,7 @@ impl fmt::Display for Report {
         for (rule, name) in RULES.into_iter().zip(["mean of ends", "both ends"]) {
             write!(out, "\n{name:<18}")?;
             for (_, sticks) in COLUMNS {
-                let of_both = sum(sticks.iter().map(|&it| &self.sticks(rule)[it]));
+                let of_both = sum(sticks.iter().map(|&it| self.sticks(rule)[it]));
                 write!(out, " {:>8.1}", of_both.percent())?;
             }
             write!(out, " {:>8.1}", self.pcp(rule).percent())?;
