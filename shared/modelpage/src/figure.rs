@@ -1,4 +1,4 @@
-//! The whole body in the types that go together best, as filters and as a tree.
+//! The whole body in its most ordinary types, as filters and as a tree.
 
 use fmp::Model;
 
@@ -23,7 +23,7 @@ const SCALE: f64 = 20.0;
 
 impl Figure {
     pub(crate) fn new(model: &Model) -> Self {
-        let types = best_types(model);
+        let types = ordinary_types(model);
         let (mut corner, mut spring) = (Vec::new(), Vec::new());
         for (part, spec) in model.spec().parts.iter().enumerate() {
             let edge = spec.edge.as_ref();
@@ -130,7 +130,7 @@ impl Figure {
     /// * `unit`: of the picture's coordinates, per cell.
     fn open(&self, class: &str, unit: f64) -> String {
         let [left, top, width, height] = self.frame;
-        let scale = SCALE.min(560.0 / width.max(1.0));
+        let scale = SCALE.min(500.0 / width.max(1.0));
         format!(
             "<figure><svg class=\"{class}\" width=\"{:.0}\" height=\"{:.0}\" viewBox=\"{:.2} {:.2} {:.2} {:.2}\">",
             width * scale,
@@ -143,27 +143,40 @@ impl Figure {
     }
 }
 
-/// The types whose biases add up to most, exactly: from the leaves to the root and back. The smallest
-/// type wins a tie.
-fn best_types(model: &Model) -> Vec<usize> {
+/// The types of an ordinary posture: of every part the one that rests nearest to the mean of where all of its
+/// types would, of the root the one that goes best with them. The smallest type wins a tie.
+///
+/// The types whose biases add up to most are those of a rare posture: its filters have most to gain from each
+/// other.
+fn ordinary_types(model: &Model) -> Vec<usize> {
     let parts = &model.spec().parts;
-    let mut score: Vec<Vec<f64>> = (0..parts.len())
-        .map(|part| vec![0.0; model.n_types(part)])
-        .collect();
-    let mut best_own: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
-    for (part, spec) in parts.iter().enumerate().rev() {
+    let mut types = vec![0; parts.len()];
+    let mut root_score = vec![0.0; model.n_types(0)];
+    for (part, spec) in parts.iter().enumerate() {
         let Some(edge) = &spec.edge else { continue };
-        for (parent_type, row) in edge.bias.iter().enumerate() {
-            let own = best(row.iter().zip(&score[part]).map(|(bias, own)| bias + own));
-            score[edge.parent][parent_type] += row[own] + score[part][own];
-            best_own[part].push(own);
+        let all = ellipses(edge);
+        let mean = [0, 1].map(|axis| {
+            let sum: f64 = all.iter().map(|(_, it)| it.centre[axis]).sum();
+            sum / all.len() as f64
+        });
+        let is_possible = |own: usize| {
+            let parent_type = types[edge.parent];
+            edge.parent == 0 || of_pair(edge, parent_type, own).is_some()
+        };
+        let nearness = |own: usize| {
+            let of_type = all.iter().filter(|it| it.0 == own && is_possible(own));
+            let distances =
+                of_type.map(|(_, it)| (it.centre[0] - mean[0]).hypot(it.centre[1] - mean[1]));
+            -distances.fold(f64::INFINITY, f64::min)
+        };
+        types[part] = best((0..model.n_types(part)).map(nearness));
+        if edge.parent == 0 {
+            for (score, row) in root_score.iter_mut().zip(&edge.bias) {
+                *score += row[types[part]];
+            }
         }
     }
-    let mut types = vec![best(score[0].iter().copied())];
-    for (part, spec) in parts.iter().enumerate().skip(1) {
-        let parent = spec.edge.as_ref().map_or(0, |it| it.parent);
-        types.push(best_own[part].get(types[parent]).copied().unwrap_or(0));
-    }
+    types[0] = best(root_score.into_iter());
     types
 }
 
@@ -184,13 +197,18 @@ mod tests {
     use crate::tests::planted;
 
     #[test]
-    fn the_types_that_go_together_best_are_drawn() {
+    fn the_types_that_rest_in_the_middle_are_drawn() {
         let mut spec = planted("m");
         let edge = spec.parts[1].edge.as_mut().unwrap();
-        edge.bias = vec![vec![0.0, 0.1], vec![0.3, f64::NEG_INFINITY]];
-        let edge = spec.parts[2].edge.as_mut().unwrap();
-        edge.bias = vec![vec![0.0, 0.5], vec![0.2, 0.2]];
+        edge.bias = vec![vec![0.0, 0.1, 9.0], vec![0.3, 0.2, 0.0]];
+        let at = |x: i32| fmp::Spring {
+            w: [0.01, 0.0, 0.01, 0.0],
+            anchor: [x, 0],
+        };
+        edge.springs = fmp::Springs::PerChildType(vec![at(-9), at(1), at(5)]);
+        spec.parts[1].filter_of_type.push(0);
         let model = Model::new(spec).unwrap();
-        assert_eq!(best_types(&model), [0, 1, 1], "0.1 + 0.5 beats 0.3 + 0.2");
+        // The second child's springs are alike, and never with its type 2 if the root's is 2.
+        assert_eq!(ordinary_types(&model), [0, 1, 0]);
     }
 }

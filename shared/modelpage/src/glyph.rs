@@ -37,8 +37,8 @@ pub(crate) fn of_type(model: &Model, part: usize, mixture: usize) -> String {
     format!(
         "<figure><svg class=\"dark\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {width} {height}\">\
          <use href=\"#f{index}\"/></svg><figcaption>type {2} \u{b7} {largest:.3}</figcaption></figure>\n",
-        width * 1.9,
-        height * 1.9,
+        width * 1.7,
+        height * 1.7,
         mixture + 1
     )
 }

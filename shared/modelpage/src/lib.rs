@@ -19,8 +19,7 @@ use svg::{escaped, put};
 ///
 /// * Every filter as a glyph: per cell the positive weights of its nine orientations, as strokes along
 ///   the edges that they answer to.
-/// * The whole body twice, in the types that go together best: as filters, and as a tree with the
-///   springs, which are ellipses at a score of [`SPRING_COST`] below the best.
+/// * The whole body twice, in an ordinary posture: as filters, and as a tree with the springs, which are ellipses at a score of [`SPRING_COST`] below the best.
 /// * Per part the springs of all types and the biases of all pairs of types.
 ///
 /// Parts and types count from 1, as in everything a user sees.
@@ -57,7 +56,7 @@ pub const SPRING_COST: f64 = 0.05;
 
 const STYLE: &str = "
 :root { color-scheme: light; }
-body { font: 14px/1.45 system-ui, sans-serif; color: #1d2430; background: #f6f7f9; margin: 2em auto; max-width: 78em; padding: 0 1.5em; }
+body { font: 14px/1.45 system-ui, sans-serif; color: #1d2430; background: #f6f7f9; margin: 2em auto; max-width: 84em; padding: 0 1.5em; }
 h1 { font-size: 1.6em; margin: 0 0 .6em; }
 h2 { font-size: 1.2em; margin: 1.6em 0 .6em; }
 h3 { font-size: 1em; margin: 0 0 .5em; }
@@ -82,8 +81,8 @@ table.biases th { font-size: .72em; font-weight: normal; color: #69707d; padding
 ";
 
 const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the filter wants there, the brighter the larger its weight \
-(positive weights of both contrasts and of none, added up, relative to the filter's largest). Left: the filters of the types whose biases \
-add up to most, each part where its spring would rest. Right: the same tree; the ellipse of a part is where its spring costs 0.05, dots are \
+(positive weights of both contrasts and of none, added up, relative to the filter's largest). Left: the filters of an ordinary posture \
+(of every part the type that rests nearest to the mean of all of its types), each part where its spring would rest. Right: the same tree; the ellipse of a part is where its spring costs 0.05, dots are \
 where the other types would rest. Axes of the springs are cells from the parent, whose place is the cross.</p>\n";
 
 fn numbers(model: &Model) -> String {
