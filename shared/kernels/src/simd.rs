@@ -1,9 +1,11 @@
 //! A few operations on a register of floats, so that a kernel is written once for all machines.
 
+mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use crate::isa::{Isa, Kind};
+use portable::Portable;
 
 /// Floats in a [`Row`].
 pub(crate) const ROW: usize = 32;
@@ -42,6 +44,12 @@ pub(crate) trait Simd: Copy {
     fn splat(self, value: f32) -> Self::V;
     /// The first `LANES` values.
     fn load(self, from: &[f32]) -> Self::V;
+    /// The `LANES` values from `at` on: as [`Self::load`], unchecked.
+    ///
+    /// # Safety
+    ///
+    /// `at + LANES` is at most the slice's length.
+    unsafe fn load_at(self, from: &[f32], at: usize) -> Self::V;
     /// Writes the first `LANES` values of `to`.
     fn store(self, value: Self::V, to: &mut [f32]);
     /// Writes all of `to` or its first `LANES` values, whichever is less.
@@ -52,6 +60,17 @@ pub(crate) trait Simd: Copy {
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     /// `a - b`.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
+    /// `a one + b`, where `one` holds ones: a sum, on the units that multiply where there are such.
+    ///
+    /// Some processors compare on the units that add, and have others that multiply: sums that look
+    /// like products leave the former to the maxima, which doubles the candidates per cycle.
+    fn plus(self, a: Self::V, one: Self::V, b: Self::V) -> Self::V;
+    /// The larger one; `b` where they are equal.
+    fn max(self, a: Self::V, b: Self::V) -> Self::V;
+    /// The smaller one; `b` where they are equal.
+    fn min(self, a: Self::V, b: Self::V) -> Self::V;
+    /// The first `n` lanes of `a`, the others of `b`.
+    fn first(self, n: usize, a: Self::V, b: Self::V) -> Self::V;
     /// Register `i` holds value `lane + i` of each of the first `LANES` rows.
     fn transposed(self, rows: &[Row], lane: usize) -> Self::Square;
 }
@@ -74,88 +93,6 @@ impl Isa {
             // SAFETY: an `Isa` of this kind only exists where AVX-512 F and VL were detected.
             Kind::Avx512 => unsafe { x86::run_avx512(kernel) },
         }
-    }
-}
-
-/// Whatever the target guarantees, eight lanes at a time.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Portable;
-
-type Eight = [f32; 8];
-
-#[inline(always)]
-fn map3(a: Eight, b: Eight, c: Eight, f: impl Fn(f32, f32, f32) -> f32) -> Eight {
-    std::array::from_fn(|it| f(a[it], b[it], c[it]))
-}
-
-impl Simd for Portable {
-    type V = Eight;
-    type Square = [Eight; 8];
-    const LANES: usize = 8;
-    const BLOCK: usize = 6;
-
-    #[inline(always)]
-    fn splat(self, value: f32) -> Eight {
-        [value; 8]
-    }
-
-    #[inline(always)]
-    fn load(self, from: &[f32]) -> Eight {
-        let mut value = [0.0; 8];
-        value.copy_from_slice(&from[..8]);
-        value
-    }
-
-    #[inline(always)]
-    fn store(self, value: Eight, to: &mut [f32]) {
-        to[..8].copy_from_slice(&value);
-    }
-
-    #[inline(always)]
-    fn store_some(self, value: Eight, to: &mut [f32]) {
-        copy_some(value, to);
-    }
-
-    #[inline(always)]
-    fn mul_add(self, a: Eight, b: Eight, c: Eight) -> Eight {
-        map3(a, b, c, f32::mul_add)
-    }
-
-    #[inline(always)]
-    fn add(self, a: Eight, b: Eight) -> Eight {
-        map3(a, b, a, |a, b, _| a + b)
-    }
-
-    #[inline(always)]
-    fn sub(self, a: Eight, b: Eight) -> Eight {
-        map3(a, b, a, |a, b, _| a - b)
-    }
-
-    #[inline(always)]
-    fn transposed(self, rows: &[Row], lane: usize) -> [Eight; 8] {
-        let rows = &rows[..8];
-        std::array::from_fn(|i| std::array::from_fn(|row| rows[row].0[lane + i]))
-    }
-}
-
-/// Copies as much as fits, without a call for the odd lengths.
-#[inline(always)]
-fn copy_some(value: Eight, to: &mut [f32]) {
-    if to.len() >= 8 {
-        to[..8].copy_from_slice(&value);
-        return;
-    }
-    let mut done = 0;
-    if to.len() & 4 != 0 {
-        to[..4].copy_from_slice(&value[..4]);
-        done = 4;
-    }
-    if to.len() & 2 != 0 {
-        to[done..done + 2].copy_from_slice(&value[done..done + 2]);
-        done += 2;
-    }
-    if to.len() & 1 != 0 {
-        to[done] = value[done];
     }
 }
 
@@ -208,7 +145,19 @@ mod tests {
             let a = simd.splat(1.0 + f32::EPSILON);
             let b = simd.load(&[3.0; ROW]);
             let c = simd.splat(-3.0);
-            for value in [simd.mul_add(a, a, c), simd.add(a, b), simd.sub(a, b)] {
+            let (one, tiny) = (simd.splat(1.0), simd.splat(f32::EPSILON / 2.0));
+            for value in [
+                simd.mul_add(a, a, c),
+                simd.add(a, b),
+                simd.sub(a, b),
+                simd.plus(a, one, tiny),
+                simd.max(a, b),
+                simd.max(b, a),
+                simd.min(a, b),
+                simd.min(b, a),
+                simd.max(simd.splat(0.0), simd.splat(-0.0)),
+                simd.min(simd.splat(-0.0), simd.splat(0.0)),
+            ] {
                 let mut to = [0.0; ROW];
                 simd.store(value, &mut to);
                 assert!(to[..S::LANES].iter().all(|it| *it == to[0]));
@@ -218,12 +167,42 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_rounds_once() {
+    fn every_instruction_set_rounds_once_and_gives_the_second_of_equals() {
         let a = 1.0 + f32::EPSILON;
+        let sums = [a.mul_add(a, -3.0), a + 3.0, a - 3.0, a + f32::EPSILON / 2.0];
+        let want = [sums.as_slice(), &[3.0, 3.0, a, a, -0.0, 0.0]].concat();
         for isa in Isa::available() {
             let mut got = Vec::new();
             isa.run(Arithmetic(&mut got));
-            assert_eq!(got, [a.mul_add(a, -3.0), a + 3.0, a - 3.0], "{isa:?}");
+            let bits = |values: &[f32]| values.iter().map(|it| it.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&got), bits(&want), "{isa:?}");
+        }
+    }
+
+    /// Loads at every place of a row, and joins registers at every lane.
+    struct Places;
+
+    impl Kernel for Places {
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) {
+            let row: [f32; ROW] = std::array::from_fn(|it| it as f32);
+            for at in 0..=ROW - S::LANES {
+                // SAFETY: the last register ends where the row does.
+                let value = unsafe { simd.load_at(&row, at) };
+                for n in 0..=S::LANES {
+                    let mut to = [0.0; ROW];
+                    simd.store(simd.first(n, value, simd.splat(-1.0)), &mut to);
+                    let want = |lane| if lane < n { (at + lane) as f32 } else { -1.0 };
+                    assert_eq!(to[..S::LANES], (0..S::LANES).map(want).collect::<Vec<_>>());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_loads_anywhere_and_joins_registers() {
+        for isa in Isa::available() {
+            isa.run(Places);
         }
     }
 }

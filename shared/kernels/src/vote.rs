@@ -8,14 +8,13 @@
 mod buffer;
 mod ends;
 mod fast;
-mod lanes;
 mod own;
 #[cfg(test)]
 mod reference;
 mod stretch;
 mod trace;
 
-use crate::isa::{Isa, Kind};
+use crate::isa::Isa;
 use crate::spring::Spring;
 
 pub use buffer::ScoreBuffer;
@@ -153,20 +152,12 @@ impl VoteRule {
         if child.grid.is_empty() {
             return;
         }
-        let parent = (parent, spans);
-        match isa.0 {
-            Kind::Portable => fast::cast::<[f32; 4]>(self, child, parent, workspace),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX2 and FMA were detected.
-            Kind::Avx2 => unsafe {
-                fast::avx2(self, child, parent, workspace);
-            },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX-512 F and VL were detected.
-            Kind::Avx512 => unsafe {
-                fast::avx512(self, child, parent, workspace);
-            },
-        }
+        isa.run(fast::Cast {
+            rule: self,
+            child,
+            parent: (parent, spans),
+            workspace,
+        });
     }
 
     fn check(&self, child: ChildScores<'_>) {

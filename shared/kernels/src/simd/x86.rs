@@ -1,15 +1,18 @@
 //! AVX2 with FMA, and AVX-512.
 
 use std::arch::x86_64::{
-    __m256, __m512, _mm256_add_ps, _mm256_castpd_ps, _mm256_castps_pd, _mm256_fmadd_ps,
-    _mm256_loadu_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps,
+    __m256, __m512, _CMP_LT_OQ, _mm256_add_ps, _mm256_blendv_ps, _mm256_castpd_ps,
+    _mm256_castps_pd, _mm256_cmp_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_max_ps,
+    _mm256_min_ps, _mm256_permute2f128_ps, _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps,
     _mm256_unpackhi_pd, _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_add_ps,
-    _mm512_castpd_ps, _mm512_castps_pd, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_storeu_ps,
-    _mm512_set1_ps, _mm512_shuffle_f32x4, _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd,
-    _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
+    _mm512_castpd_ps, _mm512_castps_pd, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_blend_ps,
+    _mm512_mask_storeu_ps, _mm512_max_ps, _mm512_min_ps, _mm512_set1_ps, _mm512_shuffle_f32x4,
+    _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
+    _mm512_unpacklo_ps,
 };
 
-use super::{Kernel, Row, Simd, copy_some};
+use super::portable::copy_some;
+use super::{Kernel, Row, Simd};
 
 /// AVX2 and FMA. The private field keeps others from making one without them.
 #[derive(Debug, Clone, Copy)]
@@ -49,6 +52,16 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn load_at(self, from: &[f32], at: usize) -> __m256 {
+        debug_assert!(at + 8 <= from.len(), "the caller's promise");
+        // SAFETY: the caller promises that `at` is inside of the slice.
+        let from = unsafe { from.as_ptr().add(at) };
+        // SAFETY: the caller promises eight floats from here on, and `self` only exists where AVX2
+        // was detected.
+        unsafe { _mm256_loadu_ps(from) }
+    }
+
+    #[inline(always)]
     fn store(self, value: __m256, to: &mut [f32]) {
         let to = &mut to[..8];
         // SAFETY: `to` has eight floats, and `self` only exists where AVX2 was detected.
@@ -62,7 +75,7 @@ impl Simd for Avx2 {
         }
         let mut all = [0.0; 8];
         self.store(value, &mut all);
-        copy_some(all, to);
+        copy_some(&all, to);
     }
 
     #[inline(always)]
@@ -81,6 +94,33 @@ impl Simd for Avx2 {
     fn sub(self, a: __m256, b: __m256) -> __m256 {
         // SAFETY: `self` only exists where AVX2 was detected.
         unsafe { _mm256_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn plus(self, a: __m256, one: __m256, b: __m256) -> __m256 {
+        self.mul_add(a, one, b)
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: `self` only exists where AVX2 was detected.
+        unsafe { _mm256_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: `self` only exists where AVX2 was detected.
+        unsafe { _mm256_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn first(self, n: usize, a: __m256, b: __m256) -> __m256 {
+        let numbers = self.load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        let end = self.splat(n as f32);
+        // SAFETY: `self` only exists where AVX2 was detected.
+        let inside = unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(numbers, end) };
+        // SAFETY: `self` only exists where AVX2 was detected.
+        unsafe { _mm256_blendv_ps(b, a, inside) }
     }
 
     #[inline(always)]
@@ -111,6 +151,16 @@ impl Simd for Avx512 {
         let from = &from[..16];
         // SAFETY: `from` has sixteen floats, and `self` only exists where AVX-512 F was detected.
         unsafe { _mm512_loadu_ps(from.as_ptr()) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_at(self, from: &[f32], at: usize) -> __m512 {
+        debug_assert!(at + 16 <= from.len(), "the caller's promise");
+        // SAFETY: the caller promises that `at` is inside of the slice.
+        let from = unsafe { from.as_ptr().add(at) };
+        // SAFETY: the caller promises sixteen floats from here on, and `self` only exists where AVX-512 F
+        // was detected.
+        unsafe { _mm512_loadu_ps(from) }
     }
 
     #[inline(always)]
@@ -147,6 +197,30 @@ impl Simd for Avx512 {
     fn sub(self, a: __m512, b: __m512) -> __m512 {
         // SAFETY: `self` only exists where AVX-512 F was detected.
         unsafe { _mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn plus(self, a: __m512, one: __m512, b: __m512) -> __m512 {
+        self.mul_add(a, one, b)
+    }
+
+    #[inline(always)]
+    fn max(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: `self` only exists where AVX-512 F was detected.
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: `self` only exists where AVX-512 F was detected.
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn first(self, n: usize, a: __m512, b: __m512) -> __m512 {
+        let inside = if n < 16 { (1_u16 << n) - 1 } else { u16::MAX };
+        // SAFETY: `self` only exists where AVX-512 F was detected.
+        unsafe { _mm512_mask_blend_ps(inside, b, a) }
     }
 
     #[inline(always)]

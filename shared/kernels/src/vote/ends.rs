@@ -1,7 +1,7 @@
 //! The least and the largest score of a plane, kept while it is written.
 
 use super::ROW_ALIGN;
-use super::lanes::Lanes;
+use crate::simd::Simd;
 
 /// The least and the largest score of a plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,25 +45,30 @@ impl Ends {
     };
 
     #[inline(always)]
-    pub(super) fn load<V: Lanes>(&self) -> [V; 2] {
-        [V::load(&self.least), V::load(&self.most)]
+    pub(super) fn load<S: Simd>(&self, simd: S) -> [S::V; 2] {
+        [simd.load(&self.least), simd.load(&self.most)]
     }
 
     #[inline(always)]
-    pub(super) fn store<V: Lanes>(&mut self, [least, most]: [V; 2]) {
-        least.store(&mut self.least);
-        most.store(&mut self.most);
+    pub(super) fn store<S: Simd>(&mut self, simd: S, [least, most]: [S::V; 2]) {
+        simd.store(least, &mut self.least);
+        simd.store(most, &mut self.most);
     }
 
     /// Adds the scores of the first `n` lanes, the others holding minus infinity.
     #[inline(always)]
-    pub(super) fn see<V: Lanes>([least, most]: [V; 2], scores: V, n: usize) -> [V; 2] {
-        let counted = if n < V::N {
-            scores.first(n, V::splat(f32::INFINITY))
+    pub(super) fn see<S: Simd>(
+        simd: S,
+        [least, most]: [S::V; 2],
+        scores: S::V,
+        n: usize,
+    ) -> [S::V; 2] {
+        let counted = if n < S::LANES {
+            simd.first(n, scores, simd.splat(f32::INFINITY))
         } else {
             scores
         };
-        [counted.min(least), scores.max(most)]
+        [simd.min(counted, least), simd.max(scores, most)]
     }
 
     #[inline(always)]

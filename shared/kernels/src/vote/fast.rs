@@ -4,9 +4,9 @@ use std::hint::black_box;
 
 use super::buffer::ScoreBuffer;
 use super::ends::{Ends, Span};
-use super::lanes::Lanes;
 use super::stretch::Stretch;
 use super::{BLOCK, ChildScores, Grid, ROW_ALIGN, VoteRule};
+use crate::simd::{Kernel, Simd};
 
 /// Buffers of [`VoteRule::cast`], used again from call to call.
 #[derive(Debug, Default)]
@@ -20,55 +20,42 @@ pub struct VoteWorkspace {
     ends: Vec<Ends>,
 }
 
-/// The parent's planes and what becomes of their spans.
-type Parent<'a> = (&'a mut [f32], &'a mut [Span]);
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-pub(super) fn avx2(
-    rule: &VoteRule,
-    child: ChildScores<'_>,
-    parent: Parent<'_>,
-    workspace: &mut VoteWorkspace,
-) {
-    cast::<std::arch::x86_64::__m256>(rule, child, parent, workspace);
+/// All votes of a child.
+pub(super) struct Cast<'a> {
+    pub(super) rule: &'a VoteRule,
+    pub(super) child: ChildScores<'a>,
+    /// The parent's planes and what becomes of their spans.
+    pub(super) parent: (&'a mut [f32], &'a mut [Span]),
+    pub(super) workspace: &'a mut VoteWorkspace,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-pub(super) fn avx512(
-    rule: &VoteRule,
-    child: ChildScores<'_>,
-    parent: Parent<'_>,
-    workspace: &mut VoteWorkspace,
-) {
-    cast::<std::arch::x86_64::__m512>(rule, child, parent, workspace);
-}
-
-#[inline(always)]
-pub(super) fn cast<V: Lanes>(
-    rule: &VoteRule,
-    child: ChildScores<'_>,
-    (parent, spans): Parent<'_>,
-    workspace: &mut VoteWorkspace,
-) {
-    let grid = child.grid;
-    workspace.prepare(rule, child);
-    for first in (0..grid.rows).step_by(BLOCK) {
-        let work = Block {
+impl Kernel for Cast<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self {
             rule,
             child,
-            first,
-            n: BLOCK.min(grid.rows - first),
-        };
-        if work.n > BLOCK / 2 {
-            work.cast::<V, BLOCK>(parent, workspace);
-        } else {
-            work.cast::<V, { BLOCK / 2 }>(parent, workspace);
+            parent: (parent, spans),
+            workspace,
+        } = self;
+        let grid = child.grid;
+        workspace.prepare(rule, child);
+        for first in (0..grid.rows).step_by(BLOCK) {
+            let work = Block {
+                rule,
+                child,
+                first,
+                n: BLOCK.min(grid.rows - first),
+            };
+            if work.n > BLOCK / 2 {
+                work.cast::<S, BLOCK>(simd, parent, workspace);
+            } else {
+                work.cast::<S, { BLOCK / 2 }>(simd, parent, workspace);
+            }
         }
-    }
-    for (span, ends) in spans.iter_mut().zip(&workspace.ends) {
-        *span = ends.span();
+        for (span, ends) in spans.iter_mut().zip(&workspace.ends) {
+            *span = ends.span();
+        }
     }
 }
 
@@ -126,7 +113,12 @@ struct Block<'a> {
 impl Block<'_> {
     /// Casts the votes for the block, computing `R` rows of which the last may not exist.
     #[inline(always)]
-    fn cast<V: Lanes, const R: usize>(&self, parent: &mut [f32], workspace: &mut VoteWorkspace) {
+    fn cast<S: Simd, const R: usize>(
+        &self,
+        simd: S,
+        parent: &mut [f32],
+        workspace: &mut VoteWorkspace,
+    ) {
         let grid = self.child.grid;
         let VoteWorkspace {
             stretches,
@@ -138,19 +130,24 @@ impl Block<'_> {
         let blocks = transformed.scores_mut().chunks_exact_mut(size);
         for (stretch, out) in stretches.iter().zip(blocks) {
             if !stretch.impossible {
-                self.stretch_down::<V, R>(stretch, middle.scores_mut());
-                self.stretch_along::<V, R>(stretch, middle.scores(), out);
+                self.stretch_down::<S, R>(simd, stretch, middle.scores_mut());
+                self.stretch_along::<S, R>(simd, stretch, middle.scores(), out);
             }
         }
         let transformed = transformed.scores();
         for (l, (choices, ends)) in self.rule.choices.iter().zip(ends).enumerate() {
             let rows = &mut parent[grid.at(l, self.first, 0)..][..self.n * grid.stride()];
-            self.add_best::<V, R>(choices, transformed, (rows, ends));
+            self.add_best::<S, R>(simd, choices, transformed, (rows, ends));
         }
     }
 
     #[inline(always)]
-    fn stretch_down<V: Lanes, const R: usize>(&self, stretch: &Stretch, middle: &mut [f32]) {
+    fn stretch_down<S: Simd, const R: usize>(
+        &self,
+        simd: S,
+        stretch: &Stretch,
+        middle: &mut [f32],
+    ) {
         let grid = self.child.grid;
         let stride = grid.stride();
         let (offset, scores) = stretch.down.of_block(self.first / BLOCK);
@@ -158,104 +155,106 @@ impl Block<'_> {
         let top = top.wrapping_add_signed(offset * stride as isize);
         let lines = &self.child.planes[top..][..(scores.len() + R - 1) * stride];
         assert!(
-            grid.cols.next_multiple_of(V::N) <= stride,
+            grid.cols.next_multiple_of(S::LANES) <= stride,
             "rows are padded"
         );
         let load = |row: usize, x: usize| {
             debug_assert!(row + 1 < scores.len() + R && x < grid.cols, "a candidate");
             // SAFETY: the row is one of `lines`, and a register that begins left of the grid's last
             // column ends within the row.
-            unsafe { V::load_at(lines, row * stride + x) }
+            unsafe { simd.load_at(lines, row * stride + x) }
         };
-        let one = V::splat(black_box(1.0));
+        let one = simd.splat(black_box(1.0));
         let (pairs, single) = scores.as_chunks::<2>();
-        for x in (0..grid.cols).step_by(V::N) {
-            let mut best = [V::splat(f32::NEG_INFINITY); R];
+        for x in (0..grid.cols).step_by(S::LANES) {
+            let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for (step, [score, next]) in pairs.iter().enumerate() {
-                let (score, next) = (V::splat(*score), V::splat(*next));
+                let (score, next) = (simd.splat(*score), simd.splat(*next));
                 // A row holds the candidates of one parent at this offset, and of the parent before
                 // it at the next one.
                 let mut candidates = load(2 * step, x);
                 for (r, best) in best.iter_mut().enumerate() {
-                    *best = candidates.plus(one, score).max(*best);
+                    *best = simd.max(simd.plus(candidates, one, score), *best);
                     candidates = load(2 * step + r + 1, x);
-                    *best = candidates.plus(one, next).max(*best);
+                    *best = simd.max(simd.plus(candidates, one, next), *best);
                 }
             }
             for score in single {
-                let score = V::splat(*score);
+                let score = simd.splat(*score);
                 for (r, best) in best.iter_mut().enumerate() {
                     let candidates = load(2 * pairs.len() + r, x);
-                    *best = candidates.plus(one, score).max(*best);
+                    *best = simd.max(simd.plus(candidates, one, score), *best);
                 }
             }
             for (r, best) in best.into_iter().enumerate() {
-                best.store(&mut middle[r * middle_stride(grid) + ROW_ALIGN + x..]);
+                simd.store(best, &mut middle[r * middle_stride(grid) + ROW_ALIGN + x..]);
             }
         }
     }
 
     #[inline(always)]
-    fn stretch_along<V: Lanes, const R: usize>(
+    fn stretch_along<S: Simd, const R: usize>(
         &self,
+        simd: S,
         stretch: &Stretch,
         middle: &[f32],
         out: &mut [f32],
     ) {
         let grid = self.child.grid;
-        let one = V::splat(black_box(1.0));
+        let one = simd.splat(black_box(1.0));
         let stride = middle_stride(grid);
         assert!(middle.len() >= R * stride, "R rows");
-        for x in (0..grid.cols).step_by(V::N) {
+        for x in (0..grid.cols).step_by(S::LANES) {
             let (offset, scores) = stretch.along.of_block(x / ROW_ALIGN);
             let first = (ROW_ALIGN + x).wrapping_add_signed(offset);
             assert!(
-                first + scores.len() + V::N <= stride + 1,
+                first + scores.len() + S::LANES <= stride + 1,
                 "offsets end beside the grid"
             );
-            let mut best = [V::splat(f32::NEG_INFINITY); R];
+            let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for (at, score) in scores.iter().enumerate() {
-                let score = V::splat(*score);
+                let score = simd.splat(*score);
                 for (r, best) in best.iter_mut().enumerate() {
                     // SAFETY: `middle` has R rows, and the assertion above keeps `at` inside of one.
-                    let candidates = unsafe { V::load_at(middle, r * stride + first + at) };
-                    *best = candidates.plus(one, score).max(*best);
+                    let candidates = unsafe { simd.load_at(middle, r * stride + first + at) };
+                    *best = simd.max(simd.plus(candidates, one, score), *best);
                 }
             }
             for (r, best) in best.into_iter().enumerate() {
-                best.store(&mut out[r * grid.stride() + x..]);
+                simd.store(best, &mut out[r * grid.stride() + x..]);
             }
         }
     }
 
     #[inline(always)]
-    fn add_best<V: Lanes, const R: usize>(
+    fn add_best<S: Simd, const R: usize>(
         &self,
+        simd: S,
         choices: &[(usize, f32)],
         transformed: &[f32],
         (rows, ends): (&mut [f32], &mut Ends),
     ) {
         let grid = self.child.grid;
         let stride = grid.stride();
-        let one = V::splat(black_box(1.0));
-        let mut seen = ends.load::<V>();
-        for x in (0..grid.cols).step_by(V::N) {
-            let mut best = [V::splat(f32::NEG_INFINITY); R];
+        let one = simd.splat(black_box(1.0));
+        let mut seen = ends.load(simd);
+        for x in (0..grid.cols).step_by(S::LANES) {
+            let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for &(spring, bias) in choices {
-                let bias = V::splat(bias);
+                let bias = simd.splat(bias);
                 let block = &transformed[spring * BLOCK * stride..][..BLOCK * stride];
                 for (r, best) in best.iter_mut().enumerate() {
-                    let scores = V::load(&block[r * stride + x..]);
-                    *best = scores.plus(one, bias).max(*best);
+                    let scores = simd.load(&block[r * stride + x..]);
+                    *best = simd.max(simd.plus(scores, one, bias), *best);
                 }
             }
             for (best, row) in best.into_iter().zip(rows.chunks_exact_mut(stride)) {
                 let row = &mut row[x..];
-                let sum = V::load(row).plus(one, best);
-                sum.store(row);
-                seen = Ends::see(seen, sum, grid.cols - x);
+                let sum = simd.plus(simd.load(row), one, best);
+                simd.store(sum, row);
+                seen = Ends::see(simd, seen, sum, grid.cols - x);
             }
         }
-        ends.store(seen);
+        ends.store(simd, seen);
     }
 }

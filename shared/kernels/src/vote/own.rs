@@ -3,9 +3,9 @@
 use std::hint::black_box;
 
 use super::ends::{Ends, Span};
-use super::lanes::Lanes;
-use super::{Grid, MARGIN};
-use crate::isa::{Isa, Kind};
+use super::{Grid, MARGIN, ROW_ALIGN};
+use crate::isa::Isa;
+use crate::simd::{Kernel, Simd};
 
 /// The scores of one type of a part before its children vote: `(response + term) + constant`.
 #[derive(Debug, Clone, Copy)]
@@ -37,90 +37,95 @@ impl OwnScores<'_> {
         if grid.is_empty() {
             return Span::NONE;
         }
-        match isa.0 {
-            Kind::Portable => write::<[f32; 4]>(self, grid, plane),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX2 and FMA were detected.
-            Kind::Avx2 => unsafe { avx2(self, grid, plane) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` of this kind only exists where AVX-512 F and VL were detected.
-            Kind::Avx512 => unsafe { avx512(self, grid, plane) },
-        }
+        let mut ends = Ends::NONE;
+        isa.run(Write {
+            own: self,
+            grid,
+            plane,
+            ends: &mut ends,
+        });
+        ends.span()
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn avx2(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
-    write::<std::arch::x86_64::__m256>(own, grid, plane)
+struct Write<'a> {
+    own: &'a OwnScores<'a>,
+    grid: Grid,
+    plane: &'a mut [f32],
+    ends: &'a mut Ends,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn avx512(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
-    write::<std::arch::x86_64::__m512>(own, grid, plane)
+impl Kernel for Write<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        *self.ends = write(simd, self.own, self.grid, self.plane);
+    }
 }
 
+/// As [`OwnScores::write`].
 #[inline(always)]
-fn write<V: Lanes>(own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Span {
+fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Ends {
     let (margin, plane) = plane.split_at_mut(MARGIN * grid.stride());
     margin.fill(f32::NEG_INFINITY);
     let sum = Sum {
+        simd,
         own,
-        one: V::splat(black_box(1.0)),
-        constant: own.constant.map(V::splat),
+        one: simd.splat(black_box(1.0)),
+        constant: own.constant.map(|it| simd.splat(it)),
     };
     let mut ends = Ends::NONE;
-    let mut seen = ends.load::<V>();
-    let whole = grid.cols - grid.cols % V::N;
+    let mut seen = ends.load(simd);
+    let whole = grid.cols - grid.cols % S::LANES;
     for (y, line) in plane.chunks_exact_mut(grid.stride()).enumerate() {
         let (line, rest) = line.split_at_mut(whole);
-        for (run, out) in line.chunks_exact_mut(V::N).enumerate() {
-            let at = y * grid.cols + run * V::N;
-            let scores = sum.of(|from| V::load(&from[at..]));
-            scores.store(out);
-            seen = Ends::see(seen, scores, V::N);
+        for (run, out) in line.chunks_exact_mut(S::LANES).enumerate() {
+            let at = y * grid.cols + run * S::LANES;
+            let scores = sum.of(|from| simd.load(&from[at..]));
+            simd.store(scores, out);
+            seen = Ends::see(simd, seen, scores, S::LANES);
         }
         let n = grid.cols - whole;
-        for (run, out) in rest.chunks_exact_mut(V::N).enumerate() {
-            let mut scores = V::splat(f32::NEG_INFINITY);
+        for (run, out) in rest.chunks_exact_mut(S::LANES).enumerate() {
+            let mut scores = simd.splat(f32::NEG_INFINITY);
             if run == 0 && n > 0 {
                 let at = y * grid.cols + whole;
-                scores = sum.of(|from| load(from, at, n)).first(n, scores);
-                seen = Ends::see(seen, scores, n);
+                scores = simd.first(n, sum.of(|from| load(simd, from, at, n)), scores);
+                seen = Ends::see(simd, seen, scores, n);
             }
-            scores.store(out);
+            simd.store(scores, out);
         }
     }
-    ends.store(seen);
-    ends.span()
+    ends.store(simd, seen);
+    ends
 }
 
 /// How the scores of a register are summed.
-struct Sum<'a, V> {
+struct Sum<'a, S: Simd> {
+    simd: S,
     own: &'a OwnScores<'a>,
-    one: V,
-    constant: Option<V>,
+    one: S::V,
+    constant: Option<S::V>,
 }
 
-impl<V: Lanes> Sum<'_, V> {
+impl<S: Simd> Sum<'_, S> {
     #[inline(always)]
-    fn of(&self, load: impl Fn(&[f32]) -> V) -> V {
+    fn of(&self, load: impl Fn(&[f32]) -> S::V) -> S::V {
         let mut scores = load(self.own.map);
         if let Some(term) = self.own.term {
-            scores = scores.plus(self.one, load(term));
+            scores = self.simd.plus(scores, self.one, load(term));
         }
-        self.constant.map_or(scores, |it| scores.plus(self.one, it))
+        self.constant
+            .map_or(scores, |it| self.simd.plus(scores, self.one, it))
     }
 }
 
 /// Loads scores of which the first `n` count; there may be no others.
 #[inline(always)]
-fn load<V: Lanes>(from: &[f32], at: usize, n: usize) -> V {
-    if at + V::N <= from.len() {
-        return V::load(&from[at..]);
+fn load<S: Simd>(simd: S, from: &[f32], at: usize, n: usize) -> S::V {
+    if at + S::LANES <= from.len() {
+        return simd.load(&from[at..]);
     }
-    let mut last = [0.0; super::ROW_ALIGN];
+    let mut last = [0.0; ROW_ALIGN];
     last[..n].copy_from_slice(&from[at..][..n]);
-    V::load(&last)
+    simd.load(&last)
 }

@@ -1,0 +1,109 @@
+//! Whatever the target guarantees, four lanes at a time: what SSE2 and NEON hold in a register.
+
+use super::{Row, Simd};
+
+/// Needs nothing, so anyone may make one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Portable;
+
+type Four = [f32; 4];
+
+#[inline(always)]
+fn map2(a: Four, b: Four, f: impl Fn(f32, f32) -> f32) -> Four {
+    std::array::from_fn(|it| f(a[it], b[it]))
+}
+
+impl Simd for Portable {
+    type V = Four;
+    type Square = [Four; 4];
+    const LANES: usize = 4;
+    const BLOCK: usize = 6;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Four {
+        [value; 4]
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> Four {
+        let mut value = [0.0; 4];
+        value.copy_from_slice(&from[..4]);
+        value
+    }
+
+    #[inline(always)]
+    unsafe fn load_at(self, from: &[f32], at: usize) -> Four {
+        debug_assert!(at + 4 <= from.len(), "the caller's promise");
+        // SAFETY: the caller promises that `at` is inside of the slice.
+        let from = unsafe { from.as_ptr().add(at) };
+        // SAFETY: the caller promises four floats from here on, whose alignment is that of an array.
+        unsafe { from.cast::<Four>().read() }
+    }
+
+    #[inline(always)]
+    fn store(self, value: Four, to: &mut [f32]) {
+        to[..4].copy_from_slice(&value);
+    }
+
+    #[inline(always)]
+    fn store_some(self, value: Four, to: &mut [f32]) {
+        copy_some(&value, to);
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Four, b: Four, c: Four) -> Four {
+        std::array::from_fn(|it| a[it].mul_add(b[it], c[it]))
+    }
+
+    #[inline(always)]
+    fn add(self, a: Four, b: Four) -> Four {
+        map2(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Four, b: Four) -> Four {
+        map2(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn plus(self, a: Four, _one: Four, b: Four) -> Four {
+        self.add(a, b)
+    }
+
+    #[inline(always)]
+    fn max(self, a: Four, b: Four) -> Four {
+        map2(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn min(self, a: Four, b: Four) -> Four {
+        map2(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn first(self, n: usize, a: Four, b: Four) -> Four {
+        std::array::from_fn(|lane| if lane < n { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
+    fn transposed(self, rows: &[Row], lane: usize) -> [Four; 4] {
+        let rows = &rows[..4];
+        std::array::from_fn(|i| std::array::from_fn(|row| rows[row].0[lane + i]))
+    }
+}
+
+/// Copies as much as fits of a register of eight or four, without a call for the odd lengths.
+#[inline(always)]
+pub(super) fn copy_some(value: &[f32], to: &mut [f32]) {
+    if to.len() >= value.len() {
+        to[..value.len()].copy_from_slice(value);
+        return;
+    }
+    let mut done = 0;
+    for n in [4, 2, 1] {
+        if to.len() & n != 0 {
+            to[done..done + n].copy_from_slice(&value[done..done + n]);
+            done += n;
+        }
+    }
+}
