@@ -325,26 +325,14 @@ impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
                         direct(simd, (panels, first_filter), level, out, row);
                     }
                     Way::Tiles(it) => {
-                        let mut answer = Answer {
-                            form: &forms[it],
-                            form_idx: it,
-                            panels,
-                            first_filter,
-                            out: self.out,
-                        };
+                        let mut answer = Answer::new(&forms, it, (panels, first_filter), self.out);
                         let pending = &mut self.workspace.pending[it];
                         winograd::take(simd, pending, &mut answer, level.map, place);
                     }
                 }
             }
             for (it, pending) in self.workspace.pending.iter_mut().enumerate() {
-                let mut answer = Answer {
-                    form: &forms[it],
-                    form_idx: it,
-                    panels,
-                    first_filter,
-                    out: self.out,
-                };
+                let mut answer = Answer::new(&forms, it, (panels, first_filter), self.out);
                 winograd::flush(simd, pending, &mut answer);
             }
         }

@@ -110,13 +110,32 @@ impl Pending {
 
 /// The panels that answer, and where.
 pub(super) struct Answer<'a> {
-    pub(super) form: &'a Form,
+    form: &'a Form,
     /// Which of a panel's packed weights belong to the form.
-    pub(super) form_idx: usize,
-    pub(super) panels: &'a [Panel],
+    form_idx: usize,
+    panels: &'a [Panel],
     /// The filter whose maps are first in a level.
-    pub(super) first_filter: usize,
-    pub(super) out: &'a mut [f32],
+    first_filter: usize,
+    out: &'a mut [f32],
+}
+
+impl<'a> Answer<'a> {
+    /// Answers in tiles of one of the forms.
+    #[inline(always)]
+    pub(super) fn new(
+        forms: &'a [Form],
+        form_idx: usize,
+        (panels, first_filter): (&'a [Panel], usize),
+        out: &'a mut [f32],
+    ) -> Self {
+        Self {
+            form: &forms[form_idx],
+            form_idx,
+            panels,
+            first_filter,
+            out,
+        }
+    }
 }
 
 /// Takes in a level whose maps begin at `level` in the output; answers when enough tiles wait.
