@@ -21,6 +21,12 @@ mod simd;
 mod spring;
 mod vote;
 
+/// A size for a test: the second where an interpreter (Miri) takes a thousand times as long.
+#[cfg(test)]
+const fn sized(usual: usize, interpreted: usize) -> usize {
+    if cfg!(miri) { interpreted } else { usual }
+}
+
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};

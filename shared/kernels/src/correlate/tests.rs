@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::sized;
 
 /// Numbers in -1..1 that look random and depend on the seed only.
 fn noise(seed: u64, n: usize) -> Vec<f64> {
@@ -167,14 +168,20 @@ fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64
     largest
 }
 
+/// A size of filters, and how many there are.
+fn filters() -> impl Strategy<Value = ([usize; 2], usize)> {
+    let side = 1..sized(8, 4);
+    ([side.clone(), side], 1..sized(20, 3))
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(sized(40, 1) as u32))]
 
     /// Up to 70 columns and 40 filters of mixed sizes, so that every remainder occurs.
     #[test]
     fn every_instruction_set_gives_the_bits_of_the_readable_version(
-        sizes in prop::collection::vec([1..12_usize, 1..70_usize], 1..4),
-        filters in prop::collection::vec(([1..8_usize, 1..8_usize], 1..20_usize), 1..3),
+        sizes in prop::collection::vec([1..sized(12, 9), 1..sized(70, 20)], 1..sized(4, 2)),
+        filters in prop::collection::vec(filters(), 1..sized(3, 2)),
         seed in any::<u64>(),
     ) {
         let problem = Problem::new(&filters, &sizes, seed);
@@ -189,12 +196,12 @@ proptest! {
     /// Also where large terms cancel, which is where a tile is worst.
     #[test]
     fn responses_are_as_exact_as_they_are_said_to_be(
-        size in [1..30_usize, 1..30_usize],
-        filter in [1..8_usize, 1..8_usize],
+        size in [1..sized(30, 9), 1..sized(30, 9)],
+        (filter, _) in filters(),
         seed in any::<u64>(),
         large in 0..3_u32,
     ) {
-        let mut problem = Problem::new(&[(filter, 3)], &[size], seed);
+        let mut problem = Problem::new(&[(filter, sized(3, 1))], &[size], seed);
         for (_, cells) in &mut problem.maps {
             for cell in cells { *cell += 10_f32.powi(large as i32) - 1.0; }
         }
@@ -208,8 +215,13 @@ proptest! {
 /// Tiles of other levels and panels never change a response.
 #[test]
 fn it_does_not_matter_what_is_asked_for_together() {
-    let sizes = [[21, 30], [7, 9], [1, 1], [40, 13], [2, 50]];
-    let problem = Problem::new(&[([5, 5], 70), ([6, 4], 3), ([2, 2], 40)], &sizes, 3);
+    let sizes = [[7, 9], [1, 1], [21, 30], [40, 13], [2, 50]];
+    let filters = [
+        ([sized(5, 3); 2], sized(70, 1)),
+        ([6, 4], sized(3, 0)),
+        ([2, 2], sized(40, 1)),
+    ];
+    let problem = Problem::new(&filters, &sizes[..sized(5, 2)], 3);
     let bank = FilterBank::new(Isa::best(), &problem.templates());
     let together = problem.responses(&bank, 0..bank.n_panels());
     let n = problem.filters.len();
@@ -226,8 +238,9 @@ fn it_does_not_matter_what_is_asked_for_together() {
 /// A bound for the worst case is far from what noise does, but not farther than this.
 #[test]
 fn the_bound_is_not_out_of_all_proportion() {
-    for filter in [[1, 1], [4, 4], [5, 5], [6, 6]] {
-        let problem = Problem::new(&[(filter, 8)], &[[24, 24]], 7);
+    for side in [1, 4, 5, 6].into_iter().take(sized(4, 2)) {
+        let filter = [side; 2];
+        let problem = Problem::new(&[(filter, sized(8, 1))], &[[sized(24, 9); 2]], 7);
         let bank = FilterBank::new(Isa::best(), &problem.templates());
         let got = problem.responses(&bank, 0..bank.n_panels());
         let share = share_of_bound(&problem, &bank, &got);
