@@ -6,15 +6,12 @@ use serde::Serialize;
 
 use crate::clock::Clock;
 use crate::readable::Ranges;
-use crate::stages::Stage;
+use crate::stages::Apart;
 use crate::workload::Workload;
 
-/// Milliseconds on one thread.
+/// The floors of all stages.
 pub(crate) struct Floors {
-    shrink: f64,
-    hog: f64,
-    filters: f64,
-    votes: f64,
+    pub(crate) ms: Apart,
     /// What they were measured by.
     pub(crate) peaks: Peaks,
 }
@@ -39,23 +36,12 @@ impl Floors {
         };
         Self {
             peaks,
-            shrink: shrinking(workload) / multiply_add,
-            hog: describing(workload) / multiply_add,
-            filters: products(workload) / multiply_add,
-            votes: candidates(workload, ranges) / max_plus,
-        }
-    }
-
-    pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
-        let extract = self.shrink + self.hog + self.filters;
-        match stage {
-            Stage::Shrink => Some(self.shrink),
-            Stage::Hog => Some(self.hog),
-            Stage::Filters => Some(self.filters),
-            Stage::Extract => Some(extract),
-            Stage::Votes | Stage::Best | Stage::Iteration => Some(self.votes),
-            Stage::Frame => Some(extract + self.votes),
-            Stage::Backtrack => None,
+            ms: Apart {
+                shrink: shrinking(workload) / multiply_add,
+                hog: describing(workload) / multiply_add,
+                filters: products(workload) / multiply_add,
+                votes: candidates(workload, ranges) / max_plus,
+            },
         }
     }
 }

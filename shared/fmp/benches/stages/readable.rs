@@ -5,15 +5,12 @@ use std::hint::black_box;
 use fmp::{Model, Springs, reference};
 
 use crate::clock::Clock;
-use crate::stages::Stage;
+use crate::stages::Apart;
 use crate::workload::Workload;
 
 /// Milliseconds of the reference, and what the floors need to know of the scores.
 pub(crate) struct Readable {
-    shrink: f64,
-    hog: f64,
-    filters: f64,
-    votes: f64,
+    pub(crate) ms: Apart,
     pub(crate) ranges: Ranges,
 }
 
@@ -46,25 +43,13 @@ impl Readable {
         let cells = |it: &fmp::LevelLayout| (it.rows * it.cols) as f64;
         let share = layout.levels.iter().map(cells).sum::<f64>() / cells(level);
         Self {
-            shrink: shrink.min,
-            hog: hog.min,
-            filters: filters.min * share,
-            votes: votes.min * share,
+            ms: Apart {
+                shrink: shrink.min,
+                hog: hog.min,
+                filters: filters.min * share,
+                votes: votes.min * share,
+            },
             ranges: ranges(model, &responses, size),
-        }
-    }
-
-    /// What the reference takes for a stage, if it has such a stage.
-    pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
-        let extract = self.shrink + self.hog + self.filters;
-        match stage {
-            Stage::Shrink => Some(self.shrink),
-            Stage::Hog => Some(self.hog),
-            Stage::Filters => Some(self.filters),
-            Stage::Extract => Some(extract),
-            Stage::Votes | Stage::Best => Some(self.votes),
-            Stage::Frame => Some(extract + self.votes),
-            Stage::Backtrack | Stage::Iteration => None,
         }
     }
 }

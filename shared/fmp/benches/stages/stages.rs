@@ -30,6 +30,31 @@ impl Times {
     }
 }
 
+/// Milliseconds on one thread of the stages that others are made of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Apart {
+    pub(crate) shrink: f64,
+    pub(crate) hog: f64,
+    pub(crate) filters: f64,
+    pub(crate) votes: f64,
+}
+
+impl Apart {
+    /// Those of a stage together, if it is made of them.
+    pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
+        let extract = self.shrink + self.hog + self.filters;
+        match stage {
+            Stage::Shrink => Some(self.shrink),
+            Stage::Hog => Some(self.hog),
+            Stage::Filters => Some(self.filters),
+            Stage::Extract => Some(extract),
+            Stage::Votes | Stage::Best | Stage::Iteration => Some(self.votes),
+            Stage::Frame => Some(extract + self.votes),
+            Stage::Backtrack => None,
+        }
+    }
+}
+
 /// A row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stage {

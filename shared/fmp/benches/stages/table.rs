@@ -71,8 +71,10 @@ impl Row {
     }
 
     pub(crate) fn compared(self, floors: &Floors, readable: &Readable) -> Self {
-        let floor_ms = floors.of(self.kind).map(|it| it / self.threads as f64);
-        let readable = readable.of(self.kind).filter(|_| self.min_ms > 0.0);
+        let floor_ms = floors.ms.of(self.kind).map(|it| it / self.threads as f64);
+        // The reference knows no other views.
+        let readable = readable.ms.of(self.kind);
+        let readable = readable.filter(|_| self.min_ms > 0.0 && self.kind != Stage::Iteration);
         Self {
             floor_ms,
             percent_of_floor: floor_ms.map(|it| 100.0 * it / self.min_ms),

@@ -4,15 +4,10 @@ use std::sync::Arc;
 
 use fmp::Solver;
 
+use crate::allocations;
 use crate::common::{Evidence, Noise, tree};
 
-/// Allocations of this thread during `call`.
-fn allocations(call: impl FnOnce()) -> u64 {
-    allocation_counter::measure(call).count_total
-}
-
-#[test]
-fn solving_allocates_the_answer_only() {
+pub(crate) fn takes_memory_for_the_answer_only() {
     let mut noise = Noise(1);
     let model = tree(&mut noise, 8);
     let sizes = [[40, 50], [37, 46], [20, 25], [9, 12]];
@@ -56,8 +51,7 @@ impl fmp::Extra for Unmoved {
     }
 }
 
-#[test]
-fn solving_again_allocates_the_answer_only() {
+pub(crate) fn takes_memory_for_the_answer_only_again() {
     let mut noise = Noise(2);
     let model = tree(&mut noise, 8);
     let sizes = [[40, 50], [37, 46], [20, 25], [9, 12]];

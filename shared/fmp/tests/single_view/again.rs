@@ -6,7 +6,8 @@ use fmp::{Extra, Pose, Solver};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use crate::common::{Evidence, Noise, OtherViews, tree};
+use crate::common::{Evidence, Noise, tree};
+use crate::other_view::OtherViews;
 
 const SIZES: [[usize; 2]; 5] = [[9, 20], [17, 7], [4, 35], [6, 6], [1, 1]];
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use fmp::{
-    Edge, Extra, Filter, Layout, LevelLayout, Model, ModelSpec, N_CHANNELS, PartSpec, Responses,
-    Spring, Springs,
+    Edge, Filter, Layout, LevelLayout, Model, ModelSpec, N_CHANNELS, PartSpec, Responses, Spring,
+    Springs,
 };
 
 /// Numbers that look random and depend on the seed only.
@@ -156,71 +156,5 @@ impl Evidence {
 
     pub(crate) fn view(&self) -> Responses<'_> {
         Responses::new(&self.layout, &self.values, &self.levels)
-    }
-}
-
-/// Made-up terms of another view: every second part has a position term.
-pub(crate) struct OtherView(pub(crate) u64);
-
-impl Extra for OtherView {
-    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
-        if !(self.0 as usize + part).is_multiple_of(2) {
-            return false;
-        }
-        let mut noise = Noise(self.0 ^ ((part * 100 + level) as u64) << 20);
-        for _ in 0..first {
-            noise.next();
-        }
-        for it in score {
-            *it += noise.score() as f32;
-        }
-        true
-    }
-
-    fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        Noise(self.0 ^ ((part * 100 + mixture) as u64) << 40).score() as f32
-    }
-}
-
-/// Terms that differ from part to part and from time to time: one seed for every part.
-#[derive(Debug)]
-pub(crate) struct OtherViews {
-    pub(crate) seeds: Vec<u64>,
-    /// Added to every position term, none of which is larger.
-    pub(crate) gain: f32,
-    /// Multiplies all terms.
-    pub(crate) scale: f32,
-    /// Whether the gain is told.
-    pub(crate) known: bool,
-}
-
-impl Extra for OtherViews {
-    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
-        let mut terms = vec![0.0; score.len()];
-        // `OtherView` says that even parts have a term under even seeds.
-        let other = OtherView(2 * self.seeds[part]);
-        let has_one = other.add_position(2 * part, level, first, &mut terms);
-        for (score, term) in score.iter_mut().zip(terms) {
-            *score += self.scale * (term - 1.0 + self.gain);
-        }
-        has_one
-    }
-
-    fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        self.scale * (OtherView(self.seeds[part]).of_type(part, mixture) - 1.0)
-    }
-
-    fn max_gain(&self, _part: usize) -> f32 {
-        if self.known {
-            self.scale * self.gain
-        } else {
-            f32::INFINITY
-        }
-    }
-
-    fn key(&self, part: usize) -> Option<u64> {
-        // Some parts never say what they depend on.
-        let key = self.seeds[part] ^ (u64::from(self.gain.to_bits()) << 32);
-        (!self.seeds[part].is_multiple_of(5)).then_some(key)
     }
 }

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod again;
-mod allocations;
 mod common;
 mod images;
+mod other_view;
 mod solver;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use fmp::{CandidateSettings, Extra, Model, Placement, Pose, Responses, Solver, Springs};
 use proptest::prelude::*;
 
-use crate::common::{Evidence, Noise, OtherView, tree};
+use crate::common::{Evidence, Noise, tree};
+use crate::other_view::OtherView;
 
 /// Every pose on a level.
 fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {

@@ -1,0 +1,38 @@
+//! From the second frame on nothing but the answers takes memory, on whatever thread.
+//!
+//! A program without the harness, whose own thread allocates too: the counter counts all threads,
+//! because those of a pool do most of the work.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "../single_view/common.rs"]
+mod common;
+mod extract;
+mod solve;
+
+use std::alloc::System;
+
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Allocations and reallocations of all threads during `call`.
+fn allocations(call: impl FnOnce()) -> usize {
+    let region = Region::new(ALLOCATOR);
+    call();
+    let change = region.change();
+    change.allocations + change.reallocations
+}
+
+/// Frames after the first take memory for their answers only.
+fn main() {
+    let mut some = Vec::new();
+    let counted = allocations(|| some = std::hint::black_box(vec![1_u8; 100]));
+    assert_eq!((counted, some.len()), (1, 100), "the counter counts");
+    let elsewhere = || std::thread::scope(|it| drop(it.spawn(|| vec![1_u8; 100]).join().unwrap()));
+    assert!(allocations(elsewhere) > 0, "and on all threads");
+    solve::takes_memory_for_the_answer_only();
+    solve::takes_memory_for_the_answer_only_again();
+    // Last, since threads of a pool may still be ending when it is gone.
+    extract::takes_no_memory();
+}
