@@ -34,7 +34,8 @@ pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
 pub use peak::Peak;
 pub use planes::{
-    Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize, resize_by_taps,
+    PartOfResized, Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize,
+    resize_by_taps, resize_part,
 };
 pub use spring::Spring;
 pub use vote::{ChildScores, Found, Grid, OwnScores, ScoreBuffer, Span, VoteRule, VoteWorkspace};

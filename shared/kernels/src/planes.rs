@@ -8,6 +8,8 @@ mod reduce;
 mod reference;
 mod resize;
 
+use std::ops::Range;
+
 use crate::dispatch::dispatch;
 use crate::{Isa, Rgb8View};
 
@@ -105,6 +107,17 @@ impl ShrinkWorkspace {
     }
 }
 
+/// A rectangle of an image that is made smaller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartOfResized {
+    /// Size `[width, height]` of the whole smaller image, pixels.
+    pub size: [usize; 2],
+    /// Columns of it.
+    pub x: Range<usize>,
+    /// Rows of it.
+    pub y: Range<usize>,
+}
+
 /// Makes `out` the area average of `image` at `[width, height]` pixels.
 ///
 /// The reference programs' `resize`, and [`resize_by_taps`]: bit for bit.
@@ -119,12 +132,40 @@ pub fn resize(
     workspace: &mut ShrinkWorkspace,
     out: &mut Planes,
 ) {
-    check_resize(image, [width, height]);
-    out.reshape(width, height);
+    let whole = PartOfResized {
+        size: [width, height],
+        x: 0..width,
+        y: 0..height,
+    };
+    resize_part(isa, image, &whole, workspace, out);
+}
+
+/// Makes `out` a part of what [`resize`] would make of `image`: the same bits, in time that grows
+/// with the part.
+///
+/// # Panics
+///
+/// As [`resize`], and if the part is empty or not inside the smaller image.
+pub fn resize_part(
+    isa: Isa,
+    image: Rgb8View<'_>,
+    part: &PartOfResized,
+    workspace: &mut ShrinkWorkspace,
+    out: &mut Planes,
+) {
+    check_resize(image, part.size);
+    for (range, side) in [&part.x, &part.y].into_iter().zip(part.size) {
+        assert!(
+            !range.is_empty() && range.end <= side,
+            "a part of the smaller image"
+        );
+    }
+    out.reshape(part.x.len(), part.y.len());
     dispatch(
         isa,
         resize::Resize {
             image,
+            part,
             workspace,
             out,
         },
@@ -242,6 +283,36 @@ mod tests {
                     let mut got = used();
                     resize(isa, image, to, &mut workspace, &mut got);
                     prop_assert!(got == want, "{:?}", isa);
+                }
+            }
+        }
+
+        #[test]
+        fn a_part_of_a_smaller_image_has_the_bits_of_the_whole(
+            size in [1..70_usize, 1..50_usize],
+            share in [0.1..1.0_f64, 0.1..1.0_f64],
+            cut in [[0.0..1.0_f64, 0.0..1.0], [0.0..1.0, 0.0..1.0]],
+            seed in any::<u64>(),
+        ) {
+            let [width, height] = size;
+            let to = [0, 1].map(|it| ((size[it] as f64 * share[it]).round() as usize).max(1));
+            let bytes = noise(seed, 3 * width * height);
+            let image = Rgb8View::new(width, height, &bytes).unwrap();
+            let [x, y] = [0, 1].map(|axis| {
+                let at = cut[axis].map(|it| (it * to[axis] as f64) as usize);
+                at[0].min(at[1])..at[0].max(at[1]) + 1
+            });
+            let part = PartOfResized { size: to, x, y };
+            let mut workspace = ShrinkWorkspace::default();
+            for isa in Isa::available() {
+                let (mut whole, mut got) = (used(), used());
+                resize(isa, image, to, &mut workspace, &mut whole);
+                resize_part(isa, image, &part, &mut workspace, &mut got);
+                prop_assert_eq!([got.width(), got.height()], [part.x.len(), part.y.len()]);
+                for plane in 0..3 {
+                    for (at, y) in part.y.clone().enumerate() {
+                        prop_assert_eq!(got.row(plane, at), &whole.row(plane, y)[part.x.clone()]);
+                    }
                 }
             }
         }

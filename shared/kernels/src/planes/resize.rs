@@ -1,6 +1,8 @@
 //! The area average, a row of pixels at a time.
 
-use super::{Planes, ShrinkWorkspace};
+use std::ops::Range;
+
+use super::{PartOfResized, Planes, ShrinkWorkspace};
 use crate::Rgb8View;
 use crate::dispatch::Body;
 
@@ -24,15 +26,15 @@ impl Taps {
         self.weights.reserve(3 * from);
     }
 
-    /// Taps of an area average from `from` to `to` samples: those of the reference, in its order,
-    /// with zeros before or after them.
-    fn cover(&mut self, from: usize, to: usize) {
+    /// Taps of some samples of an area average from `from` to `to` samples: those of the reference,
+    /// in its order, with zeros before or after them.
+    fn cover(&mut self, from: usize, to: usize, samples: Range<usize>) {
         let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
         // A sample that is covered partly on both sides of those that are covered whole.
         self.n = (inverse.ceil() as usize + 1).min(from);
         self.first.clear();
         self.weights.clear();
-        for d in 0..to {
+        for d in samples {
             let begin = d as f64 * inverse;
             let end = begin + inverse;
             let (whole, last) = (begin.ceil() as usize, end.floor() as usize);
@@ -57,6 +59,7 @@ impl Taps {
 
 pub(super) struct Resize<'a> {
     pub(super) image: Rgb8View<'a>,
+    pub(super) part: &'a PartOfResized,
     pub(super) workspace: &'a mut ShrinkWorkspace,
     /// Has its new size already.
     pub(super) out: &'a mut Planes,
@@ -67,6 +70,7 @@ impl Body for Resize<'_> {
     fn run(self) {
         let Self {
             image,
+            part,
             workspace,
             out,
         } = self;
@@ -76,17 +80,22 @@ impl Body for Resize<'_> {
             line,
             pixels,
         } = workspace;
-        down.cover(image.height(), out.height);
-        along.cover(image.width(), out.width);
+        let [width, height] = part.size;
+        down.cover(image.height(), height, part.y.clone());
+        along.cover(image.width(), width, part.x.clone());
+        // The columns that any sample of the part is made of.
+        let left = along.first.first().map_or(0, |it| 3 * it);
+        let right = along.first.last().map_or(0, |it| 3 * (it + along.n));
+        along.first.iter_mut().for_each(|it| *it -= left / 3);
         let stride = 3 * image.width();
         line.clear();
         // The fourth sample of the last pixel is read and not used.
-        line.resize(stride + 1, 0.0);
+        line.resize(right - left + 1, 0.0);
         pixels.resize(out.width, [0.0; 4]);
         for y in 0..out.height {
-            let rows = &image.data()[down.first[y] * stride..];
+            let rows = &image.data()[down.first[y] * stride + left..];
             let weights = &down.weights[y * down.n..][..down.n];
-            sum_down(rows, weights, &mut line[..stride]);
+            sum_down(rows, stride, weights, &mut line[..right - left]);
             match along.n {
                 1 => sum_along::<1>(line, along, pixels),
                 2 => sum_along::<2>(line, along, pixels),
@@ -98,11 +107,11 @@ impl Body for Resize<'_> {
     }
 }
 
-/// Weighted sums of the columns of the rows that `rows` begins with.
+/// Weighted sums of the columns of the rows that `rows` begins with, `stride` apart.
 #[inline(always)]
-fn sum_down(rows: &[u8], weights: &[f64], out: &mut [f64]) {
+fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     let n = out.len();
-    let row = |it: usize| &rows[it * n..][..n];
+    let row = |it: usize| &rows[it * stride..][..n];
     match *weights {
         [a] | [a, 0.0] | [a, 0.0, 0.0] => {
             for (out, it) in out.iter_mut().zip(row(0)) {
