@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use kernels::{CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template};
 
 use crate::features::{Features, Source};
-use crate::{Layout, Model};
+use crate::{Layout, Model, Scope};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
 /// are used again from frame to frame.
@@ -69,6 +69,29 @@ impl Extractor {
     ///
     /// If the image, the layout and `out` disagree in size, or the layout is another model's.
     pub fn responses(&self, image: Rgb8View<'_>, layout: &Layout, out: &mut [f32]) {
+        self.responses_in(image, layout, &Scope::whole(layout), out);
+    }
+
+    /// Writes the responses of all filters on the cells of a scope into `out`; nothing else is
+    /// computed but what they are made of.
+    ///
+    /// Features are those that [`Self::responses`] is made of, bit for bit. Responses lie within
+    /// twice the bound of [`FilterBank::correlate`] of each other: tiles begin elsewhere. With the
+    /// whole image as its region a scope gives the bits of [`Self::responses`] on its levels.
+    ///
+    /// * `out`: at least [`Layout::n_values`] values, `[level][filter][row][col]` without gaps.
+    ///
+    /// # Panics
+    ///
+    /// If the image, the layout, the scope and `out` disagree in size, or the layout is another
+    /// model's.
+    pub fn responses_in(
+        &self,
+        image: Rgb8View<'_>,
+        layout: &Layout,
+        scope: &Scope,
+        out: &mut [f32],
+    ) {
         assert_eq!(
             layout.image_size,
             [image.width(), image.height()],
@@ -79,12 +102,14 @@ impl Extractor {
             self.model.n_filters(),
             "layout of this model"
         );
-        assert!(out.len() >= layout.n_responses(), "one value per response");
+        let n_values = layout.n_values(scope);
+        assert!(out.len() >= n_values, "one value per response");
         let spec = self.model.spec();
         let source = Source {
             isa: self.isa,
             image,
             layout,
+            scope,
             interval: spec.interval,
             cell_px: spec.cell_px,
         };
@@ -104,15 +129,15 @@ impl Extractor {
         }
         drop(buffers);
         let everything = Part {
-            levels: 0..layout.levels.len(),
+            levels: usize::from(scope.levels().start)..usize::from(scope.levels().end),
             panels: 0..self.bank.n_panels(),
         };
         let share = if in_pool() {
-            self.work(layout, &everything) / (SHARES * n_threads)
+            self.work(&source, &everything) / (SHARES * n_threads)
         } else {
             usize::MAX
         };
-        let out = &mut out[..layout.n_responses()];
+        let out = &mut out[..n_values];
         self.correlate((&source, &features), everything, share, out);
         lock(&self.workspaces).push(features);
     }
@@ -128,20 +153,22 @@ impl Extractor {
         share: usize,
         out: &mut [f32],
     ) {
-        let layout = source.layout;
-        if self.work(layout, &part) > share
-            && let Some([first, second]) = self.halves(layout, &part)
+        if self.work(source, &part) > share
+            && let Some([first, second]) = self.halves(source, &part)
         {
-            let (out, rest) = out.split_at_mut(self.work(layout, &first));
+            let (out, rest) = out.split_at_mut(self.work(source, &first));
             rayon::join(
                 || self.correlate((source, features), first, share, out),
                 || self.correlate((source, features), second, share, rest),
             );
             return;
         }
-        let levels = part.levels.map(|level| Level {
-            map: features.of_level(source, level),
-            size: [layout.levels[level].rows, layout.levels[level].cols],
+        let levels = part.levels.map(|level| {
+            let window = source.layout.window(source.scope, level);
+            Level {
+                map: features.of_level(source, level),
+                size: [window.rows, window.cols],
+            }
         });
         let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
         self.bank.correlate(part.panels, levels, out, &mut buffers);
@@ -149,20 +176,21 @@ impl Extractor {
     }
 
     /// Number of responses.
-    fn work(&self, layout: &Layout, part: &Part) -> usize {
-        let levels = layout.levels[part.levels.clone()].iter();
-        let area: usize = levels.map(|it| it.rows * it.cols).sum();
+    fn work(&self, source: &Source<'_>, part: &Part) -> usize {
+        let windows = part.levels.clone();
+        let windows = windows.map(|level| source.layout.window(source.scope, level));
+        let area: usize = windows.map(|it| it.rows * it.cols).sum();
         area * self.bank.filters(part.panels.clone()).len()
     }
 
     /// Levels that have about half the work, and the others; of one level, the panels.
-    fn halves(&self, layout: &Layout, part: &Part) -> Option<[Part; 2]> {
+    fn halves(&self, source: &Source<'_>, part: &Part) -> Option<[Part; 2]> {
         let Range { start, end } = part.levels;
         let cut = |levels: Range<usize>, panels: Range<usize>| Part { levels, panels };
         if end - start > 1 {
-            let half = self.work(layout, part) / 2;
+            let half = self.work(source, part) / 2;
             let heavy =
-                |it: &usize| self.work(layout, &cut(start..*it, part.panels.clone())) >= half;
+                |it: &usize| self.work(source, &cut(start..*it, part.panels.clone())) >= half;
             let middle = (start + 1..end - 1).find(heavy).unwrap_or(end - 1);
             let panels = part.panels.clone();
             return Some([cut(start..middle, panels.clone()), cut(middle..end, panels)]);

@@ -3,11 +3,13 @@
 use std::sync::{Mutex, OnceLock};
 
 use kernels::{
-    FeatureMap, HogShape, HogWorkspace, Isa, Planes, Rgb8View, ShrinkWorkspace, hog, reduce, resize,
+    FeatureMap, HogShape, HogWorkspace, Isa, PartOfResized, Planes, Rgb8View, ShrinkWorkspace, hog,
+    reduce, resize_part,
 };
 
-use crate::Layout;
+use crate::cuts::{Cut, cuts};
 use crate::extract::lock;
+use crate::{Layout, N_CHANNELS, Scope};
 
 /// What the features are made of.
 #[derive(Debug, Clone, Copy)]
@@ -15,12 +17,23 @@ pub(crate) struct Source<'a> {
     pub(crate) isa: Isa,
     pub(crate) image: Rgb8View<'a>,
     pub(crate) layout: &'a Layout,
+    pub(crate) scope: &'a Scope,
     /// Levels per octave.
     pub(crate) interval: usize,
     pub(crate) cell_px: usize,
 }
 
 impl Source<'_> {
+    /// Size `[rows, cols]` of the features that the responses of a level's window are made of.
+    fn map_size(&self, level: usize) -> [usize; 2] {
+        let it = &self.layout.levels[level];
+        let window = self.layout.window(self.scope, level);
+        [
+            window.rows + it.padded[0] - it.rows,
+            window.cols + it.padded[1] - it.cols,
+        ]
+    }
+
     fn shape(&self) -> HogShape {
         HogShape {
             cell_px: self.cell_px,
@@ -44,7 +57,7 @@ pub(crate) struct Features {
 
 #[derive(Debug, Default)]
 struct Chain {
-    /// Padded features of every level of the chain.
+    /// Features of every level of the chain, padded where the image ends; empty outside of the scope.
     maps: OnceLock<Maps>,
     /// What they are made in.
     spare: Mutex<Maps>,
@@ -59,6 +72,9 @@ struct Arena {
     halved: Planes,
     shrink: ShrinkWorkspace,
     hog: HogWorkspace,
+    cuts: Vec<Cut>,
+    /// Features of a cut image with the padding that it would have if it were whole.
+    padded: Vec<f32>,
 }
 
 impl Features {
@@ -80,7 +96,8 @@ impl Features {
         }
     }
 
-    /// The padded features of a level of `source`, the same one for all levels since [`Self::begin`].
+    /// The features of a level of the scope of `source`, the same one for all levels since
+    /// [`Self::begin`].
     pub(crate) fn of_level(&self, source: &Source<'_>, level: usize) -> FeatureMap<'_> {
         let first = level % source.interval;
         let chain = &self.chains[first];
@@ -92,7 +109,7 @@ impl Features {
             lock(&self.arenas).push(arena);
             maps
         });
-        let [rows, cols] = source.layout.levels[level].padded;
+        let [rows, cols] = source.map_size(level);
         FeatureMap {
             rows,
             cols,
@@ -109,24 +126,70 @@ impl Arena {
         self.halved.reserve(width.div_ceil(2), height.div_ceil(2));
         self.shrink.reserve(width, height);
         self.hog.reserve(width, height, source.shape());
+        self.cuts.clear();
+        self.cuts.reserve(source.layout.levels.len());
+        if *source.scope != Scope::whole(source.layout) {
+            let [rows, cols] = source.shape().map_size(width, height);
+            self.padded.clear();
+            self.padded.reserve(rows * cols * N_CHANNELS);
+        }
     }
 
-    /// Features of the levels `first`, `first + interval` and so on.
+    /// Features of the levels `first`, `first + interval` and so on, as far as the scope goes.
     fn fill(&mut self, source: &Source<'_>, first: usize, maps: &mut Maps) {
-        let Source { isa, layout, .. } = *source;
-        let levels = layout.levels[first..].iter().step_by(source.interval);
+        let levels = (first..source.layout.levels.len()).step_by(source.interval);
         maps.resize_with(levels.len(), Vec::new);
+        cuts(source, first, &mut self.cuts);
         // Images take turns in the two buffers, which keep their places for the next chain.
+        let Self {
+            shrink,
+            hog,
+            padded,
+            cuts,
+            ..
+        } = self;
         let (mut image, mut other) = (&mut self.image, &mut self.halved);
-        for (octave, (level, map)) in levels.zip(maps).enumerate() {
+        for (octave, ((level, map), cut)) in levels.zip(maps).zip(&*cuts).enumerate() {
             if octave == 0 {
-                resize(isa, source.image, level.image_size, &mut self.shrink, image);
+                let part = PartOfResized {
+                    size: source.layout.levels[level].image_size,
+                    x: cut.x.clone(),
+                    y: cut.y.clone(),
+                };
+                resize_part(source.isa, source.image, &part, shrink, image);
             } else {
-                reduce(isa, image, &mut self.shrink, other);
+                reduce(source.isa, image, shrink, other);
                 std::mem::swap(&mut image, &mut other);
             }
-            map.resize(level.padded[0] * level.padded[1] * crate::N_CHANNELS, 0.0);
-            hog(isa, image, source.shape(), &mut self.hog, map);
+            if source.scope.levels().contains(&(level as u16)) {
+                describe(source, (level, cut), image, (hog, padded), map);
+            }
         }
+    }
+}
+
+/// Writes the features of a level's window, given the part of its image that `cut` says.
+fn describe(
+    source: &Source<'_>,
+    (level, cut): (usize, &Cut),
+    image: &Planes,
+    (workspace, padded): (&mut HogWorkspace, &mut Vec<f32>),
+    map: &mut Vec<f32>,
+) {
+    let (shape, size) = (source.shape(), source.map_size(level));
+    map.resize(size[0] * size[1] * N_CHANNELS, 0.0);
+    if size == source.layout.levels[level].padded {
+        return hog(source.isa, image, shape, workspace, map);
+    }
+    let [rows, cols] = shape.map_size(image.width(), image.height());
+    padded.resize(rows * cols * N_CHANNELS, 0.0);
+    hog(source.isa, image, shape, workspace, padded);
+    // Cells of the cut image are those of the whole one, less those before it.
+    let window = source.layout.window(source.scope, level);
+    let top = window.top - cut.y.start / source.cell_px;
+    let left = window.left - cut.x.start / source.cell_px;
+    let lines = padded.chunks_exact(cols * N_CHANNELS).skip(top);
+    for (to, from) in map.chunks_exact_mut(size[1] * N_CHANNELS).zip(lines) {
+        to.copy_from_slice(&from[left * N_CHANNELS..][..size[1] * N_CHANNELS]);
     }
 }

@@ -9,20 +9,25 @@
 pub mod files;
 pub mod reference;
 
+mod cuts;
 mod extract;
 mod features;
 mod layout;
 mod model;
 mod pose;
 mod responses;
+mod scope;
 mod solve;
+mod track;
 
 pub use extract::Extractor;
 pub use layout::{ImageTooSmall, Layout, LevelLayout};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 pub use pose::{Placement, Pose};
 pub use responses::Responses;
+pub use scope::{Region, Scope, ScopeError, Window};
 pub use solve::{Again, Bounds, CandidateSettings, Extra, Solver};
+pub use track::{Track, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
 /// texture energies, 1 that is set in the padding only.

@@ -53,4 +53,19 @@ impl Pose {
             placement,
         )
     }
+
+    /// The smallest box `[x1, y1, x2, y2]` around the boxes of all parts; see [`Self::part_box`].
+    pub fn bounding_box(&self, model: &Model, layout: &Layout) -> [f64; 4] {
+        let boxes = (0..self.parts.len()).map(|part| self.part_box(model, layout, part));
+        boxes
+            .reduce(|a, b| {
+                [
+                    a[0].min(b[0]),
+                    a[1].min(b[1]),
+                    a[2].max(b[2]),
+                    a[3].max(b[3]),
+                ]
+            })
+            .unwrap_or_default()
+    }
 }

@@ -1,6 +1,6 @@
 //! What every filter answers at every cell: the evidence of one image.
 
-use crate::{Bounds, Layout};
+use crate::{Bounds, Layout, Pose, Scope, Window};
 
 /// Responses of all filters on the levels that are offered.
 ///
@@ -10,6 +10,7 @@ pub struct Responses<'a> {
     layout: &'a Layout,
     values: &'a [f32],
     levels: &'a [u16],
+    scope: Scope,
     bounds: Option<&'a Bounds>,
 }
 
@@ -23,17 +24,32 @@ impl<'a> Responses<'a> {
     ///
     /// If `values` is shorter than the layout, or a level is out of range.
     pub fn new(layout: &'a Layout, values: &'a [f32], levels: &'a [u16]) -> Self {
-        assert!(values.len() >= layout.n_responses(), "one value per cell");
+        Self::within(layout, values, levels, Scope::whole(layout))
+    }
+
+    /// The same for the responses of a scope: what lies outside of it has no value, and no pose has
+    /// a part there.
+    ///
+    /// * `values`: [`Layout::n_values`] scores, `[level][filter][row][col]` without gaps.
+    /// * `levels`: the levels that hold valid values, ascending.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer values than the scope has, or a level is not one of it.
+    pub fn within(layout: &'a Layout, values: &'a [f32], levels: &'a [u16], scope: Scope) -> Self {
         assert!(
-            levels
-                .iter()
-                .all(|&it| usize::from(it) < layout.levels.len()),
-            "levels of the layout"
+            values.len() >= layout.n_values(&scope),
+            "one value per cell"
+        );
+        assert!(
+            levels.iter().all(|it| scope.levels().contains(it)),
+            "levels of the scope"
         );
         Self {
             layout,
             values,
             levels,
+            scope,
             bounds: None,
         }
     }
@@ -72,8 +88,32 @@ impl<'a> Responses<'a> {
         self.levels
     }
 
-    /// The response map of a filter, `rows x cols`, row major.
+    /// The part of the layout that the values cover.
+    pub fn scope(&self) -> &Scope {
+        &self.scope
+    }
+
+    /// The cells of a level that have values.
+    pub fn window(&self, level: usize) -> Window {
+        self.layout.window(&self.scope, level)
+    }
+
+    /// Whether every part of a pose lies where there are values.
+    pub fn covers(&self, pose: &Pose) -> bool {
+        self.levels.binary_search(&pose.level).is_ok()
+            && self.window(usize::from(pose.level)).contains_all(pose)
+    }
+
+    /// The response maps of all filters of a level, one after the other, each of the window's size,
+    /// row major.
+    pub fn maps(&self, level: usize) -> &'a [f32] {
+        &self.values[self.layout.maps_in(&self.scope, level)]
+    }
+
+    /// The response map of a filter: the rows and columns of [`Self::window`], row major.
     pub fn map(&self, level: usize, filter: usize) -> &'a [f32] {
-        &self.values[self.layout.map_range(level, filter)]
+        let maps = self.maps(level);
+        let area = maps.len() / self.layout.n_filters;
+        &maps[filter * area..][..area]
     }
 }

@@ -122,7 +122,7 @@ impl Solver {
 
     /// The best pose over the offered levels, with the extra terms if there are any.
     ///
-    /// Exact. Ties of the root go to the lower level, then to the first cell in row-major order,
+    /// Exact among the poses all of whose parts lie on cells that have values. Ties of the root go to the lower level, then to the first cell in row-major order,
     /// then to the lower type (the reference programs leave the first two open); ties of a child to
     /// the lower type, then to the first column, then to the first row. `None` if no level is
     /// offered, or no pose is possible.
@@ -166,7 +166,8 @@ impl Solver {
         search.finish(&|_, it| self.put_back(it))
     }
 
-    /// The score of the best tree at every cell of the root, `rows x cols` of the level.
+    /// The score of the best tree at every cell of the root, `rows x cols` of
+    /// [`Responses::window`].
     ///
     /// # Panics
     ///
@@ -190,7 +191,7 @@ impl Solver {
     ///
     /// # Panics
     ///
-    /// If the evidence is another model's, or the pose does not lie on its level.
+    /// If the evidence is another model's, or it does not [cover](Responses::covers) the pose.
     pub fn score(&self, evidence: &Responses<'_>, pose: &Pose, extra: Option<&dyn Extra>) -> f32 {
         self.check(evidence);
         let problem = Problem::new(self, evidence, extra, pose.level);

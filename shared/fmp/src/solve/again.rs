@@ -95,10 +95,11 @@ impl Again<'_> {
     /// Finds the levels that may hold the best pose, and those of them whose planes will be kept.
     fn choose_levels(&mut self, extra: &dyn Extra, guess: Option<&Pose>) {
         let (solver, evidence) = (self.solver, self.evidence);
-        let offered = |pose: &&Pose| evidence.levels().binary_search(&pose.level).is_ok();
-        let lowest = guess.filter(offered).map_or(f32::NEG_INFINITY, |pose| {
-            solver.score(evidence, pose, Some(extra))
-        });
+        let lowest = guess
+            .filter(|it| evidence.covers(it))
+            .map_or(f32::NEG_INFINITY, |pose| {
+                solver.score(evidence, pose, Some(extra))
+            });
         let gain = solver.max_gain(extra);
         let n_parts = solver.model.n_parts();
         self.order.clear();

@@ -84,15 +84,7 @@ fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
     let mut all: Boxes = (0..model.n_parts())
         .map(|part| pose.part_box(model, layout, part))
         .collect();
-    let around = all.iter().copied().reduce(|a, b| {
-        [
-            a[0].min(b[0]),
-            a[1].min(b[1]),
-            a[2].max(b[2]),
-            a[3].max(b[3]),
-        ]
-    });
-    all.extend(around);
+    all.push(pose.bounding_box(model, layout));
     all
 }
 

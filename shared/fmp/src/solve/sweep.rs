@@ -3,7 +3,7 @@
 use kernels::{ChildScores, Grid, OwnScores, ScoreBuffer, Span, VoteWorkspace};
 
 use super::{Extra, Root, Solver};
-use crate::{Placement, Pose, Responses};
+use crate::{Placement, Pose, Responses, Window};
 
 /// Score planes of one level, used again from level to level.
 #[derive(Debug, Default)]
@@ -33,6 +33,8 @@ pub(super) struct Workspace {
 pub(super) struct Sweep<'a> {
     solver: &'a Solver,
     level: u16,
+    /// The cells of the level that are searched; rows and columns count from its corner.
+    window: Window,
     grid: Grid,
     workspace: &'a Workspace,
 }
@@ -44,6 +46,9 @@ pub(super) struct Problem<'a> {
     evidence: &'a Responses<'a>,
     extra: Option<&'a dyn Extra>,
     level: u16,
+    window: Window,
+    /// The response maps of the level.
+    maps: &'a [f32],
     grid: Grid,
 }
 
@@ -54,36 +59,61 @@ impl<'a> Problem<'a> {
         extra: Option<&'a dyn Extra>,
         level: u16,
     ) -> Self {
-        let it = &evidence.layout().levels[usize::from(level)];
+        let window = evidence.window(usize::from(level));
+        let offered = evidence.scope().levels().contains(&level);
         Self {
             solver,
             evidence,
             extra,
             level,
+            window,
+            maps: if offered {
+                evidence.maps(usize::from(level))
+            } else {
+                &[]
+            },
             grid: Grid {
-                rows: it.rows,
-                cols: it.cols,
+                rows: window.rows,
+                cols: window.cols,
             },
         }
     }
 
     fn responses(&self, part: usize, mixture: usize) -> &'a [f32] {
         let filter = self.solver.model.spec().parts[part].filter_of_type[mixture];
-        self.evidence.map(usize::from(self.level), filter)
+        let area = self.grid.rows * self.grid.cols;
+        &self.maps[filter * area..][..area]
     }
 
-    /// The part's position term at the cells from `first` on, if it has one.
-    fn position_term<'b>(
-        &self,
-        part: usize,
-        first: usize,
-        buffer: &'b mut [f32],
-    ) -> Option<&'b [f32]> {
+    /// The part's position term at all cells of the window, if it has one.
+    fn position_term<'b>(&self, part: usize, buffer: &'b mut [f32]) -> Option<&'b [f32]> {
         let extra = self.extra?;
         buffer.fill(0.0);
         let level = usize::from(self.level);
-        let has_one = extra.add_position(part, level, first, buffer);
+        let cols = self.evidence.layout().levels[level].cols;
+        let Window { top, left, .. } = self.window;
+        if self.grid.cols == cols {
+            let has_one = extra.add_position(part, level, top * cols, buffer);
+            return has_one.then_some(buffer);
+        }
+        let mut has_one = false;
+        for (y, row) in buffer.chunks_exact_mut(self.grid.cols).enumerate() {
+            has_one = extra.add_position(part, level, (top + y) * cols + left, row);
+            if !has_one {
+                break;
+            }
+        }
         has_one.then_some(buffer)
+    }
+
+    /// The part's position term at one placement, if it has one.
+    fn term_at(&self, part: usize, at: Placement) -> Option<f32> {
+        let level = usize::from(self.level);
+        let cols = self.evidence.layout().levels[level].cols;
+        let cell = usize::from(at.y) * cols + usize::from(at.x);
+        let mut term = [0.0];
+        let has_one = self.extra?.add_position(part, level, cell, &mut term);
+        has_one.then_some(term[0])
     }
 
     /// Memory that the planes of the level need, bytes.
@@ -127,6 +157,7 @@ impl<'a> Sweep<'a> {
         Self {
             solver: problem.solver,
             level: problem.level,
+            window: problem.window,
             grid: problem.grid,
             workspace,
         }
@@ -156,7 +187,7 @@ impl<'a> Sweep<'a> {
             .filter(|it| it.score > f32::NEG_INFINITY)
     }
 
-    /// The best type of the root at every cell, in row-major order.
+    /// The best type of the root at every cell of the window, in row-major order.
     pub(super) fn roots(&self) -> impl Iterator<Item = Root> {
         let bias = self.solver.root_bias();
         let planes = self.planes(0);
@@ -182,7 +213,8 @@ impl<'a> Sweep<'a> {
     pub(super) fn backtrack(&self, root: Root) -> Option<Pose> {
         let model = &*self.solver.model;
         let mut parts = Vec::with_capacity(model.n_parts());
-        parts.push(placement(root.y, root.x, root.mixture));
+        let Window { top, left, .. } = self.window;
+        parts.push(placement(top + root.y, left + root.x, root.mixture));
         for part in 1..model.n_parts() {
             let edge = model.spec().parts[part].edge.as_ref()?;
             let parent: Placement = parts[edge.parent];
@@ -194,9 +226,9 @@ impl<'a> Sweep<'a> {
             let found = self.solver.rules[part].as_ref()?.trace(
                 child,
                 usize::from(parent.mixture),
-                [usize::from(parent.y), usize::from(parent.x)],
+                [usize::from(parent.y) - top, usize::from(parent.x) - left],
             )?;
-            parts.push(placement(found.y, found.x, found.child_type));
+            parts.push(placement(top + found.y, left + found.x, found.child_type));
         }
         Some(Pose {
             score: root.score,
@@ -257,7 +289,7 @@ impl Workspace {
             return;
         }
         let (solver, grid) = (problem.solver, problem.grid);
-        let term = problem.position_term(part, 0, &mut self.term);
+        let term = problem.position_term(part, &mut self.term);
         let mut most = f32::NEG_INFINITY;
         for (mixture, plane) in solver.planes(part).enumerate() {
             let own = OwnScores {
@@ -280,15 +312,12 @@ pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -
     assert_eq!(pose.parts.len(), model.n_parts(), "a pose of this model");
     let own = |part: usize| {
         let (at, mixture) = (pose.parts[part], usize::from(pose.parts[part].mixture));
-        assert!(
-            usize::from(at.y) < grid.rows && usize::from(at.x) < grid.cols,
-            "a placement on the level"
-        );
-        let cell = usize::from(at.y) * grid.cols + usize::from(at.x);
+        assert!(problem.window.contains(at), "a placement on the level");
+        let (y, x) = (usize::from(at.y), usize::from(at.x));
+        let cell = (y - problem.window.top) * grid.cols + (x - problem.window.left);
         let response = problem.responses(part, mixture)[cell];
-        let mut term = [0.0];
-        let term = problem.position_term(part, cell, &mut term);
-        let score = term.map_or(response, |term| response + term[0]);
+        let term = problem.term_at(part, at);
+        let score = term.map_or(response, |term| response + term);
         let extra = problem.extra;
         extra.map_or(score, |it| score + it.of_type(part, mixture))
     };

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use fmp::{Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec};
+use fmp::{
+    Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Region as Rectangle, Scope,
+};
 use kernels::Rgb8View;
 
 use crate::allocations;
@@ -46,9 +48,15 @@ fn of_frames(n_frames: usize) -> usize {
         })
         .collect();
     let mut values = vec![0.0; layout.n_responses()];
+    let part = Rectangle {
+        x: [20, 70],
+        y: [10, 60],
+    };
+    let part = Scope::new(&layout, 2..12, part).unwrap();
     let mut respond = |frame: &[u8]| {
         let image = Rgb8View::new(SIZE[0], SIZE[1], frame).unwrap();
         extractor.responses(image, &layout, &mut values);
+        extractor.responses_in(image, &layout, &part, &mut values);
     };
     respond(&frames[0]);
     allocations(|| frames[1..].iter().for_each(|it| respond(it)))

@@ -6,4 +6,6 @@ mod again;
 mod common;
 mod images;
 mod other_view;
+mod scope;
 mod solver;
+mod track;

@@ -1,0 +1,146 @@
+//! Where the next pose is looked for.
+
+use fmp::{Layout, Model, Placement, Pose, Scope, Track, Tracker};
+
+use crate::common::{Noise, tree};
+
+const TRACK: Track = Track {
+    levels: 2,
+    margin: 0.5,
+    full_every: 5,
+    max_gap: 2,
+    max_drop: 0.25,
+};
+
+struct Scene {
+    model: std::sync::Arc<Model>,
+    layout: Layout,
+    tracker: Tracker,
+}
+
+impl Scene {
+    fn new(settings: Option<Track>) -> Self {
+        let mut noise = Noise(3);
+        let mut spec = tree(&mut noise, 3).spec().clone();
+        spec.interval = 5;
+        let model = std::sync::Arc::new(Model::new(spec).unwrap());
+        Self {
+            layout: Layout::new(&model, 300, 200).unwrap(),
+            model,
+            tracker: Tracker::new(settings),
+        }
+    }
+
+    /// Whether a frame is searched in full, given the score that is found then.
+    fn is_full(&mut self, frame: u64, score: Option<f32>) -> bool {
+        let scope = self.tracker.scope(&self.layout, frame);
+        let pose = score.map(pose);
+        let of = (&*self.model, &self.layout);
+        self.tracker.found(of, (frame, &scope), pose.as_ref());
+        scope == Scope::whole(&self.layout)
+    }
+}
+
+/// Parts in columns 10 to 20 and rows 15 to 16 of level 4.
+fn pose(score: f32) -> Pose {
+    let at = |x: u16, y: u16| Placement { x, y, mixture: 0 };
+    Pose {
+        score,
+        level: 4,
+        parts: vec![at(10, 15), at(20, 16), at(14, 15)],
+    }
+}
+
+#[test]
+fn without_settings_every_frame_is_searched_in_full() {
+    let mut scene = Scene::new(None);
+    assert!((0..20).all(|frame| scene.is_full(frame, Some(1.0))));
+}
+
+#[test]
+fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
+    let mut scene = Scene::new(Some(TRACK));
+    let full: Vec<u64> = (7..30).filter(|&it| scene.is_full(it, Some(1.0))).collect();
+    assert_eq!(full, [7, 12, 17, 22, 27]);
+}
+
+#[test]
+fn a_frame_after_one_without_a_pose_is_searched_in_full() {
+    let mut scene = Scene::new(Some(TRACK));
+    let found = [Some(1.0), Some(1.0), None, Some(1.0), Some(1.0)];
+    let full: Vec<bool> = (0..)
+        .zip(found)
+        .map(|(it, score)| scene.is_full(it, score))
+        .collect();
+    assert_eq!(full, [true, false, false, true, false]);
+}
+
+#[test]
+fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
+    let mut scene = Scene::new(Some(TRACK));
+    let frames = [0, 2, 5, 6, 6, 4, 5];
+    let full = frames.map(|it| scene.is_full(it, Some(1.0)));
+    assert_eq!(full, [true, false, true, false, true, true, false]);
+}
+
+#[test]
+fn a_score_that_has_fallen_since_the_last_full_search_asks_for_another() {
+    let mut scene = Scene::new(Some(TRACK));
+    // Little by little counts as well; what the full search finds is the new measure.
+    let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
+    let full: Vec<bool> = (0..)
+        .zip(scores)
+        .map(|(it, score)| scene.is_full(it, Some(score)))
+        .collect();
+    assert_eq!(full, [true, false, false, false, true, false]);
+}
+
+#[test]
+fn levels_and_a_margin_around_the_last_pose_are_searched() {
+    let mut scene = Scene::new(Some(TRACK));
+    assert!(scene.is_full(0, Some(1.0)));
+    let scope = scene.tracker.scope(&scene.layout, 1);
+    assert_eq!(scope.levels(), 2..7);
+    let [x1, y1, x2, y2] = pose(1.0).bounding_box(&scene.model, &scene.layout);
+    let margin = (x2 - x1) / 2.0;
+    let region = scope.region();
+    assert_eq!(
+        region.x.map(f64::from),
+        [(x1 - margin).floor(), (x2 + margin).ceil() + 1.0]
+    );
+    assert_eq!(
+        region.y.map(f64::from),
+        [(y1 - margin).floor(), (y2 + margin).ceil() + 1.0]
+    );
+    let window = scene.layout.window(&scope, 4);
+    assert!(window.contains_all(&pose(1.0)));
+}
+
+#[test]
+fn the_search_ends_with_the_image_and_with_the_levels() {
+    let track = Track {
+        levels: 100,
+        margin: 9.0,
+        ..TRACK
+    };
+    let mut scene = Scene::new(Some(track));
+    assert!(scene.is_full(0, Some(1.0)));
+    assert!(scene.is_full(1, Some(1.0)), "near is everywhere");
+}
+
+#[test]
+fn a_pose_beside_the_image_is_not_followed() {
+    let mut scene = Scene::new(Some(TRACK));
+    let scope = Scope::whole(&scene.layout);
+    let mut beside = pose(1.0);
+    for part in &mut beside.parts {
+        *part = Placement {
+            x: u16::MAX,
+            y: 0,
+            mixture: 0,
+        };
+    }
+    let of = (&*scene.model, &scene.layout);
+    scene.tracker.found(of, (0, &scope), Some(&beside));
+    assert!(scene.is_full(1, None));
+}
