@@ -92,6 +92,37 @@ fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
 }
 
 #[test]
+fn poses_that_are_followed_from_frame_to_frame() {
+    let tracked = "[pose]\nsearch = \"tracked\"\ntracked_full_every = 6\n\
+                   tracked_margin = 0.1\ntracked_levels = 1\n";
+    for (name, window) in [("all", "\"all\""), ("window", "1")] {
+        let more = format!("{PLAIN}{tracked}evidence_window = {window}\n");
+        let case = Case::new(&format!("tracked-{name}"), &[20; 3], &more);
+        let ended = case.run();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let pose: pose::Config = toml::from_str(&format!(
+            "{}evidence_window = {window}\n",
+            tracked.trim_start_matches("[pose]\n")
+        ))
+        .unwrap();
+        let one = OneProcess {
+            settings: EstimatorSettings {
+                view: pose.settings(),
+                ..EstimatorSettings::default()
+            },
+            ..OneProcess::default()
+        };
+        one.assert_same(&case, 3, 20);
+        let lines = case.lines("pose2d.jsonl");
+        let n_full = lines.iter().filter(|it| it["search"] == "full").count();
+        let n_tracked = lines.iter().filter(|it| it["search"] == "tracked").count();
+        // Frames 0, 6, 12 and 18 at least.
+        assert!(n_full >= 12 && n_tracked > 0, "{n_full} {n_tracked}");
+        assert_eq!(n_full + n_tracked, 60);
+    }
+}
+
+#[test]
 fn deployments_side_by_side_do_not_meet() {
     let cases = [
         Case::new("left", &[12; 2], PLAIN),

@@ -1,5 +1,6 @@
 //! Section `[pose]` of a deployment file.
 
+use fmp::Track;
 use pipeline::{EvidenceWindow, ViewSettings};
 use serde::{Deserialize, Serialize};
 
@@ -15,11 +16,35 @@ pub struct Config {
     pub min_separation: f64,
     /// Threads of one pose process.
     pub threads: usize,
+    /// Whether every frame is searched in full, or only near the last pose.
+    pub search: Search,
+    /// Tracked: levels either side of the last pose's that are searched.
+    pub tracked_levels: u16,
+    /// Tracked: how far around the last pose's box is searched, as a share of its longer side.
+    pub tracked_margin: f64,
+    /// Tracked: every n-th frame is searched in full.
+    pub tracked_full_every: u64,
+    /// Tracked: largest step from frame to frame that is followed.
+    pub tracked_max_gap: u64,
+    /// Tracked: fall of the score below that of the last full search that asks for another.
+    pub tracked_max_drop: f32,
+}
+
+/// How a pose process looks for poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Search {
+    /// Every frame on all levels and everywhere: the paper's method.
+    #[default]
+    Full,
+    /// Near the best pose of the last frame, and in full now and then: faster, and approximate.
+    Tracked,
 }
 
 impl Default for Config {
     fn default() -> Self {
         let step = ViewSettings::default();
+        let track = Track::default();
         Self {
             evidence_window: match step.window {
                 EvidenceWindow::All => Window::All(All::All),
@@ -28,6 +53,12 @@ impl Default for Config {
             candidates: step.n_candidates,
             min_separation: step.min_separation,
             threads: 1,
+            search: Search::default(),
+            tracked_levels: track.levels,
+            tracked_margin: track.margin,
+            tracked_full_every: track.full_every,
+            tracked_max_gap: track.max_gap,
+            tracked_max_drop: track.max_drop,
         }
     }
 }
@@ -42,6 +73,13 @@ impl Config {
             },
             n_candidates: self.candidates,
             min_separation: self.min_separation,
+            track: (self.search == Search::Tracked).then_some(Track {
+                levels: self.tracked_levels,
+                margin: self.tracked_margin,
+                full_every: self.tracked_full_every,
+                max_gap: self.tracked_max_gap,
+                max_drop: self.tracked_max_drop,
+            }),
         }
     }
 }
@@ -71,5 +109,11 @@ mod tests {
     #[test]
     fn the_defaults_are_those_of_the_step() {
         assert_eq!(Config::default().settings(), ViewSettings::default());
+    }
+
+    #[test]
+    fn who_asks_for_tracking_by_name_gets_its_defaults() {
+        let config: Config = toml::from_str("search = \"tracked\"").unwrap();
+        assert_eq!(config.settings().track, Some(Track::default()));
     }
 }

@@ -65,7 +65,8 @@ impl Intake {
         }
     }
 
-    fn nth(&self, frame: u64) -> u64 {
+    /// Which of the frames that are used a frame is.
+    pub(crate) fn nth(&self, frame: u64) -> u64 {
         frame.saturating_sub(self.start_frame) / self.frame_step
     }
 }

@@ -5,5 +5,5 @@ mod config;
 mod intake;
 mod service;
 
-pub use config::{All, Config, Window};
+pub use config::{All, Config, Search, Window};
 pub use service::{Job, run};

@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
+use fmp::{Scope, Tracker};
 use kernels::Rgb8View;
-use messages::{EvidenceHeader, FrameHeader, Stamp, Status, Timing, ViewPose, topic};
-use pipeline::{ViewEstimate, ViewStep};
+use messages::{EvidenceHeader, FrameHeader, Searched, Stamp, Status, Timing, ViewPose, topic};
+use pipeline::{EvidenceWindow, ViewEstimate, ViewStep};
 use runtime::{
     Delivery, ExitKind, Failure, Loan, OrFail as _, Publisher, Sample, Service, SlicePublisher,
     Waiter, Woken, now_nanos,
@@ -61,7 +62,10 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     );
     let frame_range = [job.start_frame, job.frame_step];
     let mut intake = Intake::new(service.delivery(), frame_range, service.epoch());
-    let mut spare = Vec::new();
+    let mut memory = Memory {
+        tracker: job.step.tracker(),
+        responses: Vec::new(),
+    };
     loop {
         if waiter.wait(Duration::from_millis(100))? == Woken::Stop {
             return Ok(());
@@ -84,13 +88,28 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             service.health().received(1);
             service.health().dropped(intake.n_lost_before(&header));
             let begin = now_nanos();
-            view.answer(sample, &mut spare)?;
+            let nth = intake.nth(header.stamp.frame);
+            view.answer(sample, nth, &mut memory)?;
             intake.answered(&header, now_nanos() - begin);
             if service.stop().is_requested() {
                 return Ok(());
             }
         }
     }
+}
+
+/// What is kept from frame to frame.
+struct Memory {
+    tracker: Tracker,
+    /// Responses that do not lie in shared memory.
+    responses: Vec<f32>,
+}
+
+/// What was found in a frame, and its evidence if anybody wants it.
+struct Found<'a> {
+    estimate: ViewEstimate,
+    /// What the values in shared memory are responses of.
+    evidence: Option<(Loan<'a, f32, EvidenceHeader>, Scope)>,
 }
 
 struct View<'a> {
@@ -101,17 +120,20 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    fn answer(&self, sample: Sample<u8, FrameHeader>, spare: &mut Vec<f32>) -> Result<(), Failure> {
+    /// * `nth`: which of the frames that are used this is.
+    fn answer(
+        &self,
+        sample: Sample<u8, FrameHeader>,
+        nth: u64,
+        memory: &mut Memory,
+    ) -> Result<(), Failure> {
         let received_at_nanos = now_nanos();
         let stamp = sample.header().stamp;
-        let outcome = self.solve(&sample, spare)?;
+        let outcome = self.solve(&sample, nth, memory)?;
         // The frame goes back to the camera before anybody is waited for.
         drop(sample);
         let mut message = match &outcome {
-            Ok((found, _)) => {
-                let size = self.job.step.layout().image_size;
-                wire::candidates_to_message(&found.candidates, size).or_fail(ExitKind::Run)?
-            }
+            Ok(found) => self.message(found)?,
             Err(status) => ViewPose {
                 status: *status,
                 ..ViewPose::default()
@@ -126,11 +148,11 @@ impl View<'_> {
             ..stamp
         };
         // The evidence goes first: whoever has the candidates may count on it.
-        if let Ok((found, Some(mut loan))) = outcome
-            && !found.candidates.is_empty()
+        if let Ok(found) = outcome
+            && let Some((mut loan, scope)) = found.evidence
         {
-            let layout = self.job.step.layout();
-            let header = wire::levels_to_message(&found.levels, layout).or_fail(ExitKind::Run)?;
+            let (layout, levels) = (self.job.step.layout(), &found.estimate.levels);
+            let header = wire::levels_to_message(levels, &scope, layout).or_fail(ExitKind::Run)?;
             *loan.header_mut() = EvidenceHeader {
                 stamp,
                 timing: timing(),
@@ -147,17 +169,30 @@ impl View<'_> {
         Ok(())
     }
 
+    /// The candidates, how they were looked for, and how much goes with them.
+    fn message(&self, found: &Found<'_>) -> Result<ViewPose, Failure> {
+        let layout = self.job.step.layout();
+        let Found { estimate, evidence } = found;
+        let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
+        let n_values = evidence.as_ref().map_or(0, |it| layout.n_values(&it.1));
+        Ok(ViewPose {
+            searched: if estimate.scope == Scope::whole(layout) {
+                Searched::FULL
+            } else {
+                Searched::TRACKED
+            },
+            evidence_bytes: (n_values * size_of::<f32>()) as u64,
+            ..message.or_fail(ExitKind::Run)?
+        })
+    }
+
     /// The estimate, and the responses it was made of if anybody wants them; or why there is none.
-    #[expect(
-        clippy::type_complexity,
-        reason = "named nowhere else: an estimate with its loan, or a status"
-    )]
     fn solve(
         &self,
         sample: &Sample<u8, FrameHeader>,
-        spare: &mut Vec<f32>,
-    ) -> Result<Result<(ViewEstimate, Option<Loan<'_, f32, EvidenceHeader>>), Status>, Failure>
-    {
+        nth: u64,
+        memory: &mut Memory,
+    ) -> Result<Result<Found<'_>, Status>, Failure> {
         let header = sample.header();
         if header.status != Status::OK {
             return Ok(Err(header.status));
@@ -171,13 +206,45 @@ impl View<'_> {
                 return Ok(Err(Status::BAD_INPUT));
             }
         };
-        if self.job.n_evidence_consumers == 0 {
-            spare.resize(layout.n_responses(), 0.0);
-            return Ok(Ok((self.job.step.run(image, spare), None)));
+        let scope = memory.tracker.scope(layout, nth);
+        let found = self.find(image, scope, &mut memory.responses)?;
+        self.job
+            .step
+            .follow(&mut memory.tracker, nth, &found.estimate);
+        Ok(Ok(found))
+    }
+
+    /// Searches a frame.
+    ///
+    /// Where all levels are offered, their responses are written in shared memory from the first.
+    /// Where only those about the candidates are, which nobody knows before, they are copied there:
+    /// otherwise every sample on its way would hold the responses of all levels.
+    fn find(
+        &self,
+        image: Rgb8View<'_>,
+        scope: Scope,
+        responses: &mut Vec<f32>,
+    ) -> Result<Found<'_>, Failure> {
+        let (step, layout) = (&self.job.step, self.job.step.layout());
+        let is_wanted = self.job.n_evidence_consumers > 0;
+        if is_wanted && step.window() == EvidenceWindow::All {
+            let mut loan = self.evidence.loan(layout.n_values(&scope))?;
+            let estimate = step.run(image, scope, loan.payload_mut());
+            let is_there = !estimate.candidates.is_empty();
+            return Ok(Found {
+                evidence: is_there.then_some((loan, scope)),
+                estimate,
+            });
         }
-        let mut loan = self.evidence.loan(layout.n_responses())?;
-        let found = self.job.step.run(image, loan.payload_mut());
-        Ok(Ok((found, Some(loan))))
+        responses.resize(responses.len().max(layout.n_values(&scope)), 0.0);
+        let estimate = step.run(image, scope, responses);
+        let mut evidence = None;
+        if is_wanted && let Some((offered, range)) = estimate.offered(layout) {
+            let mut loan = self.evidence.loan(range.len())?;
+            loan.payload_mut().copy_from_slice(&responses[range]);
+            evidence = Some((loan, offered));
+        }
+        Ok(Found { estimate, evidence })
     }
 
     fn end(&self, stamp: &Stamp, waiter: &Waiter) -> Result<(), Failure> {

@@ -36,6 +36,7 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> Value {
         "time_s": scene.time_s(pose.stamp.frame),
         "view": it.name,
         "status": status.map_or("nothing came", |it| it.status.reason()),
+        "search": status.filter(|it| it.status == Status::OK).map(|it| it.searched.name()),
         "facing": fused.filter(|it| it.status == Status::OK).map(facing),
         "single": single(scene, record, view),
         "fused": fused.filter(|it| it.status == Status::OK).map(|fused| {

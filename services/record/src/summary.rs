@@ -26,6 +26,12 @@ pub struct Summary {
     pub views_missing: BTreeMap<String, BTreeMap<String, u64>>,
     /// How often every view was used, by name.
     pub views_used: Vec<(String, u64)>,
+    /// How many frames of every view were searched in full and how many near the last pose only, by
+    /// name; since the recorder was started last.
+    pub searches: BTreeMap<String, BTreeMap<&'static str, u64>>,
+    /// Evidence that a view handed on in shared memory, mean bytes per frame, by name; since the
+    /// recorder was started last.
+    pub evidence_bytes_per_frame: BTreeMap<String, u64>,
     /// Root mean square reprojection error over all joints, pixels of the frame.
     pub reprojection_px: Option<f64>,
     /// Frames of all views that the cameras' side dropped.
@@ -48,6 +54,8 @@ pub(crate) struct Tally {
     last_frame: Option<u64>,
     /// By view.
     dropped: Vec<u64>,
+    /// By view: bytes of evidence, and frames.
+    evidence: Vec<[u64; 2]>,
 }
 
 impl Tally {
@@ -57,12 +65,15 @@ impl Tally {
             summary: Summary {
                 views_present: names().map(|it| (it, 0)).collect(),
                 views_missing: names().map(|it| (it, BTreeMap::new())).collect(),
+                searches: names().map(|it| (it, BTreeMap::new())).collect(),
+                evidence_bytes_per_frame: names().map(|it| (it, 0)).collect(),
                 views_used: names().map(|it| (it, 0)).collect(),
                 ..Summary::default()
             },
             squared_px: (0.0, 0),
             last_frame: None,
             dropped: vec![0; scene.views.len()],
+            evidence: vec![[0; 2]; scene.views.len()],
         }
     }
 
@@ -111,8 +122,32 @@ impl Tally {
                 self.pixels(joint.reprojection_px);
             }
         }
+        self.searches(scene, record);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
+        }
+    }
+
+    fn searches(&mut self, scene: &Scene, record: &FrameRecord) {
+        let views = scene
+            .views
+            .iter()
+            .zip(&record.views)
+            .zip(&mut self.evidence);
+        for ((view, it), [bytes, n]) in views {
+            let searched = it
+                .pose
+                .filter(|it| it.status == Status::OK || it.status == Status::NO_DETECTION);
+            let Some(pose) = searched else { continue };
+            *bytes += pose.evidence_bytes;
+            *n += 1;
+            let summary = &mut self.summary;
+            let of_view = summary.searches.entry(view.name.clone()).or_default();
+            *of_view.entry(pose.searched.name()).or_default() += 1;
+            let mean = *bytes / *n;
+            summary
+                .evidence_bytes_per_frame
+                .insert(view.name.clone(), mean);
         }
     }
 

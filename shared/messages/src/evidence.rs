@@ -4,10 +4,10 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_LEVELS, Stamp, Status, Timing};
 
-/// Travels as the user header of the responses: `[f32]`, laid out as `fmp::Layout` says. Its
+/// Travels as the user header of the responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
 /// alignment makes them begin on a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
-#[type_name("EvidenceHeader.v1")]
+#[type_name("EvidenceHeader.v2")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {
@@ -23,6 +23,12 @@ pub struct EvidenceHeader {
     pub status: Status,
     /// How many entries of `levels` count.
     pub n_levels: u32,
+    /// First column of the image that there are responses of, and the one after the last, pixels.
+    pub x: [u32; 2],
+    /// First row, and the one after the last, pixels.
+    pub y: [u32; 2],
+    /// First level that there are responses of, and the one after the last.
+    pub scope_levels: [u16; 2],
     /// Levels of the pyramid that hold valid values, ascending.
     pub levels: [u16; MAX_LEVELS],
 }
@@ -36,6 +42,9 @@ impl Default for EvidenceHeader {
             height: 0,
             status: Status::default(),
             n_levels: 0,
+            x: [0; 2],
+            y: [0; 2],
+            scope_levels: [0; 2],
             levels: [0; MAX_LEVELS],
         }
     }

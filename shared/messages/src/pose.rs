@@ -23,9 +23,34 @@ pub struct PoseMessage {
     pub mixture: [u8; MAX_PARTS],
 }
 
+/// How much of the image and of its pyramid was searched for poses.
+///
+/// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[type_name("Searched.v1")]
+#[repr(C)]
+pub struct Searched(pub u32);
+
+impl Searched {
+    /// All of it.
+    pub const FULL: Self = Self(0);
+    /// What lies near the last pose.
+    pub const TRACKED: Self = Self(1);
+
+    /// In a word.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FULL => "full",
+            Self::TRACKED => "tracked",
+            Self(_) => "unknown",
+        }
+    }
+}
+
 /// The single-view answer: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
-#[type_name("ViewPose.v1")]
+#[type_name("ViewPose.v2")]
 #[repr(C)]
 pub struct ViewPose {
     /// Which frame of which view.
@@ -40,6 +65,12 @@ pub struct ViewPose {
     pub width: u32,
     /// Height of the image, pixels.
     pub height: u32,
+    /// Response values that were handed on as evidence, bytes; 0 where nobody wanted any.
+    pub evidence_bytes: u64,
+    /// How much of the image was searched.
+    pub searched: Searched,
+    /// Keeps the layout free of padding.
+    pub reserved: u32,
     /// The candidates.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
 }

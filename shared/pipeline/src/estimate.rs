@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fmp::{ImageTooSmall, Layout, Model, Responses};
+use fmp::{ImageTooSmall, Layout, Model, Responses, Scope, Tracker};
 use geometry::Camera;
 use kernels::Rgb8View;
 use multiview::{Settings, TypeTables, ViewPlan};
@@ -10,8 +10,8 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    Answer, FuseStep, PairAnswer, Skeleton, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep,
-    all_pairs,
+    Answer, FuseStep, PairAnswer, Skeleton, SkeletonSettings, SkeletonStep, ViewEstimate,
+    ViewSettings, ViewStep, all_pairs,
 };
 
 /// Why an estimator could not be made.
@@ -34,6 +34,8 @@ pub struct Estimate {
     pub answers: Vec<Option<Answer>>,
     /// The joint start: candidate and exchange of every view.
     pub start: Vec<Option<(usize, bool)>>,
+    /// What was searched of every view's image.
+    pub scopes: Vec<Option<Scope>>,
     /// What every pair found.
     pub pairs: Vec<PairAnswer>,
     /// The result.
@@ -48,6 +50,10 @@ pub struct Estimator {
     skeleton: SkeletonStep,
     plans: Vec<Arc<ViewPlan>>,
     responses: Vec<Vec<f32>>,
+    /// One per view.
+    trackers: Vec<Tracker>,
+    /// Frames so far.
+    n_frames: u64,
 }
 
 impl Estimator {
@@ -78,6 +84,8 @@ impl Estimator {
             .collect();
         Ok(Self {
             responses: vec![Vec::new(); steps.len()],
+            trackers: steps.iter().map(ViewStep::tracker).collect(),
+            n_frames: 0,
             views: steps,
             fuse: FuseStep::new(
                 Arc::clone(model),
@@ -95,7 +103,7 @@ impl Estimator {
         &self.plans
     }
 
-    /// Estimates one frame. Runs views and pairs side by side on rayon's current pool; the result
+    /// Estimates the next frame: where poses are followed, it depends on the frames before it. Runs views and pairs side by side on rayon's current pool; the result
     /// does not depend on the number of its threads.
     ///
     /// * `images`: one per view; `None` for a view that is missing.
@@ -110,42 +118,58 @@ impl Estimator {
         sigma_px: &[Option<Vec<f32>>],
     ) -> Estimate {
         assert_eq!(images.len(), self.views.len(), "one image per view");
-        let viewed: Vec<(Option<Answer>, Vec<u16>)> = self
+        let frame = self.n_frames;
+        self.n_frames += 1;
+        let viewed: Vec<(Option<Answer>, Option<ViewEstimate>)> = self
             .views
             .par_iter()
             .zip(&mut self.responses)
+            .zip(&mut self.trackers)
             .enumerate()
-            .map(|(view, (step, responses))| {
+            .map(|(view, ((step, responses), tracker))| {
                 let Some(image) = images[view] else {
-                    return (None, Vec::new());
+                    return (None, None);
                 };
                 responses.resize(step.layout().n_responses(), 0.0);
-                let found = step.run(image, responses);
+                let found = step.run(image, tracker.scope(step.layout(), frame), responses);
+                step.follow(tracker, frame, &found);
                 let answer = (!found.candidates.is_empty()).then(|| Answer {
-                    candidates: found.candidates,
+                    candidates: found.candidates.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                 });
-                (answer, found.levels)
+                (answer, Some(found))
             })
             .collect();
-        let (answers, levels): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
+        let (answers, found): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
         let start = self.fuse.start(&answers);
         let pairs: Vec<PairAnswer> = all_pairs(self.views.len())
             .into_par_iter()
             .filter(|pair| pair.iter().all(|&view| answers[view].is_some()))
             .filter_map(|pair| {
-                let evidence = pair.map(|view| {
-                    let layout = self.plans[view].layout();
-                    Responses::new(layout, &self.responses[view], &levels[view])
-                });
+                let evidence = |view: usize| {
+                    let (layout, found) = (self.plans[view].layout(), found[view].as_ref()?);
+                    let values = &self.responses[view];
+                    Some(Responses::within(
+                        layout,
+                        values,
+                        &found.levels,
+                        found.scope,
+                    ))
+                };
+                let evidence = [evidence(pair[0])?, evidence(pair[1])?];
                 self.fuse
                     .pair(pair, &answers, [&evidence[0], &evidence[1]], &start)
             })
+            .collect();
+        let scopes = found
+            .iter()
+            .map(|it| it.as_ref().map(|it| it.scope))
             .collect();
         let skeleton = self.skeleton.run(&answers, &pairs);
         Estimate {
             answers,
             start,
+            scopes,
             pairs,
             skeleton,
         }

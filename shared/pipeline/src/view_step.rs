@@ -1,8 +1,9 @@
 //! The single-view step: pixels in, candidates and evidence out.
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use fmp::{Extractor, Layout, Model, Pose, Responses, Solver};
+use fmp::{Extractor, Layout, Model, Pose, Responses, Scope, Solver, Track, Tracker};
 use kernels::Rgb8View;
 
 /// Which levels of the pyramid a view offers as evidence.
@@ -17,15 +18,15 @@ pub enum EvidenceWindow {
 }
 
 impl EvidenceWindow {
-    /// The levels offered for these candidates, ascending.
-    pub fn levels(self, n_levels: usize, candidates: &[Pose]) -> Vec<u16> {
+    /// Those of the searched levels that are offered for these candidates, ascending.
+    pub fn levels(self, searched: Range<u16>, candidates: &[Pose]) -> Vec<u16> {
         let offered = |level: u16| match self {
             Self::All => true,
             Self::Around(reach) => candidates
                 .iter()
                 .any(|it| it.level.abs_diff(level) <= reach),
         };
-        (0..n_levels as u16).filter(|it| offered(*it)).collect()
+        searched.filter(|it| offered(*it)).collect()
     }
 }
 
@@ -38,6 +39,8 @@ pub struct ViewSettings {
     pub n_candidates: usize,
     /// Least mean distance between the part centres of two candidates, box sides.
     pub min_separation: f64,
+    /// How poses are followed from frame to frame; every frame is searched in full without it.
+    pub track: Option<Track>,
 }
 
 impl Default for ViewSettings {
@@ -46,6 +49,7 @@ impl Default for ViewSettings {
             window: EvidenceWindow::All,
             n_candidates: 8,
             min_separation: 1.0,
+            track: None,
         }
     }
 }
@@ -57,6 +61,21 @@ pub struct ViewEstimate {
     pub candidates: Vec<Pose>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
+    /// What was searched, and is covered by the responses.
+    pub scope: Scope,
+}
+
+impl ViewEstimate {
+    /// The levels from the first to the last one that is offered, and where their responses lie
+    /// among those that were computed; `None` if none is.
+    ///
+    /// What has to be handed on, and no more than that, if all of it shall lie without gaps.
+    pub fn offered(&self, layout: &Layout) -> Option<(Scope, Range<usize>)> {
+        let (first, last) = (*self.levels.first()?, *self.levels.last()?);
+        let scope = Scope::new(layout, first..last + 1, self.scope.region()).ok()?;
+        let [begin, end] = [first, last].map(|it| layout.maps_in(&self.scope, usize::from(it)));
+        Some((scope, begin.start..end.end))
+    }
 }
 
 /// The single-view step for frames of one size.
@@ -84,24 +103,49 @@ impl ViewStep {
         &self.layout
     }
 
-    /// Solves one frame.
+    /// Begins to follow poses through the frames of a camera, as the settings say.
+    pub fn tracker(&self) -> Tracker {
+        Tracker::new(self.settings.track)
+    }
+
+    /// Which levels are offered as evidence.
+    pub fn window(&self) -> EvidenceWindow {
+        self.settings.window
+    }
+
+    /// Solves one frame within a scope.
     ///
-    /// * `responses`: [`Layout::n_responses`] values, overwritten; may lie in shared memory.
+    /// * `scope`: what [`Tracker::scope`] says, or [`Scope::whole`].
+    /// * `responses`: [`Layout::n_values`] values of the scope at least, overwritten; may lie in
+    ///   shared memory.
     ///
     /// # Panics
     ///
-    /// If the image or `responses` has another size than the layout.
-    pub fn run(&self, image: Rgb8View<'_>, responses: &mut [f32]) -> ViewEstimate {
-        self.extractor.responses(image, &self.layout, responses);
-        let n_levels = self.layout.levels.len();
-        let all: Vec<u16> = (0..n_levels as u16).collect();
-        let evidence = Responses::new(&self.layout, responses, &all);
+    /// If the image, the scope or `responses` has another size than the layout.
+    pub fn run(&self, image: Rgb8View<'_>, scope: Scope, responses: &mut [f32]) -> ViewEstimate {
+        let layout = &self.layout;
+        self.extractor
+            .responses_in(image, layout, &scope, responses);
+        let searched: Vec<u16> = scope.levels().collect();
+        let evidence = Responses::within(layout, responses, &searched, scope);
         let candidates = self.solver.distinct(
             &evidence,
             self.settings.n_candidates,
             self.settings.min_separation,
         );
-        let levels = self.settings.window.levels(n_levels, &candidates);
-        ViewEstimate { candidates, levels }
+        let levels = self.settings.window.levels(scope.levels(), &candidates);
+        ViewEstimate {
+            candidates,
+            levels,
+            scope,
+        }
+    }
+
+    /// Tells the tracker what was found in a frame.
+    ///
+    /// * `frame`: as the tracker was asked about.
+    pub fn follow(&self, tracker: &mut Tracker, frame: u64, found: &ViewEstimate) {
+        let of = (&**self.solver.model(), &*self.layout);
+        tracker.found(of, (frame, &found.scope), found.candidates.first());
     }
 }

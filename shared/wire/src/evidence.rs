@@ -1,20 +1,25 @@
 //! Response maps: the header of an array that is never copied.
 
-use fmp::{Layout, Responses};
+use fmp::{Layout, Region, Responses, Scope, ScopeError};
 use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
 
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Writes which levels are valid; the caller fills in stamp and timing.
+/// Writes what the values are responses of, and which levels are valid; the caller fills in stamp
+/// and timing.
 ///
 /// * `levels`: ascending.
 ///
 /// # Errors
 ///
 /// [`WireError`] if there are more than [`MAX_LEVELS`], or they are not ascending levels of
-/// `layout`.
-pub fn levels_to_message(levels: &[u16], layout: &Layout) -> Result<EvidenceHeader, WireError> {
+/// `scope`.
+pub fn levels_to_message(
+    levels: &[u16],
+    scope: &Scope,
+    layout: &Layout,
+) -> Result<EvidenceHeader, WireError> {
     let mut message = EvidenceHeader {
         stamp: Stamp::default(),
         timing: Timing::default(),
@@ -22,19 +27,22 @@ pub fn levels_to_message(levels: &[u16], layout: &Layout) -> Result<EvidenceHead
         height: layout.image_size[1] as u32,
         status: Status::OK,
         n_levels: count("n_levels", levels.len(), MAX_LEVELS)? as u32,
+        x: scope.region().x,
+        y: scope.region().y,
+        scope_levels: [scope.levels().start, scope.levels().end],
         levels: [0; MAX_LEVELS],
     };
-    ascending(levels, layout)?;
+    ascending(levels, scope)?;
     message.levels[..levels.len()].copy_from_slice(levels);
     Ok(message)
 }
 
-/// Views the values that came with `message` as the responses of `layout`, where they lie.
+/// Views the values that came with `message` as responses of `layout`, where they lie.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the image size is not that of `layout`, there are fewer values than it has
-/// cells, or the levels are not ascending levels of it.
+/// [`WireError`] if the image size is not that of `layout`, the scope does not lie on it, there are
+/// fewer values than the scope has cells, or the levels are not ascending levels of it.
 pub fn evidence_from_message<'a>(
     message: &'a EvidenceHeader,
     values: &'a [f32],
@@ -42,23 +50,49 @@ pub fn evidence_from_message<'a>(
 ) -> Result<Responses<'a>, WireError> {
     equal("width", message.width as usize, layout.image_size[0])?;
     equal("height", message.height as usize, layout.image_size[1])?;
-    if values.len() < layout.n_responses() {
+    let scope = scope_from_message(message, layout)?;
+    if values.len() < layout.n_values(&scope) {
         return Err(WireError::Mismatch {
             field: "values",
             got: values.len(),
-            expected: layout.n_responses(),
+            expected: layout.n_values(&scope),
         });
     }
     let n_levels = count("n_levels", message.n_levels as usize, MAX_LEVELS)?;
     let levels = &message.levels[..n_levels];
-    ascending(levels, layout)?;
-    Ok(Responses::new(layout, values, levels))
+    ascending(levels, &scope)?;
+    Ok(Responses::within(layout, values, levels, scope))
 }
 
-fn ascending(levels: &[u16], layout: &Layout) -> Result<(), WireError> {
+fn scope_from_message(message: &EvidenceHeader, layout: &Layout) -> Result<Scope, WireError> {
+    let [first, end] = message.scope_levels;
+    let region = Region {
+        x: message.x,
+        y: message.y,
+    };
+    Scope::new(layout, first..end, region).map_err(|error| match error {
+        ScopeError::Levels { end, n_levels, .. } => WireError::Mismatch {
+            field: "scope_levels",
+            got: usize::from(end),
+            expected: n_levels,
+        },
+        ScopeError::Region { end, side, .. } => WireError::Mismatch {
+            field: "region",
+            got: end as usize,
+            expected: side,
+        },
+    })
+}
+
+fn ascending(levels: &[u16], scope: &Scope) -> Result<(), WireError> {
     for (entry, &level) in levels.iter().enumerate() {
-        index("levels", entry, usize::from(level), layout.levels.len())?;
-        if entry > 0 && levels[entry - 1] >= level {
+        index(
+            "levels",
+            entry,
+            usize::from(level),
+            usize::from(scope.levels().end),
+        )?;
+        if level < scope.levels().start || entry > 0 && levels[entry - 1] >= level {
             return Err(WireError::Value {
                 field: "levels",
                 entry,
@@ -77,17 +111,38 @@ mod tests {
     use super::*;
     use crate::testing::layout;
 
+    /// Any scope of the layout, by shares of its levels, columns and rows.
+    fn scope() -> impl Strategy<Value = Scope> {
+        let layout = layout();
+        let range = |n: usize| {
+            (0..n, 1..=n).prop_map(move |(begin, n_more)| [begin, (begin + n_more).min(n)])
+        };
+        let [width, height] = layout.image_size;
+        let ranges = (range(layout.levels.len()), range(width), range(height));
+        ranges.prop_map(move |(levels, x, y)| {
+            let [x, y] = [x, y].map(|it| it.map(|it| it as u32));
+            let levels = levels.map(|it| it as u16);
+            Scope::new(&layout, levels[0]..levels[1], Region { x, y }).unwrap()
+        })
+    }
+
     proptest! {
         #[test]
-        fn the_levels_come_back_as_they_were_sent(mask in prop::collection::vec(any::<bool>(), 96)) {
+        fn levels_and_scope_come_back_as_they_were_sent(
+            scope in scope(),
+            mask in prop::collection::vec(any::<bool>(), 96),
+        ) {
             let layout = layout();
-            let levels: Vec<u16> = (0..layout.levels.len() as u16)
-                .filter(|&it| mask[usize::from(it)])
-                .collect();
-            let message = levels_to_message(&levels, &layout).unwrap();
-            let values = vec![0.0; layout.n_responses()];
+            let levels: Vec<u16> = scope.levels().filter(|&it| mask[usize::from(it)]).collect();
+            let message = levels_to_message(&levels, &scope, &layout).unwrap();
+            let values = vec![0.0; layout.n_values(&scope)];
             let back = evidence_from_message(&message, &values, &layout).unwrap();
             prop_assert_eq!(back.levels(), levels);
+            prop_assert_eq!(back.scope(), &scope);
+            let too_few = &values[1..];
+            let got = evidence_from_message(&message, too_few, &layout);
+            let is_refused = matches!(got, Err(WireError::Mismatch { field: "values", .. }));
+            prop_assert!(is_refused);
         }
 
         #[test]
@@ -95,13 +150,20 @@ mod tests {
             n_levels in any::<u32>(),
             small in 0_u32..4,
             levels in prop::collection::vec(0_u16..20, MAX_LEVELS),
+            ranges in prop::collection::vec(0_u32..90, 6),
         ) {
             let layout = layout();
             let values = vec![0.0; layout.n_responses()];
-            let mut message = levels_to_message(&[], &layout).unwrap();
+            let whole = Scope::whole(&layout);
+            let mut message = levels_to_message(&[], &whole, &layout).unwrap();
             message.levels.copy_from_slice(&levels);
-            for n in [n_levels, small] {
+            for (n, any_scope) in [(n_levels, false), (small, false), (small, true)] {
                 message.n_levels = n;
+                if any_scope {
+                    message.x = [ranges[0], ranges[1]];
+                    message.y = [ranges[2], ranges[3]];
+                    message.scope_levels = [ranges[4], ranges[5]].map(|it| it as u16 / 4);
+                }
                 if let Ok(evidence) = evidence_from_message(&message, &values, &layout) {
                     for &level in evidence.levels() {
                         prop_assert!(!evidence.map(usize::from(level), 0).is_empty());
@@ -111,26 +173,38 @@ mod tests {
         }
     }
 
-    #[test]
-    fn refuses_too_few_values() {
+    fn refused(change: impl FnOnce(&mut EvidenceHeader)) -> String {
         let layout = layout();
-        let message = levels_to_message(&[0], &layout).unwrap();
-        let values = vec![0.0; layout.n_responses() - 1];
-        assert!(matches!(
-            evidence_from_message(&message, &values, &layout),
-            Err(WireError::Mismatch {
-                field: "values",
-                ..
-            })
-        ));
+        let values = vec![0.0; layout.n_responses()];
+        let mut message = levels_to_message(&[1], &Scope::whole(&layout), &layout).unwrap();
+        change(&mut message);
+        let got = evidence_from_message(&message, &values, &layout);
+        got.unwrap_err().to_string()
     }
 
     #[test]
     fn refuses_levels_out_of_order() {
-        let got = levels_to_message(&[1, 1], &layout()).unwrap_err();
+        let layout = layout();
+        let got = levels_to_message(&[1, 1], &Scope::whole(&layout), &layout).unwrap_err();
         assert_eq!(
             got.to_string(),
             "levels of entry 1 is 1, expected ascending levels"
         );
+    }
+
+    #[test]
+    fn refuses_levels_that_nobody_computed() {
+        let before = refused(|it| it.scope_levels[0] = 2);
+        assert_eq!(before, "levels of entry 0 is 1, expected ascending levels");
+        let after = refused(|it| it.scope_levels[1] = 1);
+        assert_eq!(after, "levels of entry 0 is 1, the limit is 1");
+    }
+
+    #[test]
+    fn refuses_a_scope_beyond_the_image() {
+        assert_eq!(refused(|it| it.x[1] = 81), "region is 81, expected 80");
+        let n_levels = layout().levels.len();
+        let want = format!("scope_levels is 999, expected {n_levels}");
+        assert_eq!(refused(|it| it.scope_levels[1] = 999), want);
     }
 }

@@ -94,6 +94,30 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     ("pose.threads", "threads of one pose process"),
     (
+        "pose.search",
+        "full: every frame everywhere; tracked: near the last pose, faster and approximate",
+    ),
+    (
+        "pose.tracked_levels",
+        "tracked: levels either side of the last pose's that are searched",
+    ),
+    (
+        "pose.tracked_margin",
+        "tracked: how far around the last pose's box is searched, as a share of its longer side",
+    ),
+    (
+        "pose.tracked_full_every",
+        "tracked: every n-th frame is searched in full",
+    ),
+    (
+        "pose.tracked_max_gap",
+        "tracked: largest step from frame to frame that is followed; 1: no frame may be left out",
+    ),
+    (
+        "pose.tracked_max_drop",
+        "tracked: fall of the score since the last full search that asks for another",
+    ),
+    (
         "quality.table",
         "expected errors: subject, action, frame, camera, then one per part, pixels",
     ),

@@ -90,6 +90,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
     within("pose.candidates", it.candidates, 1, MAX_CANDIDATES)?;
     within("pose.threads", it.threads, 1, 256)?;
+    not_negative("pose.tracked_margin", it.tracked_margin)?;
+    not_negative("pose.tracked_max_drop", f64::from(it.tracked_max_drop))?;
     not_negative("pose.min_separation", it.min_separation)
 }
 
