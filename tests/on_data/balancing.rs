@@ -15,7 +15,7 @@ use skeleton::PARSE14;
 
 use crate::shared_dir;
 
-const SIZE: [u32; 2] = [272, 480];
+pub(crate) const SIZE: [u32; 2] = [272, 480];
 /// Trunk upright, and mostly bent over.
 const UPRIGHT: [usize; 5] = [0, 5, 10, 15, 20];
 const BENT: [usize; 7] = [5, 15, 25, 35, 45, 55, 65];
@@ -33,15 +33,15 @@ struct Switches {
 
 /// Errors of a set of frames.
 #[derive(Default)]
-struct Errors {
-    joints_cm: Vec<f64>,
+pub(crate) struct Errors {
+    pub(crate) joints_cm: Vec<f64>,
     wrong_single: usize,
     wrong_fused: usize,
     n_views: usize,
 }
 
 impl Errors {
-    fn median_and_p90(&self) -> [f64; 2] {
+    pub(crate) fn median_and_p90(&self) -> [f64; 2] {
         [0.5, 0.9].map(|share| percentile(&self.joints_cm, share).unwrap())
     }
 
@@ -74,10 +74,10 @@ fn rows() -> [(&'static str, Switches); 6] {
     ]
 }
 
-struct Clip {
-    cameras: Vec<Camera>,
+pub(crate) struct Clip {
+    pub(crate) cameras: Vec<Camera>,
     /// `[view][frame]`, all frames up to the last one asked for.
-    frames: Vec<Vec<Vec<u8>>>,
+    pub(crate) frames: Vec<Vec<Vec<u8>>>,
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn errors(
     all
 }
 
-fn judge(
+pub(crate) fn judge(
     got: &pipeline::Estimate,
     estimator: &Estimator,
     cameras: &[Camera],
@@ -215,7 +215,7 @@ fn torso(joints: &[[f64; 2]]) -> [f64; 2] {
 }
 
 /// The 14 joints of every frame in the world: TRC(X, Y, Z) is world(y, z, x).
-fn reference(path: &Path) -> Vec<Vec<Point3<f64>>> {
+pub(crate) fn reference(path: &Path) -> Vec<Vec<Point3<f64>>> {
     const NAMES: [&str; 14] = [
         "RAnkle",
         "RKnee",
@@ -243,7 +243,7 @@ fn reference(path: &Path) -> Vec<Vec<Point3<f64>>> {
         .collect()
 }
 
-fn clip(data: &Path, rig: &Rig, upright: bool) -> Clip {
+pub(crate) fn clip(data: &Path, rig: &Rig, upright: bool) -> Clip {
     let mut clip = Clip {
         cameras: Vec::new(),
         frames: Vec::new(),

@@ -18,6 +18,7 @@ mod multi_view;
 mod parse_set;
 mod single_view;
 mod tiles;
+mod tracked;
 
 use std::path::{Path, PathBuf};
 

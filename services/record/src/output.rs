@@ -222,6 +222,8 @@ impl Output {
 
 #[cfg(test)]
 mod tests {
+    use messages::{Searched, Status};
+
     use super::*;
     use crate::Missing;
     use crate::testing::{record, scene};
@@ -281,6 +283,35 @@ mod tests {
             [("left".to_owned(), 3), ("right".to_owned(), 3)]
         );
         assert!((summary.reprojection_px.unwrap() - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn searches_and_the_bytes_of_their_evidence_are_counted_by_view() {
+        let searched = |frame, searched, evidence_bytes| {
+            let mut it = record(frame);
+            let pose = it.views[1].pose.as_mut().unwrap();
+            (pose.searched, pose.evidence_bytes) = (searched, evidence_bytes);
+            it
+        };
+        let mut without = record(6);
+        without.views[1].pose.as_mut().unwrap().status = Status::NO_FRAME;
+        let (dir, summary) = written(vec![
+            searched(0, Searched::FULL, 1000),
+            searched(2, Searched::TRACKED, 200),
+            searched(4, Searched::TRACKED, 300),
+            without,
+        ]);
+        let of_right = [("full", 1), ("tracked", 2)];
+        assert_eq!(summary.searches["right"], of_right.into());
+        assert_eq!(summary.searches["left"], [("full", 4)].into());
+        assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
+        let text = text(&dir, "pose2d.jsonl");
+        let lines = text
+            .lines()
+            .map(|it| serde_json::from_str::<Value>(it).unwrap());
+        let said: Vec<Value> = lines.map(|it| it["search"].clone()).collect();
+        assert_eq!(said[3], "tracked");
+        assert_eq!(said[7], Value::Null, "there was no frame");
     }
 
     #[test]

@@ -75,7 +75,8 @@ impl Extractor {
     /// Writes the responses of all filters on the cells of a scope into `out`; nothing else is
     /// computed but what they are made of.
     ///
-    /// Features are those that [`Self::responses`] is made of, bit for bit. Responses lie within
+    /// Features are those that [`Self::responses`] is made of, bit for bit (where the side of a cell
+    /// is not a power of two, but for the rounding of votes' shares). Responses lie within
     /// twice the bound of [`FilterBank::correlate`] of each other: tiles begin elsewhere. With the
     /// whole image as its region a scope gives the bits of [`Self::responses`] on its levels.
     ///

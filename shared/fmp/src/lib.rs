@@ -3,7 +3,8 @@
 //! Reading order: [`Model`] (what was trained), [`Layout`] (where the cells of the feature pyramid
 //! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
 //! which finds the best tree of parts exactly, and [`Pose`], its answer; [`Again`] solves the same
-//! evidence under changing terms with less work.
+//! evidence under changing terms with less work. A [`Scope`] is a part of the pyramid that is searched
+//! instead of all of it, and [`Tracker`] decides which.
 #![forbid(unsafe_code)]
 
 pub mod files;

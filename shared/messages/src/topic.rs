@@ -12,13 +12,13 @@ pub fn frame(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v1/{view}")
+    format!("view-pose/v2/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
 #[must_use]
 pub fn evidence(view: usize) -> String {
-    format!("evidence/v1/{view}")
+    format!("evidence/v2/{view}")
 }
 
 /// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::sync::{Arc, Mutex};
 
-use fmp::{Extractor, Responses, Solver};
+use fmp::{Extractor, Responses, Solver, Track, Tracker};
 use kernels::{HogShape, HogWorkspace, Isa, Planes, ShrinkWorkspace, hog, reduce, resize};
 use rayon::prelude::*;
 
@@ -50,7 +50,7 @@ impl Apart {
             Stage::Extract => Some(extract),
             Stage::Votes | Stage::Best | Stage::Iteration => Some(self.votes),
             Stage::Frame => Some(extract + self.votes),
-            Stage::Backtrack => None,
+            Stage::Backtrack | Stage::Tracked => None,
         }
     }
 }
@@ -66,6 +66,7 @@ pub(crate) enum Stage {
     Backtrack,
     Best,
     Frame,
+    Tracked,
     Iteration,
 }
 
@@ -80,6 +81,7 @@ impl Stage {
             Self::Backtrack => "backtrack",
             Self::Best => "best",
             Self::Frame => "frame",
+            Self::Tracked => "tracked",
             Self::Iteration => "iteration",
         }
     }
@@ -168,8 +170,32 @@ impl<'a> Bench<'a> {
             });
             all.push((Stage::Frame, times));
         }
+        if wants(&[Stage::Tracked]) {
+            all.push((Stage::Tracked, self.tracked(clock, &mut values)));
+        }
         all.retain(|it| options.wants_stage(it.0));
         all
+    }
+
+    /// A frame of which only what is near the best pose is searched, by the default settings.
+    fn tracked(&self, clock: &Clock, values: &mut [f32]) -> Times {
+        let Workload { model, layout, .. } = self.workload;
+        let mut tracker = Tracker::new(Some(Track::default()));
+        let mut frame = |number: u64| {
+            let scope = tracker.scope(layout, number);
+            let image = self.workload.image();
+            self.extractor.responses_in(image, layout, &scope, values);
+            let levels = scope.levels();
+            let levels = &self.levels[usize::from(levels.start)..usize::from(levels.end)];
+            let evidence = Responses::within(layout, values, levels, scope);
+            let best = self.solver.best(&evidence, None);
+            if number == 0 {
+                tracker.found((model, layout), (number, &scope), best.as_ref());
+            }
+            black_box(best);
+        };
+        frame(0);
+        clock.measure(|| frame(1))
     }
 
     /// Images of all levels, and their features if they are wanted: level after level in the same

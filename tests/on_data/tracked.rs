@@ -1,0 +1,169 @@
+//! Following the best pose through real footage, against a full search of every frame.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fmp::{Model, Pose, Scope, Track};
+use kernels::Rgb8View;
+use nalgebra::Point3;
+use pipeline::{Combine, Estimator, EstimatorSettings, ViewSettings, ViewStep};
+use skeleton::PARSE14;
+
+use crate::balancing::{Clip, SIZE, clip, judge, reference};
+use crate::shared_dir;
+
+/// Frames of every camera that are looked at in turn.
+const N_FRAMES: usize = 60;
+/// Of these the ones that are fused as well.
+const N_FUSED: usize = 24;
+
+/// Poses by view and frame, and the share of searches that were full.
+struct Searched {
+    poses: Vec<Vec<Pose>>,
+    full: f64,
+}
+
+#[test]
+fn following_the_best_pose_finds_nearly_what_a_full_search_finds() {
+    let Some(dir) = shared_dir() else { return };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let rig = root.join("configs/rigs/pose2sim-balancing.toml");
+    let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
+    let data = dir.join("data/pose2sim_balancing");
+    let truth = reference(&data.join("reference_0-69.trc"));
+    let model = Arc::new(fmp::files::read(&dir.join("data/models/parse_fmp.mat")).unwrap());
+    let clip = clip(&data, &rig, true);
+    let full = search(&model, &clip, None);
+    println!("| search | full searches | same pose | px median / p90 |");
+    let [median, p90] = errors(&model, &clip, &truth, &full);
+    println!("| full | 100 % | 100 % | {median:.1} / {p90:.1} |");
+    let default = Track::default();
+    let row = |levels, margin, full_every, max_drop| Track {
+        levels,
+        margin,
+        full_every,
+        max_drop,
+        ..default
+    };
+    let rows = [
+        default,
+        row(2, default.margin, default.full_every, default.max_drop),
+        row(default.levels, 0.1, default.full_every, default.max_drop),
+        row(default.levels, default.margin, 30, default.max_drop),
+        row(default.levels, default.margin, default.full_every, 0.1),
+        row(default.levels, default.margin, 1000, f32::INFINITY),
+    ];
+    let mut reached = Vec::new();
+    for track in rows {
+        let got = search(&model, &clip, Some(track));
+        let same = same(&full, &got);
+        let errors = errors(&model, &clip, &truth, &got);
+        let Track {
+            levels,
+            margin,
+            full_every,
+            max_drop,
+            ..
+        } = track;
+        println!(
+            "| +-{levels} levels, margin {margin}, full every {full_every}, drop {max_drop} | {:.0} % | {:.1} % | {:.1} / {:.1} |",
+            100.0 * got.full,
+            100.0 * same,
+            errors[0],
+            errors[1]
+        );
+        reached.push((same, errors));
+    }
+    let (share, of_default) = reached[0];
+    assert!(share > 0.5, "the same pose in {share} of the frames");
+    assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);
+    let [of_full, of_tracked] =
+        [None, Some(default)].map(|it| fused(&model, &rig, &clip, (&truth, it)));
+    println!("fused, cm median / p90: full {of_full:.1?}, tracked {of_tracked:.1?}");
+    assert!(of_tracked[0] <= 1.1 * of_full[0], "{of_tracked:?}");
+}
+
+fn image(clip: &Clip, view: usize, frame: usize) -> Rgb8View<'_> {
+    let [width, height] = SIZE.map(|it| it as usize);
+    Rgb8View::new(width, height, &clip.frames[view][frame]).unwrap()
+}
+
+/// The best pose of every frame of every view, each view on its own.
+fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
+    let settings = ViewSettings {
+        track,
+        n_candidates: 1,
+        ..ViewSettings::default()
+    };
+    let [width, height] = SIZE.map(|it| it as usize);
+    let layout = Arc::new(fmp::Layout::new(model, width, height).unwrap());
+    let step = ViewStep::new(Arc::clone(model), Arc::clone(&layout), settings);
+    let mut responses = vec![0.0; layout.n_responses()];
+    let mut n_full = 0;
+    let poses = (0..clip.cameras.len()).map(|view| {
+        let mut tracker = step.tracker();
+        let frames = (0..N_FRAMES).map(|frame| {
+            let scope = tracker.scope(&layout, frame as u64);
+            n_full += usize::from(scope == Scope::whole(&layout));
+            let found = step.run(image(clip, view, frame), scope, &mut responses);
+            step.follow(&mut tracker, frame as u64, &found);
+            found.candidates[0].clone()
+        });
+        frames.collect()
+    });
+    let poses: Vec<Vec<Pose>> = poses.collect();
+    Searched {
+        full: n_full as f64 / (poses.len() * N_FRAMES) as f64,
+        poses,
+    }
+}
+
+/// Share of frames in which all parts are at the same place and of the same type.
+fn same(a: &Searched, b: &Searched) -> f64 {
+    let pairs = a.poses.iter().flatten().zip(b.poses.iter().flatten());
+    let same = pairs.filter(|(a, b)| (a.level, &a.parts) == (b.level, &b.parts));
+    same.count() as f64 / (a.poses.len() * N_FRAMES) as f64
+}
+
+/// Median and 90th percentile of the distance between joints and the projected reference, pixels.
+fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched) -> [f64; 2] {
+    let [width, height] = SIZE.map(|it| it as usize);
+    let layout = fmp::Layout::new(model, width, height).unwrap();
+    let mut all = Vec::new();
+    for (camera, poses) in clip.cameras.iter().zip(&got.poses) {
+        for (pose, truth) in poses.iter().zip(truth) {
+            let found = PARSE14.from_parts(&pose.centres(model, &layout));
+            for (found, truth) in found.iter().zip(truth) {
+                if let Ok(at) = camera.project(truth) {
+                    all.push((found[0] - at.x).hypot(found[1] - at.y));
+                }
+            }
+        }
+    }
+    [0.5, 0.9].map(|share| evaluation::percentile(&all, share).unwrap())
+}
+
+/// Median and 90th percentile of the joints' errors in the world, all views fused, cm.
+fn fused(
+    model: &Arc<Model>,
+    rig: &geometry::Rig,
+    clip: &Clip,
+    (truth, track): (&[Vec<Point3<f64>>], Option<Track>),
+) -> [f64; 2] {
+    let mut settings = EstimatorSettings::default();
+    settings.view.track = track;
+    settings.fuse.facing = true;
+    settings.skeleton.facing = true;
+    settings.skeleton.combine = Combine::Consensus;
+    let mut estimator = Estimator::new(model, &clip.cameras, rig.up_in_world(), &settings).unwrap();
+    let mut all = crate::balancing::Errors::default();
+    for (frame, truth) in truth.iter().enumerate().take(N_FUSED) {
+        let images: Vec<_> = (0..clip.cameras.len())
+            .map(|view| Some(image(clip, view, frame)))
+            .collect();
+        let got = estimator.estimate(&images, &vec![None; images.len()]);
+        let errors = judge(&got, &estimator, &clip.cameras, truth);
+        all.joints_cm.extend(errors.joints_cm);
+    }
+    all.median_and_p90()
+}
