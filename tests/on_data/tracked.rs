@@ -134,7 +134,7 @@ fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched
         for (pose, truth) in poses.iter().zip(truth) {
             let found = PARSE14.from_parts(&pose.centres(model, &layout));
             for (found, truth) in found.iter().zip(truth) {
-                if let Ok(at) = camera.project(truth) {
+                if let Some(at) = camera.project(truth) {
                     all.push((found[0] - at.x).hypot(found[1] - at.y));
                 }
             }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use fmp::{Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Stamp, Status, Timing, ViewPose, topic};
-use pipeline::{EvidenceWindow, ViewEstimate, ViewStep};
+use pipeline::{ViewEstimate, ViewStep};
 use runtime::{
     Delivery, ExitKind, Failure, Loan, OrFail as _, Publisher, Sample, Service, SlicePublisher,
     Waiter, Woken, now_nanos,
@@ -108,8 +108,8 @@ struct Memory {
 /// What was found in a frame, and its evidence if anybody wants it.
 struct Found<'a> {
     estimate: ViewEstimate,
-    /// What the values in shared memory are responses of.
-    evidence: Option<(Loan<'a, f32, EvidenceHeader>, Scope)>,
+    /// The responses of the scope that was searched.
+    evidence: Option<Loan<'a, f32, EvidenceHeader>>,
 }
 
 struct View<'a> {
@@ -149,10 +149,11 @@ impl View<'_> {
         };
         // The evidence goes first: whoever has the candidates may count on it.
         if let Ok(found) = outcome
-            && let Some((mut loan, scope)) = found.evidence
+            && let Some(mut loan) = found.evidence
         {
-            let (layout, levels) = (self.job.step.layout(), &found.estimate.levels);
-            let header = wire::levels_to_message(levels, &scope, layout).or_fail(ExitKind::Run)?;
+            let layout = self.job.step.layout();
+            let ViewEstimate { levels, scope, .. } = &found.estimate;
+            let header = wire::levels_to_message(levels, scope, layout).or_fail(ExitKind::Run)?;
             *loan.header_mut() = EvidenceHeader {
                 stamp,
                 timing: timing(),
@@ -174,7 +175,9 @@ impl View<'_> {
         let layout = self.job.step.layout();
         let Found { estimate, evidence } = found;
         let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
-        let n_values = evidence.as_ref().map_or(0, |it| layout.n_values(&it.1));
+        let n_values = evidence
+            .as_ref()
+            .map_or(0, |_| layout.n_values(&estimate.scope));
         Ok(ViewPose {
             searched: if estimate.scope == Scope::whole(layout) {
                 Searched::FULL
@@ -214,11 +217,7 @@ impl View<'_> {
         Ok(Ok(found))
     }
 
-    /// Searches a frame.
-    ///
-    /// Where all levels are offered, their responses are written in shared memory from the first.
-    /// Where only those about the candidates are, which nobody knows before, they are copied there:
-    /// otherwise every sample on its way would hold the responses of all levels.
+    /// Searches a frame. Responses that anybody wants are written in shared memory from the first.
     fn find(
         &self,
         image: Rgb8View<'_>,
@@ -226,25 +225,21 @@ impl View<'_> {
         responses: &mut Vec<f32>,
     ) -> Result<Found<'_>, Failure> {
         let (step, layout) = (&self.job.step, self.job.step.layout());
-        let is_wanted = self.job.n_evidence_consumers > 0;
-        if is_wanted && step.window() == EvidenceWindow::All {
-            let mut loan = self.evidence.loan(layout.n_values(&scope))?;
-            let estimate = step.run(image, scope, loan.payload_mut());
-            let is_there = !estimate.candidates.is_empty();
+        let n_values = layout.n_values(&scope);
+        if self.job.n_evidence_consumers == 0 {
+            responses.resize(responses.len().max(n_values), 0.0);
             return Ok(Found {
-                evidence: is_there.then_some((loan, scope)),
-                estimate,
+                estimate: step.run(image, scope, responses),
+                evidence: None,
             });
         }
-        responses.resize(responses.len().max(layout.n_values(&scope)), 0.0);
-        let estimate = step.run(image, scope, responses);
-        let mut evidence = None;
-        if is_wanted && let Some((offered, range)) = estimate.offered(layout) {
-            let mut loan = self.evidence.loan(range.len())?;
-            loan.payload_mut().copy_from_slice(&responses[range]);
-            evidence = Some((loan, offered));
-        }
-        Ok(Found { estimate, evidence })
+        let mut loan = self.evidence.loan(n_values)?;
+        let estimate = step.run(image, scope, loan.payload_mut());
+        let is_there = !estimate.candidates.is_empty();
+        Ok(Found {
+            evidence: is_there.then_some(loan),
+            estimate,
+        })
     }
 
     fn end(&self, stamp: &Stamp, waiter: &Waiter) -> Result<(), Failure> {

@@ -65,19 +65,6 @@ pub struct ViewEstimate {
     pub scope: Scope,
 }
 
-impl ViewEstimate {
-    /// The levels from the first to the last one that is offered, and where their responses lie
-    /// among those that were computed; `None` if none is.
-    ///
-    /// What has to be handed on, and no more than that, if all of it shall lie without gaps.
-    pub fn offered(&self, layout: &Layout) -> Option<(Scope, Range<usize>)> {
-        let (first, last) = (*self.levels.first()?, *self.levels.last()?);
-        let scope = Scope::new(layout, first..last + 1, self.scope.region()).ok()?;
-        let [begin, end] = [first, last].map(|it| layout.maps_in(&self.scope, usize::from(it)));
-        Some((scope, begin.start..end.end))
-    }
-}
-
 /// The single-view step for frames of one size.
 #[derive(Debug)]
 pub struct ViewStep {
@@ -106,11 +93,6 @@ impl ViewStep {
     /// Begins to follow poses through the frames of a camera, as the settings say.
     pub fn tracker(&self) -> Tracker {
         Tracker::new(self.settings.track)
-    }
-
-    /// Which levels are offered as evidence.
-    pub fn window(&self) -> EvidenceWindow {
-        self.settings.window
     }
 
     /// Solves one frame within a scope.
