@@ -15,7 +15,7 @@ use crate::shared_dir;
 /// Frames of every camera that are looked at in turn.
 const N_FRAMES: usize = 60;
 /// Of these the ones that are fused as well.
-const N_FUSED: usize = 24;
+const N_FUSED: usize = 12;
 
 /// Poses by view and frame, and the share of searches that were full.
 struct Searched {
@@ -47,10 +47,7 @@ fn following_the_best_pose_finds_nearly_what_a_full_search_finds() {
     };
     let rows = [
         default,
-        row(2, default.margin, default.full_every, default.max_drop),
         row(default.levels, 0.1, default.full_every, default.max_drop),
-        row(default.levels, default.margin, 30, default.max_drop),
-        row(default.levels, default.margin, default.full_every, 0.1),
         row(default.levels, default.margin, 1000, f32::INFINITY),
     ];
     let mut reached = Vec::new();
@@ -74,8 +71,10 @@ fn following_the_best_pose_finds_nearly_what_a_full_search_finds() {
         );
         reached.push((same, errors));
     }
+    // Reached: 82.9 % of the poses the same, 34.4 px at the median against 34.5 (left and
+    // right are as one view alone takes them).
     let (share, of_default) = reached[0];
-    assert!(share > 0.5, "the same pose in {share} of the frames");
+    assert!(share > 0.75, "the same pose in {share} of the frames");
     assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);
     let [of_full, of_tracked] =
         [None, Some(default)].map(|it| fused(&model, &rig, &clip, (&truth, it)));
