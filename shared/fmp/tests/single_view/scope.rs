@@ -10,7 +10,8 @@ use fmp::{
 use kernels::{FilterBank, Isa, Rgb8View, Template};
 use proptest::prelude::*;
 
-use crate::common::{Evidence, Noise, OtherView, OtherViews, tree};
+use crate::common::{Evidence, Noise, tree};
+use crate::other_view::{OtherView, OtherViews};
 
 /// Three filters of several sizes on one part.
 fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
