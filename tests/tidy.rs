@@ -16,7 +16,7 @@ const LAYERS: &[&[&str]] = &[
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],
-    &["wire"],
+    &["wire", "training"],
     &[
         "capture",
         "pose",

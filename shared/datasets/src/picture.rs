@@ -71,6 +71,28 @@ impl Picture {
         let view = Rgb8View::new(self.size.width, self.size.height, &self.rgb);
         view.expect("the number of bytes is checked when a picture is made")
     }
+
+    /// What of the image lies within a rectangle `[x1, y1, x2, y2]` (pixels), and where its top-left pixel
+    /// was.
+    pub fn crop(&self, within: [f64; 4]) -> (Self, [f64; 2]) {
+        let range = |low: f64, high: f64, n: usize| {
+            let start = low.floor().clamp(0.0, n as f64) as usize;
+            let end = (high.ceil() + 1.0).clamp(0.0, n as f64) as usize;
+            start..end.max(start)
+        };
+        let x = range(within[0], within[2], self.size.width);
+        let y = range(within[1], within[3], self.size.height);
+        let row = |row: usize| {
+            let first = row * self.size.width;
+            &self.rgb[3 * (first + x.start)..3 * (first + x.end)]
+        };
+        let origin = [x.start as f64, y.start as f64];
+        let cropped = Self {
+            size: Size::new(x.len(), y.len()),
+            rgb: y.flat_map(row).copied().collect(),
+        };
+        (cropped, origin)
+    }
 }
 
 impl std::fmt::Debug for Picture {

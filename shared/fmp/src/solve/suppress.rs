@@ -18,15 +18,26 @@ impl Solver {
     ///
     /// If the evidence is another model's.
     pub fn candidates(&self, evidence: &Responses<'_>, settings: &CandidateSettings) -> Vec<Pose> {
+        let poses = self.above(evidence, settings.threshold, MOST).into_iter();
+        suppress(&self.model, evidence.layout(), poses, settings)
+    }
+
+    /// Every pose whose root scores at least `threshold`, but at most the `max` best; best first,
+    /// ties as in [`Self::best`]. Most are neighbours of others: see [`Self::candidates`].
+    ///
+    /// # Panics
+    ///
+    /// If the evidence is another model's.
+    pub fn above(&self, evidence: &Responses<'_>, threshold: f32, max: usize) -> Vec<Pose> {
         let roots = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
             let roots = sweep.roots();
             roots
-                .filter(|it| it.score >= settings.threshold && it.score > f32::NEG_INFINITY)
+                .filter(|it| it.score >= threshold && it.score > f32::NEG_INFINITY)
                 .collect::<Vec<_>>()
         });
         let mut roots = roots.concat();
         roots.sort_by(Root::best_first);
-        roots.truncate(MOST);
+        roots.truncate(max);
         let mut levels: Vec<_> = roots.iter().map(|it| it.level).collect();
         levels.sort_unstable();
         levels.dedup();
@@ -39,8 +50,7 @@ impl Solver {
         });
         let mut poses = poses.concat();
         poses.sort_unstable_by_key(|(rank, _)| *rank);
-        let poses = poses.into_iter().map(|(_, pose)| pose);
-        suppress(&self.model, evidence.layout(), poses, settings)
+        poses.into_iter().map(|(_, pose)| pose).collect()
     }
 }
 

@@ -1,0 +1,106 @@
+//! Hard mistakes: wrong poses of a person that the model likes as well as the right one.
+
+use std::sync::Arc;
+
+use datasets::Picture;
+use fmp::{Extra, Extractor, Layout, Model, Pose, Responses, Solver};
+
+use crate::latent::Marked;
+
+/// Searches images of people for the pose that violates its margin most.
+#[derive(Debug)]
+pub(crate) struct Confuser {
+    model: Arc<Model>,
+    extractor: Extractor,
+    solver: Solver,
+}
+
+/// How wrong a pose is: the mean over its parts, each between 0 and the same greatest loss.
+///
+/// As terms of the solver it makes the inference loss-augmented.
+#[derive(Debug)]
+pub(crate) struct Loss<'a> {
+    layout: &'a Layout,
+    side: usize,
+    marked: &'a Marked,
+    /// Greatest loss of a part.
+    weight: f64,
+}
+
+/// The loss of poses of a person.
+///
+/// * `worst`: loss of a pose all of whose parts are wrong.
+pub(crate) fn loss<'a>(
+    model: &Model,
+    layout: &'a Layout,
+    marked: &'a Marked,
+    worst: f64,
+) -> Loss<'a> {
+    Loss {
+        layout,
+        side: model.max_filter()[0],
+        marked,
+        weight: worst / model.n_parts() as f64,
+    }
+}
+
+impl Loss<'_> {
+    /// Loss of a part whose centre is `off` pixels from the marked one: 0 up to a quarter of the box's
+    /// side, 1 from three quarters on.
+    fn of(&self, off: f64) -> f64 {
+        self.weight * ((off / self.marked.side - 0.25) / 0.5).clamp(0.0, 1.0)
+    }
+
+    /// Loss of a pose.
+    pub(crate) fn of_pose(&self, model: &Model, pose: &Pose) -> f64 {
+        let centres = pose.centres(model, self.layout);
+        let off = centres.iter().zip(&self.marked.parts);
+        off.map(|(a, b)| self.of((a[0] - b[0]).hypot(a[1] - b[1])))
+            .sum()
+    }
+}
+
+impl Extra for Loss<'_> {
+    fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
+        let it = &self.layout.levels[level];
+        let half = (self.side as f64 * it.scale - 1.0) / 2.0;
+        let [x, y] = self.marked.parts[part];
+        for (at, score) in (first..).zip(score) {
+            let (row, col) = (at / it.cols, at % it.cols);
+            let dx = (col as f64 - self.layout.pad[1] as f64) * it.scale + half - x;
+            let dy = (row as f64 - self.layout.pad[0] as f64) * it.scale + half - y;
+            *score += self.of(dx.hypot(dy)) as f32;
+        }
+        true
+    }
+
+    fn of_type(&self, _part: usize, _mixture: usize) -> f32 {
+        0.0
+    }
+}
+
+impl Confuser {
+    /// Prepares the search.
+    pub(crate) fn new(model: Model) -> Self {
+        let model = Arc::new(model);
+        Self {
+            extractor: Extractor::new(Arc::clone(&model)),
+            solver: Solver::new(Arc::clone(&model)),
+            model,
+        }
+    }
+
+    /// The pose that maximises score plus loss; `None` if the image is too small for the model.
+    ///
+    /// * `worst`: loss of a pose all of whose parts are wrong.
+    pub(crate) fn worst(&self, picture: &Picture, marked: &Marked, worst: f64) -> Option<Pose> {
+        let image = picture.view();
+        let layout = Layout::new(&self.model, image.width(), image.height()).ok()?;
+        let mut values = vec![0.0; layout.n_responses()];
+        self.extractor.responses(image, &layout, &mut values);
+        let levels: Vec<_> = (0..layout.levels.len() as u16).collect();
+        let evidence = Responses::new(&layout, &values, &levels);
+        let loss = loss(&self.model, &layout, marked, worst);
+        self.solver.best(&evidence, Some(&loss))
+    }
+}

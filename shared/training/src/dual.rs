@@ -1,0 +1,191 @@
+//! The structural support vector machine, by dual coordinate descent over the examples at hand.
+//!
+//! Primal: `min_v 1/2 |v|^2 + sum_g C_g max(0, max_{j in g} (b_j - v . x_j))` with some coordinates of
+//! `v` not negative; an example `j` belongs to a group `g` (one person, or one place of a negative
+//! image), of which the worst counts. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`,
+//! `sum_{j in g} a_j <= C_g`, `v(a) = [sum_j a_j x_j]` with the negative among those coordinates set
+//! to 0. Source: Yang & Ramanan 2013, section 5, and what is known of their release's solver.
+
+mod solve;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::sparse::Sparse;
+
+pub use solve::{Effort, Gap};
+
+/// One constraint: `v . x >= margin`.
+#[derive(Debug)]
+struct Entry<T> {
+    x: Sparse,
+    squared_norm: f64,
+    margin: f64,
+    group: usize,
+    share: f64,
+    tag: T,
+}
+
+#[derive(Debug)]
+struct Group<K> {
+    key: K,
+    cost: f64,
+    /// Sum of the shares of the members; at most the cost.
+    total: f64,
+    members: Vec<usize>,
+}
+
+/// What a violated example costs, and with which others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost<K> {
+    /// The group: only its worst example counts.
+    pub group: K,
+    /// Cost of every unit by which the group's worst example misses its margin.
+    pub of_unit: f64,
+}
+
+/// The examples, and the solution so far.
+///
+/// `K` names the groups, `T` is what the caller wants to remember of an example.
+#[derive(Debug)]
+pub struct Machine<K, T> {
+    entries: Vec<Entry<T>>,
+    groups: Vec<Group<K>>,
+    group_of: BTreeMap<K, usize>,
+    non_negative: Range<usize>,
+    /// Sum of the examples, weighted by their shares.
+    sum: Vec<f64>,
+    /// The solution: the sum with its negative coordinates set to 0 where they may not be.
+    solution: Vec<f32>,
+    bytes: usize,
+}
+
+impl<K: Ord + Clone, T> Machine<K, T> {
+    /// No examples yet; the solution is 0.
+    ///
+    /// * `non_negative`: coordinates that may not become negative.
+    pub fn new(n_coordinates: usize, non_negative: Range<usize>) -> Self {
+        Self {
+            entries: Vec::new(),
+            groups: Vec::new(),
+            group_of: BTreeMap::new(),
+            non_negative,
+            sum: vec![0.0; n_coordinates],
+            solution: vec![0.0; n_coordinates],
+            bytes: 0,
+        }
+    }
+
+    /// Demands `v . x >= margin`. The cost of a group is that of its first example.
+    pub fn add(&mut self, cost: Cost<K>, tag: T, x: Sparse, margin: f64) {
+        self.add_with_share(cost, tag, (x, margin), 0.0);
+    }
+
+    /// As [`Self::add`], with a share in the solution that is known from before; see
+    /// [`Self::entries`].
+    pub fn add_with_share(
+        &mut self,
+        cost: Cost<K>,
+        tag: T,
+        (x, margin): (Sparse, f64),
+        share: f64,
+    ) {
+        let Cost { group, of_unit } = cost;
+        let groups = &mut self.groups;
+        let group = *self.group_of.entry(group.clone()).or_insert_with(|| {
+            groups.push(Group {
+                key: group,
+                cost: of_unit,
+                total: 0.0,
+                members: Vec::new(),
+            });
+            groups.len() - 1
+        });
+        groups[group].members.push(self.entries.len());
+        groups[group].total += share;
+        self.bytes += x.bytes();
+        self.entries.push(Entry {
+            squared_norm: x.squared_norm(),
+            x,
+            margin,
+            group,
+            share,
+            tag,
+        });
+    }
+
+    /// Number of examples.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there is no example.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Bytes that the examples hold.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Tags and shares of all examples, in the order in which they were added. Added again in this
+    /// order with these shares, they make the same machine.
+    pub fn entries(&self) -> impl Iterator<Item = (&T, f64)> {
+        self.entries.iter().map(|it| (&it.tag, it.share))
+    }
+
+    /// The solution.
+    pub fn solution(&self) -> Vec<f64> {
+        let mut solution = self.sum.clone();
+        for it in &mut solution[self.non_negative.clone()] {
+            *it = it.max(0.0);
+        }
+        solution
+    }
+
+    /// Removes the examples that are not wanted, with their share in the solution.
+    pub fn retain(&mut self, wanted: impl Fn(&T) -> bool) {
+        self.keep(&|it| wanted(&it.tag));
+    }
+
+    /// Removes examples without a share, those first that meet their margin with most room to spare,
+    /// until the others hold at most `bytes`.
+    pub fn forget(&mut self, bytes: usize) {
+        if self.bytes <= bytes {
+            return;
+        }
+        let mut idle: Vec<(f64, usize)> = (0..self.entries.len())
+            .filter(|&it| self.entries[it].share == 0.0)
+            .map(|it| (self.slope(it), it))
+            .collect();
+        idle.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut left = self.bytes;
+        for (_, it) in idle {
+            if left <= bytes {
+                break;
+            }
+            left -= self.entries[it].x.bytes();
+            self.entries[it].share = f64::NAN;
+        }
+        self.keep(&|it| !it.share.is_nan());
+    }
+
+    /// Removes entries; groups without any go too, and the others take the order of their first one,
+    /// so that the machine is the same as if nothing else had ever been in it.
+    fn keep(&mut self, wanted: &dyn Fn(&Entry<T>) -> bool) {
+        let groups = std::mem::take(&mut self.groups);
+        let entries = std::mem::take(&mut self.entries);
+        self.group_of.clear();
+        self.bytes = 0;
+        for it in entries {
+            if wanted(&it) {
+                let cost = Cost {
+                    group: groups[it.group].key.clone(),
+                    of_unit: groups[it.group].cost,
+                };
+                self.add_with_share(cost, it.tag, (it.x, it.margin), it.share);
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The steps of the descent.
+
+use super::{Entry, Machine};
+
+/// How far the solution is from the best one on the examples at hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Value of the primal objective: an upper bound of the best.
+    pub primal: f64,
+    /// Value of the dual objective: a lower bound of the best.
+    pub dual: f64,
+    /// Examples with a share in the solution: support vectors.
+    pub n_support: usize,
+}
+
+impl Gap {
+    /// The gap as a share of the primal objective.
+    pub fn relative(&self) -> f64 {
+        if self.primal > 0.0 {
+            (self.primal - self.dual) / self.primal
+        } else {
+            0.0
+        }
+    }
+}
+
+/// When the descent stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Gap that is good enough, as a share of the objective.
+    pub tolerance: f64,
+    /// Most passes over all examples.
+    pub max_passes: usize,
+}
+
+/// Passes over the examples with a share for every pass over all.
+const PASSES_OVER_SUPPORT: usize = 10;
+
+impl<K: Ord + Clone, T> Machine<K, T> {
+    /// Improves the solution until the gap is small enough, or the passes are used up.
+    ///
+    /// * `go_on`: hears the gap before the first and after every pass; answers whether to go on.
+    pub fn solve(
+        &mut self,
+        effort: Effort,
+        random: &mut fastrand::Rng,
+        go_on: &mut dyn FnMut(Gap) -> bool,
+    ) -> Gap {
+        self.sum_up();
+        let mut order: Vec<usize> = (0..self.entries.len()).collect();
+        let mut gap = self.gap();
+        for _ in 0..effort.max_passes {
+            if !go_on(gap) || gap.relative() <= effort.tolerance {
+                return gap;
+            }
+            random.shuffle(&mut order);
+            for &it in &order {
+                self.step(it);
+            }
+            for _ in 0..PASSES_OVER_SUPPORT {
+                let has_share = |it: &usize| self.entries[*it].share > 0.0;
+                let mut support: Vec<_> = (0..self.entries.len()).filter(has_share).collect();
+                random.shuffle(&mut support);
+                for it in support {
+                    self.step(it);
+                }
+            }
+            gap = self.gap();
+        }
+        go_on(gap);
+        gap
+    }
+
+    /// The gap on the examples at hand.
+    pub fn gap(&self) -> Gap {
+        let mut worst = vec![0.0_f64; self.groups.len()];
+        let mut dual = 0.0;
+        let mut n_support = 0;
+        for (it, entry) in self.entries.iter().enumerate() {
+            worst[entry.group] = worst[entry.group].max(self.slope(it));
+            dual += entry.share * entry.margin;
+            n_support += usize::from(entry.share > 0.0);
+        }
+        let half: f64 = self.solution().iter().map(|it| 0.5 * it * it).sum();
+        let losses = worst.iter().zip(&self.groups).map(|(it, of)| of.cost * it);
+        Gap {
+            primal: half + losses.sum::<f64>(),
+            dual: dual - half,
+            n_support,
+        }
+    }
+
+    /// By how much an example misses its margin: the slope of the dual objective along its share.
+    pub(super) fn slope(&self, at: usize) -> f64 {
+        let Entry { margin, x, .. } = &self.entries[at];
+        margin - x.dot(&self.solution)
+    }
+
+    /// Computes the solution anew from the shares, so that it depends on nothing but them.
+    fn sum_up(&mut self) {
+        self.sum.fill(0.0);
+        for entry in &self.entries {
+            if entry.share > 0.0 {
+                entry.x.add_to(&mut self.sum, entry.share);
+            }
+        }
+        for (solution, sum) in self.solution.iter_mut().zip(&self.sum) {
+            *solution = *sum as f32;
+        }
+        for it in &mut self.solution[self.non_negative.clone()] {
+            *it = it.max(0.0);
+        }
+    }
+
+    /// Moves the share of one example to its best value while the others are held; within a group
+    /// whose shares are used up, takes from another of the group.
+    fn step(&mut self, at: usize) {
+        let slope = self.slope(at);
+        let entry = &self.entries[at];
+        let group = &self.groups[entry.group];
+        let room = group.cost - group.total;
+        if slope > 0.0 && room <= group.cost * FULL {
+            return self.exchange(at, slope);
+        }
+        if entry.squared_norm > 0.0 {
+            let wanted = slope / entry.squared_norm;
+            self.change(at, wanted.clamp(-entry.share, room.max(0.0)));
+        }
+    }
+
+    /// Takes a share from the member of the group that needs it least, if that is better.
+    fn exchange(&mut self, at: usize, slope: f64) {
+        let members = &self.groups[self.entries[at].group].members;
+        let givers = members
+            .iter()
+            .filter(|&&it| it != at && self.entries[it].share > 0.0)
+            .map(|&it| (self.slope(it), it));
+        let Some((least, giver)) = givers.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return;
+        };
+        let (to, from) = (&self.entries[at], &self.entries[giver]);
+        let curvature = to.squared_norm + from.squared_norm - 2.0 * to.x.dot_sparse(&from.x);
+        if least < slope && curvature > 0.0 {
+            let share = ((slope - least) / curvature).min(from.share);
+            self.change(giver, -share);
+            self.change(at, share);
+        }
+    }
+
+    fn change(&mut self, at: usize, by: f64) {
+        if by == 0.0 {
+            return;
+        }
+        let entry = &mut self.entries[at];
+        entry.share = (entry.share + by).max(0.0);
+        self.groups[entry.group].total += by;
+        entry.x.add_to(&mut self.sum, by);
+        for (start, run) in entry.x.runs() {
+            let may_be_negative = !self.non_negative.contains(&start);
+            let solution = self.solution[start..start + run.len()].iter_mut();
+            for (solution, sum) in solution.zip(&self.sum[start..]) {
+                *solution = if may_be_negative { *sum } else { sum.max(0.0) } as f32;
+            }
+        }
+    }
+}
+
+/// Room in a group, as a share of its cost, below which it counts as full: rounding.
+const FULL: f64 = 1e-9;

@@ -1,0 +1,98 @@
+//! The first filters: a linear support vector machine for every part and type by itself.
+
+use rayon::prelude::*;
+
+use crate::dual::{Cost, Effort, Machine};
+use crate::example::Example;
+use crate::shape::{Coordinates, Shape};
+use crate::sparse::Sparse;
+
+/// How the first filters are trained.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FilterSettings {
+    /// Cost of a negative window that misses its margin.
+    pub cost: f64,
+    /// Cost of a positive one, in costs of a negative one.
+    pub positive_weight: f64,
+    /// When a machine stops.
+    pub effort: Effort,
+    /// Seed of the order of the steps.
+    pub seed: u64,
+}
+
+/// Trains a filter for every type of every part, and puts them together to a first model.
+///
+/// The biases of the machines become those of the types, all springs are as soft as they may be, and
+/// everything is divided by the number of parts, so that a person scores about 1.
+///
+/// * `people`: every person, each part with its type.
+/// * `background`: windows without people, each a filter's features.
+pub(crate) fn first_model(
+    shape: &Shape,
+    people: &[Example],
+    background: &[Vec<f32>],
+    settings: &FilterSettings,
+) -> Vec<f64> {
+    let at = shape.coordinates();
+    let all: Vec<(usize, usize)> = (0..shape.n_parts())
+        .flat_map(|part| (0..shape.n_types(part)).map(move |mixture| (part, mixture)))
+        .collect();
+    let trained: Vec<Vec<f64>> = all
+        .par_iter()
+        .map(|&(part, mixture)| one(&at, at.filter(part, mixture), people, background, settings))
+        .collect();
+    let mut v = vec![0.0; at.len()];
+    let share = 1.0 / shape.n_parts() as f64;
+    for ((part, mixture), machine) in all.into_iter().zip(trained) {
+        let first = at.filter(part, mixture);
+        for (v, it) in v[first..first + at.filter_len()].iter_mut().zip(&machine) {
+            *v = share * it;
+        }
+        let bias = share * BIAS * machine[at.filter_len()];
+        match shape.parents[part] {
+            Some(parent) => {
+                for parent_type in 0..shape.n_types(parent) {
+                    v[at.bias(part, parent_type, mixture)] = bias;
+                }
+            }
+            None => {
+                let (root, value) = at.root();
+                v[root] += bias / (f64::from(value) * shape.n_types(part) as f64);
+            }
+        }
+    }
+    v
+}
+
+/// Feature of a machine's bias: it is regularised little.
+const BIAS: f64 = 10.0;
+
+/// Filter and bias of the windows whose features lie at `first` in the people's vectors.
+fn one(
+    at: &Coordinates,
+    first: usize,
+    people: &[Example],
+    background: &[Vec<f32>],
+    settings: &FilterSettings,
+) -> Vec<f64> {
+    let n = at.filter_len();
+    let mut machine = Machine::new(n + 1, 0..0);
+    let windows = people.iter().filter_map(|it| {
+        let mut runs = it.features.runs();
+        runs.find(|(start, _)| *start == first).map(|it| it.1)
+    });
+    let windows = windows.map(|it| (it, settings.positive_weight, 1.0));
+    let background = background.iter().map(|it| (&it[..], 1.0, -1.0));
+    for (group, (window, weight, sign)) in windows.chain(background).enumerate() {
+        let cost = Cost {
+            group,
+            of_unit: settings.cost * weight,
+        };
+        let x = Sparse::new([(0, window), (n, &[BIAS as f32][..])]);
+        let x = if sign < 0.0 { x.negated() } else { x };
+        machine.add(cost, (), x, 1.0);
+    }
+    let mut random = fastrand::Rng::with_seed(settings.seed ^ first as u64);
+    machine.solve(settings.effort, &mut random, &mut |_| true);
+    machine.solution()
+}

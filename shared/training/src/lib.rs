@@ -1,0 +1,34 @@
+//! Trains flexible mixtures of parts from people whose joints are marked (Yang & Ramanan 2013).
+//!
+//! Reading order: a [`Plan`] is made of the people alone (sizes, types of parts); a [`Trainer`] goes
+//! through the [`Step`]s: first filters, placing people, collecting hard examples and solving the
+//! structural support vector machine ([`Machine`]). Images come from an [`Album`], progress goes to a
+//! [`Watch`], and between any two steps a [`Checkpoint`] can be taken.
+#![forbid(unsafe_code)]
+
+mod album;
+mod confuse;
+mod dual;
+mod example;
+mod filters;
+mod latent;
+mod mine;
+mod origin;
+mod plan;
+mod scale;
+mod settings;
+mod shape;
+mod sparse;
+mod trainer;
+mod types;
+mod watch;
+
+pub use album::{Album, AlbumError};
+pub use dual::{Cost, Effort, Gap, Machine};
+pub use plan::{Plan, PlanError, Tree};
+pub use settings::Settings;
+pub use shape::{MIN_STIFFNESS, Shape};
+pub use sparse::Sparse;
+pub use trainer::{Checkpoint, CheckpointError, TrainError, Trainer};
+pub use types::TypesBy;
+pub use watch::{Event, Step, Watch};

@@ -1,0 +1,109 @@
+//! Where an example comes from: enough to make it again.
+
+use fmp::{Placement, Pose};
+use serde::{Deserialize, Serialize};
+
+use crate::shape::Shape;
+
+/// A pose in a file: level, and `(x, y, type)` of every part.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub(crate) struct Placed {
+    level: u16,
+    parts: Vec<(u16, u16, u8)>,
+}
+
+impl Placed {
+    /// Takes a pose without its score.
+    pub(crate) fn of(pose: &Pose) -> Self {
+        let part = |it: &Placement| (it.x, it.y, it.mixture);
+        Self {
+            level: pose.level,
+            parts: pose.parts.iter().map(part).collect(),
+        }
+    }
+
+    /// Whether it has the parts and types of a shape.
+    pub(crate) fn fits(&self, shape: &Shape) -> bool {
+        let has_type =
+            |(part, it): (usize, &(u16, u16, u8))| usize::from(it.2) < shape.n_types(part);
+        self.parts.len() == shape.n_parts() && self.parts.iter().enumerate().all(has_type)
+    }
+
+    /// The pose, with a score of 0.
+    pub(crate) fn pose(&self) -> Pose {
+        let part = |&(x, y, mixture): &(u16, u16, u8)| Placement { x, y, mixture };
+        Pose {
+            score: 0.0,
+            level: self.level,
+            parts: self.parts.iter().map(part).collect(),
+        }
+    }
+}
+
+/// What an example is an example of. People count as in the plan.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub(crate) enum Origin {
+    /// A person where they are.
+    Right {
+        /// Who.
+        person: u32,
+        /// Where.
+        pose: Placed,
+    },
+    /// The right pose of a person less a wrong one.
+    Mistake {
+        /// Who.
+        person: u32,
+        /// The wrong pose.
+        pose: Placed,
+    },
+    /// A place of an image without people.
+    Background {
+        /// Number of the image.
+        image: u32,
+        /// Where.
+        pose: Placed,
+    },
+}
+
+/// Examples of which only the worst counts.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Group {
+    /// A person.
+    Right(u32),
+    /// The mistakes made with a person.
+    Mistakes(u32),
+    /// Image, level, row and column of the root.
+    Background(u32, u16, u16, u16),
+}
+
+impl Origin {
+    /// The pose that the example shows.
+    pub(crate) fn pose(&self) -> &Placed {
+        match self {
+            Self::Right { pose, .. }
+            | Self::Mistake { pose, .. }
+            | Self::Background { pose, .. } => pose,
+        }
+    }
+
+    /// The image that shows it: whether of a person, and its number.
+    pub(crate) fn source(&self) -> (bool, u32) {
+        match self {
+            Self::Right { person, .. } | Self::Mistake { person, .. } => (true, *person),
+            Self::Background { image, .. } => (false, *image),
+        }
+    }
+
+    /// The group of the example.
+    pub(crate) fn group(&self) -> Group {
+        match self {
+            Self::Right { person, .. } => Group::Right(*person),
+            Self::Mistake { person, .. } => Group::Mistakes(*person),
+            Self::Background { image, pose } => {
+                let (x, y, _) = pose.parts.first().copied().unwrap_or_default();
+                Group::Background(*image, pose.level, y, x)
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! What is known of the people before the first image is looked at: their sizes and types.
+
+use crate::latent::Marked;
+use crate::scale::{box_sides, filter_side};
+use crate::settings::Settings;
+use crate::shape::Shape;
+use crate::types::{Types, cluster};
+
+/// The parts of a model: what an annotated person is turned into.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tree {
+    /// Names of the parts, root first.
+    pub names: Vec<String>,
+    /// Parent of every part, smaller than the part; `None` for the root, which is part 0.
+    pub parents: Vec<Option<usize>>,
+    /// The part on the other side of the body.
+    pub mirror: Option<Vec<usize>>,
+}
+
+/// Who is trained on, and with which shape of model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    shape: Shape,
+    people: Vec<Planned>,
+    n_small: usize,
+}
+
+/// A person who is trained on.
+#[derive(Debug, Clone, PartialEq)]
+struct Planned {
+    /// Number in the album.
+    person: usize,
+    parts: Vec<[f64; 2]>,
+    side: f64,
+    types: Vec<usize>,
+}
+
+/// Why nothing can be trained.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// Nobody is left.
+    #[error(
+        "of {n_people} people, none is large enough for filters of {filter_px} pixels: take larger pictures, or smaller filters"
+    )]
+    NoPeople {
+        /// People there were.
+        n_people: usize,
+        /// Side of the filters at full resolution, pixels.
+        filter_px: usize,
+    },
+    /// A person has no definite place.
+    #[error("person {person} has {got} finite parts, expected {expected}")]
+    Parts {
+        /// Number in the album, from 1.
+        person: usize,
+        /// Parts that are finite numbers.
+        got: usize,
+        /// Parts of the model.
+        expected: usize,
+    },
+    /// The people are so small that filters would have no inside.
+    #[error(
+        "the people are too small: 95 of 100 have heads of more than {side_px:.1} pixels, and the filters would have {cells} cells, expected at least 3; enlarge the pictures"
+    )]
+    Small {
+        /// Side of the part boxes that all but the smallest twentieth have, pixels.
+        side_px: f64,
+        /// Cells that fit.
+        cells: usize,
+    },
+}
+
+impl Plan {
+    /// Judges the sizes of the people, drops those smaller than the filters, and clusters the parts.
+    ///
+    /// * `people`: centres of the parts of every person of the album, pixels of the image.
+    ///
+    /// # Errors
+    ///
+    /// See [`PlanError`].
+    pub fn new(
+        name: &str,
+        tree: &Tree,
+        people: &[Vec<[f64; 2]>],
+        settings: &Settings,
+    ) -> Result<Self, PlanError> {
+        let expected = tree.parents.len();
+        for (person, parts) in people.iter().enumerate() {
+            let finite = |it: &&[f64; 2]| it.iter().all(|it| it.is_finite());
+            let got = parts.iter().filter(finite).count();
+            if got != expected || parts.len() != expected {
+                let person = person + 1;
+                return Err(PlanError::Parts {
+                    person,
+                    got,
+                    expected,
+                });
+            }
+        }
+        let sides = box_sides(people, &tree.parents);
+        let (fits, side_px) = filter_side(&sides, settings.cell_px);
+        if fits < LEAST_CELLS && !people.is_empty() {
+            let cells = fits;
+            return Err(PlanError::Small { side_px, cells });
+        }
+        let side = fits.min(settings.max_filter_cells);
+        let filter_px = side * settings.cell_px;
+        let large: Vec<usize> = (0..people.len())
+            .filter(|&it| sides[it] >= filter_px as f64)
+            .collect();
+        if large.is_empty() {
+            let n_people = people.len();
+            return Err(PlanError::NoPeople {
+                n_people,
+                filter_px,
+            });
+        }
+        let in_cells = |&it: &usize| {
+            let scale = side as f64 / sides[it];
+            people[it]
+                .iter()
+                .map(|at| at.map(|px| px * scale))
+                .collect()
+        };
+        let in_cells: Vec<Vec<[f64; 2]>> = large.iter().map(in_cells).collect();
+        let Types { of_person, anchors } = cluster(&in_cells, &tree.parents, settings);
+        let planned = large.iter().zip(of_person).map(|(&person, types)| Planned {
+            person,
+            parts: people[person].clone(),
+            side: sides[person],
+            types,
+        });
+        Ok(Self {
+            people: planned.collect(),
+            n_small: people.len() - large.len(),
+            shape: Shape {
+                name: name.to_owned(),
+                part_names: tree.names.clone(),
+                parents: tree.parents.clone(),
+                mirror: tree.mirror.clone(),
+                anchors,
+                side,
+                cell_px: settings.cell_px,
+                interval: settings.interval,
+            },
+        })
+    }
+
+    /// The model's shape.
+    pub fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Number of people who are trained on.
+    pub fn n_people(&self) -> usize {
+        self.people.len()
+    }
+
+    /// Number of people who were smaller than the filters.
+    pub fn n_small(&self) -> usize {
+        self.n_small
+    }
+
+    /// Number in the album of a person who is trained on.
+    pub fn person(&self, it: usize) -> usize {
+        self.people[it].person
+    }
+
+    /// Where a person's parts are, with the types of the clusters or without.
+    pub fn marked(&self, it: usize, with_types: bool) -> Marked {
+        let person = &self.people[it];
+        Marked {
+            parts: person.parts.clone(),
+            side: person.side,
+            types: with_types.then(|| person.types.clone()),
+        }
+    }
+}
+
+/// Smallest filters, cells a side.
+const LEAST_CELLS: usize = 3;

@@ -1,0 +1,83 @@
+//! How a model is trained.
+
+use serde::{Deserialize, Serialize};
+
+use crate::types::TypesBy;
+
+/// Everything about a training that is not its data.
+///
+/// The defaults are those of Yang & Ramanan 2013 where a comment says so, else what was found best on
+/// people who were neither trained on nor part of any test set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Settings {
+    /// Types of every part (6: Yang & Ramanan 2013).
+    pub n_types: usize,
+    /// What the types of a part are told apart by.
+    pub types_by: TypesBy,
+    /// Random starts of every clustering, of which the tightest is taken.
+    pub cluster_starts: usize,
+    /// Side of a feature cell, pixels of its level.
+    pub cell_px: usize,
+    /// Largest side of the filters, cells; smaller where the people are small.
+    pub max_filter_cells: usize,
+    /// Levels per octave of the pyramid that the model is made for.
+    pub interval: usize,
+    /// Levels per octave on which images without people are searched.
+    pub mining_interval: usize,
+    /// Cost of an image place without a person that scores above -1, for every unit (the `C` of the
+    /// machine).
+    pub cost: f64,
+    /// Cost of a person who scores below 1, in costs of a negative.
+    pub positive_weight: f64,
+    /// Cost of a wrong pose that scores as well as the right one of the same person, in costs of a
+    /// negative; 0 switches these examples off, as in Yang & Ramanan 2013.
+    pub pose_weight: f64,
+    /// Margin that the right pose must keep from one all of whose parts are wrong.
+    pub pose_margin: f64,
+    /// Least intersection over union of a placed part's box with the marked one.
+    pub overlap: f64,
+    /// Gap of the machine that is good enough, as a share of its objective.
+    pub tolerance: f64,
+    /// Memory for examples, MiB.
+    pub cache_mib: usize,
+    /// Most examples taken from one image without people at a time.
+    pub per_image: usize,
+    /// Images without people that are searched between two solutions.
+    pub batch: usize,
+    /// Rounds in which the types of the parts are those of the clusters.
+    pub fixed_rounds: usize,
+    /// Rounds after them, in which the model chooses the types.
+    pub latent_rounds: usize,
+    /// How often all images without people are searched in a round.
+    pub passes: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            n_types: 6,
+            types_by: TypesBy::Parent,
+            cluster_starts: 100,
+            cell_px: 4,
+            max_filter_cells: 5,
+            interval: 10,
+            mining_interval: 2,
+            cost: 0.002,
+            positive_weight: 2.0,
+            pose_weight: 2.0,
+            pose_margin: 1.0,
+            overlap: 0.6,
+            tolerance: 0.05,
+            cache_mib: 2048,
+            per_image: 50,
+            batch: 64,
+            fixed_rounds: 1,
+            latent_rounds: 1,
+            passes: 1,
+            seed: 1,
+        }
+    }
+}

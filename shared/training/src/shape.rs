@@ -1,0 +1,199 @@
+//! Where every number of a model lies in the vector that is trained.
+
+use fmp::{Edge, Filter, Model, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
+
+/// The smallest quadratic coefficient of a trained spring, score per cell^2: keeps every spring
+/// pulling (Yang & Ramanan 2013).
+pub const MIN_STIFFNESS: f64 = 0.01;
+
+/// How weakly the root's bias is regularised: its part of the norm counts this much squared.
+const ROOT_BIAS_SCALE: f64 = 0.01;
+
+/// What stays as it is while a model is trained: tree, sizes, names, and where the springs rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Where the model comes from, for people.
+    pub name: String,
+    /// Names of the parts, root first.
+    pub part_names: Vec<String>,
+    /// Parent of every part, smaller than the part; `None` for the root.
+    pub parents: Vec<Option<usize>>,
+    /// The part on the other side of the body.
+    pub mirror: Option<Vec<usize>>,
+    /// Where each type of a part rests relative to its parent `[x, y]`, cells: `[part][type]`.
+    pub anchors: Vec<Vec<[i32; 2]>>,
+    /// Side of every filter, cells.
+    pub side: usize,
+    /// Side of a cell, pixels of its level.
+    pub cell_px: usize,
+    /// Levels per octave of the pyramid that the model is used with.
+    pub interval: usize,
+}
+
+/// The vector of a [`Shape`]: all filters, the quadratic and the linear coefficients of all springs,
+/// the biases of all pairs of types, the root's bias.
+///
+/// What is trained is not the model's parameter `w` but `v = (w - w_0) r` with `w_0` the least
+/// stiffness and `r` the scale of the root's bias, so that the norm of `v` is what is minimised.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coordinates {
+    first_type: Vec<usize>,
+    first_bias: Vec<usize>,
+    filter_len: usize,
+    quadratic: usize,
+    linear: usize,
+    biases: usize,
+    root: usize,
+}
+
+impl Shape {
+    /// Number of parts.
+    pub fn n_parts(&self) -> usize {
+        self.parents.len()
+    }
+
+    /// Number of types of a part.
+    pub fn n_types(&self, part: usize) -> usize {
+        self.anchors[part].len()
+    }
+
+    /// Where the model's numbers lie.
+    pub fn coordinates(&self) -> Coordinates {
+        let mut first_type = vec![0];
+        let mut first_bias = vec![0];
+        for (part, parent) in self.parents.iter().enumerate() {
+            first_type.push(first_type[part] + self.n_types(part));
+            let pairs = parent.map_or(0, |it| self.n_types(it) * self.n_types(part));
+            first_bias.push(first_bias[part] + pairs);
+        }
+        let n_types = first_type[self.n_parts()];
+        let filter_len = self.side * self.side * N_CHANNELS;
+        let quadratic = n_types * filter_len;
+        let linear = quadratic + 2 * n_types;
+        let biases = linear + 2 * n_types;
+        Coordinates {
+            root: biases + first_bias[self.n_parts()],
+            first_type,
+            first_bias,
+            filter_len,
+            quadratic,
+            linear,
+            biases,
+        }
+    }
+
+    /// The model with the trained vector `v`.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] if the shape is no tree or a number is not finite.
+    ///
+    /// # Panics
+    ///
+    /// If `v` has another length than [`Coordinates::len`].
+    pub fn model(&self, v: &[f64], threshold: f64) -> Result<Model, ModelError> {
+        let at = self.coordinates();
+        assert_eq!(v.len(), at.len(), "the vector of this shape");
+        let n_types = at.first_type[self.n_parts()];
+        let filters = (0..n_types).map(|it| Filter {
+            rows: self.side,
+            cols: self.side,
+            weights: v[it * at.filter_len..(it + 1) * at.filter_len].to_vec(),
+        });
+        Model::new(ModelSpec {
+            name: self.name.clone(),
+            filters: filters.collect(),
+            parts: (0..self.n_parts())
+                .map(|it| self.part(&at, v, it))
+                .collect(),
+            root_bias: v[at.root] / ROOT_BIAS_SCALE,
+            interval: self.interval,
+            cell_px: self.cell_px,
+            threshold,
+            mirror: self.mirror.clone(),
+        })
+    }
+
+    fn part(&self, at: &Coordinates, v: &[f64], part: usize) -> PartSpec {
+        let (n_types, first) = (self.n_types(part), at.first_type[part]);
+        let spring = |k: usize| {
+            let quadratic = &v[at.quadratic + 2 * (first + k)..][..2];
+            let linear = &v[at.linear + 2 * (first + k)..][..2];
+            Spring {
+                w: [
+                    MIN_STIFFNESS + quadratic[0],
+                    linear[0],
+                    MIN_STIFFNESS + quadratic[1],
+                    linear[1],
+                ],
+                anchor: self.anchors[part][k],
+            }
+        };
+        let edge = self.parents[part].map(|parent| Edge {
+            parent,
+            bias: v[at.biases + at.first_bias[part]..at.biases + at.first_bias[part + 1]]
+                .chunks(n_types)
+                .map(<[f64]>::to_vec)
+                .collect(),
+            springs: Springs::PerChildType((0..n_types).map(spring).collect()),
+        });
+        PartSpec {
+            name: self.part_names[part].clone(),
+            filter_of_type: (first..first + n_types).collect(),
+            edge,
+        }
+    }
+}
+
+impl Coordinates {
+    /// Length of the vector.
+    pub fn len(&self) -> usize {
+        self.root + 1
+    }
+
+    /// Whether there is nothing to train; never, since the root has a bias.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Numbers in a filter.
+    pub fn filter_len(&self) -> usize {
+        self.filter_len
+    }
+
+    /// Number of types of all parts.
+    pub fn n_types(&self) -> usize {
+        self.quadratic / self.filter_len
+    }
+
+    /// Where the filter of a part's type begins.
+    pub fn filter(&self, part: usize, mixture: usize) -> usize {
+        (self.first_type[part] + mixture) * self.filter_len
+    }
+
+    /// Where the two quadratic coefficients `[x, y]` of a spring begin.
+    pub fn quadratic(&self, part: usize, mixture: usize) -> usize {
+        self.quadratic + 2 * (self.first_type[part] + mixture)
+    }
+
+    /// Where the two linear coefficients `[x, y]` of a spring begin.
+    pub fn linear(&self, part: usize, mixture: usize) -> usize {
+        self.linear + 2 * (self.first_type[part] + mixture)
+    }
+
+    /// Where the bias of a pair of types lies.
+    pub fn bias(&self, part: usize, parent_type: usize, mixture: usize) -> usize {
+        let n_types = self.first_type[part + 1] - self.first_type[part];
+        self.biases + self.first_bias[part] + parent_type * n_types + mixture
+    }
+
+    /// Where the root's bias lies, and its feature.
+    pub fn root(&self) -> (usize, f32) {
+        (self.root, (1.0 / ROOT_BIAS_SCALE) as f32)
+    }
+
+    /// The coordinates that may not become negative: the quadratic coefficients above their least.
+    pub fn non_negative(&self) -> std::ops::Range<usize> {
+        self.quadratic..self.linear
+    }
+}

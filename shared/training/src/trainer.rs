@@ -1,0 +1,263 @@
+//! The stages of training, step by step.
+
+mod checkpoint;
+mod collect;
+
+use fmp::{Model, ModelError};
+
+use crate::album::{Album, AlbumError};
+use crate::dual::{Cost, Effort, Gap, Machine};
+use crate::filters::{FilterSettings, first_model};
+use crate::origin::{Group, Origin, Placed};
+use crate::plan::Plan;
+use crate::scale::quantile;
+use crate::settings::Settings;
+use crate::shape::Coordinates;
+use crate::watch::{Event, Step, Watch};
+
+pub use checkpoint::{Checkpoint, CheckpointError};
+
+/// Why a training ended early.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// Somebody stopped it.
+    #[error("stopped")]
+    Stopped,
+    /// An image of a person cannot be had.
+    #[error("the image of person {person}")]
+    Person {
+        /// Number in the album, from 1.
+        person: usize,
+        /// Why.
+        #[source]
+        source: AlbumError,
+    },
+    /// An image without people cannot be had.
+    #[error("image {image} of those without people")]
+    Background {
+        /// Number in the album, from 1.
+        image: usize,
+        /// Why.
+        #[source]
+        source: AlbumError,
+    },
+    /// There is nothing to tell people from.
+    #[error("there are no images without people: a model cannot be trained on people alone")]
+    NoBackgrounds,
+    /// Nobody could be placed.
+    #[error("none of {n_people} people could be placed on any level of the pyramid")]
+    NobodyPlaced {
+        /// People there were.
+        n_people: usize,
+    },
+    /// A pose does not lie on its image, which must have changed since the pose was found.
+    #[error("a pose does not lie on its image: an image has changed since the training began")]
+    Moved,
+    /// What was trained is no model.
+    #[error("what was trained is no model")]
+    Model(#[from] ModelError),
+}
+
+/// A training under way. Deterministic: the same plan, images and settings give the same model, bit for
+/// bit, on any number of threads, and whether or not it was interrupted between steps.
+pub struct Trainer<'a> {
+    plan: &'a Plan,
+    settings: &'a Settings,
+    album: &'a dyn Album,
+    watch: &'a dyn Watch,
+    at: Coordinates,
+    steps: Vec<Step>,
+    next: usize,
+    machine: Machine<Group, Origin>,
+    /// Where every person was placed last.
+    right: Vec<Option<Placed>>,
+    v: Vec<f64>,
+    threshold: f64,
+}
+
+impl std::fmt::Debug for Trainer<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Trainer")
+            .field("next", &self.next)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Trainer<'a> {
+    /// Nothing is trained yet.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::NoBackgrounds`].
+    pub fn new(
+        plan: &'a Plan,
+        settings: &'a Settings,
+        album: &'a dyn Album,
+        watch: &'a dyn Watch,
+    ) -> Result<Self, TrainError> {
+        if album.n_backgrounds() == 0 {
+            return Err(TrainError::NoBackgrounds);
+        }
+        let at = plan.shape().coordinates();
+        Ok(Self {
+            machine: Machine::new(at.len(), at.non_negative()),
+            steps: steps(settings, album.n_backgrounds()),
+            next: 0,
+            right: vec![None; plan.n_people()],
+            v: vec![0.0; at.len()],
+            threshold: 0.0,
+            plan,
+            settings,
+            album,
+            watch,
+            at,
+        })
+    }
+
+    /// All steps.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Number of steps that are done.
+    pub fn n_done(&self) -> usize {
+        self.next
+    }
+
+    /// Does the next step; `false` if there was none left.
+    ///
+    /// # Errors
+    ///
+    /// See [`TrainError`]; what was done in this step is then to be thrown away, with this trainer.
+    pub fn step(&mut self) -> Result<bool, TrainError> {
+        let Some(&step) = self.steps.get(self.next) else {
+            return Ok(false);
+        };
+        let mut random = fastrand::Rng::with_seed(self.seed_of(self.next));
+        match step {
+            Step::Filters => self.filters()?,
+            Step::Place { round } => self.place(round)?,
+            Step::Learn { .. } => {
+                self.collect(step)?;
+                self.learn(&mut random)?;
+            }
+            Step::Judge => self.judge()?,
+        }
+        self.next += 1;
+        Ok(true)
+    }
+
+    /// The model as it is now.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError::Model`] if the numbers went astray.
+    pub fn model(&self) -> Result<Model, TrainError> {
+        Ok(self.plan.shape().model(&self.v, self.threshold)?)
+    }
+
+    fn seed_of(&self, salt: usize) -> u64 {
+        self.settings.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ salt as u64
+    }
+
+    fn effort(&self) -> Effort {
+        Effort {
+            tolerance: self.settings.tolerance,
+            max_passes: MAX_PASSES,
+        }
+    }
+
+    fn go_on(&self) -> Result<(), TrainError> {
+        if self.watch.go_on() {
+            Ok(())
+        } else {
+            Err(TrainError::Stopped)
+        }
+    }
+
+    fn filters(&mut self) -> Result<(), TrainError> {
+        let people = self.nearest()?;
+        let background = self.windows()?;
+        let settings = FilterSettings {
+            cost: self.settings.cost,
+            positive_weight: self.settings.positive_weight,
+            effort: self.effort(),
+            seed: self.settings.seed,
+        };
+        self.v = first_model(self.plan.shape(), &people, &background, &settings);
+        Ok(())
+    }
+
+    /// Places everybody anew, and replaces the examples that are made of people.
+    fn place(&mut self, round: usize) -> Result<(), TrainError> {
+        let placed = self.best_placements(round < self.settings.fixed_rounds)?;
+        self.machine
+            .retain(|it| matches!(it, Origin::Background { .. }));
+        self.right = placed.into_iter().map(|it| it.map(|it| it.0)).collect();
+        let origins = self.right.iter().enumerate().filter_map(|(person, pose)| {
+            let pose = pose.clone()?;
+            let person = person as u32;
+            Some(Origin::Right { person, pose })
+        });
+        self.add(origins.collect(), &mut std::iter::repeat(0.0))
+    }
+
+    fn learn(&mut self, random: &mut fastrand::Rng) -> Result<(), TrainError> {
+        let (effort, watch) = (self.effort(), self.watch);
+        let mut told = |gap: Gap| {
+            watch.tell(Event::Gap(gap));
+            watch.go_on()
+        };
+        self.machine.solve(effort, random, &mut told);
+        self.go_on()?;
+        self.machine.forget(self.settings.cache_mib << 20);
+        self.v = self.machine.solution();
+        Ok(())
+    }
+
+    /// Sets the threshold that all but the twentieth part of the people reach (Yang & Ramanan 2013).
+    fn judge(&mut self) -> Result<(), TrainError> {
+        let placed = self.best_placements(false)?;
+        let scores = placed.into_iter().flatten().map(|it| it.1);
+        self.threshold = quantile(scores.collect(), 0.05);
+        Ok(())
+    }
+
+    /// Makes examples, and gives each the next of the shares.
+    fn add(
+        &mut self,
+        origins: Vec<Origin>,
+        shares: &mut dyn Iterator<Item = f64>,
+    ) -> Result<(), TrainError> {
+        let made = self.constraints(&origins)?;
+        for ((origin, constraint), share) in origins.into_iter().zip(made).zip(shares) {
+            let weight = match origin {
+                Origin::Right { .. } => self.settings.positive_weight,
+                Origin::Mistake { .. } => self.settings.pose_weight,
+                Origin::Background { .. } => 1.0,
+            };
+            let cost = Cost {
+                group: origin.group(),
+                of_unit: self.settings.cost * weight,
+            };
+            self.machine.add_with_share(cost, origin, constraint, share);
+        }
+        Ok(())
+    }
+}
+
+/// Passes after which a solution is taken as it is.
+const MAX_PASSES: usize = 200;
+
+fn steps(settings: &Settings, n_backgrounds: usize) -> Vec<Step> {
+    let n_batches = n_backgrounds.div_ceil(settings.batch.max(1));
+    let mut steps = vec![Step::Filters];
+    for round in 0..settings.fixed_rounds + settings.latent_rounds {
+        steps.push(Step::Place { round });
+        for pass in 0..settings.passes {
+            steps.extend((0..n_batches).map(|batch| Step::Learn { round, pass, batch }));
+        }
+    }
+    steps.push(Step::Judge);
+    steps
+}

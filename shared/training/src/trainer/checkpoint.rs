@@ -1,0 +1,130 @@
+//! Where a training stood: enough to go on as if it had never been interrupted.
+
+use serde::{Deserialize, Serialize};
+
+use super::{TrainError, Trainer};
+use crate::album::Album;
+use crate::origin::{Origin, Placed};
+use crate::plan::Plan;
+use crate::settings::Settings;
+use crate::watch::Watch;
+
+/// The state of a training between two steps.
+///
+/// Examples are kept as where they come from, a hundred bytes each; their features are read off the
+/// images again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoint {
+    /// What is trained: another plan or other settings have another one.
+    fingerprint: u64,
+    n_done: usize,
+    v: Vec<f64>,
+    threshold: f64,
+    right: Vec<Option<Placed>>,
+    examples: Vec<(Origin, f64)>,
+}
+
+/// Why a training cannot go on from a checkpoint.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// It belongs to another training.
+    #[error(
+        "the checkpoint is of another training: people, images without people or settings have changed"
+    )]
+    Other,
+    /// It is damaged.
+    #[error("the checkpoint does not fit its own training: {what}")]
+    Damaged {
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// Going on failed.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+}
+
+impl Checkpoint {
+    /// Number of steps that are done.
+    pub fn n_done(&self) -> usize {
+        self.n_done
+    }
+}
+
+impl<'a> Trainer<'a> {
+    /// The state after the last step that was done.
+    pub fn checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            fingerprint: self.fingerprint(),
+            n_done: self.next,
+            v: self.v.clone(),
+            threshold: self.threshold,
+            right: self.right.clone(),
+            examples: self
+                .machine
+                .entries()
+                .map(|(origin, share)| (origin.clone(), share))
+                .collect(),
+        }
+    }
+
+    /// Goes on from a checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// See [`CheckpointError`].
+    pub fn resume(
+        (plan, settings): (&'a Plan, &'a Settings),
+        album: &'a dyn Album,
+        watch: &'a dyn Watch,
+        checkpoint: Checkpoint,
+    ) -> Result<Self, CheckpointError> {
+        let mut trainer = Self::new(plan, settings, album, watch)?;
+        if checkpoint.fingerprint != trainer.fingerprint() {
+            return Err(CheckpointError::Other);
+        }
+        trainer.fits(&checkpoint)?;
+        trainer.next = checkpoint.n_done;
+        trainer.v = checkpoint.v;
+        trainer.threshold = checkpoint.threshold;
+        trainer.right = checkpoint.right;
+        let (origins, shares): (Vec<_>, Vec<_>) = checkpoint.examples.into_iter().unzip();
+        trainer.add(origins, &mut shares.into_iter())?;
+        Ok(trainer)
+    }
+
+    fn fits(&self, it: &Checkpoint) -> Result<(), CheckpointError> {
+        let damaged = |what| Err(CheckpointError::Damaged { what });
+        if it.n_done > self.steps.len() {
+            return damaged("more steps are done than there are");
+        }
+        if it.v.len() != self.v.len() || it.right.len() != self.right.len() {
+            return damaged("a list has another length");
+        }
+        let poses = it.right.iter().flatten();
+        let poses = poses.chain(it.examples.iter().map(|it| it.0.pose()));
+        if !poses.into_iter().all(|it| it.fits(self.plan.shape())) {
+            return damaged("a pose has other parts or types than the model");
+        }
+        let known = |origin: &Origin| match origin {
+            Origin::Background { image, .. } => (*image as usize) < self.album.n_backgrounds(),
+            Origin::Right { person, .. } | Origin::Mistake { person, .. } => {
+                (*person as usize) < self.plan.n_people()
+            }
+        };
+        if !it.examples.iter().all(|it| known(&it.0) && it.1 >= 0.0) {
+            return damaged("an example is of a person or an image that is not there");
+        }
+        Ok(())
+    }
+
+    /// FNV-1a of everything that the training depends on but the pixels.
+    fn fingerprint(&self) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let n_images = self.album.n_backgrounds();
+        let text = format!("{:?} {:?} {n_images}", self.settings, self.plan);
+        for byte in text.bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        hash
+    }
+}

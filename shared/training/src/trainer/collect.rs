@@ -1,0 +1,310 @@
+//! Looking at images: placing people, searching for false alarms and mistakes, reading off features.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use datasets::Picture;
+use fmp::{FeaturePyramid, Layout, Model, Placement};
+use rayon::prelude::*;
+
+use super::{TrainError, Trainer};
+use crate::confuse::{Confuser, loss};
+use crate::example::Example;
+use crate::latent::{Marked, best_near, nearest};
+use crate::mine::Miner;
+use crate::origin::{Origin, Placed};
+use crate::shape::Shape;
+use crate::sparse::Sparse;
+use crate::watch::{Event, Step};
+
+/// Images that the windows of the first filters come from, and windows of each.
+const WINDOW_IMAGES: usize = 100;
+const WINDOWS: usize = 20;
+
+impl Trainer<'_> {
+    /// Runs `look` for every one of `all` side by side; the answers in order.
+    fn look_at<S: Sync, T: Send>(
+        &self,
+        all: &[S],
+        look: impl Fn(&S) -> Result<T, TrainError> + Sync,
+    ) -> Result<Vec<T>, TrainError> {
+        let done = AtomicUsize::new(0);
+        all.par_iter()
+            .map(|it| {
+                self.go_on()?;
+                let seen = look(it)?;
+                let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+                let of = all.len();
+                self.watch.tell(Event::Images { done, of });
+                Ok(seen)
+            })
+            .collect()
+    }
+
+    /// The surroundings of a person.
+    fn person(&self, it: usize, with_types: bool) -> Result<(Picture, Marked), TrainError> {
+        let person = self.plan.person(it);
+        let image = self.album.person(person).map_err(|source| {
+            let person = person + 1;
+            TrainError::Person { person, source }
+        })?;
+        let mut marked = self.plan.marked(it, with_types);
+        let (crop, origin) = image.crop(marked.surroundings());
+        for part in &mut marked.parts {
+            *part = [part[0] - origin[0], part[1] - origin[1]];
+        }
+        Ok((crop, marked))
+    }
+
+    fn background(&self, image: usize) -> Result<Picture, TrainError> {
+        self.album.background(image).map_err(|source| {
+            let image = image + 1;
+            TrainError::Background { image, source }
+        })
+    }
+
+    /// The model as it is now, for images without people.
+    fn mining_model(&self) -> Result<Model, TrainError> {
+        let shape = Shape {
+            interval: self.settings.mining_interval,
+            ..self.plan.shape().clone()
+        };
+        Ok(shape.model(&self.v, 0.0)?)
+    }
+
+    /// Everybody whose parts are marked, as close to the marks as cells allow, with the types of the
+    /// clusters.
+    pub(super) fn nearest(&self) -> Result<Vec<Example>, TrainError> {
+        let model = self.model()?;
+        let all: Vec<_> = (0..self.plan.n_people()).collect();
+        let placed = self.look_at(&all, |&it| {
+            let (image, marked) = self.person(it, true)?;
+            Ok(on_pyramid(&model, &image, |pyramid, layout| {
+                let pose = nearest(&model, layout, &marked, self.settings.overlap)?;
+                Some(Example::of(self.plan.shape(), &self.at, pyramid, &pose))
+            }))
+        })?;
+        let placed: Vec<_> = placed.into_iter().flatten().collect();
+        if placed.is_empty() {
+            let n_people = self.plan.n_people();
+            return Err(TrainError::NobodyPlaced { n_people });
+        }
+        Ok(placed)
+    }
+
+    /// Random windows of images without people.
+    pub(super) fn windows(&self) -> Result<Vec<Vec<f32>>, TrainError> {
+        let model = self.model()?;
+        let side = self.plan.shape().side;
+        let images: Vec<_> = (0..self.album.n_backgrounds().min(WINDOW_IMAGES)).collect();
+        let found = self.look_at(&images, |&image| {
+            let mut random = fastrand::Rng::with_seed(self.seed_of(image));
+            let picture = self.background(image)?;
+            let windows = on_pyramid(&model, &picture, |pyramid, layout| {
+                let window = |_| {
+                    let level = random.usize(0..layout.levels.len());
+                    let it = &layout.levels[level];
+                    let (x, y) = (random.usize(0..it.cols), random.usize(0..it.rows));
+                    crate::example::window(&pyramid.level(level), [x, y], side)
+                };
+                Some((0..WINDOWS).map(window).collect::<Vec<_>>())
+            });
+            Ok(windows.unwrap_or_default())
+        })?;
+        Ok(found.concat())
+    }
+
+    /// Where the model as it is now places everybody near their marks, and the scores.
+    pub(super) fn best_placements(
+        &self,
+        with_types: bool,
+    ) -> Result<Vec<Option<(Placed, f64)>>, TrainError> {
+        let model = self.model()?;
+        let all: Vec<_> = (0..self.plan.n_people()).collect();
+        let placed = self.look_at(&all, |&it| {
+            let (image, marked) = self.person(it, with_types)?;
+            Ok(on_pyramid(&model, &image, |pyramid, layout| {
+                let pose = best_near(&model, pyramid, layout, &marked, self.settings.overlap)?;
+                Some((Placed::of(&pose), f64::from(pose.score)))
+            }))
+        })?;
+        let scores: Vec<f64> = placed.iter().flatten().map(|it| it.1).collect();
+        let n = scores.len();
+        if n == 0 {
+            let n_people = placed.len();
+            return Err(TrainError::NobodyPlaced { n_people });
+        }
+        self.watch.tell(Event::Placed {
+            n,
+            n_lost: placed.len() - n,
+            mean_score: scores.iter().sum::<f64>() / n as f64,
+        });
+        Ok(placed)
+    }
+
+    /// Adds the examples of a batch: false alarms of images without people, and wrong poses.
+    pub(super) fn collect(&mut self, step: Step) -> Result<(), TrainError> {
+        let Step::Learn { round, pass, batch } = step else {
+            return Ok(());
+        };
+        let share = |n: usize, salt: usize| {
+            // The same order in all batches of a pass.
+            let mut order: Vec<usize> = (0..n).collect();
+            let salt = (round * self.settings.passes + pass) * 2 + salt;
+            fastrand::Rng::with_seed(self.seed_of(usize::MAX - salt)).shuffle(&mut order);
+            let n_batches = self
+                .album
+                .n_backgrounds()
+                .div_ceil(self.settings.batch.max(1));
+            let size = n.div_ceil(n_batches);
+            let batch = order.into_iter().skip(batch * size).take(size);
+            batch.collect::<Vec<_>>()
+        };
+        let held: BTreeSet<&Origin> = self.machine.entries().map(|it| it.0).collect();
+        let images = share(self.album.n_backgrounds(), 0);
+        let mut origins = self.false_alarms(&images, &held)?;
+        let backgrounds = origins.len();
+        if self.settings.pose_weight > 0.0 {
+            let people = share(self.plan.n_people(), 1);
+            origins.extend(self.mistakes(&people, &held)?);
+        }
+        let mistakes = origins.len() - backgrounds;
+        self.add(origins, &mut std::iter::repeat(0.0))?;
+        self.watch.tell(Event::Collected {
+            backgrounds,
+            mistakes,
+            held: self.machine.len(),
+            bytes: self.machine.bytes(),
+        });
+        Ok(())
+    }
+
+    fn false_alarms(
+        &self,
+        images: &[usize],
+        held: &BTreeSet<&Origin>,
+    ) -> Result<Vec<Origin>, TrainError> {
+        let miner = Miner::new(self.mining_model()?);
+        let found = self.look_at(images, |&image| {
+            let picture = self.background(image)?;
+            let poses = miner.search(&picture, -1.0, self.settings.per_image);
+            let origins = poses.iter().map(|it| Origin::Background {
+                image: image as u32,
+                pose: Placed::of(it),
+            });
+            Ok(origins.filter(|it| !held.contains(it)).collect::<Vec<_>>())
+        })?;
+        Ok(found.concat())
+    }
+
+    fn mistakes(
+        &self,
+        people: &[usize],
+        held: &BTreeSet<&Origin>,
+    ) -> Result<Vec<Origin>, TrainError> {
+        let confuser = Confuser::new(self.model()?);
+        let found = self.look_at(people, |&it| {
+            if self.right[it].is_none() {
+                return Ok(None);
+            }
+            let (image, marked) = self.person(it, false)?;
+            let wrong = confuser.worst(&image, &marked, self.settings.pose_margin);
+            Ok(wrong.map(|pose| Origin::Mistake {
+                person: it as u32,
+                pose: Placed::of(&pose),
+            }))
+        })?;
+        let found = found.into_iter().flatten();
+        Ok(found.filter(|it| !held.contains(it)).collect())
+    }
+
+    /// What the machine is to demand of every origin: features, and the margin they must reach.
+    pub(super) fn constraints(&self, origins: &[Origin]) -> Result<Vec<(Sparse, f64)>, TrainError> {
+        let (of_people, of_images) = (self.model()?, self.mining_model()?);
+        let same = |a: &Origin, b: &Origin| a.source() == b.source();
+        let runs: Vec<&[Origin]> = origins.chunk_by(same).collect();
+        let made = self.look_at(&runs, |run| {
+            let Some(first) = run.first() else {
+                return Ok(Vec::new());
+            };
+            let (model, image, marked) = match first {
+                Origin::Background { image, .. } => {
+                    (&of_images, self.background(*image as usize)?, None)
+                }
+                Origin::Right { person, .. } | Origin::Mistake { person, .. } => {
+                    let (image, marked) = self.person(*person as usize, false)?;
+                    (&of_people, image, Some(marked))
+                }
+            };
+            let made: Option<Vec<_>> = on_pyramid(model, &image, |pyramid, layout| {
+                let look = Look {
+                    trainer: self,
+                    model,
+                    pyramid,
+                    layout,
+                    marked: marked.as_ref(),
+                };
+                run.iter().map(|it| look.constraint(it)).collect()
+            });
+            made.ok_or(TrainError::Moved)
+        })?;
+        Ok(made.into_iter().flatten().collect())
+    }
+}
+
+/// One image, looked at.
+struct Look<'a> {
+    trainer: &'a Trainer<'a>,
+    model: &'a Model,
+    pyramid: &'a FeaturePyramid<'a>,
+    layout: &'a Layout,
+    /// Where the person is, if it shows one.
+    marked: Option<&'a Marked>,
+}
+
+impl Look<'_> {
+    /// Features of a pose; `None` if it does not lie on the image.
+    fn example(&self, placed: &Placed) -> Option<Example> {
+        let pose = placed.pose();
+        let level = self.layout.levels.get(usize::from(pose.level))?;
+        let lies =
+            |it: &Placement| usize::from(it.x) < level.cols && usize::from(it.y) < level.rows;
+        let shape = self.trainer.plan.shape();
+        (pose.parts.iter().all(lies))
+            .then(|| Example::of(shape, &self.trainer.at, self.pyramid, &pose))
+    }
+
+    fn constraint(&self, origin: &Origin) -> Option<(Sparse, f64)> {
+        Some(match origin {
+            Origin::Right { pose, .. } => {
+                let right = self.example(pose)?;
+                (right.features, 1.0 - right.fixed)
+            }
+            Origin::Background { pose, .. } => {
+                let wrong = self.example(pose)?;
+                (wrong.features.negated(), 1.0 + wrong.fixed)
+            }
+            Origin::Mistake { person, pose } => {
+                let wrong = self.example(pose)?;
+                let right = self.trainer.right[*person as usize].as_ref();
+                let right = self.example(right?)?;
+                let worst = self.trainer.settings.pose_margin;
+                let loss = loss(self.model, self.layout, self.marked?, worst);
+                let margin = loss.of_pose(self.model, &pose.pose());
+                let margin = margin - (right.fixed - wrong.fixed);
+                (right.features.minus(&wrong.features), margin)
+            }
+        })
+    }
+}
+
+/// Runs `look` on the features of an image, if it is large enough for the model.
+fn on_pyramid<T>(
+    model: &Model,
+    image: &Picture,
+    look: impl FnOnce(&FeaturePyramid<'_>, &Layout) -> Option<T>,
+) -> Option<T> {
+    let view = image.view();
+    let layout = Layout::new(model, view.width(), view.height()).ok()?;
+    look(&FeaturePyramid::new(model, view, &layout), &layout)
+}
