@@ -15,12 +15,24 @@ use crate::sparse::Sparse;
 
 pub use solve::{Effort, Gap};
 
-/// One constraint: `v . x >= margin`.
+/// One demand on the solution: `v . x >= margin`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Constraint {
+    /// The example.
+    pub x: Sparse,
+    /// What its product with the solution is to reach.
+    pub margin: f64,
+    /// Examples with the same number share their values, and are visited one after the other while
+    /// these are in the cache.
+    pub near: u64,
+}
+
 #[derive(Debug)]
 struct Entry<T> {
     x: Sparse,
     squared_norm: f64,
     margin: f64,
+    near: u64,
     group: usize,
     share: f64,
     tag: T,
@@ -76,20 +88,11 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         }
     }
 
-    /// Demands `v . x >= margin`. The cost of a group is that of its first example.
-    pub fn add(&mut self, cost: Cost<K>, tag: T, x: Sparse, margin: f64) {
-        self.add_with_share(cost, tag, (x, margin), 0.0);
-    }
-
-    /// As [`Self::add`], with a share in the solution that is known from before; see
-    /// [`Self::entries`].
-    pub fn add_with_share(
-        &mut self,
-        cost: Cost<K>,
-        tag: T,
-        (x, margin): (Sparse, f64),
-        share: f64,
-    ) {
+    /// Adds a demand. The cost of a group is that of its first example.
+    ///
+    /// * `share`: of the example in the solution; 0 if it is not known from before, see
+    ///   [`Self::entries`].
+    pub fn add(&mut self, cost: Cost<K>, tag: T, demand: Constraint, share: f64) {
         let Cost { group, of_unit } = cost;
         let groups = &mut self.groups;
         let group = *self.group_of.entry(group.clone()).or_insert_with(|| {
@@ -103,11 +106,13 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         });
         groups[group].members.push(self.entries.len());
         groups[group].total += share;
+        let Constraint { x, margin, near } = demand;
         self.bytes += x.bytes();
         self.entries.push(Entry {
             squared_norm: x.squared_norm(),
             x,
             margin,
+            near,
             group,
             share,
             tag,
@@ -149,20 +154,17 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         self.keep(&|it| wanted(&it.tag));
     }
 
-    /// Removes examples without a share, those first that meet their margin with most room to spare,
-    /// until the others hold at most `bytes`.
-    pub fn forget(&mut self, bytes: usize) {
-        if self.bytes <= bytes {
-            return;
-        }
+    /// Removes examples without a share that meet their margin with `room` to spare, and, of all without
+    /// a share, as many of those with most room that the others hold at most `bytes`.
+    pub fn forget(&mut self, room: f64, bytes: usize) {
         let mut idle: Vec<(f64, usize)> = (0..self.entries.len())
             .filter(|&it| self.entries[it].share == 0.0)
             .map(|it| (self.slope(it), it))
             .collect();
         idle.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut left = self.bytes;
-        for (_, it) in idle {
-            if left <= bytes {
+        for (slope, it) in idle {
+            if left <= bytes && slope >= -room {
                 break;
             }
             left -= self.entries[it].x.bytes();
@@ -184,7 +186,12 @@ impl<K: Ord + Clone, T> Machine<K, T> {
                     group: groups[it.group].key.clone(),
                     of_unit: groups[it.group].cost,
                 };
-                self.add_with_share(cost, it.tag, (it.x, it.margin), it.share);
+                let demand = Constraint {
+                    x: it.x,
+                    margin: it.margin,
+                    near: it.near,
+                };
+                self.add(cost, it.tag, demand, it.share);
             }
         }
     }

@@ -1,10 +1,12 @@
 //! What a placed pose looks like to the trainer: a sparse vector.
 
+use std::sync::Arc;
+
 use fmp::{FeaturePyramid, Pose};
 use kernels::{FeatureMap, N_CHANNELS};
 
 use crate::shape::{Coordinates, MIN_STIFFNESS, Shape};
-use crate::sparse::Sparse;
+use crate::sparse::{Run, Sparse};
 
 /// A pose as the trainer sees it: its score under the vector `v` is `features . v + fixed`.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,25 +18,56 @@ pub(crate) struct Example {
 }
 
 impl Example {
-    /// Reads the features of a pose off its pyramid.
+    /// Reads the features of a pose off its level, and keeps them.
+    ///
+    /// # Panics
+    ///
+    /// If the pose does not lie on the level.
+    pub(crate) fn of(shape: &Shape, at: &Coordinates, map: &FeatureMap<'_>, pose: &Pose) -> Self {
+        let runs = pose.parts.iter().enumerate().map(|(part, placed)| {
+            let corner = [placed.x, placed.y].map(usize::from);
+            let cells = window(map, corner, shape.side);
+            (
+                at.filter(part, usize::from(placed.mixture)),
+                Run::Own(cells),
+            )
+        });
+        Self::with(shape, at, pose, None, runs.collect())
+    }
+
+    /// As [`Self::of`], but the features stay where they are.
     ///
     /// # Panics
     ///
     /// If the pose does not lie on the pyramid.
-    pub(crate) fn of(
+    pub(crate) fn sharing(shape: &Shape, at: &Coordinates, pyramid: &Cells, pose: &Pose) -> Self {
+        let row_len = shape.side * N_CHANNELS;
+        let mut runs = Vec::with_capacity((shape.side + 3) * shape.n_parts());
+        for (part, placed) in pose.parts.iter().enumerate() {
+            let first = at.filter(part, usize::from(placed.mixture));
+            let corner = [placed.x, placed.y].map(usize::from);
+            for row in 0..shape.side {
+                let run = Run::Shared {
+                    at: pyramid.cell(pose.level, [corner[0], corner[1] + row]),
+                    len: row_len,
+                };
+                runs.push((first + row * row_len, run));
+            }
+        }
+        Self::with(shape, at, pose, Some(Arc::clone(&pyramid.cells)), runs)
+    }
+
+    /// Adds springs and biases to the runs of the filters.
+    fn with(
         shape: &Shape,
         at: &Coordinates,
-        pyramid: &FeaturePyramid<'_>,
         pose: &Pose,
+        shared: Option<Arc<[f32]>>,
+        mut runs: Vec<(usize, Run)>,
     ) -> Self {
-        let map = pyramid.level(usize::from(pose.level));
-        let mut runs: Vec<(usize, Vec<f32>)> = Vec::with_capacity(4 * shape.n_parts());
         let mut fixed = 0.0;
         for (part, placed) in pose.parts.iter().enumerate() {
-            let (x, y) = (usize::from(placed.x), usize::from(placed.y));
             let mixture = usize::from(placed.mixture);
-            let cells = window(&map, [x, y], shape.side);
-            runs.push((at.filter(part, mixture), cells));
             let Some(parent) = shape.parents[part] else {
                 continue;
             };
@@ -45,19 +78,55 @@ impl Example {
                 i32::from(parent.y) + anchor[1] - i32::from(placed.y),
             ]
             .map(|it| it as f32);
-            runs.push((at.quadratic(part, mixture), vec![-dx * dx, -dy * dy]));
-            runs.push((at.linear(part, mixture), vec![-dx, -dy]));
             let bias = at.bias(part, usize::from(parent.mixture), mixture);
-            runs.push((bias, vec![1.0]));
+            let quadratic = vec![-dx * dx, -dy * dy];
+            runs.push((at.quadratic(part, mixture), Run::Own(quadratic)));
+            runs.push((at.linear(part, mixture), Run::Own(vec![-dx, -dy])));
+            runs.push((bias, Run::Own(vec![1.0])));
             fixed -= MIN_STIFFNESS * f64::from(dx * dx + dy * dy);
         }
         let (root, value) = at.root();
-        runs.push((root, vec![value]));
+        runs.push((root, Run::Own(vec![value])));
         runs.sort_unstable_by_key(|it| it.0);
         Self {
-            features: Sparse::new(runs),
+            features: Sparse::sharing(shared, runs),
             fixed,
         }
+    }
+}
+
+/// The features of all levels of an image, in one array.
+#[derive(Debug)]
+pub(crate) struct Cells {
+    cells: Arc<[f32]>,
+    /// Where each level begins, and its columns.
+    levels: Vec<(usize, usize)>,
+}
+
+impl Cells {
+    /// Computes all levels.
+    pub(crate) fn of(pyramid: &FeaturePyramid<'_>, n_levels: usize) -> Self {
+        let mut cells = Vec::new();
+        let mut levels = Vec::new();
+        for level in 0..n_levels {
+            let map = pyramid.level(level);
+            levels.push((cells.len(), map.cols));
+            cells.extend_from_slice(&map.cells[..map.rows * map.cols * N_CHANNELS]);
+        }
+        Self {
+            cells: cells.into(),
+            levels,
+        }
+    }
+
+    /// Bytes that they take.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.cells)
+    }
+
+    fn cell(&self, level: u16, [x, y]: [usize; 2]) -> usize {
+        let (first, cols) = self.levels[usize::from(level)];
+        first + (y * cols + x) * N_CHANNELS
     }
 }
 

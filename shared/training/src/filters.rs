@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::dual::{Cost, Effort, Machine};
+use crate::dual::{Constraint, Cost, Effort, Machine};
 use crate::example::Example;
 use crate::shape::{Coordinates, Shape};
 use crate::sparse::Sparse;
@@ -77,20 +77,22 @@ fn one(
 ) -> Vec<f64> {
     let n = at.filter_len();
     let mut machine = Machine::new(n + 1, 0..0);
-    let windows = people.iter().filter_map(|it| {
-        let mut runs = it.features.runs();
-        runs.find(|(start, _)| *start == first).map(|it| it.1)
-    });
+    let windows = people.iter().filter_map(|it| it.features.run(first));
     let windows = windows.map(|it| (it, settings.positive_weight, 1.0));
-    let background = background.iter().map(|it| (&it[..], 1.0, -1.0));
+    let background = background.iter().map(|it| (it.clone(), 1.0, -1.0));
     for (group, (window, weight, sign)) in windows.chain(background).enumerate() {
         let cost = Cost {
             group,
             of_unit: settings.cost * weight,
         };
-        let x = Sparse::new([(0, window), (n, &[BIAS as f32][..])]);
+        let x = Sparse::new([(0, window), (n, vec![BIAS as f32])]);
         let x = if sign < 0.0 { x.negated() } else { x };
-        machine.add(cost, (), x, 1.0);
+        let demand = Constraint {
+            x,
+            margin: 1.0,
+            near: 0,
+        };
+        machine.add(cost, (), demand, 0.0);
     }
     let mut random = fastrand::Rng::with_seed(settings.seed ^ first as u64);
     machine.solve(settings.effort, &mut random, &mut |_| true);

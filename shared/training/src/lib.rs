@@ -24,11 +24,11 @@ mod types;
 mod watch;
 
 pub use album::{Album, AlbumError};
-pub use dual::{Cost, Effort, Gap, Machine};
+pub use dual::{Constraint, Cost, Effort, Gap, Machine};
 pub use plan::{Plan, PlanError, Tree};
 pub use settings::Settings;
 pub use shape::{MIN_STIFFNESS, Shape};
-pub use sparse::Sparse;
+pub use sparse::{Run, Sparse};
 pub use trainer::{Checkpoint, CheckpointError, TrainError, Trainer};
 pub use types::TypesBy;
 pub use watch::{Event, Step, Watch};

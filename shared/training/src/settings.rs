@@ -39,9 +39,12 @@ pub struct Settings {
     pub overlap: f64,
     /// Gap of the machine that is good enough, as a share of its objective.
     pub tolerance: f64,
-    /// Memory for examples, MiB.
+    /// Memory for examples and the features that they show, MiB; what the solution needs is kept even
+    /// if it takes more.
     pub cache_mib: usize,
-    /// Most examples taken from one image without people at a time.
+    /// Score by which a place without a person must stay clear of its margin to be dropped.
+    pub room: f64,
+    /// Most places of one image without people that are added at a time, best first.
     pub per_image: usize,
     /// Images without people that are searched between two solutions.
     pub batch: usize,
@@ -72,7 +75,8 @@ impl Default for Settings {
             overlap: 0.6,
             tolerance: 0.05,
             cache_mib: 2048,
-            per_image: 50,
+            room: 0.2,
+            per_image: 200,
             batch: 64,
             fixed_rounds: 1,
             latent_rounds: 1,

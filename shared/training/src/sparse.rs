@@ -1,66 +1,131 @@
 //! Sparse vectors made of runs.
 
+use std::sync::Arc;
+
 /// Consecutive coordinates that are not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Span {
     start: u32,
     len: u32,
+    /// Where the values are, in one's own list or the shared one.
+    at: u32,
+    shared: bool,
 }
 
-/// A sparse vector, as runs of values in ascending order.
+/// A sparse vector, as runs of values in ascending order, times 1 or -1.
+///
+/// The values of a run are the vector's own, or lie in an array that many vectors share: the features of
+/// one image, of which every example shows other windows.
 ///
 /// Vectors that meet (in [`Self::dot_sparse`], [`Self::minus`]) are made of the same kinds of runs: two
 /// runs begin at the same coordinate and have the same length, or share no coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sparse {
     spans: Box<[Span]>,
-    values: Box<[f32]>,
+    own: Box<[f32]>,
+    shared: Option<Arc<[f32]>>,
+    sign: f32,
+}
+
+/// The values of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Run {
+    /// A copy.
+    Own(Vec<f32>),
+    /// So many values of the shared array, from there on.
+    Shared {
+        /// The first.
+        at: usize,
+        /// How many.
+        len: usize,
+    },
 }
 
 impl Sparse {
     /// Makes a vector of runs `(start, values)`, in ascending order and without overlap.
     pub fn new<R: AsRef<[f32]>>(runs: impl IntoIterator<Item = (usize, R)>) -> Self {
-        let mut spans: Vec<Span> = Vec::new();
-        let mut values = Vec::new();
-        for (start, run) in runs {
-            let run = run.as_ref();
-            spans.push(Span {
+        let runs = runs.into_iter();
+        Self::sharing(
+            None,
+            runs.map(|(start, run)| (start, Run::Own(run.as_ref().to_vec()))),
+        )
+    }
+
+    /// Makes a vector of runs, some of which lie in `shared`.
+    ///
+    /// # Panics
+    ///
+    /// If a run is to lie beyond the end of `shared`.
+    pub fn sharing(
+        shared: Option<Arc<[f32]>>,
+        runs: impl IntoIterator<Item = (usize, Run)>,
+    ) -> Self {
+        let n_shared = shared.as_ref().map_or(0, |it| it.len());
+        let mut own = Vec::new();
+        let span = |(start, run): (usize, Run)| {
+            let (at, len, shared) = match run {
+                Run::Own(values) => {
+                    own.extend_from_slice(&values);
+                    (own.len() - values.len(), values.len(), false)
+                }
+                Run::Shared { at, len } => {
+                    assert!(at + len <= n_shared, "a run within the shared values");
+                    (at, len, true)
+                }
+            };
+            Span {
                 start: start as u32,
-                len: run.len() as u32,
-            });
-            values.extend_from_slice(run);
-        }
+                len: len as u32,
+                at: at as u32,
+                shared,
+            }
+        };
         Self {
-            spans: spans.into(),
-            values: values.into(),
+            spans: runs.into_iter().map(span).collect(),
+            own: own.into(),
+            shared,
+            sign: 1.0,
         }
     }
 
-    /// Bytes that the vector holds.
+    /// Bytes that the vector holds for itself alone.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.spans) + size_of_val(&*self.values)
+        size_of_val(&*self.spans) + size_of_val(&*self.own)
     }
 
-    /// The runs, each with where it begins.
-    pub fn runs(&self) -> impl Iterator<Item = (usize, &[f32])> {
-        let mut at = 0;
+    /// The runs, each with where it begins, before the sign.
+    fn runs(&self) -> impl Iterator<Item = (usize, &[f32])> {
+        let shared = self.shared.as_deref().unwrap_or_default();
         self.spans.iter().map(move |it| {
-            let run = &self.values[at..at + it.len as usize];
-            at += run.len();
-            (it.start as usize, run)
+            let values = if it.shared { shared } else { &self.own };
+            let at = it.at as usize;
+            (it.start as usize, &values[at..at + it.len as usize])
         })
+    }
+
+    /// Where every run begins and how long it is.
+    pub fn spans(&self) -> impl Iterator<Item = (usize, usize)> {
+        let spans = self.spans.iter();
+        spans.map(|it| (it.start as usize, it.len as usize))
+    }
+
+    /// The values of the run that begins at `start`.
+    pub fn run(&self, start: usize) -> Option<Vec<f32>> {
+        let found = self.runs().find(|it| it.0 == start);
+        found.map(|(_, run)| run.iter().map(|it| self.sign * it).collect())
     }
 
     /// The square of its norm.
     pub fn squared_norm(&self) -> f64 {
-        sum_of_products(&self.values, &self.values)
+        self.runs().map(|(_, run)| sum_of_products(run, run)).sum()
     }
 
     /// The product with a dense vector.
     pub fn dot(&self, dense: &[f32]) -> f64 {
-        self.runs()
-            .map(|(start, run)| sum_of_products(run, &dense[start..start + run.len()]))
-            .sum()
+        let products = self
+            .runs()
+            .map(|(start, run)| sum_of_products(run, &dense[start..start + run.len()]));
+        f64::from(self.sign) * products.sum::<f64>()
     }
 
     /// The product with another sparse vector.
@@ -73,11 +138,12 @@ impl Sparse {
                 sum += sum_of_products(run, their_run);
             }
         }
-        sum
+        f64::from(self.sign * other.sign) * sum
     }
 
     /// Adds `factor` times this vector to a dense one.
     pub fn add_to(&self, dense: &mut [f64], factor: f64) {
+        let factor = factor * f64::from(self.sign);
         for (start, run) in self.runs() {
             for (sum, x) in dense[start..start + run.len()].iter_mut().zip(run) {
                 *sum += factor * f64::from(*x);
@@ -88,30 +154,29 @@ impl Sparse {
     /// The vector with its sign changed.
     #[must_use]
     pub fn negated(mut self) -> Self {
-        for it in &mut self.values {
-            *it = -*it;
-        }
+        self.sign = -self.sign;
         self
     }
 
     /// This vector less another.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
+        let signed = |run: &[f32], sign: f32| run.iter().map(|it| sign * it).collect::<Vec<_>>();
         let mut runs: Vec<(usize, Vec<f32>)> = Vec::new();
         let mut theirs = other.runs().peekable();
-        let negative =
-            |(start, run): (usize, &[f32])| (start, run.iter().map(|it| -it).collect::<Vec<_>>());
         for (start, run) in self.runs() {
-            while let Some(it) = theirs.next_if(|it| it.0 < start) {
-                runs.push(negative(it));
+            while let Some((start, run)) = theirs.next_if(|it| it.0 < start) {
+                runs.push((start, signed(run, -other.sign)));
             }
-            let run = match theirs.next_if(|it| it.0 == start) {
-                Some((_, their_run)) => run.iter().zip(their_run).map(|(a, b)| a - b).collect(),
-                None => run.to_vec(),
-            };
+            let mut run = signed(run, self.sign);
+            if let Some((_, their_run)) = theirs.next_if(|it| it.0 == start) {
+                for (a, b) in run.iter_mut().zip(their_run) {
+                    *a -= other.sign * b;
+                }
+            }
             runs.push((start, run));
         }
-        runs.extend(theirs.map(negative));
+        runs.extend(theirs.map(|(start, run)| (start, signed(run, -other.sign))));
         Self::new(runs)
     }
 }

@@ -3,10 +3,14 @@
 mod checkpoint;
 mod collect;
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, PoisonError};
+
 use fmp::{Model, ModelError};
 
 use crate::album::{Album, AlbumError};
 use crate::dual::{Cost, Effort, Gap, Machine};
+use crate::example::Cells;
 use crate::filters::{FilterSettings, first_model};
 use crate::origin::{Group, Origin, Placed};
 use crate::plan::Plan;
@@ -69,6 +73,8 @@ pub struct Trainer<'a> {
     steps: Vec<Step>,
     next: usize,
     machine: Machine<Group, Origin>,
+    /// Features of the images without people that examples show.
+    cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
     /// Where every person was placed last.
     right: Vec<Option<Placed>>,
     v: Vec<f64>,
@@ -103,6 +109,7 @@ impl<'a> Trainer<'a> {
             machine: Machine::new(at.len(), at.non_negative()),
             steps: steps(settings, album.n_backgrounds()),
             next: 0,
+            cells: Mutex::default(),
             right: vec![None; plan.n_people()],
             v: vec![0.0; at.len()],
             threshold: 0.0,
@@ -210,9 +217,33 @@ impl<'a> Trainer<'a> {
         };
         self.machine.solve(effort, random, &mut told);
         self.go_on()?;
-        self.machine.forget(self.settings.cache_mib << 20);
+        self.forget();
         self.v = self.machine.solution();
         Ok(())
+    }
+
+    /// Bytes that examples and features take.
+    fn bytes(&self) -> usize {
+        let cells = self.cells.lock().unwrap_or_else(PoisonError::into_inner);
+        self.machine.bytes() + cells.values().map(|it| it.bytes()).sum::<usize>()
+    }
+
+    /// Drops examples that the solution does not need, and the features that no example shows.
+    fn forget(&mut self) {
+        let features = self.bytes() - self.machine.bytes();
+        let room = (self.settings.cache_mib << 20).saturating_sub(features);
+        self.machine.forget(self.settings.room, room);
+        let image = |it: &Origin| match it {
+            Origin::Background { image, .. } => Some(*image as usize),
+            Origin::Right { .. } | Origin::Mistake { .. } => None,
+        };
+        let shown: BTreeSet<usize> = self
+            .machine
+            .entries()
+            .filter_map(|it| image(it.0))
+            .collect();
+        let cells = self.cells.get_mut().unwrap_or_else(PoisonError::into_inner);
+        cells.retain(|it, _| shown.contains(it));
     }
 
     /// Sets the threshold that all but the twentieth part of the people reach (Yang & Ramanan 2013).
@@ -240,7 +271,7 @@ impl<'a> Trainer<'a> {
                 group: origin.group(),
                 of_unit: self.settings.cost * weight,
             };
-            self.machine.add_with_share(cost, origin, constraint, share);
+            self.machine.add(cost, origin, constraint, share);
         }
         Ok(())
     }

@@ -47,21 +47,16 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         go_on: &mut dyn FnMut(Gap) -> bool,
     ) -> Gap {
         self.sum_up();
-        let mut order: Vec<usize> = (0..self.entries.len()).collect();
         let mut gap = self.gap();
         for _ in 0..effort.max_passes {
             if !go_on(gap) || gap.relative() <= effort.tolerance {
                 return gap;
             }
-            random.shuffle(&mut order);
-            for &it in &order {
+            for it in self.order(random, |_| true) {
                 self.step(it);
             }
             for _ in 0..PASSES_OVER_SUPPORT {
-                let has_share = |it: &usize| self.entries[*it].share > 0.0;
-                let mut support: Vec<_> = (0..self.entries.len()).filter(has_share).collect();
-                random.shuffle(&mut support);
-                for it in support {
+                for it in self.order(random, |it| it.share > 0.0) {
                     self.step(it);
                 }
             }
@@ -69,6 +64,20 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         }
         go_on(gap);
         gap
+    }
+
+    /// A random order of some examples, in which those of one place in memory stand together.
+    fn order(&self, random: &mut fastrand::Rng, wanted: impl Fn(&Entry<T>) -> bool) -> Vec<usize> {
+        let salt = random.u64(..);
+        let all = (0..self.entries.len()).filter(|&it| wanted(&self.entries[it]));
+        let mut order: Vec<_> = all
+            .map(|it| {
+                let near = fastrand::Rng::with_seed(salt ^ self.entries[it].near).u64(..);
+                (near, random.u32(..), it)
+            })
+            .collect();
+        order.sort_unstable();
+        order.into_iter().map(|it| it.2).collect()
     }
 
     /// The gap on the examples at hand.
@@ -155,9 +164,9 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         entry.share = (entry.share + by).max(0.0);
         self.groups[entry.group].total += by;
         entry.x.add_to(&mut self.sum, by);
-        for (start, run) in entry.x.runs() {
+        for (start, len) in entry.x.spans() {
             let may_be_negative = !self.non_negative.contains(&start);
-            let solution = self.solution[start..start + run.len()].iter_mut();
+            let solution = self.solution[start..start + len].iter_mut();
             for (solution, sum) in solution.zip(&self.sum[start..]) {
                 *solution = if may_be_negative { *sum } else { sum.max(0.0) } as f32;
             }

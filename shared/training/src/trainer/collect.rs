@@ -2,19 +2,20 @@
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, PoisonError};
 
 use datasets::Picture;
-use fmp::{FeaturePyramid, Layout, Model, Placement};
+use fmp::{FeaturePyramid, Layout, Model, Placement, Pose};
 use rayon::prelude::*;
 
 use super::{TrainError, Trainer};
 use crate::confuse::{Confuser, loss};
-use crate::example::Example;
+use crate::dual::Constraint;
+use crate::example::{Cells, Example};
 use crate::latent::{Marked, best_near, nearest};
 use crate::mine::Miner;
 use crate::origin::{Origin, Placed};
 use crate::shape::Shape;
-use crate::sparse::Sparse;
 use crate::watch::{Event, Step};
 
 /// Images that the windows of the first filters come from, and windows of each.
@@ -81,7 +82,8 @@ impl Trainer<'_> {
             let (image, marked) = self.person(it, true)?;
             Ok(on_pyramid(&model, &image, |pyramid, layout| {
                 let pose = nearest(&model, layout, &marked, self.settings.overlap)?;
-                Some(Example::of(self.plan.shape(), &self.at, pyramid, &pose))
+                let map = pyramid.level(usize::from(pose.level));
+                Some(Example::of(self.plan.shape(), &self.at, &map, &pose))
             }))
         })?;
         let placed: Vec<_> = placed.into_iter().flatten().collect();
@@ -174,7 +176,7 @@ impl Trainer<'_> {
             backgrounds,
             mistakes,
             held: self.machine.len(),
-            bytes: self.machine.bytes(),
+            bytes: self.bytes(),
         });
         Ok(())
     }
@@ -218,84 +220,100 @@ impl Trainer<'_> {
         Ok(found.filter(|it| !held.contains(it)).collect())
     }
 
-    /// What the machine is to demand of every origin: features, and the margin they must reach.
-    pub(super) fn constraints(&self, origins: &[Origin]) -> Result<Vec<(Sparse, f64)>, TrainError> {
+    /// What the machine is to demand of every origin.
+    pub(super) fn constraints(&self, origins: &[Origin]) -> Result<Vec<Constraint>, TrainError> {
         let (of_people, of_images) = (self.model()?, self.mining_model()?);
         let same = |a: &Origin, b: &Origin| a.source() == b.source();
         let runs: Vec<&[Origin]> = origins.chunk_by(same).collect();
         let made = self.look_at(&runs, |run| {
-            let Some(first) = run.first() else {
-                return Ok(Vec::new());
-            };
-            let (model, image, marked) = match first {
-                Origin::Background { image, .. } => {
-                    (&of_images, self.background(*image as usize)?, None)
+            let made = match run.first() {
+                None => Some(Vec::new()),
+                Some(Origin::Background { image, .. }) => {
+                    self.of_background(&of_images, *image as usize, run)?
                 }
-                Origin::Right { person, .. } | Origin::Mistake { person, .. } => {
-                    let (image, marked) = self.person(*person as usize, false)?;
-                    (&of_people, image, Some(marked))
+                Some(Origin::Right { person, .. } | Origin::Mistake { person, .. }) => {
+                    self.of_person(&of_people, *person as usize, run)?
                 }
             };
-            let made: Option<Vec<_>> = on_pyramid(model, &image, |pyramid, layout| {
-                let look = Look {
-                    trainer: self,
-                    model,
-                    pyramid,
-                    layout,
-                    marked: marked.as_ref(),
-                };
-                run.iter().map(|it| look.constraint(it)).collect()
-            });
             made.ok_or(TrainError::Moved)
         })?;
         Ok(made.into_iter().flatten().collect())
     }
-}
 
-/// One image, looked at.
-struct Look<'a> {
-    trainer: &'a Trainer<'a>,
-    model: &'a Model,
-    pyramid: &'a FeaturePyramid<'a>,
-    layout: &'a Layout,
-    /// Where the person is, if it shows one.
-    marked: Option<&'a Marked>,
-}
-
-impl Look<'_> {
-    /// Features of a pose; `None` if it does not lie on the image.
-    fn example(&self, placed: &Placed) -> Option<Example> {
-        let pose = placed.pose();
-        let level = self.layout.levels.get(usize::from(pose.level))?;
-        let lies =
-            |it: &Placement| usize::from(it.x) < level.cols && usize::from(it.y) < level.rows;
-        let shape = self.trainer.plan.shape();
-        (pose.parts.iter().all(lies))
-            .then(|| Example::of(shape, &self.trainer.at, self.pyramid, &pose))
+    /// `None` if a pose does not lie on the image.
+    fn of_background(
+        &self,
+        model: &Model,
+        image: usize,
+        origins: &[Origin],
+    ) -> Result<Option<Vec<Constraint>>, TrainError> {
+        let picture = self.background(image)?;
+        let near = image as u64;
+        Ok(on_pyramid(model, &picture, |pyramid, layout| {
+            let cells = self.cells(image, pyramid, layout);
+            let constraint = |it: &Origin| {
+                let pose = on_layout(it.pose(), layout)?;
+                let wrong = Example::sharing(self.plan.shape(), &self.at, &cells, &pose);
+                Some(Constraint {
+                    x: wrong.features.negated(),
+                    margin: 1.0 + wrong.fixed,
+                    near,
+                })
+            };
+            origins.iter().map(constraint).collect()
+        }))
     }
 
-    fn constraint(&self, origin: &Origin) -> Option<(Sparse, f64)> {
-        Some(match origin {
-            Origin::Right { pose, .. } => {
-                let right = self.example(pose)?;
-                (right.features, 1.0 - right.fixed)
-            }
-            Origin::Background { pose, .. } => {
-                let wrong = self.example(pose)?;
-                (wrong.features.negated(), 1.0 + wrong.fixed)
-            }
-            Origin::Mistake { person, pose } => {
-                let wrong = self.example(pose)?;
-                let right = self.trainer.right[*person as usize].as_ref();
-                let right = self.example(right?)?;
-                let worst = self.trainer.settings.pose_margin;
-                let loss = loss(self.model, self.layout, self.marked?, worst);
-                let margin = loss.of_pose(self.model, &pose.pose());
-                let margin = margin - (right.fixed - wrong.fixed);
-                (right.features.minus(&wrong.features), margin)
-            }
-        })
+    /// `None` if a pose does not lie on the image.
+    fn of_person(
+        &self,
+        model: &Model,
+        person: usize,
+        origins: &[Origin],
+    ) -> Result<Option<Vec<Constraint>>, TrainError> {
+        let (image, marked) = self.person(person, false)?;
+        Ok(on_pyramid(model, &image, |pyramid, layout| {
+            let example = |placed: &Placed| {
+                let pose = on_layout(placed, layout)?;
+                let map = pyramid.level(usize::from(pose.level));
+                let example = Example::of(self.plan.shape(), &self.at, &map, &pose);
+                Some((pose, example))
+            };
+            let constraint = |it: &Origin| {
+                let (pose, shown) = example(it.pose())?;
+                let (x, margin) = if let Origin::Mistake { .. } = it {
+                    let (_, right) = example(self.right[person].as_ref()?)?;
+                    let worst = self.settings.pose_margin;
+                    let lost = loss(model, layout, &marked, worst).of_pose(model, &pose);
+                    let margin = lost - (right.fixed - shown.fixed);
+                    (right.features.minus(&shown.features), margin)
+                } else {
+                    (shown.features, 1.0 - shown.fixed)
+                };
+                let near = u64::MAX; // everybody has a vector of their own
+                Some(Constraint { x, margin, near })
+            };
+            origins.iter().map(constraint).collect()
+        }))
     }
+
+    /// The features of an image without people, kept as long as examples show them.
+    fn cells(&self, image: usize, pyramid: &FeaturePyramid<'_>, layout: &Layout) -> Arc<Cells> {
+        let held = || self.cells.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(it) = held().get(&image) {
+            return Arc::clone(it);
+        }
+        let cells = Arc::new(Cells::of(pyramid, layout.levels.len()));
+        Arc::clone(held().entry(image).or_insert(cells))
+    }
+}
+
+/// The pose, if it lies on the image.
+fn on_layout(placed: &Placed, layout: &Layout) -> Option<Pose> {
+    let pose = placed.pose();
+    let level = layout.levels.get(usize::from(pose.level))?;
+    let lies = |it: &Placement| usize::from(it.x) < level.cols && usize::from(it.y) < level.rows;
+    pose.parts.iter().all(lies).then_some(pose)
 }
 
 /// Runs `look` on the features of an image, if it is large enough for the model.
