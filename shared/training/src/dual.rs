@@ -22,9 +22,6 @@ pub struct Constraint {
     pub x: Sparse,
     /// What its product with the solution is to reach.
     pub margin: f64,
-    /// Examples with the same number share their values, and are visited one after the other while
-    /// these are in the cache.
-    pub near: u64,
 }
 
 #[derive(Debug)]
@@ -32,7 +29,6 @@ struct Entry<T> {
     x: Sparse,
     squared_norm: f64,
     margin: f64,
-    near: u64,
     group: usize,
     share: f64,
     tag: T,
@@ -106,13 +102,12 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         });
         groups[group].members.push(self.entries.len());
         groups[group].total += share;
-        let Constraint { x, margin, near } = demand;
+        let Constraint { x, margin } = demand;
         self.bytes += x.bytes();
         self.entries.push(Entry {
             squared_norm: x.squared_norm(),
             x,
             margin,
-            near,
             group,
             share,
             tag,
@@ -189,7 +184,6 @@ impl<K: Ord + Clone, T> Machine<K, T> {
                 let demand = Constraint {
                     x: it.x,
                     margin: it.margin,
-                    near: it.near,
                 };
                 self.add(cost, it.tag, demand, it.share);
             }

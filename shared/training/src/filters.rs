@@ -87,11 +87,7 @@ fn one(
         };
         let x = Sparse::new([(0, window), (n, vec![BIAS as f32])]);
         let x = if sign < 0.0 { x.negated() } else { x };
-        let demand = Constraint {
-            x,
-            margin: 1.0,
-            near: 0,
-        };
+        let demand = Constraint { x, margin: 1.0 };
         machine.add(cost, (), demand, 0.0);
     }
     let mut random = fastrand::Rng::with_seed(settings.seed ^ first as u64);

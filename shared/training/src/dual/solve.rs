@@ -66,18 +66,15 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         gap
     }
 
-    /// A random order of some examples, in which those of one place in memory stand together.
+    /// A random order of some examples.
+    ///
+    /// Examples of one image side by side would be faster to read, but the descent needs several times
+    /// as many passes then: right and wrong ones must take turns to settle the root's bias.
     fn order(&self, random: &mut fastrand::Rng, wanted: impl Fn(&Entry<T>) -> bool) -> Vec<usize> {
-        let salt = random.u64(..);
-        let all = (0..self.entries.len()).filter(|&it| wanted(&self.entries[it]));
-        let mut order: Vec<_> = all
-            .map(|it| {
-                let near = fastrand::Rng::with_seed(salt ^ self.entries[it].near).u64(..);
-                (near, random.u32(..), it)
-            })
-            .collect();
-        order.sort_unstable();
-        order.into_iter().map(|it| it.2).collect()
+        let all = 0..self.entries.len();
+        let mut order: Vec<_> = all.filter(|&it| wanted(&self.entries[it])).collect();
+        random.shuffle(&mut order);
+        order
     }
 
     /// The gap on the examples at hand.

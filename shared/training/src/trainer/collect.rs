@@ -248,7 +248,6 @@ impl Trainer<'_> {
         origins: &[Origin],
     ) -> Result<Option<Vec<Constraint>>, TrainError> {
         let picture = self.background(image)?;
-        let near = image as u64;
         Ok(on_pyramid(model, &picture, |pyramid, layout| {
             let cells = self.cells(image, pyramid, layout);
             let constraint = |it: &Origin| {
@@ -257,7 +256,6 @@ impl Trainer<'_> {
                 Some(Constraint {
                     x: wrong.features.negated(),
                     margin: 1.0 + wrong.fixed,
-                    near,
                 })
             };
             origins.iter().map(constraint).collect()
@@ -290,8 +288,7 @@ impl Trainer<'_> {
                 } else {
                     (shown.features, 1.0 - shown.fixed)
                 };
-                let near = u64::MAX; // everybody has a vector of their own
-                Some(Constraint { x, margin, near })
+                Some(Constraint { x, margin })
             };
             origins.iter().map(constraint).collect()
         }))
