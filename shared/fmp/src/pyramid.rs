@@ -3,12 +3,16 @@
 use kernels::{FeatureMap, Isa, Rgb8View};
 
 use crate::features::{Features, Source};
-use crate::{Layout, Model};
+use crate::{Layout, Model, Scope};
 
 /// The features of an image, level by level; a level is computed when it is first asked for.
 #[derive(Debug)]
 pub struct FeaturePyramid<'a> {
-    source: Source<'a>,
+    image: Rgb8View<'a>,
+    layout: &'a Layout,
+    scope: Scope,
+    interval: usize,
+    cell_px: usize,
     features: Features,
 }
 
@@ -24,17 +28,18 @@ impl<'a> FeaturePyramid<'a> {
             [image.width(), image.height()],
             "layout of this image"
         );
-        let spec = model.spec();
-        let source = Source {
-            isa: Isa::best(),
+        let mut pyramid = Self {
             image,
             layout,
-            interval: spec.interval,
-            cell_px: spec.cell_px,
+            scope: Scope::whole(layout),
+            interval: model.spec().interval,
+            cell_px: model.spec().cell_px,
+            features: Features::default(),
         };
         let mut features = Features::default();
-        features.begin(&source, 1);
-        Self { source, features }
+        features.begin(&pyramid.source(), 1);
+        pyramid.features = features;
+        pyramid
     }
 
     /// The features of a level, padded: the response of a filter at `(x, y)` is the sum of its
@@ -44,6 +49,17 @@ impl<'a> FeaturePyramid<'a> {
     ///
     /// If the layout has no such level.
     pub fn level(&self, level: usize) -> FeatureMap<'_> {
-        self.features.of_level(&self.source, level)
+        self.features.of_level(&self.source(), level)
+    }
+
+    fn source(&self) -> Source<'_> {
+        Source {
+            isa: Isa::best(),
+            image: self.image,
+            layout: self.layout,
+            scope: &self.scope,
+            interval: self.interval,
+            cell_px: self.cell_px,
+        }
     }
 }

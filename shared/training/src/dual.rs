@@ -7,6 +7,8 @@
 //! to 0. Source: Yang & Ramanan 2013, section 5, and what is known of their release's solver.
 
 mod solve;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,5 +1,8 @@
 //! The best placement of a person whose parts are known roughly.
 
+#[cfg(test)]
+mod tests;
+
 use fmp::{FeaturePyramid, Layout, Model, Placement, Pose, Springs};
 use kernels::N_CHANNELS;
 

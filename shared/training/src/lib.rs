@@ -19,6 +19,8 @@ mod scale;
 mod settings;
 mod shape;
 mod sparse;
+#[cfg(test)]
+mod testing;
 mod trainer;
 mod types;
 mod watch;

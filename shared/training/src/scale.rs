@@ -54,3 +54,52 @@ pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
         _ => 0.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Head, neck, and an arm of two parts.
+    const PARENTS: [Option<usize>; 4] = [None, Some(0), Some(1), Some(2)];
+
+    fn person(scale: f64) -> Vec<[f64; 2]> {
+        [[0.0, 0.0], [0.0, 20.0], [15.0, 30.0], [30.0, 55.0]]
+            .iter()
+            .map(|it| it.map(|it| 7.0 + scale * it))
+            .collect()
+    }
+
+    #[test]
+    fn the_box_grows_with_the_person() {
+        let people = [person(1.0), person(1.5), person(3.0)];
+        let sides = box_sides(&people, &PARENTS);
+        assert!(
+            (sides[0] - 20.0).abs() < 1e-9,
+            "the length of the head: {sides:?}"
+        );
+        assert!((sides[1] - 30.0).abs() < 1e-9 && (sides[2] - 60.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_head_seen_from_above_does_not_make_a_person_small() {
+        let mut people = vec![person(1.0); 9];
+        people[4][0] = [7.0, 26.0];
+        let sides = box_sides(&people, &PARENTS);
+        assert!(sides[4] > 15.0, "{sides:?}");
+    }
+
+    #[test]
+    fn nobody_and_people_at_one_point_have_no_size() {
+        assert!(box_sides(&[], &PARENTS).is_empty());
+        let side = box_sides(&[vec![[3.0, 3.0]; 4]], &PARENTS)[0];
+        assert_eq!(side, 0.0);
+    }
+
+    #[test]
+    fn the_filter_fits_all_but_the_smallest_twentieth() {
+        let mut sides = vec![23.0; 96];
+        sides.extend([9.0; 4]);
+        assert_eq!(filter_side(&sides, 4), (5, 23.0));
+        assert_eq!(quantile(vec![1.0, 2.0, 4.0], 0.75), 3.0);
+    }
+}

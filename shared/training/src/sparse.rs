@@ -195,3 +195,63 @@ fn sum_of_products(a: &[f32], b: &[f32]) -> f64 {
     }
     sums.iter().map(|it| f64::from(*it)).sum::<f64>() + rest
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LEN: usize = 40;
+
+    /// Runs that begin at multiples of 4 and are 1 to 4 long, the same length at the same place.
+    fn vector() -> impl Strategy<Value = Sparse> {
+        let run = (any::<bool>(), prop::collection::vec(-9_i8..9, 4));
+        (prop::collection::vec(run, LEN / 4), any::<bool>()).prop_map(|(runs, negated)| {
+            let runs = runs.into_iter().enumerate().filter(|it| it.1.0);
+            let runs = runs.map(|(at, (_, values))| {
+                let values = values[..=at % 4].iter().map(|it| f32::from(*it));
+                (4 * at, values.collect::<Vec<_>>())
+            });
+            let it = Sparse::new(runs);
+            if negated { it.negated() } else { it }
+        })
+    }
+
+    fn dense(it: &Sparse) -> Vec<f64> {
+        let mut dense = vec![0.0; LEN];
+        it.add_to(&mut dense, 1.0);
+        dense
+    }
+
+    fn product(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+
+    proptest! {
+        #[test]
+        fn products_and_differences_are_those_of_dense_vectors(a in vector(), b in vector()) {
+            let (da, db) = (dense(&a), dense(&b));
+            let single: Vec<f32> = db.iter().map(|it| *it as f32).collect();
+            prop_assert_eq!(a.dot(&single), product(&da, &db));
+            prop_assert_eq!(a.dot_sparse(&b), product(&da, &db));
+            prop_assert_eq!(a.squared_norm(), product(&da, &da));
+            let difference: Vec<f64> = da.iter().zip(&db).map(|(a, b)| a - b).collect();
+            prop_assert_eq!(dense(&a.minus(&b)), difference);
+        }
+    }
+
+    #[test]
+    fn shared_values_count_as_ones_own() {
+        let shared: Arc<[f32]> = [7.0, 1.0, 2.0, 3.0, 8.0].into();
+        let runs = [(2, Run::Shared { at: 1, len: 3 }), (9, Run::Own(vec![4.0]))];
+        let it = Sparse::sharing(Some(Arc::clone(&shared)), runs);
+        let same = Sparse::new([(2, vec![1.0, 2.0, 3.0]), (9, vec![4.0])]);
+        assert_eq!(dense(&it), dense(&same));
+        assert_eq!(it.dot_sparse(&same), 30.0);
+        assert!(
+            it.bytes() < same.bytes(),
+            "the shared values are not counted"
+        );
+    }
+}

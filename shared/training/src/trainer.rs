@@ -2,6 +2,8 @@
 
 mod checkpoint;
 mod collect;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};

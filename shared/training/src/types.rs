@@ -151,3 +151,75 @@ fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
 
 /// Rounds after which a start that still moves is taken as it is.
 const MAX_ROUNDS: usize = 1000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PARENTS: [Option<usize>; 3] = [None, Some(0), Some(1)];
+
+    /// People whose second part hangs to the left, below, or to the right, and whose third one always
+    /// lies below that.
+    fn people() -> Vec<Vec<[f64; 2]>> {
+        let person = |it: usize| {
+            let jitter = 0.1 * (it % 7) as f64;
+            let arm = [[-5.0, 1.0], [0.2, 5.0], [6.0, 0.0], [6.0, 0.0]][it % 4];
+            let second = [10.0 + arm[0] + jitter, 10.0 + arm[1] - jitter];
+            vec![[10.0, 10.0], second, [second[0], second[1] + 4.0]]
+        };
+        (0..40).map(person).collect()
+    }
+
+    fn settings(n_types: usize, types_by: TypesBy) -> Settings {
+        Settings {
+            n_types,
+            types_by,
+            cluster_starts: 20,
+            ..Settings::default()
+        }
+    }
+
+    #[test]
+    fn clusters_are_found_the_largest_first() {
+        let types = cluster(&people(), &PARENTS, &settings(3, TypesBy::Parent));
+        let of_second: Vec<_> = types.of_person.iter().map(|it| it[1]).collect();
+        assert_eq!(types.anchors[1][0], [6, 0], "half of the people");
+        for (person, label) in of_second.iter().enumerate() {
+            assert_eq!(of_second[person % 4], *label, "person {person}");
+        }
+        assert_eq!(of_second[2], of_second[3]);
+        assert_ne!(of_second[0], of_second[1]);
+    }
+
+    #[test]
+    fn neighbours_tell_apart_what_the_parent_does_not() {
+        let by_parent = cluster(&people(), &PARENTS, &settings(3, TypesBy::Parent));
+        assert_eq!(
+            by_parent.anchors[2].len(),
+            by_parent.anchors[2].iter().len()
+        );
+        assert!(by_parent.anchors[2].iter().all(|it| *it == [0, 4]));
+        let by_all = cluster(&people(), &PARENTS, &settings(3, TypesBy::Neighbours));
+        let spread = |types: &Types| {
+            let labels = types.of_person.iter().map(|it| it[1]);
+            labels.collect::<std::collections::BTreeSet<_>>().len()
+        };
+        assert_eq!(spread(&by_all), 3);
+    }
+
+    #[test]
+    fn few_people_have_few_types() {
+        let types = cluster(&people()[..2], &PARENTS, &settings(6, TypesBy::Parent));
+        assert!(types.anchors.iter().all(|it| (1..=2).contains(&it.len())));
+        let fits =
+            |person: &Vec<usize>| person.iter().zip(&types.anchors).all(|(a, b)| *a < b.len());
+        assert!(types.of_person.iter().all(fits));
+    }
+
+    #[test]
+    fn the_seed_decides() {
+        let people = people();
+        let twice = [0, 1].map(|_| cluster(&people, &PARENTS, &settings(2, TypesBy::Parent)));
+        assert_eq!(twice[0], twice[1]);
+    }
+}
