@@ -36,7 +36,7 @@ pub use health::{Health, HealthError};
 pub use launch::{Launch, LaunchError};
 pub use lock::{DeploymentLock, LockError};
 pub use log::init_logging;
-pub use memory::{MemoryError, free_shared_memory};
+pub use memory::{MemoryError, free_shared_memory, peak_memory};
 pub use namespace::{Namespace, NamespaceError};
 pub use payload::{Element, Header, Message};
 pub use process::{Service, raise_file_limit, run_service};

@@ -59,6 +59,15 @@ pub fn free_shared_memory() -> io::Result<u64> {
     Ok(status.f_bavail * status.f_frsize)
 }
 
+/// Most bytes of physical memory that this process has ever held (`VmHWM`); `None` where the system does
+/// not say.
+pub fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|it| it.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kib * 1024)
+}
+
 /// Allocates every page of the pool of one publisher and maps it.
 ///
 /// A page that was never touched costs a fault and its zeroing when it is first written (a frame of
