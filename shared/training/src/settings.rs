@@ -1,5 +1,6 @@
 //! How a model is trained.
 
+use fmp::Model;
 use serde::{Deserialize, Serialize};
 
 use crate::types::TypesBy;
@@ -83,5 +84,63 @@ impl Default for Settings {
             passes: 1,
             seed: 1,
         }
+    }
+}
+
+/// A setting that nothing can be trained with.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{key} is {got}, expected {min} to {max}")]
+pub struct SettingsError {
+    /// Its key.
+    pub key: &'static str,
+    /// Its value.
+    pub got: f64,
+    /// Least value that is accepted.
+    pub min: f64,
+    /// Greatest value that is accepted.
+    pub max: f64,
+}
+
+impl Settings {
+    /// Checks that every setting lies where a training makes sense.
+    ///
+    /// # Errors
+    ///
+    /// [`SettingsError`], for the first that does not.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        const LEAST: f64 = 1e-12;
+        const MOST: f64 = 1e12;
+        let (most_types, most_cells) = (Model::MAX_TYPES as f64, Model::MAX_FILTER as f64);
+        let limits = [
+            ("n-types", self.n_types as f64, 1.0, most_types),
+            ("cluster-starts", self.cluster_starts as f64, 1.0, 1e6),
+            ("cell-px", self.cell_px as f64, 2.0, 64.0),
+            (
+                "max-filter-cells",
+                self.max_filter_cells as f64,
+                3.0,
+                most_cells,
+            ),
+            ("interval", self.interval as f64, 1.0, 64.0),
+            ("mining-interval", self.mining_interval as f64, 1.0, 64.0),
+            ("cost", self.cost, LEAST, MOST),
+            ("positive-weight", self.positive_weight, LEAST, MOST),
+            ("pose-weight", self.pose_weight, 0.0, MOST),
+            ("pose-margin", self.pose_margin, 0.0, MOST),
+            ("overlap", self.overlap, 0.01, 0.99),
+            ("tolerance", self.tolerance, 0.0, 1.0),
+            ("cache-mib", self.cache_mib as f64, 1.0, 1e6),
+            ("per-image", self.per_image as f64, 1.0, 1e6),
+            ("batch", self.batch as f64, 1.0, 1e9),
+            ("fixed-rounds", self.fixed_rounds as f64, 0.0, 1e3),
+            ("latent-rounds", self.latent_rounds as f64, 0.0, 1e3),
+            ("passes", self.passes as f64, 0.0, 1e3),
+        ];
+        for (key, got, min, max) in limits {
+            if !(min..=max).contains(&got) {
+                return Err(SettingsError { key, got, min, max });
+            }
+        }
+        Ok(())
     }
 }

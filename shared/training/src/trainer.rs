@@ -21,7 +21,7 @@ use crate::settings::Settings;
 use crate::shape::Coordinates;
 use crate::watch::{Event, Step, Watch};
 
-pub use checkpoint::{Checkpoint, CheckpointError};
+pub use checkpoint::{Checkpoint, CheckpointBytesError, CheckpointError};
 
 /// Why a training ended early.
 #[derive(Debug, thiserror::Error)]

@@ -1,5 +1,7 @@
 //! Where a training stood: enough to go on as if it had never been interrupted.
 
+mod bytes;
+
 use serde::{Deserialize, Serialize};
 
 use super::{TrainError, Trainer};
@@ -8,6 +10,8 @@ use crate::origin::{Origin, Placed};
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::watch::Watch;
+
+pub use bytes::CheckpointBytesError;
 
 /// The state of a training between two steps.
 ///
@@ -97,6 +101,9 @@ impl<'a> Trainer<'a> {
         if it.n_done > self.steps.len() {
             return damaged("more steps are done than there are");
         }
+        if !it.threshold.is_finite() || !it.v.iter().all(|it| it.is_finite()) {
+            return damaged("a number is not finite");
+        }
         if it.v.len() != self.v.len() || it.right.len() != self.right.len() {
             return damaged("a list has another length");
         }
@@ -111,7 +118,11 @@ impl<'a> Trainer<'a> {
                 (*person as usize) < self.plan.n_people()
             }
         };
-        if !it.examples.iter().all(|it| known(&it.0) && it.1 >= 0.0) {
+        if !it
+            .examples
+            .iter()
+            .all(|it| known(&it.0) && it.1 >= 0.0 && it.1.is_finite())
+        {
             return damaged("an example is of a person or an image that is not there");
         }
         Ok(())
@@ -119,12 +130,15 @@ impl<'a> Trainer<'a> {
 
     /// FNV-1a of everything that the training depends on but the pixels.
     fn fingerprint(&self) -> u64 {
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let n_images = self.album.n_backgrounds();
         let text = format!("{:?} {:?} {n_images}", self.settings, self.plan);
-        for byte in text.bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-        hash
+        fnv1a(text.bytes())
     }
+}
+
+/// Fowler, Noll and Vo's hash 1a, 64 bit.
+fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
 }
