@@ -3,7 +3,7 @@
 use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
-use crate::commands::{calib, config, deployments, detect, fuse_frame, model, run, service};
+use crate::commands::{calib, config, deployments, detect, fuse_frame, model, run, service, train};
 use crate::exit::EXIT_CODES;
 
 const LONG_ABOUT: &str = "\
@@ -22,6 +22,8 @@ Examples:
     parallax config show my.toml                        every value, and who said it
     parallax detect photo.jpg --model parse.mat --json  people in single images
     parallax model import parse.mat --out parse.plx     another format's model as our own
+    parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
+    parallax model judge person.fmp PARSE --only 101-200    how good it is
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -79,7 +81,10 @@ pub(crate) enum Command {
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.
     FuseFrame(fuse_frame::Arguments),
-    /// Read, show and convert models.
+    /// Train a model from annotated people.
+    #[command(subcommand)]
+    Train(train::Command),
+    /// Read, show, convert and try models.
     #[command(subcommand)]
     Model(model::Command),
     /// Read, show, check and convert calibrations.

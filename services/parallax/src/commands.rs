@@ -5,9 +5,11 @@ pub(crate) mod config;
 pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod fuse_frame;
+pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod service;
+pub(crate) mod train;
 
 use std::process::ExitCode;
 
@@ -24,6 +26,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
+        Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it),
         Command::Calib(it) => calib::run(&it),
         Command::Config(it) => config::run(&it),

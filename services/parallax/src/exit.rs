@@ -10,8 +10,8 @@ Exit codes:
     0  done
     1  the run failed
     2  the command line is wrong
-    3  the deployment file is wrong
-    4  an input is missing or unreadable (footage, model, calibration file, table)
+    3  a deployment or settings file is wrong
+    4  an input is missing or unreadable (footage, model, calibration file, table, data set)
     5  the calibration cannot be used
     6  a limit was missed
     7  done, but degraded: views, frames or processes were lost on the way

@@ -1,7 +1,7 @@
 //! The files that a deployment names: read before anything is started.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use fmp::Model;
@@ -122,6 +122,40 @@ pub(crate) fn text(file: &Path) -> Result<String, Failure> {
 /// An input that is wrong: the file, then what is wrong with it.
 pub(crate) fn in_file(file: &Path, error: &dyn std::error::Error) -> Failure {
     Failure::new(ExitKind::Input, format!("{}: {error}", file.display()))
+}
+
+/// The images that are named, those of folders in the order of their names.
+pub(crate) fn images(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut images = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            images.push(path.clone());
+            continue;
+        }
+        let wrong = |error: std::io::Error| in_file(path, &error);
+        let mut inside = Vec::new();
+        for entry in fs::read_dir(path).map_err(wrong)? {
+            inside.push(entry.map_err(wrong)?.path());
+        }
+        inside.retain(|it| is_image(it));
+        inside.sort();
+        if inside.is_empty() {
+            let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        images.append(&mut inside);
+    }
+    Ok(images)
+}
+
+fn is_image(path: &Path) -> bool {
+    let extension = path
+        .extension()
+        .and_then(|it| it.to_str())
+        .unwrap_or_default();
+    ["png", "jpg", "jpeg", "bmp"]
+        .iter()
+        .any(|it| extension.eq_ignore_ascii_case(it))
 }
 
 /// Reads everything that the deployment names, and says what it is.

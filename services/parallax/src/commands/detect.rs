@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(folder) = &arguments.overlay {
         std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
     }
-    let images = images(&arguments.images)?;
+    let images = inputs::images(&arguments.images)?;
     let mut sheet = arguments
         .sheet
         .as_ref()
@@ -88,40 +88,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         sheet.finish()?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The images that are named, those of folders in the order of their names.
-fn images(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut images = Vec::new();
-    for path in named {
-        if !path.is_dir() {
-            images.push(path.clone());
-            continue;
-        }
-        let wrong = |error: std::io::Error| inputs::in_file(path, &error);
-        let mut inside = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(wrong)? {
-            inside.push(entry.map_err(wrong)?.path());
-        }
-        inside.retain(|it| is_image(it));
-        inside.sort();
-        if inside.is_empty() {
-            let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
-            return Err(Failure::new(ExitKind::Input, message));
-        }
-        images.append(&mut inside);
-    }
-    Ok(images)
-}
-
-fn is_image(path: &Path) -> bool {
-    let extension = path
-        .extension()
-        .and_then(|it| it.to_str())
-        .unwrap_or_default();
-    ["png", "jpg", "jpeg", "bmp"]
-        .iter()
-        .any(|it| extension.eq_ignore_ascii_case(it))
 }
 
 struct Detector {

@@ -1,4 +1,4 @@
-//! `parallax model`: what a model is made of, and other formats as our own.
+//! `parallax model`: what a model is made of, how good it is, and other formats as our own.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,6 +8,7 @@ use fmp::{Model, Springs};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
+use super::judge;
 use crate::{inputs, output};
 
 /// What to do with a model.
@@ -33,12 +34,15 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         html: Option<PathBuf>,
     },
+    /// Try a model on people whose joints are known: PCP and PCK.
+    Judge(judge::Arguments),
 }
 
 /// Imports or shows.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Import { file, out } => import(file, out),
+        Command::Judge(it) => judge::run(it),
         Command::Show {
             file,
             html: Some(html),

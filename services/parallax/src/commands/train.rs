@@ -1,0 +1,257 @@
+//! `parallax train`: a model from annotated people.
+
+mod alarms;
+mod album;
+mod data;
+mod leave;
+mod per_dataset;
+mod progress;
+mod report;
+mod store;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::{Args, Subcommand};
+use datasets::SkeletonTable;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use training::{CheckpointError, Plan, Settings, TrainError, Trainer, Tree};
+
+use crate::cli::Globals;
+use crate::{inputs, output};
+use album::Gallery;
+use data::Data;
+use progress::Progress;
+use report::Report;
+use store::Store;
+
+pub(crate) use data::unread;
+
+const HELP: &str = "\
+DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of JSON
+lines, one person each, image paths relative to the file:
+    {\"image\": \"photos/7.jpg\", \"joints\": [[31.5, 80.0], ...], \"visible\": [true, ...], \"name\": \"ann\"}
+`visible` and `name` may be left out; the centre of the top-left pixel is (0, 0). Unless --skeleton says
+otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, ankle, right wrist,
+elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
+
+Rows of a data set count from 1. With several data sets, --only, --without and --rotate name the one they
+mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or a file with a row, a
+range of rows or the file name of an image a line; what it names must be there.
+
+The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that what is
+stopped by Ctrl-C, or killed, goes on with --resume from the last step that was done, and ends with the same
+model, bit for bit, as if it had not been interrupted; on any number of threads. Ctrl-C exits with 130.
+
+Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, twice,
+same-name. People with others are reported with file and row, and left out; a fatal one exits with 4.
+
+With --json, one object a line on standard output: {\"event\": \"left-out\" | \"unreadable\" | \"data\" |
+\"resumed\" | \"step\" | \"summary\", ...}.
+
+Examples:
+    parallax train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 --negatives INRIA/neg --out person.fmp
+    parallax train fmp PARSE lsp/joints.mat --only PARSE=1-100 --without lsp/joints.mat=held-out.txt \\
+        --rotate PARSE=-15,15 --negatives INRIA/neg --judge holiday-photos --out person.fmp
+    parallax train fmp --print-settings > settings.toml
+    parallax model judge person.fmp PARSE --only 101-200";
+
+/// What to train.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Train a flexible mixture of parts: the model that finds people in single views.
+    Fmp(Box<Arguments>),
+}
+
+/// What to train on, and how.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The people.
+    #[command(flatten)]
+    data: data::Chosen,
+    /// The model file to write.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    out: Option<PathBuf>,
+    /// How to train, as TOML; what it does not say has its default, see --print-settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Print the settings that would be used, as TOML, and end.
+    #[arg(long)]
+    print_settings: bool,
+    /// Seed of everything random, instead of the settings' one.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Threads; one a core if not given. The model does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Folder of images without people on which false alarms are counted at the end; the negatives
+    /// themselves if not given.
+    #[arg(long, value_name = "DIR")]
+    judge: Option<PathBuf>,
+    /// Go on from the checkpoint of an interrupted training; from the beginning if there is none.
+    #[arg(long)]
+    resume: bool,
+    /// Print events and the summary as JSON, one object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Trains until the model is written, or it is told to stop.
+pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failure> {
+    let Command::Fmp(arguments) = command;
+    let settings = settings(&arguments)?;
+    if arguments.print_settings {
+        output::line(
+            toml::to_string(&settings)
+                .or_fail(ExitKind::Run)?
+                .trim_end(),
+        )?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let out = arguments.out.clone().unwrap_or_default();
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let shared = Arc::new(Shared {
+        store: Store::new(&out, arguments.resume)?,
+        progress: Progress::new(stop.clone(), globals.quiet, arguments.json),
+        quiet: globals.quiet,
+    });
+    let threads = arguments.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|it| format!("train-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let worker = Arc::clone(&shared);
+    let done = leave::unless_stopped(&stop, move || {
+        pool.install(|| work(&arguments, &settings, &worker))
+    })?;
+    shared.progress.finish();
+    match done {
+        Some(Err(failure)) if failure.kind() != ExitKind::Interrupted => Err(failure),
+        Some(Ok(code)) => Ok(code),
+        _ => Err(shared.store.interrupted()),
+    }
+}
+
+/// What the thread that trains shares with the one that waits for it.
+struct Shared {
+    store: Store,
+    progress: Progress,
+    quiet: bool,
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
+    let mut settings = match &arguments.settings {
+        None => Settings::default(),
+        Some(file) => toml::from_str(&inputs::text(file)?).map_err(|error| {
+            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
+        })?,
+    };
+    if let Some(seed) = arguments.seed {
+        settings.seed = u64::from(seed);
+    }
+    settings.check().or_fail(ExitKind::Config)?;
+    Ok(settings)
+}
+
+fn work(arguments: &Arguments, settings: &Settings, shared: &Shared) -> Result<ExitCode, Failure> {
+    let begin = Instant::now();
+    let table = arguments.data.table()?;
+    let judged = match &arguments.judge {
+        Some(folder) => Some(data::in_folders(std::slice::from_ref(folder))?),
+        None => None,
+    };
+    let data = Data::read(&arguments.data, &table, &shared.progress)?;
+    let gallery = Gallery::new(&data, &table)?;
+    let name = shared.store.model_name();
+    let plan = Plan::new(&name, &tree(&table), gallery.parts(), settings);
+    let plan = plan.or_fail(ExitKind::Input)?;
+    let mut report = Report::new(&data, &gallery, &plan);
+    shared.progress.data(&report)?;
+    let mut trainer = start(arguments, (&plan, settings), &gallery, shared)?;
+    report.n_resumed = trainer.n_done();
+    while let Some(step) = trainer.steps().get(trainer.n_done()).copied() {
+        shared
+            .progress
+            .begin(step, trainer.n_done(), trainer.steps());
+        trainer.step().map_err(failure)?;
+        shared.store.save(
+            &trainer.checkpoint(),
+            gallery.stamp(),
+            trainer.steps().len(),
+        )?;
+        shared.progress.done()?;
+    }
+    let model = trainer.model().map_err(failure)?;
+    report.n_steps = trainer.steps().len();
+    report.n_lost = shared.progress.n_lost();
+    drop(trainer);
+    shared.store.finish(&model)?;
+    report.trained(&model, begin.elapsed());
+    let images = judged.as_ref().unwrap_or(&data.negatives);
+    let folder = arguments.judge.clone();
+    report.alarms = Some(alarms::count(&model, images, folder, &shared.progress)?);
+    report.seconds = begin.elapsed().as_secs_f64();
+    shared.progress.finish();
+    if arguments.json {
+        output::json(&report.json())?;
+    } else if !shared.quiet {
+        output::line(report.text())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Begins, or goes on from the checkpoint.
+fn start<'a>(
+    arguments: &Arguments,
+    (plan, settings): (&'a Plan, &'a Settings),
+    gallery: &'a Gallery,
+    shared: &'a Shared,
+) -> Result<Trainer<'a>, Failure> {
+    let found = if arguments.resume {
+        shared.store.load(gallery.stamp())?
+    } else {
+        None
+    };
+    let Some(checkpoint) = found else {
+        return Trainer::new(plan, settings, gallery, &shared.progress).map_err(failure);
+    };
+    shared.progress.resuming(checkpoint.n_done());
+    let trainer = Trainer::resume((plan, settings), gallery, &shared.progress, checkpoint);
+    let trainer = trainer.map_err(|error| match error {
+        CheckpointError::Train(error) => failure(error),
+        error => shared.store.refused(error),
+    })?;
+    let (n_done, n_steps) = (trainer.n_done(), trainer.steps().len());
+    shared.store.resumed(n_done, n_steps);
+    shared.progress.resumed(n_done, n_steps)?;
+    Ok(trainer)
+}
+
+fn tree(table: &SkeletonTable) -> Tree {
+    Tree {
+        names: table.names().to_vec(),
+        parents: table.parent().to_vec(),
+        mirror: Some(table.mirror().to_vec()),
+    }
+}
+
+fn failure(error: TrainError) -> Failure {
+    let kind = match error {
+        TrainError::Stopped => ExitKind::Interrupted,
+        TrainError::Model(_) => ExitKind::Run,
+        _ => ExitKind::Input,
+    };
+    Failure::new(kind, error)
+}
+
+/// The folder that a file lies in, as the operating system wants it named.
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
+}

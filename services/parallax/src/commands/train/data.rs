@@ -1,0 +1,255 @@
+//! What a model is trained on: data sets joined, and images without people.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::Args;
+use datasets::{
+    DatasetError, FaultKind, People, Person, Picture, ReadOptions, Selection, SkeletonTable,
+};
+use rayon::prelude::*;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::per_dataset::deal;
+use super::progress::{Progress, chain};
+use crate::inputs;
+
+/// Which people, which images without people, and what is made of them.
+#[derive(Debug, Args)]
+pub(super) struct Chosen {
+    /// Annotated people: folders or files, see below.
+    #[arg(value_name = "DATASET", required_unless_present = "print_settings")]
+    datasets: Vec<PathBuf>,
+    /// Folder of images without people, all of which are used; may be given several times.
+    #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
+    negatives: Vec<PathBuf>,
+    /// Who of a data set is trained on, everybody if not given.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    only: Vec<String>,
+    /// Who of a data set is left out: a test set.
+    #[arg(long, value_name = "[DATASET=]SELECTION")]
+    without: Vec<String>,
+    /// Train on turned copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
+    #[arg(long, value_name = "[DATASET=]DEGREES,...", allow_hyphen_values = true)]
+    rotate: Vec<String>,
+    /// Do not train on mirror images.
+    #[arg(long)]
+    no_mirror: bool,
+    /// The parts of the model and where they lie between the joints, as TOML; the published 26 parts
+    /// between 14 joints if not given.
+    #[arg(long, value_name = "FILE")]
+    skeleton: Option<PathBuf>,
+    /// Kinds of bad labels that end the training instead of leaving the person out: a list, or `all`.
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = fatal)]
+    fatal: Vec<Fatal>,
+}
+
+/// Faults that end the training.
+#[derive(Debug, Clone, Copy)]
+enum Fatal {
+    All,
+    One(FaultKind),
+}
+
+fn fatal(name: &str) -> Result<Fatal, String> {
+    if name == "all" {
+        return Ok(Fatal::All);
+    }
+    let known = FaultKind::ALL.map(FaultKind::name).join(", ");
+    let kind = FaultKind::by_name(name);
+    kind.map(Fatal::One)
+        .ok_or_else(|| format!("expected all, or some of {known}"))
+}
+
+impl Chosen {
+    /// The skeleton that is trained.
+    pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
+        match &self.skeleton {
+            Some(file) => SkeletonTable::parse(&inputs::text(file)?).map_err(|error| {
+                let message = format!("{}: {}", file.display(), chain(&error));
+                Failure::new(ExitKind::Input, message)
+            }),
+            None => Ok(SkeletonTable::published()),
+        }
+    }
+}
+
+/// Everything that is trained on.
+#[derive(Debug)]
+pub(super) struct Data {
+    /// Everybody who can be used, in the order of the data sets, with the angles they are turned by,
+    /// 0 first.
+    pub(super) people: Vec<(Person, Vec<f64>)>,
+    /// How many people were left out, for every kind of fault.
+    pub(super) left_out: BTreeMap<&'static str, usize>,
+    /// Whether mirror images are trained on.
+    pub(super) with_mirror: bool,
+    /// Images without people, all of which can be decoded.
+    pub(super) negatives: Vec<PathBuf>,
+    /// Images without people that cannot.
+    pub(super) n_unreadable: usize,
+}
+
+impl Data {
+    /// Reads and judges all of it.
+    ///
+    /// # Errors
+    ///
+    /// A data set or a selection cannot be read, somebody has a fault that was called fatal, or nobody
+    /// or no image without people is left.
+    pub(super) fn read(
+        arguments: &Chosen,
+        table: &SkeletonTable,
+        progress: &Progress,
+    ) -> Result<Self, Failure> {
+        let mut data = Self {
+            people: Vec::new(),
+            left_out: BTreeMap::new(),
+            with_mirror: !arguments.no_mirror,
+            negatives: Vec::new(),
+            n_unreadable: 0,
+        };
+        let options = options(arguments, table)?;
+        let all = &arguments.datasets;
+        let angles = deal(all, "--rotate", &arguments.rotate, true)?;
+        for ((path, options), angles) in all.iter().zip(&options).zip(angles) {
+            let angles = degrees(&angles)?;
+            let People { people, problems } = datasets::read(path, options).map_err(unread)?;
+            for problem in problems {
+                *data
+                    .left_out
+                    .entry(problem.fault.kind().name())
+                    .or_default() += 1;
+                progress.left_out(&problem)?;
+            }
+            data.people
+                .extend(people.into_iter().map(|it| (it, angles.clone())));
+        }
+        if data.people.is_empty() {
+            let n: usize = data.left_out.values().sum();
+            let message = format!("nobody is left to train on: all {n} people were left out");
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        data.negatives(&arguments.negatives, progress)?;
+        Ok(data)
+    }
+
+    /// Decodes every image once, to know that it can be.
+    fn negatives(&mut self, folders: &[PathBuf], progress: &Progress) -> Result<(), Failure> {
+        let images = in_folders(folders)?;
+        let read: Vec<_> = images
+            .par_iter()
+            .map(|it| Picture::read(it).err())
+            .collect();
+        for (image, error) in images.into_iter().zip(read) {
+            match error {
+                None => self.negatives.push(image),
+                Some(error) => {
+                    self.n_unreadable += 1;
+                    progress.unreadable(&image, &error)?;
+                }
+            }
+        }
+        if self.negatives.is_empty() {
+            let n = self.n_unreadable;
+            let message = format!("none of {n} images without people can be read");
+            return Err(Failure::new(ExitKind::Input, message));
+        }
+        Ok(())
+    }
+}
+
+/// All images of folders, by name.
+pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    if let Some(folder) = folders.iter().find(|it| !it.is_dir()) {
+        let message = format!("{}: no folder of images without people", folder.display());
+        return Err(Failure::new(ExitKind::Input, message));
+    }
+    inputs::images(folders)
+}
+
+/// What of every data set is read.
+fn options(arguments: &Chosen, table: &SkeletonTable) -> Result<Vec<ReadOptions>, Failure> {
+    let all = &arguments.datasets;
+    let mut fatal: Vec<FaultKind> = Vec::new();
+    for it in &arguments.fatal {
+        match it {
+            Fatal::All => fatal.extend(FaultKind::ALL),
+            Fatal::One(kind) => fatal.push(*kind),
+        }
+    }
+    if let Some((_, twice)) = (1..)
+        .zip(all)
+        .find(|&(after, path)| all[after..].contains(path))
+    {
+        let message = format!("{}: the data set is named twice", twice.display());
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let only = deal(all, "--only", &arguments.only, false)?;
+    let without = deal(all, "--without", &arguments.without, false)?;
+    only.iter()
+        .zip(&without)
+        .map(|(only, without)| {
+            Ok(ReadOptions {
+                only: selection("--only", only)?,
+                without: selection("--without", without)?,
+                n_joints: Some(table.n_joints()),
+                fatal: fatal.clone(),
+                ..ReadOptions::default()
+            })
+        })
+        .collect()
+}
+
+/// One selection at most.
+fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure> {
+    match values {
+        [] => Ok(None),
+        [one] => Ok(Some(
+            Selection::from_argument(one).or_fail(ExitKind::Usage)?,
+        )),
+        _ => {
+            let message = format!("{option} is given more than once for one data set");
+            Err(Failure::new(ExitKind::Usage, message).with_hint("join them: 1-100,150"))
+        }
+    }
+}
+
+/// Angles of copies, 0 first, each once.
+fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
+    let mut angles = vec![0.0];
+    for text in values.iter().flat_map(|it| it.split(',')) {
+        let angle = text.trim().parse::<f64>().ok();
+        let angle = angle.filter(|it| it.abs() <= 180.0).ok_or_else(|| {
+            let message = format!("--rotate {text}: expected degrees between -180 and 180");
+            Failure::new(ExitKind::Usage, message)
+        })?;
+        if !angles.contains(&angle) {
+            angles.push(angle);
+        }
+    }
+    Ok(angles)
+}
+
+/// A selection that means nobody is a slip on the command line, all else is the data set's fault.
+pub(crate) fn unread(error: DatasetError) -> Failure {
+    let kind = match error {
+        DatasetError::Select(_) => ExitKind::Usage,
+        _ => ExitKind::Input,
+    };
+    Failure::new(kind, error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_what_was_written_after_no_turn() {
+        let angles = degrees(&["-15,-7.5", "7.5, 0,-15"]).unwrap();
+        assert_eq!(angles, [0.0, -15.0, -7.5, 7.5]);
+        for wrong in ["", "a", "nan", "inf", "181"] {
+            assert_eq!(degrees(&[wrong]).unwrap_err().kind(), ExitKind::Usage);
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! What a training leaves on the disk: its checkpoint, and at the end the model.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use fmp::Model;
+use runtime::{ExitKind, Failure, OrFail as _};
+use training::{Checkpoint, CheckpointBytesError, CheckpointError};
+
+use super::folder_of;
+
+/// The files of one training. Nothing is being written while the state is not locked.
+#[derive(Debug)]
+pub(super) struct Store {
+    out: PathBuf,
+    state: Mutex<State>,
+}
+
+/// What is on the disk.
+#[derive(Debug, Clone, Copy, Default)]
+struct State {
+    n_done: usize,
+    n_steps: usize,
+    model_written: bool,
+}
+
+/// Why a checkpoint is of no use.
+#[derive(Debug, thiserror::Error)]
+enum Refused {
+    #[error("cannot read the checkpoint {}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{} is no sound checkpoint", path.display())]
+    Bytes {
+        path: PathBuf,
+        source: CheckpointBytesError,
+    },
+    #[error("the checkpoint {} is of a training on other image files", path.display())]
+    Images { path: PathBuf },
+    #[error("cannot go on from the checkpoint {}", path.display())]
+    Other {
+        path: PathBuf,
+        source: CheckpointError,
+    },
+}
+
+impl Store {
+    /// Looks whether a model can be written, and whether a training was interrupted before.
+    ///
+    /// # Errors
+    ///
+    /// There is no place for the model, or a checkpoint that is not to be gone on from.
+    pub(super) fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
+        let wrong = |what: &str| {
+            let message = format!("--out {}: {what}", out.display());
+            Err(Failure::new(ExitKind::Usage, message))
+        };
+        if out.file_name().is_none() || out.is_dir() {
+            return wrong("expected a file");
+        }
+        if !folder_of(out).is_dir() {
+            return wrong("there is no such folder");
+        }
+        let store = Self {
+            out: out.to_owned(),
+            state: Mutex::default(),
+        };
+        let checkpoint = store.checkpoint();
+        if !resume && checkpoint.exists() {
+            let message = format!(
+                "{} is there: an earlier training was interrupted",
+                checkpoint.display()
+            );
+            return Err(Failure::new(ExitKind::Usage, message).with_hint(
+                "--resume goes on from it; to begin anew, delete it or write to another --out",
+            ));
+        }
+        Ok(store)
+    }
+
+    /// What the model is called: its file without the ending.
+    pub(super) fn model_name(&self) -> String {
+        let stem = self.out.file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    }
+
+    /// Reads the checkpoint, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// It is damaged, or was made with other image files.
+    pub(super) fn load(&self, stamp: u64) -> Result<Option<Checkpoint>, Failure> {
+        let path = self.checkpoint();
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            other => other,
+        };
+        let bytes = bytes.map_err(|source| {
+            let path = path.clone();
+            self.with_advice(Refused::Io { path, source })
+        })?;
+        let read = Checkpoint::from_bytes(&bytes).map_err(|source| {
+            let path = path.clone();
+            self.with_advice(Refused::Bytes { path, source })
+        });
+        let (checkpoint, of) = read?;
+        if of == stamp {
+            Ok(Some(checkpoint))
+        } else {
+            Err(self.with_advice(Refused::Images { path }))
+        }
+    }
+
+    /// A checkpoint that does not fit the training.
+    pub(super) fn refused(&self, source: CheckpointError) -> Failure {
+        let path = self.checkpoint();
+        self.with_advice(Refused::Other { path, source })
+    }
+
+    fn with_advice(&self, refused: Refused) -> Failure {
+        let path = self.checkpoint();
+        Failure::new(ExitKind::Input, refused).with_hint(format!(
+            "--resume needs the data sets, negatives, options and settings that it was made with; to \
+             begin anew, delete {}",
+            path.display()
+        ))
+    }
+
+    /// Takes note of where a training goes on.
+    pub(super) fn resumed(&self, n_done: usize, n_steps: usize) {
+        let mut state = self.lock();
+        (state.n_done, state.n_steps) = (n_done, n_steps);
+    }
+
+    /// Writes the checkpoint: it is complete, or the one before it stays.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub(super) fn save(
+        &self,
+        checkpoint: &Checkpoint,
+        stamp: u64,
+        n_steps: usize,
+    ) -> Result<(), Failure> {
+        let bytes = checkpoint.to_bytes(stamp).or_fail(ExitKind::Run)?;
+        let path = self.checkpoint();
+        let mut state = self.lock();
+        replace(&path, &bytes).map_err(|error| {
+            let message = format!("cannot write the checkpoint {}: {error}", path.display());
+            Failure::new(ExitKind::Run, message)
+        })?;
+        (state.n_done, state.n_steps) = (checkpoint.n_done(), n_steps);
+        Ok(())
+    }
+
+    /// Writes the model, and removes the checkpoint, which is of no use any more.
+    ///
+    /// # Errors
+    ///
+    /// Those of the operating system.
+    pub(super) fn finish(&self, model: &Model) -> Result<(), Failure> {
+        let mut state = self.lock();
+        fmp::files::write(&self.out, model).or_fail(ExitKind::Run)?;
+        state.model_written = true;
+        let path = self.checkpoint();
+        fs::remove_file(&path).map_err(|error| {
+            let message = format!("cannot remove the checkpoint {}: {error}", path.display());
+            Failure::new(ExitKind::Run, message)
+        })
+    }
+
+    /// How a training that was stopped ends: what is left of it, and how to go on. Waits for what is
+    /// being written.
+    pub(super) fn interrupted(&self) -> Failure {
+        let state = self.lock();
+        let State {
+            n_done,
+            n_steps,
+            model_written,
+        } = *state;
+        // Never unlocked again: nothing is to be written any more.
+        core::mem::forget(state);
+        let stopped = |what: String| Failure::new(ExitKind::Interrupted, what);
+        if model_written {
+            let out = self.out.display();
+            return stopped(format!("stopped after the model {out} was written"));
+        }
+        let path = self.checkpoint();
+        let so_far = match n_done {
+            0 => stopped("stopped before a step was done".to_owned()),
+            _ => stopped(format!("stopped after {n_done} of {n_steps} steps")),
+        };
+        if !path.exists() {
+            return so_far
+                .with_hint("nothing is kept: the first checkpoint is written after a step");
+        }
+        let path = path.display();
+        so_far.with_hint(format!(
+            "the same command with --resume goes on from {path}"
+        ))
+    }
+
+    fn checkpoint(&self) -> PathBuf {
+        let mut name = OsString::from(self.out.file_name().unwrap_or_default());
+        name.push(".checkpoint");
+        self.out.with_file_name(name)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Puts a whole file into its place in one step.
+fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".part");
+    let beside = path.with_file_name(name);
+    let written = File::create(&beside)
+        .and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        })
+        .and_then(|()| fs::rename(&beside, path));
+    if written.is_err() {
+        // The error that is reported came first; one of the removal could add nothing to it.
+        drop(fs::remove_file(&beside));
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests;

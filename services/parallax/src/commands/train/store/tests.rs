@@ -1,0 +1,172 @@
+//! Checkpoints that are damaged, foreign or fine.
+
+use datasets::Picture;
+use footage::Size;
+use proptest::prelude::*;
+use training::{Album, AlbumError, Event, Plan, Settings, Trainer, Tree, Watch};
+
+use super::*;
+
+/// Bytes before the payload of a checkpoint.
+const HEADER: usize = 28;
+
+/// Stamp and fingerprint, at most: two numbers of a byte and eight.
+const WHOSE: usize = 18;
+
+struct Noise;
+
+impl Noise {
+    fn picture(seed: usize) -> Picture {
+        let mut random = fastrand::Rng::with_seed(seed as u64);
+        let size = Size::new(64, 64);
+        let rgb = (0..size.rgb_bytes()).map(|_| random.u8(..)).collect();
+        Picture::new(size, rgb).unwrap()
+    }
+}
+
+impl Album for Noise {
+    fn person(&self, person: usize) -> Result<Picture, AlbumError> {
+        Ok(Self::picture(person))
+    }
+
+    fn n_backgrounds(&self) -> usize {
+        2
+    }
+
+    fn background(&self, image: usize) -> Result<Picture, AlbumError> {
+        Ok(Self::picture(100 + image))
+    }
+}
+
+impl Watch for Noise {
+    fn tell(&self, _: Event) {}
+
+    fn go_on(&self) -> bool {
+        true
+    }
+}
+
+fn plan() -> (Plan, Settings) {
+    let settings = Settings {
+        n_types: 2,
+        cluster_starts: 1,
+        interval: 2,
+        per_image: 2,
+        batch: 1,
+        latent_rounds: 0,
+        ..Settings::default()
+    };
+    let tree = Tree {
+        names: vec!["a".to_owned(), "b".to_owned()],
+        parents: vec![None, Some(0)],
+        mirror: None,
+    };
+    let person = |it: f64| vec![[28.0 + it, 24.0], [30.0, 40.0 - it]];
+    let people: Vec<_> = (0..4).map(|it| person(f64::from(it))).collect();
+    (Plan::new("m", &tree, &people, &settings).unwrap(), settings)
+}
+
+/// The bytes of a checkpoint with examples of all kinds.
+fn bytes(plan: &Plan, settings: &Settings) -> Vec<u8> {
+    let mut trainer = Trainer::new(plan, settings, &Noise, &Noise).unwrap();
+    for _ in 0..4 {
+        assert!(trainer.step().unwrap());
+    }
+    trainer.checkpoint().to_bytes(7).unwrap()
+}
+
+/// The same file with another payload, and its right checksum.
+fn with_payload(bytes: &[u8], payload: &[u8]) -> Vec<u8> {
+    let hash = payload.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3_u64)
+    });
+    let length = payload.len() as u64;
+    let header = [&bytes[..12], &length.to_le_bytes(), &hash.to_le_bytes()].concat();
+    [&header, payload].concat()
+}
+
+#[test]
+fn what_was_written_goes_on_as_if_nothing_had_been() {
+    let (plan, settings) = plan();
+    let bytes = bytes(&plan, &settings);
+    let (checkpoint, stamp) = Checkpoint::from_bytes(&bytes).unwrap();
+    assert_eq!((checkpoint.n_done(), stamp), (4, 7));
+    assert_eq!(checkpoint.to_bytes(7).unwrap(), bytes);
+    let resumed = Trainer::resume((&plan, &settings), &Noise, &Noise, checkpoint).unwrap();
+    assert_eq!(resumed.checkpoint().to_bytes(7).unwrap(), bytes);
+}
+
+#[test]
+fn no_cut_and_no_changed_byte_is_accepted() {
+    let (plan, settings) = plan();
+    let bytes = bytes(&plan, &settings);
+    for length in (0..bytes.len()).step_by(7) {
+        assert!(
+            Checkpoint::from_bytes(&bytes[..length]).is_err(),
+            "{length}"
+        );
+    }
+    for at in (0..bytes.len()).step_by(11) {
+        let mut changed = bytes.clone();
+        changed[at] ^= 1;
+        assert!(Checkpoint::from_bytes(&changed).is_err(), "{at}");
+    }
+    let mut longer = bytes[HEADER..].to_vec();
+    longer.push(0);
+    let longer = Checkpoint::from_bytes(&with_payload(&bytes, &longer));
+    assert!(matches!(
+        longer.unwrap_err(),
+        CheckpointBytesError::Left { left: 1 }
+    ));
+}
+
+#[test]
+fn a_file_is_replaced_and_nothing_lies_beside_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("m.checkpoint");
+    for content in ["first", "second"] {
+        replace(&path, content.as_bytes()).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), content);
+    }
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn other_bytes_never_panic(bytes: Vec<u8>) {
+        let (plan, settings) = plan();
+        drop(Checkpoint::from_bytes(&bytes));
+        let fine = super::tests::bytes(&plan, &settings);
+        drop(Checkpoint::from_bytes(&with_payload(&fine, &bytes)));
+    }
+
+    /// Damage under a right checksum: poses, shares, counts.
+    #[test]
+    fn damage_is_an_error_or_another_training_but_no_panic(
+        all in prop::collection::vec(
+            prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+            40,
+        ),
+    ) {
+        let (plan, settings) = plan();
+        let fine = super::tests::bytes(&plan, &settings);
+        for changes in all {
+            let mut payload = fine[HEADER..].to_vec();
+            // The vector of the model lies between; the poses are at the end.
+            let n_poses = payload.len().min(1500);
+            let start = (payload.len() - n_poses).max(WHOSE);
+            for (at, value) in changes {
+                let at = start + at.index(payload.len() - start);
+                payload[at] = value;
+            }
+            let read = Checkpoint::from_bytes(&with_payload(&fine, &payload));
+            let Ok((checkpoint, _)) = read else { continue };
+            let resumed = Trainer::resume((&plan, &settings), &Noise, &Noise, checkpoint);
+            if let Ok(mut trainer) = resumed {
+                drop(trainer.step());
+            }
+        }
+    }
+}
