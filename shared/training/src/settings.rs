@@ -130,6 +130,7 @@ impl Settings {
             ("overlap", self.overlap, 0.01, 0.99),
             ("tolerance", self.tolerance, 0.0, 1.0),
             ("cache-mib", self.cache_mib as f64, 1.0, 1e6),
+            ("room", self.room, 0.0, MOST),
             ("per-image", self.per_image as f64, 1.0, 1e6),
             ("batch", self.batch as f64, 1.0, 1e9),
             ("fixed-rounds", self.fixed_rounds as f64, 0.0, 1e3),
