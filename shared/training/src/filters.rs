@@ -49,16 +49,13 @@ pub(crate) fn first_model(
             *v = share * it;
         }
         let bias = share * BIAS * machine[at.filter_len()];
-        match shape.parents[part] {
-            Some(parent) => {
-                for parent_type in 0..shape.n_types(parent) {
-                    v[at.bias(part, parent_type, mixture)] = bias;
-                }
+        if let Some(parent) = shape.parents[part] {
+            for parent_type in 0..shape.n_types(parent) {
+                v[at.bias(part, parent_type, mixture)] = bias;
             }
-            None => {
-                let (root, value) = at.root();
-                v[root] += bias / (f64::from(value) * shape.n_types(part) as f64);
-            }
+        } else {
+            let (root, value) = at.root();
+            v[root] += bias / (f64::from(value) * shape.n_types(part) as f64);
         }
     }
     v

@@ -153,7 +153,7 @@ impl Coordinates {
 
     /// Whether there is nothing to train; never, since the root has a bias.
     pub fn is_empty(&self) -> bool {
-        false
+        self.len() == 0
     }
 
     /// Numbers in a filter.
