@@ -26,13 +26,14 @@ const COVERED: f64 = 0.3;
 /// Which model, and on whom.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-DATASET and SELECTION are those of `parallax train fmp`. Two detections of an image are judged: the best
-one of the image, which is how PCP is published, and the best one that covers 30 % of the box around
-the person's joints, which is how PCK is (Yang & Ramanan). Bad labels are reported and left out.
+DATASET and SELECTION are those of `parallax train fmp`. Two detections of an image are judged: the \
+best one of the image, which is how PCP is published, and the best one that covers 30 % of the box \
+around the person's joints, which is how PCK is (Yang & Ramanan). Bad labels are reported and left out.
 
 With --json one object:
-    {\"images\", \"left_out\", \"best\" | \"on_person\": {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"},
-     \"pck\": {\"0.1\", \"0.2\"}}}, percentages, \"total\" with the ten sticks or seven joints
+    {\"images\", \"left_out\", \"best\" | \"on_person\":
+     {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
+Percentages, of every stick or joint and in \"total\".
 
 Example:
     parallax model judge person.fmp PARSE --only 101-200")]

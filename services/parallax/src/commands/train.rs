@@ -30,31 +30,36 @@ use store::Store;
 pub(crate) use data::unread;
 
 const HELP: &str = "\
-DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of JSON
-lines, one person each, image paths relative to the file:
-    {\"image\": \"photos/7.jpg\", \"joints\": [[31.5, 80.0], ...], \"visible\": [true, ...], \"name\": \"ann\"}
-`visible` and `name` may be left out; the centre of the top-left pixel is (0, 0). Unless --skeleton says
-otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, ankle, right wrist,
-elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
+DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of \
+JSON lines, one person each, image paths relative to the file:
+    {\"image\": \"7.jpg\", \"joints\": [[31.5, 80.0], ...], \"visible\": [true, ...], \"name\": \"ann\"}
+`visible` and `name` may be left out; the centre of the top-left pixel is (0, 0). Unless --skeleton \
+says otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
+ankle, right wrist, elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
 
-Rows of a data set count from 1. With several data sets, --only, --without and --rotate name the one they
-mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or a file with a row, a
-range of rows or the file name of an image a line; what it names must be there.
+Rows of a data set count from 1. With several data sets, --only, --without and --rotate name the \
+one they mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
+a file with a row, a range of rows or the file name of an image a line; what it names must be there.
 
-The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that what is
-stopped by Ctrl-C, or killed, goes on with --resume from the last step that was done, and ends with the same
-model, bit for bit, as if it had not been interrupted; on any number of threads. Ctrl-C exits with 130.
+The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that \
+what is stopped by Ctrl-C, or killed, goes on with --resume from the last step that was done, and \
+ends with the same model, bit for bit, as if it had not been interrupted, on any number of threads.
 
-Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, twice,
-same-name. People with others are reported with file and row, and left out; a fatal one exits with 4.
+Kinds of bad labels, for --fatal: syntax, count, unknown, not-finite, zero-size, image, outside, \
+twice, same-name. People with others are reported with file and row, and left out.
 
-With --json, one object a line on standard output: {\"event\": \"left-out\" | \"unreadable\" | \"data\" |
-\"resumed\" | \"step\" | \"summary\", ...}.
+With --json, one object a line on standard output, nothing else:
+    {\"event\": \"left-out\" | \"unreadable\" | \"data\" | \"resumed\" | \"step\" | \"summary\", ...}
+
+Exit codes: 0 the model is written; 2 the command line is wrong, or an interrupted training is in \
+the way; 3 a setting is wrong; 4 a data set, a fatal label, a checkpoint; 130 stopped by Ctrl-C.
 
 Examples:
-    parallax train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 --negatives INRIA/neg --out person.fmp
-    parallax train fmp PARSE lsp/joints.mat --only PARSE=1-100 --without lsp/joints.mat=held-out.txt \\
-        --rotate PARSE=-15,15 --negatives INRIA/neg --judge holiday-photos --out person.fmp
+    parallax train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 \\
+        --negatives INRIA/neg --out person.fmp
+    parallax train fmp PARSE lsp/joints.mat --only PARSE=1-100 --rotate PARSE=-15,15 \\
+        --without lsp/joints.mat=held-out.txt \\
+        --negatives INRIA/neg --judge holiday-photos --out person.fmp
     parallax train fmp --print-settings > settings.toml
     parallax model judge person.fmp PARSE --only 101-200";
 

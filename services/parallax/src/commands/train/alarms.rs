@@ -121,15 +121,17 @@ impl Alarms {
             None => "negatives, which were trained on".to_owned(),
         };
         let n = self.n_images;
-        let mut text = format!(
-            "{:.3} per image at the trained threshold {trained:.4}",
-            self.per_image(at_trained)
-        );
-        if used < trained {
+        let of_trained = self.per_image(at_trained);
+        let where_detection_begins = if used < trained {
             let of_used = self.per_image(at_used);
-            text += &format!(", {of_used:.3} at {used} where detection begins");
-        }
-        format!("{text} ({n} {of})")
+            format!(", {of_used:.3} at {used} where detection begins")
+        } else {
+            String::new()
+        };
+        format!(
+            "{of_trained:.3} per image at the trained threshold {trained:.4}{where_detection_begins} \
+             ({n} {of})"
+        )
     }
 
     /// For programs.

@@ -234,19 +234,17 @@ impl State {
     }
 
     fn details(&self) -> String {
-        let mut text = String::new();
-        if let Some((n, n_lost, mean)) = self.placed {
-            text += &format!(", {n} placed, {n_lost} lost, mean score {mean:.3}");
-        }
-        if let Some(gap) = self.gap {
-            let share = 100.0 * gap.relative();
-            let (objective, n) = (gap.primal, gap.n_support);
-            text += &format!(", objective {objective:.4}, gap {share:.1} %, {n} support vectors");
-        }
-        if let (Some((n, bytes)), Step::Learn { .. }) = (self.held, self.step) {
-            text += &format!(", {n} examples, {:.0} MiB", mib(bytes));
-        }
-        text
+        let placed = self
+            .placed
+            .map(|(n, n_lost, mean)| format!(", {n} placed, {n_lost} lost, mean score {mean:.3}"));
+        let gap = self.gap.map(|it| {
+            let (objective, n, share) = (it.primal, it.n_support, 100.0 * it.relative());
+            format!(", objective {objective:.4}, gap {share:.1} %, {n} support vectors")
+        });
+        let learns = matches!(self.step, Step::Learn { .. });
+        let held = self.held.filter(|_| learns);
+        let held = held.map(|(n, bytes)| format!(", {n} examples, {:.0} MiB", mib(bytes)));
+        [placed, gap, held].into_iter().flatten().collect()
     }
 
     /// Seconds until all steps are done: each takes as long as those of its kind took, or all did.
@@ -340,13 +338,11 @@ fn mib(bytes: usize) -> f64 {
 
 /// An error with its causes, in one line.
 pub(super) fn chain(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        text += &format!(": {error}");
-        cause = error.source();
-    }
-    text
+    let causes = core::iter::successors(Some(error), |&it| it.source());
+    causes
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(": ")
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ fn plan() -> (Plan, Settings) {
 }
 
 /// The bytes of a checkpoint with examples of all kinds.
-fn bytes(plan: &Plan, settings: &Settings) -> Vec<u8> {
+fn bytes_of(plan: &Plan, settings: &Settings) -> Vec<u8> {
     let mut trainer = Trainer::new(plan, settings, &Noise, &Noise).unwrap();
     for _ in 0..4 {
         assert!(trainer.step().unwrap());
@@ -88,7 +88,7 @@ fn with_payload(bytes: &[u8], payload: &[u8]) -> Vec<u8> {
 #[test]
 fn what_was_written_goes_on_as_if_nothing_had_been() {
     let (plan, settings) = plan();
-    let bytes = bytes(&plan, &settings);
+    let bytes = bytes_of(&plan, &settings);
     let (checkpoint, stamp) = Checkpoint::from_bytes(&bytes).unwrap();
     assert_eq!((checkpoint.n_done(), stamp), (4, 7));
     assert_eq!(checkpoint.to_bytes(7).unwrap(), bytes);
@@ -99,7 +99,7 @@ fn what_was_written_goes_on_as_if_nothing_had_been() {
 #[test]
 fn no_cut_and_no_changed_byte_is_accepted() {
     let (plan, settings) = plan();
-    let bytes = bytes(&plan, &settings);
+    let bytes = bytes_of(&plan, &settings);
     for length in (0..bytes.len()).step_by(7) {
         assert!(
             Checkpoint::from_bytes(&bytes[..length]).is_err(),
@@ -138,7 +138,7 @@ proptest! {
     fn other_bytes_never_panic(bytes: Vec<u8>) {
         let (plan, settings) = plan();
         drop(Checkpoint::from_bytes(&bytes));
-        let fine = super::tests::bytes(&plan, &settings);
+        let fine = bytes_of(&plan, &settings);
         drop(Checkpoint::from_bytes(&with_payload(&fine, &bytes)));
     }
 
@@ -151,7 +151,7 @@ proptest! {
         ),
     ) {
         let (plan, settings) = plan();
-        let fine = super::tests::bytes(&plan, &settings);
+        let fine = bytes_of(&plan, &settings);
         for changes in all {
             let mut payload = fine[HEADER..].to_vec();
             // The vector of the model lies between; the poses are at the end.
