@@ -90,7 +90,7 @@ impl Shape {
     ///
     /// # Panics
     ///
-    /// If `v` has another length than [`Coordinates::len`].
+    /// If `v` has another length than the shape has coordinates.
     pub fn model(&self, v: &[f64], threshold: f64) -> Result<Model, ModelError> {
         let at = self.coordinates();
         assert_eq!(v.len(), at.len(), "the vector of this shape");
