@@ -236,12 +236,16 @@ fn what_was_stopped_says_how_to_go_on_and_refuses_what_is_foreign() {
     }
 }
 
-#[test]
-fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
-    let drawn = Drawn::new(14);
+/// Adds a line before, and one of every kind of bad label after the sound ones.
+fn add_bad_labels(drawn: &Drawn) {
     let sound = fs::read_to_string(drawn.path("people.jsonl")).unwrap();
     let outside = FIGURE.map(|it| [it[0] + 60.0, it[1]]);
     let one_place = [[40.0; 2]; 14];
+    let named = |image: &str| {
+        let mut line = line(image, &FIGURE);
+        line["name"] = "ann".into();
+        line.to_string()
+    };
     let bad = [
         line("people/0.png", &outside).to_string(),
         line("people/99.png", &FIGURE).to_string(),
@@ -252,8 +256,16 @@ fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
         line("people/3.png", &FIGURE[1..]).to_string(),
         sound.lines().next().unwrap().to_owned(),
         "once upon a time".to_owned(),
+        named("people/4.png"),
     ];
+    let sound = format!("{}\n{sound}", named("people/5.png"));
     drawn.write("people.jsonl", sound + &bad.join("\n"));
+}
+
+#[test]
+fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
+    let drawn = Drawn::new(14);
+    add_bad_labels(&drawn);
     drawn.write("negatives/9.png", "no image");
     let quick = SETTINGS.replace("batch = 1", "batch = 100\nlatent-rounds = 0");
     drawn.write("settings.toml", quick);
@@ -262,7 +274,7 @@ fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
     assert_ended(
         &ended,
         0,
-        &["people.jsonl, line 15", "px outside", "negatives/9.png"],
+        &["people.jsonl, line 16", "px outside", "negatives/9.png"],
     );
     let events = events(&ended);
     let left_out = events.iter().filter(|it| it["event"] == "left-out");
@@ -270,19 +282,20 @@ fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
         .map(|it| (it["row"].as_str().unwrap(), it["kind"].as_str().unwrap()))
         .collect();
     let expected = [
-        ("line 15", "outside"),
-        ("line 16", "image"),
-        ("line 17", "unknown"),
-        ("line 18", "zero-size"),
-        ("line 19", "count"),
-        ("line 20", "twice"),
-        ("line 21", "syntax"),
+        ("line 16", "outside"),
+        ("line 17", "image"),
+        ("line 18", "unknown"),
+        ("line 19", "zero-size"),
+        ("line 20", "count"),
+        ("line 21", "twice"),
+        ("line 22", "syntax"),
+        ("line 23", "same-name"),
     ];
     assert_eq!(told, expected);
     let data = &events.last().unwrap()["data"];
     assert_eq!(
         (&data["people"], &data["unreadable"]),
-        (&14.into(), &1.into())
+        (&15.into(), &1.into())
     );
     assert!(
         expected.iter().all(|it| data["left_out"][it.1] == 1),
@@ -290,9 +303,9 @@ fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
     );
 
     let fatal = drawn.train("n.fmp", &["--fatal", "syntax,image"]).wait();
-    assert_ended(&fatal, 4, &["2 of 21 people", "called fatal", "line 16"]);
+    assert_ended(&fatal, 4, &["2 of 23 people", "called fatal", "line 17"]);
     let all = drawn.train("n.fmp", &["--fatal", "all"]).wait();
-    assert_ended(&all, 4, &["7 of 21 people"]);
+    assert_ended(&all, 4, &["8 of 23 people"]);
     assert!(is_gone(&drawn.path("n.fmp")));
 }
 

@@ -255,7 +255,7 @@ impl State {
             (n > 0).then(|| taken.sum::<f64>() / n as f64)
         };
         let any = mean(&|_| true)?;
-        let left = self.all.iter().skip(self.at);
+        let left = self.all.get(self.at..).filter(|it| !it.is_empty())?.iter();
         let of_step = |it: &Step| mean(&|other| kind(other) == kind(*it)).unwrap_or(any);
         Some(left.map(of_step).sum())
     }
@@ -375,5 +375,7 @@ mod tests {
             Some(9.0 + 5.0),
             "5 is the mean of all"
         );
+        state.at = 5;
+        assert_eq!(state.seconds_left(), None, "all are done");
     }
 }
