@@ -29,7 +29,7 @@ pub use pose::{Placement, Pose};
 pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
-pub use solve::{Again, Bounds, CandidateSettings, Extra, Solver};
+pub use solve::{Again, Bound, Bounds, CandidateSettings, Effort, Extra, Solver};
 pub use track::{Track, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4

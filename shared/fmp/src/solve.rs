@@ -3,6 +3,7 @@
 mod again;
 mod bounds;
 mod distinct;
+mod effort;
 mod suppress;
 mod sweep;
 
@@ -12,11 +13,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use kernels::{Isa, VoteRule};
 use rayon::prelude::*;
 
+use self::effort::Tally;
 use self::sweep::{Problem, Sweep, Workspace};
 use crate::extract::{in_pool, lock};
 use crate::{Edge, Model, Pose, Responses, Spring, Springs};
 pub use again::Again;
-pub use bounds::Bounds;
+pub use bounds::{Bound, Bounds};
+pub use effort::Effort;
 
 /// Terms that another view adds to the score of a part (the `xi` and `lambda` of eq. 3).
 ///
@@ -34,7 +37,7 @@ pub trait Extra: Sync {
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
     /// An upper bound of what both terms together can add to any placement of the part: what lets
-    /// [`Again`] leave levels out. Infinite where none is known.
+    /// [`Again`] leave levels out, and poses on the others. Infinite where none is known.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
@@ -77,6 +80,7 @@ pub struct Solver {
     workspaces: Mutex<Vec<Workspace>>,
     /// One list of part scores for every caller of [`Self::score`].
     scores: Mutex<Vec<Vec<f32>>>,
+    tally: Tally,
 }
 
 /// A placement of the root and the score of the best tree that hangs on it.
@@ -112,6 +116,7 @@ impl Solver {
             model,
             workspaces: Mutex::default(),
             scores: Mutex::default(),
+            tally: Tally::default(),
         }
     }
 
@@ -150,12 +155,14 @@ impl Solver {
             solver: self,
             evidence,
             extra,
+            tally: None,
             best: Mutex::new(None),
         };
         let run = |&level: &u16| {
             if evidence.levels().binary_search(&level).is_ok() {
                 let bytes = Problem::new(self, evidence, extra, level).bytes();
-                search.look_at(level, self.workspace(bytes), &|_, it| self.put_back(it));
+                let put_back = |_: u16, it: Workspace| self.put_back(it);
+                search.look_at(level, f64::INFINITY, self.workspace(bytes), &put_back);
             }
         };
         if in_pool() {
@@ -199,6 +206,11 @@ impl Solver {
         let score = sweep::score(&problem, pose, &mut scores);
         lock(&self.scores).push(scores);
         score
+    }
+
+    /// What repeated solutions have taken so far.
+    pub fn effort(&self) -> Effort {
+        self.tally.sums()
     }
 
     /// The planes of a part.
@@ -265,6 +277,8 @@ struct Search<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
     extra: Option<&'a dyn Extra>,
+    /// Where work is counted, if it is.
+    tally: Option<&'a Tally>,
     /// The best root so far, and the workspace in which its tree can be followed.
     best: Mutex<Option<(Root, Workspace)>>,
 }
@@ -273,12 +287,10 @@ struct Search<'a> {
 type PutBack<'a> = dyn Fn(u16, Workspace) + Sync + 'a;
 
 impl Search<'_> {
-    /// Whether a level whose roots score `upper` at most can hold a better root than the best so far.
-    fn could_win(&self, upper: f64) -> bool {
+    /// The score of the best root so far.
+    fn score(&self) -> f32 {
         let best = lock(&self.best);
-        !best
-            .as_ref()
-            .is_some_and(|(it, _)| upper < f64::from(it.score))
+        best.as_ref().map_or(f32::NEG_INFINITY, |it| it.0.score)
     }
 
     /// Whether a root of this score on this level would be the best so far.
@@ -291,9 +303,15 @@ impl Search<'_> {
     }
 
     /// Solves a level.
-    fn look_at(&self, level: u16, mut workspace: Workspace, put_back: &PutBack<'_>) {
+    ///
+    /// * `slack`: see [`Problem::with_slack`].
+    fn look_at(&self, level: u16, slack: f64, mut workspace: Workspace, put_back: &PutBack<'_>) {
         let problem = Problem::new(self.solver, self.evidence, self.extra, level);
+        let problem = problem.with_slack(slack);
         let sweep = Sweep::run(&problem, &mut workspace);
+        if let Some(tally) = self.tally {
+            tally.solved(problem.n_votes(), sweep.n_cast());
+        }
         let root = if self.wins(sweep.highest(), level) {
             sweep.best_root()
         } else {

@@ -1,9 +1,11 @@
 //! The same evidence solved again and again, under terms that change little from time to time.
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::bounds::Upper;
 use super::sweep::{Problem, Workspace};
 use super::{Bounds, Extra, Search, Solver};
 use crate::extract::{in_pool, lock};
@@ -15,8 +17,9 @@ const ROOM: usize = 64 << 20;
 /// Solves one view's evidence repeatedly, as the other views' terms change.
 ///
 /// The answers are those of [`Solver::best`], bit for bit, from less work: levels that cannot hold the
-/// best pose are left out ([`Bounds`], [`Extra::max_gain`]), and on the others the scores of those
-/// sub-trees stay whose terms have not changed since the last time ([`Extra::key`]).
+/// best pose are left out ([`Bounds`], [`Extra::max_gain`]); on the others no term is taken to be worse
+/// than what rules a pose out already, so that votes come from near; and the scores of those sub-trees
+/// stay whose terms have not changed since the last time ([`Extra::key`]).
 ///
 /// Keeps up to 64 MiB of score planes, those of the most promising levels, and gives them back to the
 /// solver when it is dropped.
@@ -30,7 +33,9 @@ pub struct Again<'a> {
     /// By level: whether its planes are to be kept.
     keep: Vec<bool>,
     /// Levels to be looked at and the most that each can score, best first.
-    order: Vec<(f64, u16)>,
+    order: Vec<(Upper, u16)>,
+    /// Score of the best guess.
+    lowest: f32,
 }
 
 impl Solver {
@@ -49,6 +54,7 @@ impl Solver {
             kept: (0..n_levels).map(|_| Mutex::new(None)).collect(),
             keep: vec![false; n_levels],
             order: Vec::with_capacity(n_levels),
+            lowest: f32::NEG_INFINITY,
         }
     }
 }
@@ -58,29 +64,50 @@ impl Again<'_> {
     ///
     /// Without [`Responses::with_bounds`] the first call computes them.
     ///
-    /// * `guess`: a pose that may be nearly as good as the best, such as the last answer. It only
-    ///   saves work.
-    pub fn best(&mut self, extra: &dyn Extra, guess: Option<&Pose>) -> Option<Pose> {
+    /// * `guesses`: poses that may be nearly as good as the best, such as the last answer. They only
+    ///   save work: levels that cannot reach the best of them are left out, and its own comes first.
+    #[expect(
+        single_use_lifetimes,
+        reason = "anonymous lifetimes in `impl Trait` are unstable"
+    )]
+    pub fn best<'b>(
+        &mut self,
+        extra: &dyn Extra,
+        guesses: impl IntoIterator<Item = &'b Pose>,
+    ) -> Option<Pose> {
         let (solver, evidence) = (self.solver, self.evidence);
         if evidence.bounds().is_none() && self.own_bounds.is_none() {
             self.own_bounds = Some(solver.bounds(evidence));
         }
-        self.choose_levels(extra, guess);
+        self.choose_levels(extra, guesses);
         let this = &*self;
         let search = Search {
             solver,
             evidence,
             extra: Some(extra),
+            tally: Some(&solver.tally),
             best: Mutex::new(None),
         };
+        let votes = |&level: &u16| Problem::new(solver, evidence, None, level).n_votes();
+        let n_votes = evidence.levels().iter().map(votes).sum();
+        solver.tally.offered(evidence.levels().len(), n_votes);
         let put_back = |level: u16, it: Workspace| this.put_back(level, it);
-        let run = |&(upper, level): &(f64, u16)| {
-            if search.could_win(upper) {
-                search.look_at(level, this.workspace(level), &put_back);
+        let run = |&(upper, level): &(Upper, u16)| {
+            let lowest = search.score().max(this.lowest);
+            if !upper.is_below(lowest) {
+                let slack = upper.slack(lowest);
+                search.look_at(level, slack, this.workspace(level), &put_back);
             }
         };
         if in_pool() {
-            self.order.par_iter().with_max_len(1).for_each(run);
+            // In order, whichever thread is free: the sooner a good pose is known, the less is left.
+            let next = AtomicUsize::new(0);
+            let threads = 0..rayon::current_num_threads().min(self.order.len());
+            threads.into_par_iter().with_max_len(1).for_each(|_| {
+                while let Some(it) = self.order.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    run(it);
+                }
+            });
         } else {
             self.order.iter().for_each(run);
         }
@@ -93,25 +120,40 @@ impl Again<'_> {
     }
 
     /// Finds the levels that may hold the best pose, and those of them whose planes will be kept.
-    fn choose_levels(&mut self, extra: &dyn Extra, guess: Option<&Pose>) {
+    #[expect(
+        single_use_lifetimes,
+        reason = "anonymous lifetimes in `impl Trait` are unstable"
+    )]
+    fn choose_levels<'b>(
+        &mut self,
+        extra: &dyn Extra,
+        guesses: impl IntoIterator<Item = &'b Pose>,
+    ) {
         let (solver, evidence) = (self.solver, self.evidence);
-        let lowest = guess
-            .filter(|it| evidence.covers(it))
-            .map_or(f32::NEG_INFINITY, |pose| {
-                solver.score(evidence, pose, Some(extra))
-            });
+        let guesses = guesses.into_iter().filter(|it| evidence.covers(it));
+        let (lowest, first) = guesses.fold((f32::NEG_INFINITY, None), |best, pose| {
+            let score = solver.score(evidence, pose, Some(extra));
+            if score > best.0 {
+                (score, Some(pose.level))
+            } else {
+                best
+            }
+        });
         let gain = solver.max_gain(extra);
         let n_parts = solver.model.n_parts();
         self.order.clear();
         if let Some(bounds) = evidence.bounds().or(self.own_bounds.as_ref()) {
             let uppers = evidence.levels().iter();
             let uppers = uppers.map(|&it| (bounds.upper(it, gain, lowest, n_parts), it));
-            // A bound that is no number says nothing.
-            let is_below = |upper: f64| upper < f64::from(lowest);
-            self.order.extend(uppers.filter(|it| !is_below(it.0)));
+            self.order
+                .extend(uppers.filter(|it| !it.0.is_below(lowest)));
         }
-        self.order
-            .sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.lowest = lowest;
+        self.order.sort_unstable_by(|a, b| {
+            let later = |it: u16| Some(it) != first;
+            let by_bound = b.0.most.total_cmp(&a.0.most).then(a.1.cmp(&b.1));
+            later(a.1).cmp(&later(b.1)).then(by_bound)
+        });
         self.keep.fill(false);
         let mut room = ROOM;
         for &(_, level) in &self.order {

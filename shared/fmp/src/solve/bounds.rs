@@ -1,5 +1,6 @@
 //! What every level can offer at most: the start of exact pruning.
 
+use super::sweep::Sweep;
 use super::{Extra, Solver};
 use crate::{Responses, Springs};
 
@@ -10,22 +11,65 @@ use crate::{Responses, Springs};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds(Vec<Bound>);
 
+/// What one level can offer at most.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Bound {
-    /// Score of the best pose.
-    best: f32,
+pub struct Bound {
+    /// Score of the best pose, without the terms of other views; infinite where it is not known.
+    pub best: f32,
     /// More than any sum on the way to a score can be, terms of other views not counted.
-    size: f64,
+    pub size: f32,
+}
+
+impl Bound {
+    /// Of a level of which nothing is known.
+    pub const UNKNOWN: Self = Self {
+        best: f32::INFINITY,
+        size: 0.0,
+    };
+}
+
+impl Bound {
+    /// Of a level on which the votes have been cast without terms.
+    ///
+    /// * `edges`: see [`Solver::most_of_edges`].
+    pub(super) fn of(sweep: &Sweep<'_>, edges: f64) -> Self {
+        Self {
+            best: sweep.highest(),
+            size: ((sweep.own() + edges) as f32).next_up(),
+        }
+    }
 }
 
 impl Bounds {
+    /// The bounds of some levels; nothing is known of the others.
+    pub(super) fn of_some(evidence: &Responses<'_>, found: Vec<(u16, Bound)>) -> Self {
+        let mut bounds = vec![Bound::UNKNOWN; evidence.layout().levels.len()];
+        for (level, bound) in found {
+            bounds[usize::from(level)] = bound;
+        }
+        Self(bounds)
+    }
+
+    /// Bounds that were found elsewhere, one per level of the layout, offered or not.
+    ///
+    /// Bounds that are too low make wrong answers, and do no other harm.
+    pub fn new(of_levels: Vec<Bound>) -> Self {
+        Self(of_levels)
+    }
+
+    /// The bound of every level, offered or not.
+    pub fn levels(&self) -> &[Bound] {
+        &self.0
+    }
+
     /// Number of levels, offered or not.
     pub fn n_levels(&self) -> usize {
         self.0.len()
     }
 
-    /// More than any pose on a level can score under terms that add at most `gain` (the sum over the
-    /// parts, and that of its absolute values), unless it scores less than `lowest`. Not finite: nothing is known.
+    /// The most that a pose on a level can score under terms that add at most `gain` (the sum over
+    /// the parts, and that of its absolute values), unless it scores less than `lowest`. Not finite:
+    /// nothing is known.
     ///
     /// Rounding is monotone, so a computed score never exceeds the one computed with every term at
     /// its bound. That one and the sum made here differ by rounding alone: the way to a score has
@@ -38,11 +82,39 @@ impl Bounds {
         (gain, sizes): (f64, f64),
         lowest: f32,
         n_parts: usize,
-    ) -> f64 {
+    ) -> Upper {
         let it = self.0[usize::from(level)];
-        let size = it.size + sizes + f64::from(lowest.max(-f32::MAX)).abs();
+        let size = f64::from(it.size) + sizes + f64::from(lowest.max(-f32::MAX)).abs();
         let rounding = 8.0 * n_parts as f64 * f64::from(f32::EPSILON) * 4.0 * size;
-        f64::from(it.best) + gain + rounding
+        Upper {
+            most: f64::from(it.best) + gain + rounding,
+            rounding,
+        }
+    }
+}
+
+/// See [`Bounds::upper`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Upper {
+    /// The bound.
+    pub(super) most: f64,
+    /// What it allows for rounding.
+    rounding: f64,
+}
+
+impl Upper {
+    /// Whether nothing on the level scores as much as `lowest`; a bound that is no number says nothing.
+    pub(super) fn is_below(&self, lowest: f32) -> bool {
+        self.most < f64::from(lowest)
+    }
+
+    /// What a pose can lose against the bound without scoring less than `lowest`.
+    ///
+    /// The bound of a pose one of whose terms has a given value is [`Self::most`], less that term's
+    /// bound, plus the value; the value itself may be as large as what is lost, and adds as much
+    /// rounding again.
+    pub(super) fn slack(&self, lowest: f32) -> f64 {
+        self.most - f64::from(lowest) + self.rounding
     }
 }
 
@@ -53,27 +125,15 @@ impl Solver {
     ///
     /// If the evidence is another model's.
     pub fn bounds(&self, evidence: &Responses<'_>) -> Bounds {
-        let unknown = Bound {
-            best: f32::INFINITY,
-            size: 0.0,
-        };
-        let mut bounds = vec![unknown; evidence.layout().levels.len()];
         let votes = self.most_of_edges();
         let found = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
-            let bound = Bound {
-                best: sweep.highest(),
-                size: sweep.own() + votes,
-            };
-            (sweep.level(), bound)
+            (sweep.level(), Bound::of(sweep, votes))
         });
-        for (level, bound) in found {
-            bounds[usize::from(level)] = bound;
-        }
-        Bounds(bounds)
+        Bounds::of_some(evidence, found)
     }
 
     /// All that springs and biases can add to a score.
-    fn most_of_edges(&self) -> f64 {
+    pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
         let of_edge = parts.filter_map(|it| it.edge.as_ref()).map(|edge| {
             let springs: Vec<_> = match &edge.springs {

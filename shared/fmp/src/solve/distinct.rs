@@ -1,5 +1,6 @@
 //! The best few poses that are different people, or different ideas of one.
 
+use super::bounds::{Bound, Bounds};
 use super::{Root, Solver};
 use crate::{Pose, Responses};
 
@@ -19,11 +20,38 @@ impl Solver {
     ///
     /// If the evidence is another model's.
     pub fn distinct(&self, evidence: &Responses<'_>, n: usize, min_separation: f64) -> Vec<Pose> {
-        let peaks = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
+        self.distinct_and_bounds(evidence, n, min_separation).0
+    }
+
+    /// [`Self::distinct`] and, by the way, [`Self::bounds`].
+    ///
+    /// # Panics
+    ///
+    /// If the evidence is another model's.
+    pub fn distinct_and_bounds(
+        &self,
+        evidence: &Responses<'_>,
+        n: usize,
+        min_separation: f64,
+    ) -> (Vec<Pose>, Bounds) {
+        let edges = self.most_of_edges();
+        let found = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
             let roots: Vec<_> = sweep.roots().collect();
-            peaks(&roots)
+            (peaks(&roots), (sweep.level(), Bound::of(sweep, edges)))
         });
-        let mut peaks = peaks.concat();
+        let (peaks, bounds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        let poses = self.greedy(evidence, peaks.concat(), n, min_separation);
+        (poses, Bounds::of_some(evidence, bounds))
+    }
+
+    /// The best `n` of these roots whose poses are far enough from each other.
+    fn greedy(
+        &self,
+        evidence: &Responses<'_>,
+        mut peaks: Vec<Root>,
+        n: usize,
+        min_separation: f64,
+    ) -> Vec<Pose> {
         peaks.sort_by(Root::best_first);
         let mut poses: Vec<Option<Pose>> = vec![None; peaks.len()];
         let mut batches = vec![BATCH; evidence.layout().levels.len()];

@@ -15,6 +15,8 @@ pub(super) struct Workspace {
     spans: Vec<Span>,
     /// The level whose planes these are, if they may serve again.
     level: Option<u16>,
+    /// The slack under which they were computed.
+    slack: f64,
     /// What every part's terms depended on.
     keys: Vec<Option<u64>>,
     /// Whether a part's planes of before can stay: all terms of its sub-tree are those of before.
@@ -23,6 +25,8 @@ pub(super) struct Workspace {
     begun: Vec<bool>,
     /// Sum over the parts of the largest score that each has by itself.
     own: f64,
+    /// Votes that have been cast in the last sweep.
+    n_cast: usize,
     /// A part's position term, `rows x cols`.
     term: Vec<f32>,
     votes: VoteWorkspace,
@@ -50,6 +54,7 @@ pub(super) struct Problem<'a> {
     /// The response maps of the level.
     maps: &'a [f32],
     grid: Grid,
+    slack: f64,
 }
 
 impl<'a> Problem<'a> {
@@ -76,7 +81,18 @@ impl<'a> Problem<'a> {
                 rows: window.rows,
                 cols: window.cols,
             },
+            slack: f64::INFINITY,
         }
+    }
+
+    /// The same, where only poses are looked for that lose less than `slack` against the bound of
+    /// the level; scores of others may come out as any that is too low as well.
+    ///
+    /// Then no term needs to be as bad as it is: a pose of which one term loses more than `slack`
+    /// alone is still ruled out if the term is taken to lose just that. Scores that differ less ask
+    /// for votes from less far.
+    pub(super) fn with_slack(self, slack: f64) -> Self {
+        Self { slack, ..self }
     }
 
     fn responses(&self, part: usize, mixture: usize) -> &'a [f32] {
@@ -116,6 +132,27 @@ impl<'a> Problem<'a> {
         has_one.then_some(term[0])
     }
 
+    /// The worst position term that a part of a pose that loses less than `slack` may have, if any
+    /// is too bad.
+    fn worst_term(&self, part: usize, slack: f64) -> Option<f32> {
+        let extra = self.extra?;
+        let types = 0..self.solver.model.n_types(part);
+        let types = types.map(|it| f64::from(extra.of_type(part, it)));
+        let best_type = types.fold(f64::NEG_INFINITY, f64::max);
+        let worst = f64::from(extra.max_gain(part)) - best_type - slack;
+        let worst = (worst as f32).next_down();
+        worst.is_finite().then_some(worst)
+    }
+
+    /// Votes that a sweep casts if it knows none.
+    pub(super) fn n_votes(&self) -> usize {
+        (self.solver.model.n_parts() - 1) * self.n_cells()
+    }
+
+    fn n_cells(&self) -> usize {
+        self.grid.rows * self.grid.cols
+    }
+
     /// Memory that the planes of the level need, bytes.
     pub(super) fn bytes(&self) -> usize {
         let n_planes = self.solver.first_planes[self.solver.model.n_parts()];
@@ -147,6 +184,7 @@ impl<'a> Sweep<'a> {
                 let parent = &mut before[grid.len(of_parent.start)..grid.len(of_parent.end)];
                 let parent = (parent, &mut spans[of_parent]);
                 rule.cast(solver.isa, child, parent, &mut workspace.votes);
+                workspace.n_cast += problem.n_cells();
             }
         }
         Self::of(problem, workspace)
@@ -165,6 +203,11 @@ impl<'a> Sweep<'a> {
 
     pub(super) fn level(&self) -> u16 {
         self.level
+    }
+
+    /// Votes that were cast.
+    pub(super) fn n_cast(&self) -> usize {
+        self.workspace.n_cast
     }
 
     /// The score of the best root of the level.
@@ -266,9 +309,15 @@ impl Workspace {
         self.spans.resize(n_planes, Span::NONE);
         self.term.resize(grid.rows * grid.cols, 0.0);
         self.own = 0.0;
+        self.n_cast = 0;
         self.keys.resize(n_parts, None);
         self.stays.clear();
         let same_level = self.level.replace(problem.level) == Some(problem.level);
+        // Planes that allow for more serve as well.
+        let same_level = same_level && problem.slack <= self.slack;
+        if !same_level {
+            self.slack = problem.slack;
+        }
         for (part, before) in self.keys.iter_mut().enumerate() {
             let key = problem.extra.and_then(|it| it.key(part));
             let same = std::mem::replace(before, key) == key && key.is_some();
@@ -289,12 +338,17 @@ impl Workspace {
             return;
         }
         let (solver, grid) = (problem.solver, problem.grid);
-        let term = problem.position_term(part, &mut self.term);
+        let has_term = problem.position_term(part, &mut self.term).is_some();
+        if has_term && let Some(worst) = problem.worst_term(part, self.slack) {
+            for it in &mut self.term {
+                *it = it.max(worst);
+            }
+        }
         let mut most = f32::NEG_INFINITY;
         for (mixture, plane) in solver.planes(part).enumerate() {
             let own = OwnScores {
                 map: problem.responses(part, mixture),
-                term,
+                term: has_term.then_some(&self.term),
                 constant: problem.extra.map(|it| it.of_type(part, mixture)),
             };
             let scores = &mut self.planes.scores_mut()[grid.len(plane)..grid.len(plane + 1)];

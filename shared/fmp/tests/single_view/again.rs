@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fmp::{Extra, Pose, Solver};
+use fmp::{Bound, Bounds, Extra, Pose, Solver};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -87,6 +87,33 @@ proptest! {
         let want = solver.best(&view, Some(&terms));
         let found = solver.again(&view).best(&terms, want.as_ref());
         prop_assert_eq!(bits(found.as_ref()), bits(want.as_ref()));
+    }
+}
+
+proptest! {
+    /// They come from another process: what they say is done, and no more than that.
+    #[test]
+    fn bounds_that_lie_do_no_harm(
+        seed in any::<u64>(),
+        lies in vec((any::<f32>(), any::<f32>()), SIZES.len()),
+        times in times(6),
+    ) {
+        let mut noise = Noise(seed);
+        let model = tree(&mut noise, 6);
+        let evidence = Evidence::new(&mut noise, &model, &SIZES);
+        let lie = |&(best, size): &(f32, f32)| Bound { best, size };
+        let bounds = Bounds::new(lies.iter().map(lie).collect());
+        let solver = Solver::new(model);
+        let view = evidence.view().with_bounds(&bounds);
+        let mut again = solver.again(&view);
+        let mut last: Option<Pose> = None;
+        for (terms, _) in &times {
+            last = again.best(terms, last.as_ref());
+            if let Some(pose) = &last {
+                // Panics if the pose does not lie on its level.
+                solver.score(&view, pose, Some(terms));
+            }
+        }
     }
 }
 

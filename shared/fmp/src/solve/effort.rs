@@ -1,0 +1,81 @@
+//! How much of the full work repeated solutions took: what their shortcuts are worth.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Sums over all solutions of all [`Again`](crate::Again) of a solver, since it was made.
+///
+/// A vote is that of one part for one cell of its parent. With several threads the figures depend on
+/// which of them is faster; the answers do not.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Solutions asked for.
+    pub solutions: u64,
+    /// Levels that were offered.
+    pub levels_offered: u64,
+    /// Levels that bounds could not rule out.
+    pub levels_solved: u64,
+    /// Votes on all levels that were offered.
+    pub votes_offered: u64,
+    /// Votes on the levels that bounds could not rule out.
+    pub votes_solved: u64,
+    /// Votes that were cast, since they were not known from the solution before.
+    pub votes_cast: u64,
+}
+
+impl Effort {
+    /// What was added since an earlier look.
+    #[must_use]
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            solutions: self.solutions - before.solutions,
+            levels_offered: self.levels_offered - before.levels_offered,
+            levels_solved: self.levels_solved - before.levels_solved,
+            votes_offered: self.votes_offered - before.votes_offered,
+            votes_solved: self.votes_solved - before.votes_solved,
+            votes_cast: self.votes_cast - before.votes_cast,
+        }
+    }
+}
+
+/// [`Effort`], counted by several threads.
+#[derive(Debug, Default)]
+pub(super) struct Tally {
+    solutions: AtomicU64,
+    levels_offered: AtomicU64,
+    levels_solved: AtomicU64,
+    votes_offered: AtomicU64,
+    votes_solved: AtomicU64,
+    votes_cast: AtomicU64,
+}
+
+impl Tally {
+    /// Counts a solution about to begin.
+    pub(super) fn offered(&self, levels: usize, votes: usize) {
+        add(&self.solutions, 1);
+        add(&self.levels_offered, levels);
+        add(&self.votes_offered, votes);
+    }
+
+    /// Counts a level.
+    pub(super) fn solved(&self, votes: usize, cast: usize) {
+        add(&self.levels_solved, 1);
+        add(&self.votes_solved, votes);
+        add(&self.votes_cast, cast);
+    }
+
+    pub(super) fn sums(&self) -> Effort {
+        let of = |sum: &AtomicU64| sum.load(Ordering::Relaxed);
+        Effort {
+            solutions: of(&self.solutions),
+            levels_offered: of(&self.levels_offered),
+            levels_solved: of(&self.levels_solved),
+            votes_offered: of(&self.votes_offered),
+            votes_solved: of(&self.votes_solved),
+            votes_cast: of(&self.votes_cast),
+        }
+    }
+}
+
+fn add(sum: &AtomicU64, n: usize) {
+    sum.fetch_add(n as u64, Ordering::Relaxed);
+}
