@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use fmp::{Placement, Pose};
-use multiview::{PairEstimate, PairStart, Settings, ViewPlan};
+use fmp::{Bound, Bounds, Placement, Pose};
+use multiview::{EnergyKind, PairEstimate, PairStart, Settings, ViewPlan};
 use nalgebra::Point2;
 use proptest::prelude::*;
 
@@ -54,6 +54,33 @@ fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
         }
     }
     poses
+}
+
+proptest! {
+    /// They come from another process.
+    #[test]
+    fn bounds_change_nothing_unless_they_lie_and_then_do_no_harm(
+        seed in any::<u64>(),
+        start in starts(),
+        lies in proptest::collection::vec((-20.0..20.0_f32, 0.0..20.0_f32), 2 * SIZES.len()),
+        released: bool,
+    ) {
+        let scene = Scene::new(seed, 2, &SIZES);
+        let energy = if released { EnergyKind::Released } else { EnergyKind::Paper };
+        let settings = Settings { energy, ..settings(seed) };
+        let evidence = [0, 1].map(|it| scene.views[it].evidence());
+        let fuse = |bounds: &[Bounds; 2]| {
+            let evidence = [0, 1].map(|it| evidence[it].with_bounds(&bounds[it]));
+            scene.fuse_evidence(&settings, [0, 1], start, evidence.each_ref())
+        };
+        let right = evidence.each_ref().map(|it| scene.solver.bounds(it));
+        prop_assert_eq!(fuse(&right), scene.fuse(&settings, [0, 1], start));
+        let lie = |&(best, size): &(f32, f32)| Bound { best, size };
+        let lies: Vec<Bound> = lies.iter().map(lie).collect();
+        let wrong = [0, 1].map(|it| Bounds::new(lies[it * SIZES.len()..][..SIZES.len()].to_vec()));
+        let found = fuse(&wrong);
+        prop_assert!(found.iterations.len() <= settings.max_iterations);
+    }
 }
 
 proptest! {

@@ -260,13 +260,24 @@ impl Scene {
         views: [usize; 2],
         start: PairStart,
     ) -> PairEstimate {
+        let evidence = views.map(|it| self.views[it].evidence());
+        self.fuse_evidence(settings, views, start, evidence.each_ref())
+    }
+
+    /// The same on evidence of these views that is given.
+    pub(crate) fn fuse_evidence(
+        &self,
+        settings: &Settings,
+        views: [usize; 2],
+        start: PairStart,
+        evidence: [&Responses<'_>; 2],
+    ) -> PairEstimate {
         let [first, second] = views.map(|it| &self.views[it]);
         let input = PairInput {
             views: [first.answer(), second.answer()],
             epipolar: Epipolar::new(&first.plan, &second.plan),
             tables: (views == [0, 1]).then_some(&self.tables),
         };
-        let evidence = [&first.evidence(), &second.evidence()];
         estimate_pair(&self.solver, settings, &input, evidence, start)
     }
 }
