@@ -1,9 +1,9 @@
 //! The response maps of the views a worker reads, one frame of each held where it lies.
 
-use fmp::Responses;
 use messages::{EvidenceHeader, topic};
 use multiview::ViewPlan;
 use runtime::{Failure, Sample, Service, SliceSubscriber, Waiter};
+use wire::EvidenceView;
 
 /// The evidence of one view.
 #[derive(Debug)]
@@ -51,14 +51,14 @@ impl Evidence {
     }
 
     /// The evidence of exactly this frame, if it is there and well formed.
-    pub(crate) fn of<'a>(&'a self, frame: u64, plan: &'a ViewPlan) -> Option<Responses<'a>> {
+    pub(crate) fn of<'a>(&'a self, frame: u64, plan: &'a ViewPlan) -> Option<EvidenceView<'a>> {
         let sample = self.held.as_ref()?;
         if sample.header().stamp.frame != frame {
             return None;
         }
         let read = wire::evidence_from_message(sample.header(), sample.payload(), plan.layout());
         match read {
-            Ok(responses) => Some(responses),
+            Ok(evidence) => Some(evidence),
             Err(error) => {
                 tracing::warn!(frame, %error, "unreadable evidence");
                 None

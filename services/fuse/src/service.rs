@@ -12,6 +12,8 @@ use runtime::{
     now_nanos,
 };
 
+use wire::EvidenceView;
+
 use crate::evidence::Evidence;
 
 /// What one worker's process has to do.
@@ -189,18 +191,16 @@ impl<'a> Worker<'a> {
         for evidence in self.evidence.iter_mut().flatten() {
             evidence.advance(joined.frame)?;
         }
+        let evidence = self.evidence_of(joined.frame);
         for &(index, views) in &self.job.pairs {
             let received_at_nanos = now_nanos();
             self.service.progress().tick();
-            let answer = if views.iter().all(|&view| answers[view].is_some()) {
-                self.evidence_of(views, joined.frame)
-                    .and_then(|[first, second]| {
-                        self.job
-                            .step
-                            .pair(views, &answers, [&first, &second], &start)
-                    })
-            } else {
-                None
+            let answer = match views.map(|view| evidence[view].as_ref()) {
+                [Some(first), Some(second)] => {
+                    let evidence = [&first.responses(), &second.responses()];
+                    self.job.step.pair(views, &answers, evidence, &start)
+                }
+                _ => None,
             };
             let mut message = wire::pair_to_message(views, answer.as_ref(), views_present)
                 .or_fail(ExitKind::Run)?;
@@ -218,6 +218,7 @@ impl<'a> Worker<'a> {
             health.sent(joined.frame);
             health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
         }
+        drop(evidence);
         // Room for the next, whatever its sender has left undone: it may have died half-way.
         for evidence in self.evidence.iter_mut().flatten() {
             evidence.advance(joined.frame + 1)?;
@@ -225,13 +226,12 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    fn evidence_of(&self, views: [usize; 2], frame: u64) -> Option<[fmp::Responses<'_>; 2]> {
-        let of = |view: usize| {
-            self.evidence[view]
-                .as_ref()?
-                .of(frame, &self.job.plans[view])
-        };
-        Some([of(views[0])?, of(views[1])?])
+    /// The evidence of a frame, by view.
+    fn evidence_of(&self, frame: u64) -> Vec<Option<EvidenceView<'_>>> {
+        let views = self.evidence.iter().zip(&self.job.plans);
+        views
+            .map(|(evidence, plan)| evidence.as_ref()?.of(frame, plan))
+            .collect()
     }
 
     fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {

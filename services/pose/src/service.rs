@@ -152,8 +152,9 @@ impl View<'_> {
             && let Some(mut loan) = found.evidence
         {
             let layout = self.job.step.layout();
-            let ViewEstimate { levels, scope, .. } = &found.estimate;
-            let header = wire::levels_to_message(levels, scope, layout).or_fail(ExitKind::Run)?;
+            let it = &found.estimate;
+            let header = wire::evidence_to_message(&it.levels, &it.bounds, &it.scope, layout);
+            let header = header.or_fail(ExitKind::Run)?;
             *loan.header_mut() = EvidenceHeader {
                 stamp,
                 timing: timing(),

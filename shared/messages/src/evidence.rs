@@ -6,8 +6,8 @@ use crate::{MAX_LEVELS, Stamp, Status, Timing};
 
 /// Travels as the user header of the responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
 /// alignment makes them begin on a cache line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
-#[type_name("EvidenceHeader.v2")]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("EvidenceHeader.v3")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {
@@ -31,6 +31,10 @@ pub struct EvidenceHeader {
     pub scope_levels: [u16; 2],
     /// Levels of the pyramid that hold valid values, ascending.
     pub levels: [u16; MAX_LEVELS],
+    /// Score of the best pose on each of `levels`, by this view alone; infinite where it is not known.
+    pub best: [f32; MAX_LEVELS],
+    /// More than any sum on the way to a score on each of `levels`, by this view alone.
+    pub size: [f32; MAX_LEVELS],
 }
 
 impl Default for EvidenceHeader {
@@ -46,6 +50,8 @@ impl Default for EvidenceHeader {
             y: [0; 2],
             scope_levels: [0; 2],
             levels: [0; MAX_LEVELS],
+            best: [0.0; MAX_LEVELS],
+            size: [0.0; MAX_LEVELS],
         }
     }
 }

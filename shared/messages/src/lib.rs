@@ -37,7 +37,7 @@ const _: () = {
     assert!(size_of::<Stamp>() == 32);
     assert!(size_of::<Timing>() == 16);
     assert!(size_of::<FrameHeader>() == 128);
-    assert!(size_of::<EvidenceHeader>() == 320);
+    assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<ViewPose>() == 1424);
     assert!(size_of::<ViewQuality>() == 184);

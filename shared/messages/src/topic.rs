@@ -18,7 +18,7 @@ pub fn view_pose(view: usize) -> String {
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
 #[must_use]
 pub fn evidence(view: usize) -> String {
-    format!("evidence/v2/{view}")
+    format!("evidence/v3/{view}")
 }
 
 /// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).

@@ -149,12 +149,8 @@ impl Estimator {
                 let evidence = |view: usize| {
                     let (layout, found) = (self.plans[view].layout(), found[view].as_ref()?);
                     let values = &self.responses[view];
-                    Some(Responses::within(
-                        layout,
-                        values,
-                        &found.levels,
-                        found.scope,
-                    ))
+                    let evidence = Responses::within(layout, values, &found.levels, found.scope);
+                    Some(evidence.with_bounds(&found.bounds))
                 };
                 let evidence = [evidence(pair[0])?, evidence(pair[1])?];
                 self.fuse

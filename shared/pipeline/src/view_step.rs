@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use fmp::{Extractor, Layout, Model, Pose, Responses, Scope, Solver, Track, Tracker};
+use fmp::{Bounds, Extractor, Layout, Model, Pose, Responses, Scope, Solver, Track, Tracker};
 use kernels::Rgb8View;
 
 /// Which levels of the pyramid a view offers as evidence.
@@ -61,6 +61,8 @@ pub struct ViewEstimate {
     pub candidates: Vec<Pose>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
+    /// What every level can offer at most.
+    pub bounds: Bounds,
     /// What was searched, and is covered by the responses.
     pub scope: Scope,
 }
@@ -110,7 +112,7 @@ impl ViewStep {
             .responses_in(image, layout, &scope, responses);
         let searched: Vec<u16> = scope.levels().collect();
         let evidence = Responses::within(layout, responses, &searched, scope);
-        let candidates = self.solver.distinct(
+        let (candidates, bounds) = self.solver.distinct_and_bounds(
             &evidence,
             self.settings.n_candidates,
             self.settings.min_separation,
@@ -119,6 +121,7 @@ impl ViewStep {
         ViewEstimate {
             candidates,
             levels,
+            bounds,
             scope,
         }
     }

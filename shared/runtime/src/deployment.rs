@@ -211,10 +211,10 @@ mod tests {
         let topics = plan().topics();
         let evidence = topics
             .iter()
-            .find(|it| it.topic() == "evidence/v2/0")
+            .find(|it| it.topic() == "evidence/v3/0")
             .unwrap();
         // 2 workers x (1 waiting + 2 held) + 1 being written, of 40 MB and the headers.
-        let chunk = 40_000_000 + 384;
+        let chunk = 40_000_000 + 1152;
         assert_eq!(evidence.pool_bytes(), 7 * chunk);
     }
 
@@ -247,7 +247,7 @@ mod tests {
         assert!(*needed_bytes > 4 * 7 * 40_000_000, "{needed_bytes}");
         assert_eq!(*free_bytes, 64 << 20);
         assert!(error.to_string().contains("67 MB are free"), "{error}");
-        assert!(error.to_string().contains("evidence/v2/"), "{error}");
+        assert!(error.to_string().contains("evidence/v3/"), "{error}");
         assert!(error.hint().unwrap().contains("--shm-size"), "{error}");
     }
 

@@ -1,22 +1,38 @@
 //! Response maps: the header of an array that is never copied.
 
-use fmp::{Layout, Region, Responses, Scope, ScopeError};
+use fmp::{Bound, Bounds, Layout, Region, Responses, Scope, ScopeError};
 use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
 
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Writes what the values are responses of, and which levels are valid; the caller fills in stamp
-/// and timing.
+/// Evidence as it arrived: the responses where they lie, and the bounds of their levels.
+#[derive(Debug, Clone)]
+pub struct EvidenceView<'a> {
+    responses: Responses<'a>,
+    bounds: Bounds,
+}
+
+impl EvidenceView<'_> {
+    /// The responses, with their bounds.
+    pub fn responses(&self) -> Responses<'_> {
+        self.responses.with_bounds(&self.bounds)
+    }
+}
+
+/// Writes what the values are responses of, which levels are valid and what they offer at most; the caller
+/// fills in stamp and timing.
 ///
 /// * `levels`: ascending.
+/// * `bounds`: of the same responses; a level of which nothing sensible is known counts as unknown.
 ///
 /// # Errors
 ///
 /// [`WireError`] if there are more than [`MAX_LEVELS`], or they are not ascending levels of
-/// `scope`.
-pub fn levels_to_message(
+/// `scope`, or the bounds are another layout's.
+pub fn evidence_to_message(
     levels: &[u16],
+    bounds: &Bounds,
     scope: &Scope,
     layout: &Layout,
 ) -> Result<EvidenceHeader, WireError> {
@@ -30,10 +46,20 @@ pub fn levels_to_message(
         x: scope.region().x,
         y: scope.region().y,
         scope_levels: [scope.levels().start, scope.levels().end],
-        levels: [0; MAX_LEVELS],
+        ..EvidenceHeader::default()
     };
     ascending(levels, scope)?;
+    equal("bounds", bounds.n_levels(), layout.levels.len())?;
     message.levels[..levels.len()].copy_from_slice(levels);
+    for (entry, &level) in levels.iter().enumerate() {
+        let bound = bounds.levels()[usize::from(level)];
+        let bound = if refusal(entry, bound).is_none() {
+            bound
+        } else {
+            Bound::UNKNOWN
+        };
+        (message.best[entry], message.size[entry]) = (bound.best, bound.size);
+    }
     Ok(message)
 }
 
@@ -42,12 +68,13 @@ pub fn levels_to_message(
 /// # Errors
 ///
 /// [`WireError`] if the image size is not that of `layout`, the scope does not lie on it, there are
-/// fewer values than the scope has cells, or the levels are not ascending levels of it.
+/// fewer values than the scope has cells, the levels are not ascending levels of it, or a bound is
+/// none: it is not a number, minus infinity, or its size is negative or infinite.
 pub fn evidence_from_message<'a>(
     message: &'a EvidenceHeader,
     values: &'a [f32],
     layout: &'a Layout,
-) -> Result<Responses<'a>, WireError> {
+) -> Result<EvidenceView<'a>, WireError> {
     equal("width", message.width as usize, layout.image_size[0])?;
     equal("height", message.height as usize, layout.image_size[1])?;
     let scope = scope_from_message(message, layout)?;
@@ -61,7 +88,40 @@ pub fn evidence_from_message<'a>(
     let n_levels = count("n_levels", message.n_levels as usize, MAX_LEVELS)?;
     let levels = &message.levels[..n_levels];
     ascending(levels, &scope)?;
-    Ok(Responses::within(layout, values, levels, scope))
+    let mut bounds = vec![Bound::UNKNOWN; layout.levels.len()];
+    for (entry, &level) in levels.iter().enumerate() {
+        let bound = Bound {
+            best: message.best[entry],
+            size: message.size[entry],
+        };
+        match refusal(entry, bound) {
+            Some(error) => return Err(error),
+            None => bounds[usize::from(level)] = bound,
+        }
+    }
+    Ok(EvidenceView {
+        responses: Responses::within(layout, values, levels, scope),
+        bounds: Bounds::new(bounds),
+    })
+}
+
+/// What is wrong with a bound.
+fn refusal(entry: usize, bound: Bound) -> Option<WireError> {
+    let refused = |field, got: f32, expected| {
+        Some(WireError::Value {
+            field,
+            entry,
+            got: f64::from(got),
+            expected,
+        })
+    };
+    if bound.best.is_nan() || bound.best == f32::NEG_INFINITY {
+        refused("best", bound.best, "a score")
+    } else if !(bound.size.is_finite() && bound.size >= 0.0) {
+        refused("size", bound.size, "finite and not negative")
+    } else {
+        None
+    }
 }
 
 fn scope_from_message(message: &EvidenceHeader, layout: &Layout) -> Result<Scope, WireError> {
@@ -111,6 +171,10 @@ mod tests {
     use super::*;
     use crate::testing::layout;
 
+    fn unknown() -> Bounds {
+        Bounds::new(vec![Bound::UNKNOWN; layout().levels.len()])
+    }
+
     /// Any scope of the layout, by shares of its levels, columns and rows.
     fn scope() -> impl Strategy<Value = Scope> {
         let layout = layout();
@@ -128,16 +192,24 @@ mod tests {
 
     proptest! {
         #[test]
-        fn levels_and_scope_come_back_as_they_were_sent(
+        fn levels_bounds_and_scope_come_back_as_they_were_sent(
             scope in scope(),
             mask in prop::collection::vec(any::<bool>(), 96),
+            known in prop::collection::vec((-1e6..1e6_f32, 0.0..1e6_f32, any::<bool>()), 96),
         ) {
             let layout = layout();
             let levels: Vec<u16> = scope.levels().filter(|&it| mask[usize::from(it)]).collect();
-            let message = levels_to_message(&levels, &scope, &layout).unwrap();
+            let bound = |level: u16| match known[usize::from(level)] {
+                (best, size, true) if levels.contains(&level) => Bound { best, size },
+                _ => Bound::UNKNOWN,
+            };
+            let bounds = Bounds::new((0..layout.levels.len() as u16).map(bound).collect());
+            let message = evidence_to_message(&levels, &bounds, &scope, &layout).unwrap();
             let values = vec![0.0; layout.n_values(&scope)];
             let back = evidence_from_message(&message, &values, &layout).unwrap();
+            let back = back.responses();
             prop_assert_eq!(back.levels(), levels);
+            prop_assert_eq!(back.bounds(), Some(&bounds));
             prop_assert_eq!(back.scope(), &scope);
             let too_few = &values[1..];
             let got = evidence_from_message(&message, too_few, &layout);
@@ -151,12 +223,15 @@ mod tests {
             small in 0_u32..4,
             levels in prop::collection::vec(0_u16..20, MAX_LEVELS),
             ranges in prop::collection::vec(0_u32..90, 6),
+            bounds in prop::collection::vec((any::<u32>(), any::<u32>()), MAX_LEVELS),
         ) {
             let layout = layout();
             let values = vec![0.0; layout.n_responses()];
             let whole = Scope::whole(&layout);
-            let mut message = levels_to_message(&[], &whole, &layout).unwrap();
+            let mut message = evidence_to_message(&[], &unknown(), &whole, &layout).unwrap();
             message.levels.copy_from_slice(&levels);
+            message.best = std::array::from_fn(|it| f32::from_bits(bounds[it].0));
+            message.size = std::array::from_fn(|it| f32::from_bits(bounds[it].1));
             for (n, any_scope) in [(n_levels, false), (small, false), (small, true)] {
                 message.n_levels = n;
                 if any_scope {
@@ -165,6 +240,10 @@ mod tests {
                     message.scope_levels = [ranges[4], ranges[5]].map(|it| it as u16 / 4);
                 }
                 if let Ok(evidence) = evidence_from_message(&message, &values, &layout) {
+                    let evidence = evidence.responses();
+                    for bound in evidence.bounds().unwrap().levels() {
+                        prop_assert!(bound.best > f32::NEG_INFINITY && bound.size.is_finite());
+                    }
                     for &level in evidence.levels() {
                         prop_assert!(!evidence.map(usize::from(level), 0).is_empty());
                     }
@@ -176,7 +255,8 @@ mod tests {
     fn refused(change: impl FnOnce(&mut EvidenceHeader)) -> String {
         let layout = layout();
         let values = vec![0.0; layout.n_responses()];
-        let mut message = levels_to_message(&[1], &Scope::whole(&layout), &layout).unwrap();
+        let whole = Scope::whole(&layout);
+        let mut message = evidence_to_message(&[1], &unknown(), &whole, &layout).unwrap();
         change(&mut message);
         let got = evidence_from_message(&message, &values, &layout);
         got.unwrap_err().to_string()
@@ -185,7 +265,8 @@ mod tests {
     #[test]
     fn refuses_levels_out_of_order() {
         let layout = layout();
-        let got = levels_to_message(&[1, 1], &Scope::whole(&layout), &layout).unwrap_err();
+        let whole = Scope::whole(&layout);
+        let got = evidence_to_message(&[1, 1], &unknown(), &whole, &layout).unwrap_err();
         assert_eq!(
             got.to_string(),
             "levels of entry 1 is 1, expected ascending levels"
@@ -206,5 +287,42 @@ mod tests {
         let n_levels = layout().levels.len();
         let want = format!("scope_levels is 999, expected {n_levels}");
         assert_eq!(refused(|it| it.scope_levels[1] = 999), want);
+    }
+
+    #[test]
+    fn refuses_bounds_of_another_layout() {
+        let (layout, none) = (layout(), Bounds::new(Vec::new()));
+        let got = evidence_to_message(&[0], &none, &Scope::whole(&layout), &layout).unwrap_err();
+        assert!(matches!(
+            got,
+            WireError::Mismatch {
+                field: "bounds",
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn refuses_bounds_that_are_none() {
+        let said = |best: f32, size: f32| refused(|it| (it.best[0], it.size[0]) = (best, size));
+        assert_eq!(
+            said(f32::NAN, 1.0),
+            "best of entry 0 is NaN, expected a score"
+        );
+        assert!(said(f32::NEG_INFINITY, 1.0).contains("best"));
+        for size in [f32::NAN, f32::INFINITY, -1.0] {
+            assert!(said(0.0, size).contains("size"));
+        }
+    }
+
+    #[test]
+    fn a_bound_that_is_none_is_sent_as_unknown() {
+        let layout = layout();
+        for best in [f32::NAN, f32::NEG_INFINITY] {
+            let bounds = Bounds::new(vec![Bound { best, size: 1.0 }; layout.levels.len()]);
+            let whole = Scope::whole(&layout);
+            let message = evidence_to_message(&[0], &bounds, &whole, &layout).unwrap();
+            assert_eq!((message.best[0], message.size[0]), (f32::INFINITY, 0.0));
+        }
     }
 }

@@ -13,7 +13,7 @@ mod quality;
 mod skeleton;
 
 pub use error::WireError;
-pub use evidence::{evidence_from_message, levels_to_message};
+pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
 pub use pair::{pair_from_message, pair_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, pose_from_message, pose_to_message,
