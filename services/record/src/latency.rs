@@ -20,6 +20,8 @@ pub struct Percentiles {
     pub p50_ms: f64,
     /// 99 of 100 are shorter.
     pub p99_ms: f64,
+    /// 999 of 1000 are shorter; the longest where fewer were measured.
+    pub p99_9_ms: f64,
     /// The longest.
     pub max_ms: f64,
 }
@@ -254,6 +256,7 @@ fn percentiles(histogram: &Histogram<u32>) -> Percentiles {
         count: histogram.len(),
         p50_ms: ms(histogram.value_at_quantile(0.5)),
         p99_ms: ms(histogram.value_at_quantile(0.99)),
+        p99_9_ms: ms(histogram.value_at_quantile(0.999)),
         max_ms: ms(histogram.max()),
     }
 }
