@@ -83,9 +83,7 @@ pub(crate) struct Clip {
 #[test]
 fn uprighting_facing_and_candidates_make_the_difference() {
     let Some(dir) = shared_dir() else { return };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let rig = root.join("configs/rigs/pose2sim-balancing.toml");
-    let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
+    let rig = rig();
     let data = dir.join("data/pose2sim_balancing");
     let truth = reference(&data.join("reference_0-69.trc"));
     let model = Arc::new(fmp::files::read(&dir.join("data/models/parse_fmp.mat")).unwrap());
@@ -120,6 +118,13 @@ fn uprighting_facing_and_candidates_make_the_difference() {
         );
         assert!(bent.median_and_p90()[0] <= bent_cm, "bent median, cm");
     }
+}
+
+/// The four cameras.
+pub(crate) fn rig() -> Rig {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let file = root.join("configs/rigs/pose2sim-balancing.toml");
+    geometry::files::read(&file, &geometry::files::ReadOptions::default()).unwrap()
 }
 
 /// Errors over [`UPRIGHT`] and [`BENT`], every frame on its own.

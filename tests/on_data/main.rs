@@ -13,6 +13,7 @@ mod annotations;
 mod balancing;
 mod calibration;
 mod footage;
+mod iterations;
 mod models;
 mod multi_view;
 mod parse_set;

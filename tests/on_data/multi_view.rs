@@ -61,7 +61,7 @@ fn pinhole(
 }
 
 /// C1 or C2 of HumanEva for subject S1, principal point moved by `shift` pixels.
-fn humaneva(shared: &Path, name: &str, shift: f64) -> Camera {
+pub(crate) fn humaneva(shared: &Path, name: &str, shift: f64) -> Camera {
     let file = json(&shared.join("data/humaneva/calibration.json"));
     let (inside, outside) = (&file["intrinsics"][name], &file["extrinsics"]["S1"][name]);
     let centre = ["cx", "cy"].map(|key| number(&inside[key]) + shift);
@@ -71,7 +71,7 @@ fn humaneva(shared: &Path, name: &str, shift: f64) -> Camera {
 }
 
 /// L or R of UMPM, principal point moved by `shift` pixels.
-fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
+pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     let file = json(&shared.join("data/umpm/calibration_derived.json"));
     let it = &file["cams"][name];
     let centre = ["cx", "cy"].map(|key| number(&it[key]) + shift);
@@ -222,7 +222,7 @@ impl Pair {
 }
 
 /// The tables of a pair: the file `<first>wrt<second>` holds p(second | first).
-fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> TypeTables {
+pub(crate) fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> TypeTables {
     let read = |rows: &str, cols: &str| {
         let path = shared.join(format!("data/ptc/{set}_{rows}wrt{cols}.csv"));
         Compatibility::parse(&std::fs::read_to_string(path).unwrap(), &SIX_TYPES).unwrap()
