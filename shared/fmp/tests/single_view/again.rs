@@ -91,6 +91,52 @@ proptest! {
 }
 
 proptest! {
+    /// The best pose loses on one part all that a pose may lose.
+    #[test]
+    fn a_term_may_take_all_there_is_to_lose(
+        seed in any::<u64>(),
+        offset in prop_oneof![Just(0.0_f32), -1e4..1e4_f32],
+        part in 0..6_usize,
+        term in -8.0..0.0_f32,
+    ) {
+        let mut noise = Noise(seed);
+        let model = tree(&mut noise, 6);
+        let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
+        evidence.values.iter_mut().for_each(|it| *it += offset);
+        let solver = Solver::new(Arc::clone(&model));
+        let (view, terms) = (evidence.view(), OnOnePart { part, term });
+        let want = solver.best(&view, Some(&terms));
+        let found = solver.again(&view).best(&terms, want.as_ref());
+        prop_assert_eq!(bits(found.as_ref()), bits(want.as_ref()));
+    }
+}
+
+/// The same term for all placements of one part.
+struct OnOnePart {
+    part: usize,
+    term: f32,
+}
+
+impl Extra for OnOnePart {
+    fn add_position(&self, part: usize, _: usize, _: usize, score: &mut [f32]) -> bool {
+        if part == self.part {
+            for it in score {
+                *it += self.term;
+            }
+        }
+        part == self.part
+    }
+
+    fn of_type(&self, _: usize, _: usize) -> f32 {
+        0.0
+    }
+
+    fn max_gain(&self, _: usize) -> f32 {
+        0.0
+    }
+}
+
+proptest! {
     /// They come from another process: what they say is done, and no more than that.
     #[test]
     fn bounds_that_lie_do_no_harm(
