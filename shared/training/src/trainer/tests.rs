@@ -142,7 +142,7 @@ fn off(model: &Model, person: usize) -> f64 {
     let picture = Figures::drawn(person);
     let layout = Layout::new(&model, 70, 90).unwrap();
     let mut values = vec![0.0; layout.n_responses()];
-    Extractor::new(model.clone()).responses(picture.view(), &layout, &mut values);
+    Extractor::new(std::sync::Arc::clone(&model)).responses(picture.view(), &layout, &mut values);
     let levels: Vec<_> = (0..layout.levels.len() as u16).collect();
     let evidence = Responses::new(&layout, &values, &levels);
     let settings = CandidateSettings {
@@ -150,7 +150,7 @@ fn off(model: &Model, person: usize) -> f64 {
         overlap: 0.3,
         max: 1,
     };
-    let poses = Solver::new(model.clone()).candidates(&evidence, &settings);
+    let poses = Solver::new(std::sync::Arc::clone(&model)).candidates(&evidence, &settings);
     let centres = poses[0].centres(&model, &layout);
     let parts = Figures::parts(person);
     let off = centres.iter().zip(&parts);
