@@ -106,6 +106,7 @@ fn settings() -> Settings {
         batch: 4,
         per_image: 40,
         cost: 0.02,
+        pose_weight: 2.0,
         ..Settings::default()
     }
 }
