@@ -70,7 +70,7 @@ pub struct Machine<K, T> {
     bytes: usize,
 }
 
-impl<K: Ord + Clone, T> Machine<K, T> {
+impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     /// No examples yet; the solution is 0.
     ///
     /// * `non_negative`: coordinates that may not become negative.
@@ -153,9 +153,11 @@ impl<K: Ord + Clone, T> Machine<K, T> {
 
     /// Removes examples without a share that meet their margin with `room` to spare, and, of all without
     /// a share, as many of those with most room that the others hold at most `bytes`.
-    pub fn forget(&mut self, room: f64, bytes: usize) {
+    ///
+    /// * `may_go`: whether an example with this tag may be removed.
+    pub fn forget(&mut self, room: f64, bytes: usize, may_go: impl Fn(&T) -> bool) {
         let mut idle: Vec<(f64, usize)> = (0..self.entries.len())
-            .filter(|&it| self.entries[it].share == 0.0)
+            .filter(|&it| self.entries[it].share == 0.0 && may_go(&self.entries[it].tag))
             .map(|it| (self.slope(it), it))
             .collect();
         idle.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

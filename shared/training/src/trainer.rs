@@ -230,11 +230,13 @@ impl<'a> Trainer<'a> {
         self.machine.bytes() + cells.values().map(|it| it.bytes()).sum::<usize>()
     }
 
-    /// Drops examples that the solution does not need, and the features that no example shows.
+    /// Drops wrong poses that the solution does not need, and the features that no example shows.
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
-        self.machine.forget(self.settings.room, room);
+        // A right pose that needs no share now may need one again, and would not be found anew.
+        let may_go = |it: &Origin| !matches!(it, Origin::Right { .. });
+        self.machine.forget(self.settings.room, room, may_go);
         let image = |it: &Origin| match it {
             Origin::Background { image, .. } => Some(*image as usize),
             Origin::Right { .. } | Origin::Mistake { .. } => None,

@@ -1,5 +1,7 @@
 //! The steps of the descent.
 
+use rayon::prelude::*;
+
 use super::{Entry, Machine};
 
 /// How far the solution is from the best one on the examples at hand.
@@ -33,10 +35,13 @@ pub struct Effort {
     pub max_passes: usize,
 }
 
-/// Passes over the examples with a share for every pass over all.
-const PASSES_OVER_SUPPORT: usize = 10;
+/// Most passes over the examples that still move, for every look at all.
+const PASSES_OVER_MOVING: usize = 10;
 
-impl<K: Ord + Clone, T> Machine<K, T> {
+/// Room up to which examples without a share may come to need one before the next look at all.
+const NEAR: f64 = 0.05;
+
+impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     /// Improves the solution until the gap is small enough, or the passes are used up.
     ///
     /// * `go_on`: hears the gap before the first and after every pass; answers whether to go on.
@@ -47,43 +52,44 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         go_on: &mut dyn FnMut(Gap) -> bool,
     ) -> Gap {
         self.sum_up();
-        let mut gap = self.gap();
+        let mut slopes = self.slopes();
+        let mut gap = self.gap_of(&slopes);
         for _ in 0..effort.max_passes {
             if !go_on(gap) || gap.relative() <= effort.tolerance {
                 return gap;
             }
-            for it in self.order(random, |_| true) {
-                self.step(it);
+            let at_stake = |it: &usize| self.entries[*it].share > 0.0 || slopes[*it] > -NEAR;
+            let mut moving: Vec<_> = (0..self.entries.len()).filter(at_stake).collect();
+            for _ in 0..PASSES_OVER_MOVING {
+                // Examples of one image side by side would be faster to read, but the descent needs
+                // several times as many passes then: right and wrong ones must take turns to settle
+                // the root's bias.
+                random.shuffle(&mut moving);
+                moving.retain(|&it| self.step(it));
             }
-            for _ in 0..PASSES_OVER_SUPPORT {
-                for it in self.order(random, |it| it.share > 0.0) {
-                    self.step(it);
-                }
-            }
-            gap = self.gap();
+            slopes = self.slopes();
+            gap = self.gap_of(&slopes);
         }
         go_on(gap);
         gap
     }
 
-    /// A random order of some examples.
-    ///
-    /// Examples of one image side by side would be faster to read, but the descent needs several times
-    /// as many passes then: right and wrong ones must take turns to settle the root's bias.
-    fn order(&self, random: &mut fastrand::Rng, wanted: impl Fn(&Entry<T>) -> bool) -> Vec<usize> {
-        let all = 0..self.entries.len();
-        let mut order: Vec<_> = all.filter(|&it| wanted(&self.entries[it])).collect();
-        random.shuffle(&mut order);
-        order
-    }
-
     /// The gap on the examples at hand.
     pub fn gap(&self) -> Gap {
+        self.gap_of(&self.slopes())
+    }
+
+    fn slopes(&self) -> Vec<f64> {
+        let all = (0..self.entries.len()).into_par_iter();
+        all.map(|it| self.slope(it)).collect()
+    }
+
+    fn gap_of(&self, slopes: &[f64]) -> Gap {
         let mut worst = vec![0.0_f64; self.groups.len()];
         let mut dual = 0.0;
         let mut n_support = 0;
         for (it, entry) in self.entries.iter().enumerate() {
-            worst[entry.group] = worst[entry.group].max(self.slope(it));
+            worst[entry.group] = worst[entry.group].max(slopes[it]);
             dual += entry.share * entry.margin;
             n_support += usize::from(entry.share > 0.0);
         }
@@ -119,8 +125,8 @@ impl<K: Ord + Clone, T> Machine<K, T> {
     }
 
     /// Moves the share of one example to its best value while the others are held; within a group
-    /// whose shares are used up, takes from another of the group.
-    fn step(&mut self, at: usize) {
+    /// whose shares are used up, takes from another of the group. `true` if something moved.
+    fn step(&mut self, at: usize) -> bool {
         let slope = self.slope(at);
         let entry = &self.entries[at];
         let group = &self.groups[entry.group];
@@ -128,34 +134,35 @@ impl<K: Ord + Clone, T> Machine<K, T> {
         if slope > 0.0 && room <= group.cost * FULL {
             return self.exchange(at, slope);
         }
-        if entry.squared_norm > 0.0 {
-            let wanted = slope / entry.squared_norm;
-            self.change(at, wanted.clamp(-entry.share, room.max(0.0)));
+        if entry.squared_norm <= 0.0 {
+            return false;
         }
+        let wanted = slope / entry.squared_norm;
+        self.change(at, wanted.clamp(-entry.share, room.max(0.0)))
     }
 
     /// Takes a share from the member of the group that needs it least, if that is better.
-    fn exchange(&mut self, at: usize, slope: f64) {
+    fn exchange(&mut self, at: usize, slope: f64) -> bool {
         let members = &self.groups[self.entries[at].group].members;
         let givers = members
             .iter()
             .filter(|&&it| it != at && self.entries[it].share > 0.0)
             .map(|&it| (self.slope(it), it));
         let Some((least, giver)) = givers.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return;
+            return false;
         };
         let (to, from) = (&self.entries[at], &self.entries[giver]);
         let curvature = to.squared_norm + from.squared_norm - 2.0 * to.x.dot_sparse(&from.x);
-        if least < slope && curvature > 0.0 {
-            let share = ((slope - least) / curvature).min(from.share);
-            self.change(giver, -share);
-            self.change(at, share);
+        if least >= slope || curvature <= 0.0 {
+            return false;
         }
+        let share = ((slope - least) / curvature).min(from.share);
+        self.change(giver, -share) | self.change(at, share)
     }
 
-    fn change(&mut self, at: usize, by: f64) {
+    fn change(&mut self, at: usize, by: f64) -> bool {
         if by == 0.0 {
-            return;
+            return false;
         }
         let entry = &mut self.entries[at];
         entry.share = (entry.share + by).max(0.0);
@@ -168,6 +175,7 @@ impl<K: Ord + Clone, T> Machine<K, T> {
                 *solution = if may_be_negative { *sum } else { sum.max(0.0) } as f32;
             }
         }
+        true
     }
 }
 

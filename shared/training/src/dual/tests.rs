@@ -15,7 +15,7 @@ fn demand(x: &[f32], margin: f64) -> Constraint {
     Constraint { x, margin }
 }
 
-fn solve<K: Ord + Clone, T>(machine: &mut Machine<K, T>, effort: Effort) -> Gap {
+fn solve<K: Ord + Clone + Sync, T: Sync>(machine: &mut Machine<K, T>, effort: Effort) -> Gap {
     machine.solve(effort, &mut fastrand::Rng::with_seed(3), &mut |_| true)
 }
 
@@ -126,7 +126,7 @@ proptest! {
         let mut machine = filled(&examples);
         solve(&mut machine, effort);
         machine.retain(|it| examples[*it].0 != cut);
-        machine.forget(0.1, usize::MAX);
+        machine.forget(0.1, usize::MAX, |_| true);
         let mut again = Machine::new(5, 4..5);
         for (it, share) in machine.entries() {
             let (group, x, margin) = &examples[*it];
@@ -146,10 +146,20 @@ proptest! {
         let mut machine = filled(&examples);
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let (before, solution) = (machine.gap(), machine.solution());
-        machine.forget(0.0, 0);
+        machine.forget(0.0, 0, |_| true);
         prop_assert_eq!(machine.len(), before.n_support);
         prop_assert_eq!(machine.solution(), solution);
         let after = machine.gap();
         prop_assert!((after.dual - before.dual).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_may_not_go_is_never_forgotten(examples in examples()) {
+        let mut machine = filled(&examples);
+        solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
+        let even: Vec<usize> = (0..examples.len()).step_by(2).collect();
+        machine.forget(0.0, 0, |it| it % 2 == 1);
+        let kept: Vec<usize> = machine.entries().map(|it| *it.0).filter(|it| it % 2 == 0).collect();
+        prop_assert_eq!(kept, even);
     }
 }
