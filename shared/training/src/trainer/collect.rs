@@ -1,6 +1,6 @@
 //! Looking at images: placing people, searching for false alarms and mistakes, reading off features.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError};
 
@@ -181,20 +181,29 @@ impl Trainer<'_> {
         Ok(())
     }
 
-    fn false_alarms(
+    pub(super) fn false_alarms(
         &self,
         images: &[usize],
         held: &BTreeSet<&Origin>,
     ) -> Result<Vec<Origin>, TrainError> {
         let miner = Miner::new(self.mining_model()?);
+        let mut n_held = BTreeMap::<usize, usize>::new();
+        for it in held {
+            if let Origin::Background { image, .. } = it {
+                *n_held.entry(*image as usize).or_default() += 1;
+            }
+        }
         let found = self.look_at(images, |&image| {
             let picture = self.background(image)?;
-            let poses = miner.search(&picture, -1.0, self.settings.per_image);
+            // Those that are held may all score best, as each may keep some slack.
+            let n_held = n_held.get(&image).copied().unwrap_or(0);
+            let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|it| Origin::Background {
                 image: image as u32,
                 pose: Placed::of(it),
             });
-            Ok(origins.filter(|it| !held.contains(it)).collect::<Vec<_>>())
+            let new = origins.filter(|it| !held.contains(it));
+            Ok(new.take(self.settings.per_image).collect::<Vec<_>>())
         })?;
         Ok(found.concat())
     }

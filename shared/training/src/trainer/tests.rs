@@ -8,6 +8,7 @@ use rayon::ThreadPoolBuilder;
 
 use super::{Checkpoint, CheckpointError, TrainError, Trainer};
 use crate::album::{Album, AlbumError};
+use crate::origin::Origin;
 use crate::plan::{Plan, Tree};
 use crate::settings::Settings;
 use crate::testing::noise;
@@ -270,6 +271,51 @@ fn without_backgrounds_nothing_is_trained() {
     let plan = plan(&settings);
     let refused = Trainer::new(&plan, &settings, &album, &watch);
     assert!(matches!(refused, Err(TrainError::NoBackgrounds)));
+}
+
+#[test]
+fn people_stay_examples_however_well_they_are_told_apart() {
+    let (album, watch) = (figures(), Quiet::for_ever());
+    // Next to nothing is kept without need.
+    let settings = Settings {
+        room: 0.0,
+        cache_mib: 1,
+        ..settings()
+    };
+    let plan = plan(&settings);
+    let mut trainer = Trainer::new(&plan, &settings, &album, &watch).unwrap();
+    let mut n_idle = 0;
+    while trainer.step().unwrap() {
+        if trainer.right.iter().any(Option::is_some) {
+            let right = |it: &(&Origin, f64)| matches!(it.0, Origin::Right { .. });
+            let people: Vec<_> = trainer.machine.entries().filter(right).collect();
+            assert_eq!(people.len(), album.n_people);
+            n_idle += people.iter().filter(|it| it.1 == 0.0).count();
+        }
+    }
+    assert!(
+        n_idle > album.n_people,
+        "only {n_idle} could have been lost"
+    );
+}
+
+#[test]
+fn places_that_are_held_already_do_not_hide_others() {
+    let (album, watch) = (figures(), Quiet::for_ever());
+    let settings = Settings {
+        per_image: 1,
+        ..settings()
+    };
+    let plan = plan(&settings);
+    let mut trainer = Trainer::new(&plan, &settings, &album, &watch).unwrap();
+    trainer.step().unwrap();
+    let mut held = Vec::new();
+    for _ in 0..5 {
+        let found = trainer.false_alarms(&[0], &held.iter().collect());
+        held.extend(found.unwrap());
+    }
+    let different: std::collections::BTreeSet<_> = held.iter().collect();
+    assert_eq!(different.len(), 5);
 }
 
 #[test]
