@@ -10,6 +10,7 @@ mod inputs;
 mod output;
 mod plan;
 mod prepare;
+mod search;
 mod sheet;
 mod summary;
 mod views;

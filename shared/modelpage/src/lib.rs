@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod biases;
+mod examples;
 mod figure;
 mod glyph;
 mod springs;
@@ -12,6 +13,7 @@ mod svg;
 
 use fmp::{Model, files::describe};
 
+pub use examples::Examples;
 use figure::Figure;
 use svg::{escaped, put};
 
@@ -22,8 +24,10 @@ use svg::{escaped, put};
 /// * The whole body twice, in an ordinary posture: as filters, and as a tree with the springs, which are ellipses at a score of [`SPRING_COST`] below the best.
 /// * Per part the springs of all types and the biases of all pairs of types.
 ///
+/// * With `examples`: under every type what it was found on.
+///
 /// Parts and types count from 1, as in everything a user sees.
-pub fn html(model: &Model) -> String {
+pub fn html(model: &Model, examples: Option<&Examples>) -> String {
     let title = escaped(&model.spec().name);
     let figure = Figure::new(model);
     let mut page = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
@@ -45,7 +49,7 @@ pub fn html(model: &Model) -> String {
     page.push_str(LEGEND);
     page.push_str("<h2>The parts</h2>\n");
     for part in 0..model.n_parts() {
-        page.push_str(&card(model, part));
+        page.push_str(&card(model, part, examples));
     }
     page.push_str("</body>\n</html>\n");
     page
@@ -69,6 +73,7 @@ h3 small { font-weight: normal; color: #69707d; margin-left: .6em; }
 .row { display: flex; flex-wrap: wrap; gap: 1.2em; align-items: flex-start; }
 .card { background: #fff; border: 1px solid #dfe3e8; border-radius: 8px; padding: .9em 1.1em; margin: 0 0 .9em; break-inside: avoid; }
 figure { margin: 0; }
+.examples { display: grid; grid-template-columns: repeat(2, 42px); gap: 2px; margin-top: .3em; }
 figcaption { margin-top: .25em; text-align: center; }
 svg { display: block; }
 .hidden { position: absolute; width: 0; height: 0; }
@@ -127,7 +132,7 @@ fn numbers(model: &Model) -> String {
 }
 
 /// Everything about one part.
-fn card(model: &Model, part: usize) -> String {
+fn card(model: &Model, part: usize, examples: Option<&Examples>) -> String {
     let spec = &model.spec().parts[part];
     let n_types = model.n_types(part);
     let parent = spec.edge.as_ref().map_or("the root".to_owned(), |edge| {
@@ -141,7 +146,12 @@ fn card(model: &Model, part: usize) -> String {
         escaped(&spec.name)
     );
     for mixture in 0..n_types {
+        out.push_str("<div>\n");
         out.push_str(&glyph::of_type(model, part, mixture));
+        if let Some(examples) = examples {
+            out.push_str(&examples::of_type(examples, part, mixture));
+        }
+        out.push_str("</div>\n");
     }
     if let Some(edge) = &spec.edge {
         out.push_str(&springs::panel(edge));

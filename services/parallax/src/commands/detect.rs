@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use clap::Args;
-use fmp::{CandidateSettings, Extractor, Layout, Model, Pose, Responses, Solver};
+use fmp::{CandidateSettings, Layout, Pose};
 use footage::{ACCENT, Canvas, FAINT, Size, Source, SourceSpec};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -13,6 +12,7 @@ use serde_json::json;
 use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
+use crate::search::Search;
 use crate::sheet::{Sheet, Skeleton, limbs};
 use crate::{inputs, output};
 
@@ -64,14 +64,12 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let model = inputs::model(&arguments.model)?;
     let detector = Detector {
-        extractor: Extractor::new(Arc::clone(&model)),
-        solver: Solver::new(Arc::clone(&model)),
         settings: CandidateSettings {
             threshold: arguments.threshold.unwrap_or(model.detection_threshold()) as f32,
             overlap: arguments.overlap,
             max: arguments.max,
         },
-        model,
+        search: Search::new(model),
     };
     if let Some(folder) = &arguments.overlay {
         std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
@@ -91,9 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 struct Detector {
-    model: Arc<Model>,
-    extractor: Extractor,
-    solver: Solver,
+    search: Search,
     settings: CandidateSettings,
 }
 
@@ -111,7 +107,7 @@ impl Detector {
         let rgb = frame.map_or(&[][..], |it| it.rgb);
         let image = Rgb8View::new(size.width, size.height, rgb);
         let image = image.map_err(|error| inputs::in_file(path, &error))?;
-        let layout = Layout::new(&self.model, size.width, size.height);
+        let layout = Layout::new(&self.search.model, size.width, size.height);
         let layout = layout.map_err(|error| inputs::in_file(path, &error))?;
         let found = self.detect(image, &layout);
         self.report(path, arguments, &layout, &found)?;
@@ -124,8 +120,8 @@ impl Detector {
         if let Some(sheet) = sheet {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let best = found.first().map(|pose| Skeleton {
-                points: pose.centres(&self.model, &layout),
-                limbs: limbs(&self.model),
+                points: pose.centres(&self.search.model, &layout),
+                limbs: limbs(&self.search.model),
                 score: pose.score,
             });
             sheet.add(&name, size, rgb, best.as_ref())?;
@@ -143,7 +139,9 @@ impl Detector {
         if arguments.json {
             let detections: Vec<_> = found
                 .iter()
-                .map(|pose| Placed::new(pose, &self.model, layout).json(Some(arguments.joints)))
+                .map(|pose| {
+                    Placed::new(pose, &self.search.model, layout).json(Some(arguments.joints))
+                })
                 .collect();
             output::json(&json!({
                 "image": path,
@@ -158,7 +156,7 @@ impl Detector {
                 found.len()
             ))?;
             for pose in found {
-                let [x, y] = pose.centre(&self.model, layout, 0);
+                let [x, y] = pose.centre(&self.search.model, layout, 0);
                 output::line(format_args!(
                     "  score {:8.4}  level {:2}  head at ({x:.1}, {y:.1})",
                     pose.score,
@@ -170,11 +168,8 @@ impl Detector {
     }
 
     fn detect(&self, image: Rgb8View<'_>, layout: &Layout) -> Vec<Pose> {
-        let mut values = vec![0.0; layout.n_responses()];
-        self.extractor.responses(image, layout, &mut values);
-        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
-        let evidence = Responses::new(layout, &values, &levels);
-        self.solver.candidates(&evidence, &self.settings)
+        let Self { search, settings } = self;
+        search.on(image, layout, |it| search.solver.candidates(it, settings))
     }
 
     /// The best detection in colour, the others faint.
@@ -182,8 +177,8 @@ impl Detector {
         let mut canvas = Canvas::from_rgb(size, rgb);
         for (rank, pose) in found.iter().enumerate().rev() {
             let colour = if rank == 0 { ACCENT } else { FAINT };
-            let centres = pose.centres(&self.model, layout);
-            for (part, spec) in self.model.spec().parts.iter().enumerate() {
+            let centres = pose.centres(&self.search.model, layout);
+            for (part, spec) in self.search.model.spec().parts.iter().enumerate() {
                 if let Some(edge) = &spec.edge {
                     canvas.line(centres[edge.parent], centres[part], 1.5, colour);
                 }

@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use clap::Args;
 use datasets::{Person, Picture, ReadOptions, Selection};
 use evaluation::{
     PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering, evaluate,
 };
-use fmp::{Extractor, Layout, Model, Pose, Responses, Solver};
+use fmp::{Layout, Pose};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::{N_PARTS, PARSE14};
 
+use crate::search::Search;
 use crate::{inputs, output};
 
 /// Most detections that are looked through for the one that lies on the person.
@@ -79,11 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         let (message, fault) = (problem, &problem.fault);
         output::message(format_args!("left out: {message}: {fault}"));
     }
-    let judge = Judge {
-        extractor: Extractor::new(Arc::clone(&model)),
-        solver: Solver::new(Arc::clone(&model)),
-        model,
-    };
+    let judge = Judge(Search::new(model));
     let found: Result<Vec<_>, Failure> =
         people.people.par_iter().map(|it| judge.find(it)).collect();
     let found = found?;
@@ -114,27 +110,22 @@ fn truth(person: &Person) -> Joints {
     core::array::from_fn(|it| person.joints.get(it).copied().unwrap_or([f64::NAN; 2]))
 }
 
-struct Judge {
-    model: Arc<Model>,
-    extractor: Extractor,
-    solver: Solver,
-}
+struct Judge(Search);
 
 impl Judge {
     /// Joints of the best detection, and of the best one on the person.
     fn find(&self, person: &Person) -> Result<[Option<Joints>; 2], Failure> {
         let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
         let size = picture.size();
-        let Ok(layout) = Layout::new(&self.model, size.width, size.height) else {
+        let Search { model, solver, .. } = &self.0;
+        let Ok(layout) = Layout::new(model, size.width, size.height) else {
             return Ok([None, None]);
         };
-        let mut values = vec![0.0; layout.n_responses()];
-        self.extractor
-            .responses(picture.view(), &layout, &mut values);
-        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
-        let evidence = Responses::new(&layout, &values, &levels);
-        let threshold = self.model.detection_threshold() as f32;
-        let found = self.solver.above(&evidence, threshold, MOST);
+        let threshold = model.detection_threshold() as f32;
+        let (found, best) = self.0.on(picture.view(), &layout, |evidence| {
+            let found = solver.above(evidence, threshold, MOST);
+            (found, solver.best(evidence, None))
+        });
         let boxes: Vec<_> = found.iter().map(|it| self.around(it, &layout)).collect();
         let [x, y] = [0, 1].map(|axis| {
             let values = person.joints.iter().map(|it| it[axis]);
@@ -143,9 +134,8 @@ impl Judge {
             })
         });
         let covering = best_covering(&boxes, [x[0], y[0], x[1], y[1]], COVERED);
-        let best = self.solver.best(&evidence, None);
         let joints = |pose: &Pose| {
-            let joints = PARSE14.from_parts(&pose.centres(&self.model, &layout));
+            let joints = PARSE14.from_parts(&pose.centres(model, &layout));
             Joints::try_from(joints).ok()
         };
         let covering = covering.and_then(|it| found.get(it));
@@ -154,7 +144,7 @@ impl Judge {
 
     /// Score of a pose, and the box around all its parts.
     fn around(&self, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
-        let boxes = (0..N_PARTS).map(|it| pose.part_box(&self.model, layout, it));
+        let boxes = (0..N_PARTS).map(|it| pose.part_box(&self.0.model, layout, it));
         let whole = boxes.reduce(|a, b| {
             [
                 a[0].min(b[0]),

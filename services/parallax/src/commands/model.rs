@@ -1,5 +1,7 @@
 //! `parallax model`: what a model is made of, how good it is, and other formats as our own.
 
+mod examples;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -33,6 +35,10 @@ pub(crate) enum Command {
         /// tree with its springs, the biases.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         html: Option<PathBuf>,
+        /// With --html: images of people, or folders of them, from which every type of every part is shown by
+        /// example. The page then holds pieces of these images.
+        #[arg(long, value_name = "IMAGES", num_args = 1.., requires = "html")]
+        examples: Vec<PathBuf>,
     },
     /// Try a model on people whose joints are known: PCP and PCK.
     Judge(judge::Arguments),
@@ -46,8 +52,9 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
         Command::Show {
             file,
             html: Some(html),
+            examples,
             ..
-        } => draw(file, html),
+        } => draw(file, html, examples),
         Command::Show { file, json, .. } => show(file, *json),
     }
 }
@@ -59,9 +66,13 @@ fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn draw(file: &Path, html: &Path) -> Result<ExitCode, Failure> {
+fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failure> {
     let model = inputs::model(file)?;
-    let page = modelpage::html(&model);
+    let examples = match images {
+        [] => None,
+        images => Some(examples::gather(&model, &inputs::images(images)?)?),
+    };
+    let page = modelpage::html(&model, examples.as_ref());
     std::fs::write(html, page).map_err(|error| inputs::in_file(html, &error))?;
     output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)

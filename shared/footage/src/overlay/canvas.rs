@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder as _};
+use image::{ExtendedColorType, ImageEncoder as _, ImageError};
 
 use super::Colour;
 use crate::Size;
@@ -27,7 +27,7 @@ pub enum OverlayError {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: image::ImageError,
+        source: ImageError,
     },
 }
 
@@ -168,6 +168,22 @@ impl Canvas {
         }
     }
 
+    /// The bytes of a PNG.
+    ///
+    /// # Errors
+    ///
+    /// The size is none that a PNG can have.
+    pub fn png(&self) -> Result<Vec<u8>, ImageError> {
+        let mut png = Vec::new();
+        PngEncoder::new(&mut png).write_image(
+            &self.rgb,
+            self.size.width as u32,
+            self.size.height as u32,
+            ExtendedColorType::Rgb8,
+        )?;
+        Ok(png)
+    }
+
     /// Writes a PNG. Who reads `path` sees the old file or the new one, never a part: it is written
     /// beside it (`.part`) and renamed.
     ///
@@ -175,18 +191,10 @@ impl Canvas {
     ///
     /// [`OverlayError`], with nothing left behind.
     pub fn save_png(&self, path: &Path) -> Result<(), OverlayError> {
-        let mut png = Vec::new();
-        PngEncoder::new(&mut png)
-            .write_image(
-                &self.rgb,
-                self.size.width as u32,
-                self.size.height as u32,
-                ExtendedColorType::Rgb8,
-            )
-            .map_err(|source| OverlayError::Encode {
-                path: path.to_path_buf(),
-                source,
-            })?;
+        let png = self.png().map_err(|source| OverlayError::Encode {
+            path: path.to_path_buf(),
+            source,
+        })?;
         let part = path.with_extension("png.part");
         let written = fs::write(&part, png).and_then(|()| fs::rename(&part, path));
         written.map_err(|source| {

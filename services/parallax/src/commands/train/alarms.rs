@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::Picture;
-use fmp::{CandidateSettings, Extractor, Layout, Model, Responses, Solver};
+use fmp::{CandidateSettings, Layout, Model};
 use rayon::prelude::*;
 use runtime::Failure;
 use serde_json::{Value, json};
 
 use super::progress::Progress;
+use crate::search::Search;
 
 /// Largest share of a better detection's boxes that a worse one may cover, as `detect` has it.
 const OVERLAP: f64 = 0.1;
@@ -39,22 +40,18 @@ pub(super) fn count(
 ) -> Result<Alarms, Failure> {
     let model = Arc::new(model.clone());
     let thresholds = [model.spec().threshold, model.detection_threshold()];
-    let search = Search {
-        extractor: Extractor::new(Arc::clone(&model)),
-        solver: Solver::new(Arc::clone(&model)),
-        settings: CandidateSettings {
-            threshold: thresholds[1] as f32,
-            overlap: OVERLAP,
-            max: MOST,
-        },
-        model,
+    let search = Search::new(model);
+    let settings = CandidateSettings {
+        threshold: thresholds[1] as f32,
+        overlap: OVERLAP,
+        max: MOST,
     };
     progress.begin_alarms(images.len());
     let scores: Vec<_> = images
         .par_iter()
         .map(|it| {
             progress.go_on_or_stop()?;
-            let scores = search.scores(it);
+            let scores = scores(&search, &settings, it);
             progress.looked_at_one();
             Ok::<_, Failure>(scores)
         })
@@ -83,29 +80,21 @@ pub(super) fn count(
     Ok(alarms)
 }
 
-struct Search {
-    model: Arc<Model>,
-    extractor: Extractor,
-    solver: Solver,
-    settings: CandidateSettings,
-}
-
-impl Search {
-    /// Scores of what is found; nothing on images that are too small.
-    fn scores(&self, image: &Path) -> Result<Vec<f32>, footage::FootageError> {
-        let picture = Picture::read(image)?;
-        let size = picture.size();
-        let Ok(layout) = Layout::new(&self.model, size.width, size.height) else {
-            return Ok(Vec::new());
-        };
-        let mut values = vec![0.0; layout.n_responses()];
-        self.extractor
-            .responses(picture.view(), &layout, &mut values);
-        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
-        let evidence = Responses::new(&layout, &values, &levels);
-        let found = self.solver.candidates(&evidence, &self.settings);
-        Ok(found.iter().map(|it| it.score).collect())
-    }
+/// Scores of what is found; nothing on images that are too small.
+fn scores(
+    search: &Search,
+    settings: &CandidateSettings,
+    image: &Path,
+) -> Result<Vec<f32>, footage::FootageError> {
+    let picture = Picture::read(image)?;
+    let size = picture.size();
+    let Ok(layout) = Layout::new(&search.model, size.width, size.height) else {
+        return Ok(Vec::new());
+    };
+    let found = search.on(picture.view(), &layout, |evidence| {
+        search.solver.candidates(evidence, settings)
+    });
+    Ok(found.iter().map(|it| it.score).collect())
 }
 
 impl Alarms {
