@@ -59,6 +59,7 @@ max-filter-cells = 3
 interval = 4
 per-image = 10
 batch = 1
+passes = 1
 cache-mib = 64
 ";
 

@@ -8,7 +8,7 @@ use crate::types::TypesBy;
 /// Everything about a training that is not its data.
 ///
 /// The defaults are those of Yang & Ramanan 2013, as far as they are known, but for what keeps memory
-/// and time in bounds (`per_image`, `room`, `cache_mib`, `batch`). None has been tuned yet.
+/// and time in bounds (`per_image`, `room`, `cache_mib`, `batch`, `passes`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Settings {
@@ -76,12 +76,12 @@ impl Default for Settings {
             overlap: 0.6,
             tolerance: 0.05,
             cache_mib: 2048,
-            room: 0.2,
+            room: 0.05,
             per_image: 200,
-            batch: 64,
+            batch: 128,
             fixed_rounds: 1,
             latent_rounds: 1,
-            passes: 1,
+            passes: 3,
             seed: 1,
         }
     }

@@ -200,15 +200,25 @@ impl<'a> Trainer<'a> {
     /// Places everybody anew, and replaces the examples that are made of people.
     fn place(&mut self, round: usize) -> Result<(), TrainError> {
         let placed = self.best_placements(round < self.settings.fixed_rounds)?;
+        // Most people stay where they were, or nearly so: their shares are a good guess.
+        let mut shares = vec![0.0; self.plan.n_people()];
+        for (origin, share) in self.machine.entries() {
+            if let Origin::Right { person, .. } = origin {
+                shares[*person as usize] = share;
+            }
+        }
         self.machine
             .retain(|it| matches!(it, Origin::Background { .. }));
         self.right = placed.into_iter().map(|it| it.map(|it| it.0)).collect();
-        let origins = self.right.iter().enumerate().filter_map(|(person, pose)| {
-            let pose = pose.clone()?;
-            let person = person as u32;
-            Some(Origin::Right { person, pose })
-        });
-        self.add(origins.collect(), &mut std::iter::repeat(0.0))
+        let people = self.right.iter().zip(shares).enumerate();
+        let (origins, shares): (Vec<_>, Vec<_>) = people
+            .filter_map(|(person, (pose, share))| {
+                let pose = pose.clone()?;
+                let person = person as u32;
+                Some((Origin::Right { person, pose }, share))
+            })
+            .unzip();
+        self.add(origins, &mut shares.into_iter())
     }
 
     fn learn(&mut self, random: &mut fastrand::Rng) -> Result<(), TrainError> {

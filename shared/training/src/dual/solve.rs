@@ -38,6 +38,9 @@ pub struct Effort {
 /// Most passes over the examples that still move, for every look at all.
 const PASSES_OVER_MOVING: usize = 10;
 
+/// Miss or room, in margins, up to which an example with a part of its cost rests.
+const RESTING: f64 = 0.01;
+
 /// Room up to which examples without a share may come to need one before the next look at all.
 const NEAR: f64 = 0.05;
 
@@ -125,7 +128,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     }
 
     /// Moves the share of one example to its best value while the others are held; within a group
-    /// whose shares are used up, takes from another of the group. `true` if something moved.
+    /// whose shares are used up, takes from another of the group. `true` if it moved so far that
+    /// another look may be worth while.
     fn step(&mut self, at: usize) -> bool {
         let slope = self.slope(at);
         let entry = &self.entries[at];
@@ -138,7 +142,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             return false;
         }
         let wanted = slope / entry.squared_norm;
-        self.change(at, wanted.clamp(-entry.share, room.max(0.0)))
+        self.change(at, wanted.clamp(-entry.share, room.max(0.0))) && slope.abs() > RESTING
     }
 
     /// Takes a share from the member of the group that needs it least, if that is better.
@@ -157,7 +161,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             return false;
         }
         let share = ((slope - least) / curvature).min(from.share);
-        self.change(giver, -share) | self.change(at, share)
+        let moved = self.change(giver, -share) | self.change(at, share);
+        moved && slope - least > RESTING
     }
 
     fn change(&mut self, at: usize, by: f64) -> bool {

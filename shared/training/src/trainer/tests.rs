@@ -106,6 +106,7 @@ fn settings() -> Settings {
         interval: 4,
         batch: 4,
         per_image: 40,
+        passes: 1,
         cost: 0.02,
         pose_weight: 2.0,
         ..Settings::default()
