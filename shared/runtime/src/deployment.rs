@@ -100,12 +100,15 @@ impl DeploymentPlan {
                 Limits::new(2 + self.n_recorders, LARGE_BUFFER, self.held),
                 view.frame_bytes,
             ));
-            topics.push(TopicPlan::slices::<f32, EvidenceHeader>(
+            let evidence = TopicPlan::slices::<f32, EvidenceHeader>(
                 topic::evidence(index),
                 self.delivery,
                 Limits::new(view.n_workers.max(1), LARGE_BUFFER, self.held),
                 view.evidence_values,
-            ));
+            );
+            // One to be written while others are read: they are by far the largest messages, and
+            // one that waits would cost as much memory again to save no time.
+            topics.push(evidence.with_few_chunks(1 + self.held));
             // Poses and expected errors: quality, triangulate, fusion and the recorders.
             let small = self.small(2 + self.n_workers + self.n_recorders);
             topics.push(TopicPlan::messages::<ViewPose>(
@@ -216,6 +219,19 @@ mod tests {
         // 2 workers x (1 waiting + 2 held) + 1 being written, of 40 MB and the headers.
         let chunk = 40_000_000 + 1152;
         assert_eq!(evidence.pool_bytes(), 7 * chunk);
+    }
+
+    #[test]
+    fn where_a_sender_may_wait_evidence_takes_one_chunk_more_than_is_held() {
+        let plan = DeploymentPlan {
+            delivery: Delivery::Lossless,
+            ..plan()
+        };
+        let topics = plan.topics();
+        let mut evidence = topics
+            .iter()
+            .filter(|it| it.topic().starts_with("evidence/"));
+        assert!(evidence.all(|it| it.pool_bytes() == 3 * (40_000_000 + 1152)));
     }
 
     #[test]

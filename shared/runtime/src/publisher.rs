@@ -8,6 +8,7 @@ use std::time::Instant;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher as IoxPublisher;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::port::{BackpressureAction, LoanError as IoxLoanError, SendError as IoxSendError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as _, ipc};
 use iceoryx2::sample_mut::SampleMut;
@@ -21,6 +22,8 @@ use crate::{Progress, Stop};
 
 /// Longest pause between two looks at the subscribers of a topic.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);
+/// Pause between two looks for memory that receivers have given back.
+const CHUNK_PAUSE: Duration = Duration::from_micros(500);
 
 /// A message could not be delivered.
 #[derive(Debug, thiserror::Error)]
@@ -118,23 +121,31 @@ pub struct SlicePublisher<E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> SlicePublisher<E, H> {
-    /// Takes memory for an array of `len` elements.
+    /// Takes memory for an array of `len` elements. With [`Delivery::Lossless`] it waits until a
+    /// receiver gives some back, if need be.
     ///
     /// Its content is what an earlier message left there: write every element before sending.
     ///
     /// # Errors
     ///
-    /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held.
+    /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held;
+    /// [`SendError::Stopped`], [`SendError::Stuck`] if it waited in vain.
     pub fn loan(&self, len: usize) -> Result<Loan<'_, E, H>, SendError> {
-        let sample = self
-            .port
-            .publisher
-            .loan_slice_uninit(len)
-            .map_err(|source| self.port.loan_failed(len, source))?;
-        Ok(Loan {
-            sample: memory::assume_written(sample),
-            port: &self.port,
-        })
+        let port = &self.port;
+        let begin = Instant::now();
+        loop {
+            let source = match port.publisher.loan_slice_uninit(len) {
+                Ok(sample) => {
+                    let sample = memory::assume_written(sample);
+                    return Ok(Loan { sample, port });
+                }
+                Err(source) => source,
+            };
+            if source != IoxLoanError::OutOfMemory || port.delivery != Delivery::Lossless {
+                return Err(port.loan_failed(len, source));
+            }
+            port.wait_for_a_chunk(begin)?;
+        }
     }
 
     /// Longest array, elements.
@@ -200,6 +211,8 @@ struct Port<E: Message, H: Header> {
     messages: Messages<E, H>,
     stop: Stop,
     progress: Progress,
+    /// How long a slow receiver is waited for.
+    patience: Duration,
 }
 
 impl Bus {
@@ -248,6 +261,7 @@ impl<E: Message, H: Header> Port<E, H> {
             .initial_max_slice_len(extras.max_len)
             .allocation_strategy(AllocationStrategy::Static)
             .max_loaned_samples(extras.loaned)
+            .override_sample_preallocation(move |_| extras.chunks)
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .set_backpressure_handler(patience(bus))
             .create()
@@ -255,11 +269,11 @@ impl<E: Message, H: Header> Port<E, H> {
                 topic: topic.to_owned(),
                 source,
             })?;
-        memory::populate(bus.namespace().prefix(), publisher.id().value()).map_err(|source| {
-            PortError::Memory {
-                topic: topic.to_owned(),
-                source,
-            }
+        let mapped = [extras.mapped, extras.chunks];
+        let pool = (bus.namespace().prefix(), publisher.id().value());
+        memory::populate(pool, mapped).map_err(|source| PortError::Memory {
+            topic: topic.to_owned(),
+            source,
         })?;
         Ok(Self {
             topic: Arc::from(topic),
@@ -272,7 +286,26 @@ impl<E: Message, H: Header> Port<E, H> {
             messages,
             stop: bus.stop().clone(),
             progress: bus.progress().clone(),
+            patience: bus.patience(),
         })
+    }
+
+    /// Makes a pause, unless that was done for too long.
+    fn wait_for_a_chunk(&self, begin: Instant) -> Result<(), SendError> {
+        let (topic, waited) = (Arc::clone(&self.topic), begin.elapsed());
+        if self.stop.is_requested() {
+            return Err(SendError::Stopped { topic });
+        }
+        if waited >= self.patience {
+            return Err(SendError::Stuck { topic, waited });
+        }
+        self.progress.tick();
+        // What a receiver that is gone has held is given back when it is noticed to be gone.
+        if let Err(error) = self.publisher.update_connections() {
+            tracing::debug!(topic = %self.topic, ?error, "cannot look for receivers");
+        }
+        std::thread::sleep(CHUNK_PAUSE);
+        Ok(())
     }
 
     fn loan_failed(&self, len: usize, source: IoxLoanError) -> SendError {

@@ -37,6 +37,10 @@ const MAX_WAKE_UP_PORTS: usize = 64;
 const MAX_LEN: &str = "parallax.max-len";
 /// Attribute of a service: arrays that a publisher may write at the same time.
 const LOANED: &str = "parallax.loaned";
+/// Attribute of a service: chunks of a publisher.
+const CHUNKS: &str = "parallax.chunks";
+/// Attribute of a service: chunks that a publisher maps ahead of use.
+const MAPPED: &str = "parallax.mapped";
 /// Attribute of a service: 1 if senders wake receivers.
 const WAKES: &str = "parallax.wakes";
 
@@ -277,6 +281,10 @@ pub(crate) struct Extras {
     pub(crate) max_len: usize,
     /// Arrays that a publisher may write at the same time.
     pub(crate) loaned: usize,
+    /// Chunks of a publisher.
+    pub(crate) chunks: usize,
+    /// Of these, those that are mapped ahead of use.
+    pub(crate) mapped: usize,
     /// Whether senders wake receivers.
     pub(crate) wakes: bool,
     /// Whether anything may be lost.
@@ -288,6 +296,8 @@ pub(crate) fn extras<E: Message, H: Header>(messages: &Messages<E, H>) -> Extras
     Extras {
         max_len: attribute(set, MAX_LEN).unwrap_or(1),
         loaned: attribute(set, LOANED).unwrap_or(1),
+        chunks: attribute(set, CHUNKS).unwrap_or(usize::MAX),
+        mapped: attribute(set, MAPPED).unwrap_or(usize::MAX),
         wakes: attribute(set, WAKES) == Some(1),
         delivery: if messages.static_config().has_safe_overflow() {
             Delivery::Realtime
@@ -302,6 +312,8 @@ fn attributes(plan: &TopicPlan) -> Option<AttributeSpecifier> {
     for (key, value) in [
         (MAX_LEN, plan.max_len()),
         (LOANED, plan.limits().loaned),
+        (CHUNKS, plan.chunks()),
+        (MAPPED, plan.mapped_chunks()),
         (WAKES, usize::from(plan.wakes())),
     ] {
         let key = AttributeKey::new(key.as_bytes()).ok()?;

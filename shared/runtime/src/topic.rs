@@ -16,7 +16,8 @@ pub enum Delivery {
 /// How many ports a topic has and how much each of them may hold.
 ///
 /// Memory is reserved for the worst case, so that a sender never runs out:
-/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher.
+/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher, unless
+/// [`TopicPlan::with_few_chunks`] says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Ports that may send at the same time.
@@ -55,6 +56,8 @@ pub struct TopicPlan {
     limits: Limits,
     max_len: usize,
     chunk_bytes: usize,
+    /// See [`Self::with_few_chunks`].
+    usual_chunks: Option<usize>,
     wakes: bool,
     create: fn(&Bus, &Self) -> Result<Topic, BusError>,
 }
@@ -68,6 +71,7 @@ impl TopicPlan {
             limits,
             max_len: 1,
             chunk_bytes: chunk_bytes(0, size_of::<T>()),
+            usual_chunks: None,
             wakes: true,
             create: Bus::create_topic::<T, ()>,
         }
@@ -93,6 +97,7 @@ impl TopicPlan {
             limits,
             max_len,
             chunk_bytes: chunk_bytes(size_of::<H>(), size_of::<E>() * max_len),
+            usual_chunks: None,
             wakes: true,
             create: Bus::create_topic::<E, H>,
         }
@@ -102,6 +107,19 @@ impl TopicPlan {
     #[must_use]
     pub fn without_wake_up(mut self) -> Self {
         self.wakes = false;
+        self
+    }
+
+    /// For large arrays: says that so few chunks do, at least 1.
+    ///
+    /// With [`Delivery::Lossless`] a publisher has no more than these, and
+    /// [`SlicePublisher::loan`](crate::SlicePublisher::loan) waits until one is free: any number that
+    /// leaves one to write while every receiver holds its own keeps all of them going. With
+    /// [`Delivery::Realtime`], where nobody may be made to wait, there are as many as before, but
+    /// only these are mapped ahead of use; the others cost a sender no memory unless receivers lag.
+    #[must_use]
+    pub fn with_few_chunks(mut self, chunks: usize) -> Self {
+        self.usual_chunks = Some(chunks.max(1));
         self
     }
 
@@ -130,11 +148,25 @@ impl TopicPlan {
         self.wakes
     }
 
+    /// Chunks of one publisher.
+    pub(crate) fn chunks(&self) -> usize {
+        let limits = self.limits;
+        let most = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
+        match self.delivery {
+            Delivery::Realtime => most,
+            Delivery::Lossless => self.usual_chunks.map_or(most, |it| it.min(most)),
+        }
+    }
+
+    /// Of these, those that are mapped ahead of use.
+    pub(crate) fn mapped_chunks(&self) -> usize {
+        let chunks = self.chunks();
+        self.usual_chunks.map_or(chunks, |it| it.min(chunks))
+    }
+
     /// Shared memory that all publishers of the topic take together, bytes.
     pub fn pool_bytes(&self) -> u64 {
-        let limits = self.limits;
-        let chunks = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
-        (limits.publishers * chunks) as u64 * self.chunk_bytes as u64
+        (self.limits.publishers * self.chunks()) as u64 * self.chunk_bytes as u64
     }
 
     /// Creates the services of the topic.

@@ -263,6 +263,8 @@ fn one_publisher_too_many_is_refused() {
 fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
     let plans = [
         frames(Delivery::Realtime, 1_000_003),
+        frames(Delivery::Realtime, 1_000_003).with_few_chunks(2),
+        frames(Delivery::Lossless, 1_000_003).with_few_chunks(2),
         small(Delivery::Lossless, 16),
     ];
     for plan in plans {
