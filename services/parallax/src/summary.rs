@@ -2,6 +2,7 @@
 
 use core::fmt::Write as _;
 use core::time::Duration;
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -114,6 +115,8 @@ pub(crate) struct Report {
     interrupted: bool,
     given_up: Vec<String>,
     restarts: Vec<(String, u32)>,
+    /// Most memory that every process has held, shared memory included, bytes.
+    peaks: Vec<(String, u64)>,
     n_dropped: u64,
     is_lossless: bool,
     views: Vec<ViewReport>,
@@ -149,6 +152,10 @@ impl Report {
             interrupted: outcome.interrupted,
             given_up: given_up.map(|it| it.name.clone()).collect(),
             restarts: restarted.map(|it| (it.name.clone(), it.restarts)).collect(),
+            peaks: processes
+                .iter()
+                .map(|it| (it.name.clone(), it.counts.peak_memory_bytes))
+                .collect(),
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
             is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
             views: ViewReport::all(resolved, outcome, &recorded["summary"]),
@@ -191,6 +198,7 @@ impl Report {
             "degraded": self.kind() == Some(ExitKind::Degraded),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
+            "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
             "dropped": self.n_dropped,
             "views": self.views,
             "recorded": self.recorded,
@@ -243,6 +251,7 @@ impl Report {
             it["frames_with_views_missing"].as_u64().unwrap_or(0),
             it["writes_failed"].as_u64().unwrap_or(0),
         )?;
+        self.write_memory(text)?;
         let restarts: Vec<String> = self
             .restarts
             .iter()
@@ -274,6 +283,25 @@ impl Report {
             writeln!(text, "    {view}")?;
         }
         Ok(())
+    }
+
+    /// The largest process of every service.
+    fn write_memory(&self, text: &mut String) -> core::fmt::Result {
+        let mut peaks = BTreeMap::new();
+        for (process, bytes) in &self.peaks {
+            let service = process.split('-').next().unwrap_or_default();
+            let most = peaks.entry(service).or_insert(0);
+            *most = bytes.div_ceil(1_000_000).max(*most);
+        }
+        let peaks: Vec<String> = peaks
+            .iter()
+            .map(|(service, megabytes)| format!("{service} {megabytes}"))
+            .collect();
+        writeln!(
+            text,
+            "  memory        {} MB (peak of one process, with the shared memory it uses)",
+            peaks.join(", ")
+        )
     }
 
     fn write_latency(&self, text: &mut String) -> core::fmt::Result {

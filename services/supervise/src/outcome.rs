@@ -61,6 +61,8 @@ pub struct Counts {
     pub n_sent: u64,
     /// Messages or frames lost before they reached it, or that came too late.
     pub n_dropped: u64,
+    /// Most memory that any of its lives has held, shared memory included, bytes.
+    pub peak_memory_bytes: u64,
 }
 
 impl Counts {
@@ -70,6 +72,7 @@ impl Counts {
             n_received: self.n_received + health.n_received,
             n_sent: self.n_sent + health.n_sent,
             n_dropped: self.n_dropped + health.n_dropped,
+            peak_memory_bytes: self.peak_memory_bytes.max(health.peak_memory_bytes),
         })
     }
 }

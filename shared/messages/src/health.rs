@@ -4,7 +4,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 /// Sent by every process a few times a second; a counter that stands still means a hang.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
-#[type_name("Health.v1")]
+#[type_name("Health.v2")]
 #[repr(C)]
 pub struct Health {
     /// Run of the deployment.
@@ -29,6 +29,9 @@ pub struct Health {
     pub p50_micros: u64,
     /// 99th percentile of the computing time, microseconds.
     pub p99_micros: u64,
+    /// Most physical memory that the process has held, shared memory that it has mapped included,
+    /// bytes; 0 where the system does not say.
+    pub peak_memory_bytes: u64,
     /// 1 once the process has seen the end of the footage and passed it on.
     pub finished: u32,
     /// Keeps the layout free of padding.

@@ -45,5 +45,5 @@ const _: () = {
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
     assert!(size_of::<Pose3d>() == 11600);
-    assert!(size_of::<Health>() == 96);
+    assert!(size_of::<Health>() == 104);
 };

@@ -44,5 +44,5 @@ pub fn pose3d() -> String {
 /// * `process`: its unique name in the deployment, for example `pose-2`.
 #[must_use]
 pub fn health(process: &str) -> String {
-    format!("health/v1/{process}")
+    format!("health/v2/{process}")
 }

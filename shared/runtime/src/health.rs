@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use hdrhistogram::Histogram;
 use messages::Health as HealthMessage;
 
-use crate::{Bus, Launch, PortError, Progress, now_nanos};
+use crate::{Bus, Launch, PortError, Progress, memory, now_nanos};
 
 /// Pause between two signs of life.
 const PERIOD: Duration = Duration::from_millis(150);
@@ -189,6 +189,7 @@ impl Counts {
             last_frame: self.last_frame.load(Ordering::Relaxed),
             p50_micros,
             p99_micros,
+            peak_memory_bytes: memory::peak_memory().unwrap_or(0),
             finished: self.finished.load(Ordering::Relaxed),
             reserved: 0,
             n_total: self.n_total.load(Ordering::Relaxed),
