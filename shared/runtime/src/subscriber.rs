@@ -100,10 +100,15 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
     /// [`ReceiveError`].
     pub fn latest(&self) -> Result<Option<Sample<E, H>>, ReceiveError> {
         let mut latest = None;
-        while let Some(sample) = self.receive()? {
-            latest = Some(sample);
+        loop {
+            match self.receive() {
+                Ok(Some(sample)) => latest = Some(sample),
+                Ok(None) => return Ok(latest),
+                // A newer one waits: it was sent since the last look.
+                Err(ReceiveError::TooManyHeld { .. }) if latest.is_some() => latest = None,
+                Err(error) => return Err(error),
+            }
         }
-        Ok(latest)
     }
 
     /// Processes that may send, dead ones included until they are cleaned away.

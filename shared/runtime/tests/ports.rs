@@ -119,6 +119,28 @@ fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
 }
 
 #[test]
+fn who_may_hold_one_array_gets_the_newest_of_several() {
+    let limits = Limits::new(1, 3, 1);
+    let plan =
+        TopicPlan::slices::<u8, FrameHeader>("frames".to_owned(), Delivery::Realtime, limits, 8);
+    let deployment = Deployment::new(&[plan]);
+    let bus = deployment.bus("both");
+    let mut waiter = bus.waiter();
+    let publisher = bus.slice_publisher::<u8, FrameHeader>("frames").unwrap();
+    let subscriber = bus
+        .slice_subscriber::<u8, FrameHeader>("frames", &mut waiter)
+        .unwrap();
+    for value in 0..3 {
+        let mut loan = publisher.loan(8).unwrap();
+        loan.payload_mut().fill(value);
+        loan.send().unwrap();
+    }
+    let newest = subscriber.latest().unwrap().unwrap();
+    assert_eq!(newest.payload(), [2; 8]);
+    assert!(subscriber.latest().unwrap().is_none());
+}
+
+#[test]
 fn a_slow_receiver_of_a_lossless_topic_gets_everything_in_order() {
     const N: u64 = 200;
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
