@@ -12,7 +12,7 @@ use std::process::Command;
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
-    &["geometry", "kernels", "messages", "footage", "join", "mat5"],
+    &["geometry", "kernels", "messages", "footage", "join", "mat5", "c3d"],
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],

@@ -15,6 +15,7 @@ mod calibration;
 mod footage;
 mod iterations;
 mod models;
+mod motion;
 mod multi_view;
 mod parse_set;
 mod single_view;

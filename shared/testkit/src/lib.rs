@@ -1,5 +1,6 @@
 //! What only tests need.
 #![forbid(unsafe_code)]
 
+pub mod c3d;
 pub mod mat;
 pub mod npy;

@@ -1,0 +1,146 @@
+//! Points over time from C3D files, in all six encodings: Intel, DEC and MIPS numbers, as integers or reals.
+//!
+//! Written here because the readers on offer refuse many files of old laboratories (a missing
+//! `POINT:UNITS` or `ANALOG:RATE`, an offset written as a real) that hold all that is needed. Analog
+//! samples are passed over. Nothing is allocated on a count's word: what a file announces must be
+//! there. The format is described in *The C3D File Format* (c3d.org).
+//!
+//! ```no_run
+//! let trial = c3d::C3d::parse(&std::fs::read("Walking_1.c3d")?)?;
+//! if let Some(head) = trial.point("HEDO") {
+//!     println!("{:?} {}", trial.frame(0)[head], trial.units());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+
+mod error;
+
+mod numbers;
+
+mod header;
+mod parameters;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::C3dError;
+
+use header::Header;
+use numbers::Bytes;
+use parameters::Parameters;
+
+/// The points of one trial.
+#[derive(Debug, Clone, PartialEq)]
+pub struct C3d {
+    rate_hz: f64,
+    units: String,
+    first_frame: u32,
+    labels: Vec<String>,
+    n_frames: usize,
+    n_points: usize,
+    /// `[frame][point]`.
+    points: Vec<Option<[f64; 3]>>,
+}
+
+impl C3d {
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    ///
+    /// [`C3dError`]; the memory used is at most some tens of bytes for each byte of the file.
+    pub fn parse(file: &[u8]) -> Result<Self, C3dError> {
+        let (bytes, section) = Bytes::of_file(file)?;
+        let parameters = Parameters::read(bytes, section)?;
+        let header = Header::read(bytes, &parameters)?;
+        let points = header.points(bytes)?;
+        let n_labels = header.n_points.min(file.len());
+        Ok(Self {
+            rate_hz: header.rate_hz,
+            units: parameters.text("POINT", "UNITS").unwrap_or_default(),
+            first_frame: header.first_frame,
+            labels: labels(&parameters, n_labels),
+            n_frames: header.n_frames,
+            n_points: header.n_points,
+            points,
+        })
+    }
+
+    /// Frames per second of the points; 0 where the file does not say.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Unit of the positions as the file names it: `mm`, `m`; empty where it does not say.
+    pub fn units(&self) -> &str {
+        &self.units
+    }
+
+    /// Metres per unit of the positions; millimetres where the file does not say, `None` where it
+    /// names a unit that is not known.
+    pub fn metres_per_unit(&self) -> Option<f64> {
+        match self.units.to_ascii_lowercase().as_str() {
+            "" | "mm" => Some(0.001),
+            "cm" => Some(0.01),
+            "dm" => Some(0.1),
+            "m" => Some(1.0),
+            "in" => Some(0.0254),
+            _ => None,
+        }
+    }
+
+    /// Number of the first frame, as the file counts (from 1).
+    pub fn first_frame(&self) -> u32 {
+        self.first_frame
+    }
+
+    /// Number of frames.
+    pub fn n_frames(&self) -> usize {
+        self.n_frames
+    }
+
+    /// Number of points in every frame.
+    pub fn n_points(&self) -> usize {
+        self.n_points
+    }
+
+    /// Names of the points; may be fewer than there are points.
+    pub fn labels(&self) -> &[String] {
+        &self.labels
+    }
+
+    /// Index of the point of that name: whole, or after the subject's name and a colon (`S1:LFWT`).
+    pub fn point(&self, name: &str) -> Option<usize> {
+        let is_named = |label: &String| {
+            let own = label.rsplit_once(':').map_or(label.as_str(), |it| it.1);
+            label == name || own == name
+        };
+        self.labels.iter().position(is_named)
+    }
+
+    /// The points of a frame (from 0) in the file's own unit and frame of reference; `None` where a
+    /// point was not seen.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such frame.
+    pub fn frame(&self, frame: usize) -> &[Option<[f64; 3]>] {
+        assert!(frame < self.n_frames, "frame {frame} of {}", self.n_frames);
+        &self.points[frame * self.n_points..(frame + 1) * self.n_points]
+    }
+}
+
+/// `POINT:LABELS`, then `LABELS2` and so on: one parameter holds 255 names at most.
+fn labels(parameters: &Parameters<'_>, most: usize) -> Vec<String> {
+    let mut labels = parameters.texts("POINT", "LABELS", most);
+    let mut n = 2;
+    while labels.len() < most {
+        let more = parameters.texts("POINT", &format!("LABELS{n}"), most - labels.len());
+        if more.is_empty() {
+            break;
+        }
+        labels.extend(more);
+        n += 1;
+    }
+    labels
+}
