@@ -1,14 +1,32 @@
 //! Errors against a reference: PCP, PCK, distances, percentiles, and the TRC files references come in.
+//!
+//! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
+//! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
+//! any of them.
 #![forbid(unsafe_code)]
 
 mod pck;
 mod pcp;
-mod percentile;
 mod report;
+
+mod joints3d;
+mod pcp3d;
+
+mod bootstrap;
+mod changes;
+mod percentile;
+
 mod trc;
 
+pub use bootstrap::{Bootstrap, Share};
+pub use changes::Changes;
+pub use joints3d::{aligned, joint_errors};
 pub use pck::{PCK_GROUPS, best_covering, joints_found};
 pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
+pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
 pub use percentile::percentile;
 pub use report::{PCK_SHARES, Report, evaluate};
 pub use trc::{Trc, TrcError};
+
+/// A place in space.
+pub type Point = [f64; 3];

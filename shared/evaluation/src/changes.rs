@@ -1,0 +1,115 @@
+//! What another version makes better and worse: the paper's histogram of improvements and deteriorations.
+
+/// Counts of differences of errors, `before - after`: what is above 0 has become better.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Changes {
+    width: f64,
+    /// Of `[edge, edge + width)`; the outermost hold everything beyond.
+    bins: Vec<usize>,
+    improved: usize,
+    deteriorated: usize,
+    total: usize,
+    same: f64,
+}
+
+impl Changes {
+    /// Begins to count.
+    ///
+    /// * `reach`: the histogram goes from `-reach` to `reach`, in the unit of the errors.
+    /// * `n_bins`: how many there are, at least 2.
+    /// * `same`: differences that are at most this large count as no change.
+    pub fn new(reach: f64, n_bins: usize, same: f64) -> Self {
+        let n_bins = n_bins.max(2);
+        Self {
+            width: 2.0 * reach / n_bins as f64,
+            bins: vec![0; n_bins],
+            improved: 0,
+            deteriorated: 0,
+            total: 0,
+            same,
+        }
+    }
+
+    /// Counts an error before and after; passed over if either is not a finite number.
+    pub fn add(&mut self, before: f64, after: f64) {
+        let gain = before - after;
+        if !gain.is_finite() {
+            return;
+        }
+        self.total += 1;
+        self.improved += usize::from(gain > self.same);
+        self.deteriorated += usize::from(gain < -self.same);
+        let last = self.bins.len() - 1;
+        let bin = (gain / self.width + self.bins.len() as f64 / 2.0).floor();
+        self.bins[bin.clamp(0.0, last as f64) as usize] += 1;
+    }
+
+    /// The bins from the worst to the best: lower edge and count.
+    pub fn bins(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
+        let middle = self.bins.len() as f64 / 2.0;
+        let edge = move |it: usize| (it as f64 - middle) * self.width;
+        let counts = self.bins.iter().enumerate();
+        counts.map(move |(it, &count)| (edge(it), count))
+    }
+
+    /// How many became better.
+    pub fn improved(&self) -> usize {
+        self.improved
+    }
+
+    /// How many became worse.
+    pub fn deteriorated(&self) -> usize {
+        self.deteriorated
+    }
+
+    /// How many were counted.
+    pub fn total(&self) -> usize {
+        self.total
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn better_is_to_the_right_and_the_outermost_bins_hold_the_rest() {
+        let mut changes = Changes::new(20.0, 4, 0.5);
+        for (before, after) in [
+            (100.0, 1.0),
+            (5.0, 4.0),
+            (4.0, 4.25),
+            (4.0, 15.0),
+            (0.0, 99.0),
+        ] {
+            changes.add(before, after);
+        }
+        changes.add(f64::INFINITY, 3.0);
+        let bins: Vec<_> = changes.bins().collect();
+        assert_eq!(bins, [(-20.0, 2), (-10.0, 1), (0.0, 1), (10.0, 1)]);
+        assert_eq!((changes.improved(), changes.deteriorated()), (2, 2));
+        assert_eq!(changes.total(), 5);
+    }
+
+    proptest! {
+        #[test]
+        fn every_change_is_in_one_bin_and_exchanging_the_two_mirrors_them(
+            pairs in prop::collection::vec((0.0..200.0_f64, 0.0..200.0_f64), 0..50),
+        ) {
+            let count = |swap: bool| {
+                let mut changes = Changes::new(50.0, 10, 1.0);
+                for &(a, b) in &pairs {
+                    let (before, after) = if swap { (b, a) } else { (a, b) };
+                    changes.add(before, after);
+                }
+                changes
+            };
+            let (there, back) = (count(false), count(true));
+            prop_assert_eq!(there.bins().map(|it| it.1).sum::<usize>(), pairs.len());
+            prop_assert_eq!(there.improved(), back.deteriorated());
+            prop_assert_eq!(there.deteriorated(), back.improved());
+        }
+    }
+}
