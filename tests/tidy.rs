@@ -16,7 +16,7 @@ const LAYERS: &[&[&str]] = &[
     &["runtime", "fmp"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],
-    &["wire", "training"],
+    &["wire", "training", "sequences"],
     &[
         "capture",
         "pose",
