@@ -2,7 +2,7 @@
 //!
 //! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewAnswer`], what a
 //! view brings; [`choose_start`], which candidate of every view is the person; [`estimate_pair`], the
-//! optimiser; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], from the pairs back to one pose per view.
+//! optimiser of a pair, [`estimate_all_views`], that of all views at once; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], from the pairs back to one pose per view.
 #![forbid(unsafe_code)]
 
 mod settings;
@@ -14,6 +14,7 @@ mod consistency;
 mod heat_map;
 mod released;
 
+mod all_views;
 mod average;
 mod consensus;
 mod facing;
@@ -23,6 +24,7 @@ mod start;
 mod anatomy;
 mod compatibility;
 
+pub use all_views::{AllViewsEstimate, AllViewsInput, AllViewsStart, estimate_all_views};
 pub use anatomy::anatomical_evidence;
 pub use average::{FusedPose, anatomical, average};
 pub use compatibility::{Compatibility, CompatibilityError};

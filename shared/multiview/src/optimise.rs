@@ -4,7 +4,7 @@ use fmp::{Bounds, Extra, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::released::{ReleasedPair, ReleasedTerms};
-use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewAnswer};
+use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewAnswer, ViewPlan};
 
 /// A pair of views of one frame.
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +121,7 @@ fn paper(
         });
         let (mut moved_px, mut same_types) = (0.0, true);
         if let Some((pose, score, term)) = better {
-            moved_px = mean_movement(pair, target, &poses[target], &pose);
+            moved_px = mean_movement(pair.views[target].plan, &poses[target], &pose);
             same_types = types(&poses[target]).eq(types(&pose));
             (poses[target], own[target], between) = (pose, score, term);
         }
@@ -167,7 +167,7 @@ fn released_pair(
         let Some(pose) = found else {
             break;
         };
-        let moved_px = mean_movement(pair, target, &poses[target], &pose);
+        let moved_px = mean_movement(pair.views[target].plan, &poses[target], &pose);
         poses[target] = pose;
         iterations.push(Iteration {
             target,
@@ -193,7 +193,7 @@ fn released_pair(
 }
 
 /// Whether shortcuts have changed nothing; whoever comes with wrong bounds gets what they say.
-fn is_best(
+pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,
     extra: &dyn Extra,
@@ -224,12 +224,12 @@ fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
     }
 }
 
-fn types(pose: &Pose) -> impl Iterator<Item = u8> {
+pub(crate) fn types(pose: &Pose) -> impl Iterator<Item = u8> {
     pose.parts.iter().map(|it| it.mixture)
 }
 
-fn mean_movement(pair: &PairInput<'_>, view: usize, from: &Pose, to: &Pose) -> f64 {
-    let plan = pair.views[view].plan;
+/// Mean distance between the part centres of two poses, pixels.
+pub(crate) fn mean_movement(plan: &ViewPlan, from: &Pose, to: &Pose) -> f64 {
     let (from, to) = (plan.centres(from), plan.centres(to));
     let sum: f64 = from
         .iter()

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use fmp::{Model, Pose, Responses, Solver};
 use multiview::{
-    Epipolar, PairEstimate, PairInput, PairStart, Settings, Start, TypeTables, ViewAnswer,
-    ViewPlan, choose_start, estimate_pair,
+    AllViewsEstimate, AllViewsInput, AllViewsStart, Epipolar, PairEstimate, PairInput, PairStart,
+    Settings, Start, TypeTables, ViewAnswer, ViewPlan, choose_start, estimate_all_views,
+    estimate_pair,
 };
 
 /// What a view answered for one frame, besides its evidence.
@@ -33,6 +34,39 @@ pub struct PairAnswer {
     pub views: [usize; 2],
     /// Same facing, then opposite facing; the latter only where facing is to be decided.
     pub hypotheses: Vec<PairEstimate>,
+}
+
+/// What all views found at once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AllViewsAnswer {
+    /// The views that answered, ascending.
+    pub views: Vec<usize>,
+    /// Whether left and right of each were taken to be exchanged with respect to the first.
+    pub exchanged: Vec<bool>,
+    /// The result, by index into `views`.
+    pub estimate: AllViewsEstimate,
+}
+
+impl AllViewsAnswer {
+    /// The same as answers of pairs, which is what the last step takes: every pair of a view has its one pose.
+    pub fn as_pairs(&self) -> Vec<PairAnswer> {
+        let estimate = &self.estimate;
+        let pair = |[first, second]: [usize; 2]| PairAnswer {
+            views: [self.views[first], self.views[second]],
+            hypotheses: vec![PairEstimate {
+                start: PairStart {
+                    candidates: [0, 0],
+                    exchanged: self.exchanged[first] != self.exchanged[second],
+                },
+                energy: estimate.energy,
+                iterations: Vec::new(),
+                converged: estimate.converged,
+                active: Vec::new(),
+                poses: [first, second].map(|it| estimate.poses[it].clone()),
+            }],
+        };
+        all_pairs(self.views.len()).into_iter().map(pair).collect()
+    }
 }
 
 impl FuseStep {
@@ -131,6 +165,47 @@ impl FuseStep {
             vec![hypothesis(exchanged_a != exchanged_b)]
         };
         Some(PairAnswer { views, hypotheses })
+    }
+
+    /// Solves all views at once from the joint start.
+    ///
+    /// * `evidence`: of the views that answered.
+    /// * `weight`: of the terms of each pair; see [`AllViewsInput::weight`].
+    /// * Returns `None` if fewer than two views answered.
+    pub fn all_views(
+        &self,
+        answers: &[Option<Answer>],
+        evidence: &[Option<Responses<'_>>],
+        start: &[Option<(usize, bool)>],
+        weight: f64,
+    ) -> Option<AllViewsAnswer> {
+        let present =
+            |it: &usize| answers[*it].is_some() && evidence[*it].is_some() && start[*it].is_some();
+        let present: Vec<usize> = (0..answers.len()).filter(present).collect();
+        if present.len() < 2 {
+            return None;
+        }
+        let views = present.iter();
+        let views = views.filter_map(|&it| Some(self.view_answer(it, answers[it].as_ref()?)));
+        let views: Vec<ViewAnswer<'_>> = views.collect();
+        let evidence = present.iter().filter_map(|&it| evidence[it].as_ref());
+        let evidence: Vec<&Responses<'_>> = evidence.collect();
+        let start: Vec<(usize, bool)> = present.iter().filter_map(|&it| start[it]).collect();
+        let (candidates, exchanged): (Vec<usize>, Vec<bool>) = start.into_iter().unzip();
+        let input = AllViewsInput {
+            views: &views,
+            tables: &|first, second| self.tables(present[first], present[second]),
+            weight,
+        };
+        let start = AllViewsStart {
+            candidates: &candidates,
+            exchanged: &exchanged,
+        };
+        Some(AllViewsAnswer {
+            estimate: estimate_all_views(&self.solver, &self.settings, &input, &evidence, start),
+            exchanged,
+            views: present,
+        })
     }
 
     fn view_answer<'a>(&'a self, view: usize, answer: &'a Answer) -> ViewAnswer<'a> {

@@ -11,6 +11,6 @@ mod view_step;
 mod estimate;
 
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
-pub use fuse_step::{Answer, FuseStep, PairAnswer, all_pairs};
+pub use fuse_step::{AllViewsAnswer, Answer, FuseStep, PairAnswer, all_pairs};
 pub use skeleton_step::{Combine, FusedView, Skeleton, SkeletonSettings, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

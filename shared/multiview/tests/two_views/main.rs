@@ -5,6 +5,7 @@
 mod oracle;
 mod planted;
 
+mod all_views;
 mod paper;
 mod released;
 mod start;

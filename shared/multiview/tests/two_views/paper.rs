@@ -12,11 +12,11 @@ use crate::planted::{
     FROM_BEST, MIRROR, N_PARTS, N_TYPES, Noise, Scene, camera, layout, lenses, mirrored, settings,
 };
 
-const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
+pub(crate) const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
 /// Few enough cells to try every pose there is; in the second, only types can change.
-const TINY: [&[[usize; 2]]; 2] = [&[[3, 4], [2, 2]], &[[1, 1]]];
+pub(crate) const TINY: [&[[usize; 2]]; 2] = [&[[3, 4], [2, 2]], &[[1, 1]]];
 /// Single-view scores are sums in single precision.
-const ROUNDING: f64 = 1e-4;
+pub(crate) const ROUNDING: f64 = 1e-4;
 
 fn starts() -> impl Strategy<Value = PairStart> {
     (0..4_usize, 0..4_usize, any::<bool>()).prop_map(|(a, b, exchanged)| PairStart {
@@ -31,7 +31,7 @@ fn parts(estimate: &PairEstimate) -> [(u16, Vec<Placement>); 2] {
 }
 
 /// Every pose of a view.
-fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
+pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
     let mut poses = Vec::new();
     for (level, it) in plan.layout().levels.iter().enumerate() {
         let n = it.rows * it.cols * N_TYPES;
