@@ -17,6 +17,7 @@ const LAYERS: &[&[&str]] = &[
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],
     &["wire", "training", "sequences"],
+    &["experiment"],
     &[
         "capture",
         "pose",

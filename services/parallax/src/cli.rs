@@ -3,7 +3,9 @@
 use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
-use crate::commands::{calib, config, deployments, detect, fuse_frame, model, run, service, train};
+use crate::commands::{
+    calib, config, deployments, detect, eval, fuse_frame, model, run, service, train,
+};
 use crate::exit::EXIT_CODES;
 
 const LONG_ABOUT: &str = "\
@@ -81,6 +83,8 @@ pub(crate) enum Command {
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.
     FuseFrame(fuse_frame::Arguments),
+    /// Evaluate versions of the method on sequences whose joints are known.
+    Eval(Box<eval::Arguments>),
     /// Train a model from annotated people.
     #[command(subcommand)]
     Train(train::Command),

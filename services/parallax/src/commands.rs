@@ -4,6 +4,7 @@ pub(crate) mod calib;
 pub(crate) mod config;
 pub(crate) mod deployments;
 pub(crate) mod detect;
+pub(crate) mod eval;
 pub(crate) mod fuse_frame;
 pub(crate) mod judge;
 pub(crate) mod model;
@@ -26,6 +27,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
+        Command::Eval(it) => eval::run(&it, cli.globals),
         Command::Train(it) => train::run(it, cli.globals),
         Command::Model(it) => model::run(&it),
         Command::Calib(it) => calib::run(&it),

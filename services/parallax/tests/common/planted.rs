@@ -91,6 +91,12 @@ fn figure(frame: usize) -> [Point3<f64>; N_PARTS] {
     core::array::from_fn(|part| turn * standing(part) + walk)
 }
 
+/// The 14 joints of the figure, metres.
+pub(crate) fn joints(frame: usize) -> Vec<[f64; 3]> {
+    let parts = figure(frame).map(|it| it.coords.into());
+    skeleton::PARSE14.from_parts(&parts)
+}
+
 /// A part of a figure that stands: further down the further from the head, and to its own side.
 fn standing(part: usize) -> Point3<f64> {
     let depth = core::iter::successors(PARENT[part], |it| PARENT[*it]).count() as f64;

@@ -1,0 +1,309 @@
+//! `parallax eval`: the paper's evaluation on sequences whose joints are known.
+
+mod job;
+mod report;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use experiment::{FilmSettings, Version};
+use fuse::Config;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use sequences::{Alignment, Sequence, SequenceError};
+use viewquality::Table;
+
+use crate::cli::Globals;
+use crate::inputs;
+use job::Job;
+
+const HELP: &str = "\
+SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax synth`, or a description \
+(configs/sequences/). Every frame is solved on its own: once in every view, then by each version.
+
+Versions: fmp (every view alone, then triangulation), geometry, appearance (part types too), adaptive \
+(parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
+geometry+consensus by what all views can mean; geometry+all-views supports each view by all others at \
+once, geometry+all-views-mean by the mean of their terms. Without --versions: all for which there is what \
+they need (tables of part types for appearance; --sigma or --oracle for adaptive), pairs and all views.
+
+--fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
+
+OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
+--resume frames that are there are not solved again; other settings are refused. --json prints the report's \
+numbers.
+
+Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a model; 5 a calibration; \
+7 done, but footage ended before the truth; 130 interrupted.
+
+Examples:
+    parallax eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
+    parallax eval HumanEva_I --model he.txt --fuse he.toml --sigma errors.csv --out out/humaneva --resume";
+
+/// What to evaluate, and how.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The sequences.
+    #[arg(required = true, value_name = "SEQUENCE")]
+    sequences: Vec<PathBuf>,
+    /// The model file.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Where the report goes.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// What is compared, separated by commas; the others are compared with the first.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    versions: Vec<Version>,
+    /// Settings of fusion.
+    #[arg(long, value_name = "FILE")]
+    fuse: Option<PathBuf>,
+    /// Table of expected errors, as the authors released it.
+    #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
+    sigma: Option<PathBuf>,
+    /// Expect the true errors: a part is off beyond a tenth of the person's size.
+    #[arg(long)]
+    oracle: bool,
+    /// Size of the frames.
+    #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
+    size: Option<[u32; 2]>,
+    /// Size of the frames as a share of the footage's.
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+    /// Do not turn the frames upright.
+    #[arg(long)]
+    no_upright: bool,
+    /// Most candidates of a view.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    candidates: usize,
+    /// Take the first and every so many-th frame after it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    every: usize,
+    /// Most frames of each sequence.
+    #[arg(long, value_name = "N")]
+    frames: Option<usize>,
+    /// Which part of each sequence: 0.8-1 is the last fifth.
+    #[arg(long, value_name = "FROM-TO", value_parser = share)]
+    share: Option<[f64; 2]>,
+    /// UMPM: every frame with the pose of the frame before, as the released tools have it.
+    #[arg(long)]
+    umpm_late: bool,
+    /// Frames that are drawn together for confidence intervals.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    block: usize,
+    /// Threads; one a core if not given. The numbers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Go on with a run that was interrupted.
+    #[arg(long)]
+    resume: bool,
+    /// Print the numbers as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
+    let side = |it: &str| it.parse().map_err(|_| format!("{it:?} is no size"));
+    Ok([side(width)?, side(height)?])
+}
+
+fn share(text: &str) -> Result<[f64; 2], String> {
+    let (from, to) = text.split_once('-').ok_or("expected FROM-TO, as 0.8-1")?;
+    let end = |it: &str| match it.parse::<f64>() {
+        Ok(end) if (0.0..=1.0).contains(&end) => Ok(end),
+        _ => Err(format!("{it:?} is no share from 0 to 1")),
+    };
+    let [from, to] = [end(from)?, end(to)?];
+    if from < to {
+        Ok([from, to])
+    } else {
+        Err(format!("nothing lies between {from} and {to}"))
+    }
+}
+
+/// Evaluates.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let sequences = sequences(arguments)?;
+    let model = inputs::model(&arguments.model)?;
+    let config = config(arguments)?;
+    let sigma = match &arguments.sigma {
+        Some(file) => Some(inputs::quality_table(file, model.n_parts())?),
+        None => None,
+    };
+    let poses = arguments.out.join("poses");
+    fs::create_dir_all(&poses).map_err(|error| inputs::in_file(&poses, &error))?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.map_or(0, usize::from))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let job = Job {
+        versions: versions(arguments, &config, sigma.as_ref())?,
+        settings: settings_text(arguments, &config)?,
+        film: FilmSettings {
+            size: arguments.size,
+            scale: arguments.scale,
+            upright: !arguments.no_upright,
+        },
+        n_candidates: arguments.candidates,
+        oracle: arguments.oracle,
+        resume: arguments.resume,
+        quiet: globals.quiet,
+        model,
+        config,
+        sigma,
+        poses,
+        stop,
+    };
+    let done = pool.install(|| job.run(&sequences))?;
+    report::write(arguments, &job, &done)?;
+    if job.stop.is_requested() {
+        let failure = Failure::new(ExitKind::Interrupted, "interrupted");
+        return Err(failure.with_hint("--resume goes on where it was"));
+    }
+    match done.n_missing {
+        0 => Ok(ExitCode::SUCCESS),
+        n => {
+            let message = format!("{n} frames were left out: the footage ended before the truth");
+            Err(Failure::new(ExitKind::Degraded, message))
+        }
+    }
+}
+
+fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
+    let options = sequences::Options {
+        alignment: if arguments.umpm_late {
+            Alignment::OneLate
+        } else {
+            Alignment::Direct
+        },
+        share: arguments.share,
+    };
+    let mut all: Vec<Sequence> = Vec::new();
+    for path in &arguments.sequences {
+        let read = sequences::read(path, &options);
+        for mut it in read.map_err(unread)? {
+            it.thin_out(arguments.every, arguments.frames);
+            if all
+                .iter()
+                .any(|other| other.name == it.name && other.dataset == it.dataset)
+            {
+                let message = format!("{} {} is given twice", it.dataset, it.name);
+                return Err(Failure::new(ExitKind::Usage, message));
+            }
+            all.push(it);
+        }
+    }
+    Ok(all)
+}
+
+fn unread(error: SequenceError) -> Failure {
+    let kind = match &error {
+        SequenceError::Rig(geometry::files::RigFileError::Read { .. }) => ExitKind::Input,
+        SequenceError::Rig(_) | SequenceError::Cameras { .. } => ExitKind::Calibration,
+        _ => ExitKind::Input,
+    };
+    Failure::new(kind, error)
+}
+
+fn config(arguments: &Arguments) -> Result<Config, Failure> {
+    let Some(file) = &arguments.fuse else {
+        return Ok(Config::default());
+    };
+    let text = inputs::text(file)?;
+    let mut config: Config = toml::from_str(&text).map_err(|error| {
+        let message = format!("{}: {error}", file.display());
+        Failure::new(ExitKind::Config, message)
+    })?;
+    let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
+    for table in &mut config.compatibility {
+        table.files = table.files.each_ref().map(|it| folder.join(it));
+    }
+    Ok(config)
+}
+
+/// What is compared: what was asked for, or all that can be.
+fn versions(
+    arguments: &Arguments,
+    config: &Config,
+    sigma: Option<&Table>,
+) -> Result<Vec<Version>, Failure> {
+    let expects = sigma.is_some() || arguments.oracle;
+    if let [_, ..] = arguments.versions[..] {
+        let adaptive = |it: &Version| it.terms == experiment::Terms::Adaptive;
+        if !expects && arguments.versions.iter().any(adaptive) {
+            let message = "adaptive selection needs expected errors: --sigma FILE or --oracle";
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+        return Ok(arguments.versions.clone());
+    }
+    let mut names = vec!["geometry"];
+    if !config.compatibility.is_empty() {
+        names.push("appearance");
+    }
+    if expects {
+        names.push("adaptive");
+    }
+    let each = ["", "+all-views"].into_iter();
+    let each = each.flat_map(|it| names.iter().map(move |name| format!("{name}{it}")));
+    let mut versions = vec![Version::SINGLE];
+    for name in each {
+        versions.push(name.parse().or_fail(ExitKind::Run)?);
+    }
+    Ok(versions)
+}
+
+/// All that what is found depends on, besides the sequence and its frames.
+fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
+    let digest = |file: &PathBuf| {
+        let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
+        Ok::<_, Failure>(fingerprint(&bytes))
+    };
+    let model = digest(&arguments.model)?;
+    let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
+    let mut tables = Vec::new();
+    for file in config.compatibility.iter().flat_map(|it| &it.files) {
+        tables.push(digest(file)?);
+    }
+    let fuse = toml::to_string(config).or_fail(ExitKind::Run)?;
+    let (size, scale) = (arguments.size, arguments.scale);
+    let (upright, n, oracle) = (
+        !arguments.no_upright,
+        arguments.candidates,
+        arguments.oracle,
+    );
+    Ok(format!(
+        "model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
+         scale {scale}, upright {upright}, candidates {n}\n{fuse}"
+    ))
+}
+
+/// FNV-1a, 64 bits: to tell files apart, not to keep anybody out.
+fn fingerprint(bytes: &[u8]) -> u64 {
+    let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_shares_are_checked() {
+        assert_eq!(size("272x480"), Ok([272, 480]));
+        assert!(size("272").is_err() && size("ax2").is_err());
+        assert_eq!(share("0.8-1"), Ok([0.8, 1.0]));
+        for text in ["0.8", "1-0.8", "0.5-0.5", "0-2", "nan-1"] {
+            assert!(share(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_fingerprint_is_that_of_the_published_function() {
+        assert_eq!(fingerprint(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(fingerprint(b"a"), 0xaf63_dc4c_8601_ec8c);
+    }
+}

@@ -1,0 +1,292 @@
+//! All sequences, frame by frame, and what is kept of them.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Seek as _, SeekFrom, Write as _};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use experiment::{
+    Bench, Film, FilmError, FilmSettings, Header, Record, Setup, Version, parse14, part_errors,
+    read_records, seen,
+};
+use fmp::Model;
+use fuse::Config;
+use indicatif::{ProgressBar, ProgressStyle};
+use multiview::TypeTables;
+use pipeline::{SkeletonSettings, ViewSettings};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use sequences::{Frame, Sequence};
+use viewquality::Table;
+
+use crate::{inputs, output};
+
+/// How long a line of progress lasts where it cannot be redrawn.
+const EVERY: Duration = Duration::from_secs(10);
+
+/// What is done with every sequence.
+pub(super) struct Job {
+    pub(super) model: Arc<Model>,
+    pub(super) config: Config,
+    pub(super) versions: Vec<Version>,
+    pub(super) settings: String,
+    pub(super) film: FilmSettings,
+    pub(super) n_candidates: usize,
+    pub(super) sigma: Option<Table>,
+    pub(super) oracle: bool,
+    pub(super) resume: bool,
+    pub(super) quiet: bool,
+    pub(super) poses: PathBuf,
+    pub(super) stop: Stop,
+}
+
+/// What was found.
+#[derive(Debug, Default)]
+pub(super) struct Done {
+    /// The sequences that were begun, and their frames.
+    pub(super) sequences: Vec<(Sequence, Vec<Record>)>,
+    /// Frames whose footage was not there.
+    pub(super) n_missing: usize,
+}
+
+impl Job {
+    /// Solves all sequences, until it is told to stop.
+    pub(super) fn run(&self, sequences: &[Sequence]) -> Result<Done, Failure> {
+        let n_frames = sequences.iter().map(|it| it.frames.len()).sum();
+        let mut progress = Progress::new(self.quiet, n_frames);
+        let mut done = Done::default();
+        for sequence in sequences {
+            if self.stop.is_requested() {
+                break;
+            }
+            let (records, n_missing) = self.sequence(sequence, &mut progress)?;
+            done.n_missing += n_missing;
+            done.sequences.push((sequence.clone(), records));
+        }
+        progress.end();
+        Ok(done)
+    }
+
+    fn sequence(
+        &self,
+        sequence: &Sequence,
+        progress: &mut Progress,
+    ) -> Result<(Vec<Record>, usize), Failure> {
+        let (mut kept, mut records) = self.keep(sequence)?;
+        let is_done = |frame: &Frame| records.iter().any(|it: &Record| it.frame == frame.number);
+        let open: Vec<&Frame> = sequence.frames.iter().filter(|it| !is_done(it)).collect();
+        progress.passed_over(sequence.frames.len() - open.len());
+        if open.is_empty() {
+            return Ok((records, 0));
+        }
+        let mut film = Film::open(sequence, &self.film).map_err(no_film)?;
+        let mut bench = self.bench(sequence, &film)?;
+        let scales: Vec<f32> = film.footage_from_frame().iter().map(scale).collect();
+        let mut n_missing = 0;
+        for frame in open {
+            if self.stop.is_requested() {
+                break;
+            }
+            let images = film.at(frame.index).map_err(no_film)?;
+            if images.iter().any(Option::is_none) {
+                n_missing += 1;
+                progress.passed_over(1);
+                continue;
+            }
+            let truth = self.truth(sequence, frame, &bench);
+            let found = bench.solve(&images, &|view, centres| {
+                if let Some(truth) = &truth {
+                    let may_be_exchanged = self.config.facing;
+                    return part_errors(centres, truth[view].as_ref()?, may_be_exchanged);
+                }
+                let table = self.sigma.as_ref()?;
+                let camera = &sequence.views[view].camera;
+                let number = i64::try_from(frame.number).ok()?;
+                let sigma = table.get(&sequence.subject, &sequence.action, number, camera)?;
+                Some(sigma.iter().map(|it| it * scales[view]).collect())
+            });
+            let record = Record {
+                frame: frame.number,
+                found,
+            };
+            let line = serde_json::to_string(&record).or_fail(ExitKind::Run)?;
+            writeln!(kept, "{line}").or_fail(ExitKind::Run)?;
+            records.push(record);
+            progress.solved(&sequence.name);
+        }
+        Ok((records, n_missing))
+    }
+
+    /// The file that what is found goes to, and what is in it already.
+    fn keep(&self, sequence: &Sequence) -> Result<(File, Vec<Record>), Failure> {
+        let name = format!("{} {}", sequence.dataset, sequence.name);
+        let safe = |it: char| if it.is_alphanumeric() { it } else { '-' };
+        let file = self
+            .poses
+            .join(name.chars().map(safe).collect::<String>() + ".jsonl");
+        let versions = self.versions.iter().map(ToString::to_string).collect();
+        let header = Header::new(&sequence.name, &self.settings, versions);
+        let wrong = |error: std::io::Error| inputs::in_file(&file, &error);
+        let (mut records, mut n_bytes) = (Vec::new(), 0);
+        if file.exists() {
+            if !self.resume {
+                let message = format!("{} is there already", file.display());
+                let failure = Failure::new(ExitKind::Usage, message);
+                return Err(failure.with_hint("--resume goes on with it; or choose another --out"));
+            }
+            (records, n_bytes) = read_records(&inputs::text(&file)?, &header).map_err(|error| {
+                let failure = inputs::in_file(&file, &error);
+                failure.with_hint("remove it, or choose another --out")
+            })?;
+        }
+        let mut options = OpenOptions::new();
+        let opened = options.create(true).write(true).truncate(false).open(&file);
+        let mut kept = opened.map_err(wrong)?;
+        kept.set_len(n_bytes as u64).map_err(wrong)?;
+        kept.seek(SeekFrom::End(0)).map_err(wrong)?;
+        if n_bytes == 0 {
+            let line = serde_json::to_string(&header).or_fail(ExitKind::Run)?;
+            writeln!(kept, "{line}").map_err(wrong)?;
+        }
+        Ok((kept, records))
+    }
+
+    fn bench(&self, sequence: &Sequence, film: &Film) -> Result<Bench, Failure> {
+        let maps = film.footage_from_frame();
+        let mean = maps.iter().map(scale).sum::<f32>() / maps.len().max(1) as f32;
+        let mut config = self.config.clone();
+        if let fuse::Tau::File(tau) = &config.tau {
+            config.tau = fuse::Tau::Given(inputs::tau(&tau.file, self.model.n_parts())?);
+        }
+        let mut fuse = config.settings(self.n_candidates, mean);
+        if self.oracle {
+            fuse.tau_px = vec![1.0; self.model.n_parts()];
+            fuse.rescue_px = Vec::new();
+        }
+        let setup = Setup {
+            model: Arc::clone(&self.model),
+            view: ViewSettings {
+                n_candidates: self.n_candidates,
+                ..ViewSettings::default()
+            },
+            tables: self.tables(sequence)?,
+            skeleton: SkeletonSettings {
+                joints: sequence.joints,
+                facing: fuse.facing,
+                ..SkeletonSettings::default()
+            },
+            fuse,
+            versions: self.versions.clone(),
+        };
+        let up = sequence.rig.up_in_world();
+        Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
+    }
+
+    /// Tables of part types of the sequence's pairs of cameras.
+    fn tables(&self, sequence: &Sequence) -> Result<Vec<(usize, usize, TypeTables)>, Failure> {
+        let index = |name: &String| sequence.views.iter().position(|it| it.camera == *name);
+        let mut tables = Vec::new();
+        for entry in &self.config.compatibility {
+            let [Some(first), Some(second)] = entry.views.each_ref().map(index) else {
+                continue;
+            };
+            let mut files = entry.files.each_ref().map(PathBuf::as_path);
+            if first > second {
+                files.reverse();
+            }
+            let read = inputs::type_tables(files, &self.model)?;
+            tables.push((first.min(second), first.max(second), read));
+        }
+        Ok(tables)
+    }
+
+    /// The true joints in the frames of every view, where they stand in for expected errors.
+    fn truth(
+        &self,
+        sequence: &Sequence,
+        frame: &Frame,
+        bench: &Bench,
+    ) -> Option<Vec<Option<Vec<[f64; 2]>>>> {
+        let joints = parse14(sequence.joints, &frame.joints);
+        let in_frame = |camera: &geometry::Camera| {
+            let joints = seen(camera, [0.0; 2], &joints)?;
+            Some(joints.to_vec())
+        };
+        self.oracle.then(|| bench.cameras().map(in_frame).collect())
+    }
+}
+
+fn no_film(error: FilmError) -> Failure {
+    let kind = match &error {
+        FilmError::Footage { .. } => ExitKind::Input,
+        FilmError::Framing { .. } | FilmError::Warp { .. } => ExitKind::Calibration,
+    };
+    Failure::new(kind, error)
+}
+
+/// Pixels of the frame per pixel of the footage.
+fn scale(footage_from_frame: &[[f64; 3]; 2]) -> f32 {
+    let [[a, b, _], [c, d, _]] = footage_from_frame;
+    (1.0 / (a * d - b * c).abs().sqrt()) as f32
+}
+
+/// Frames done, and the time that is left: a bar on a terminal, else a line now and then.
+struct Progress {
+    bar: ProgressBar,
+    is_lively: bool,
+    quiet: bool,
+    begin: Instant,
+    said: Instant,
+    n_frames: usize,
+    n_solved: usize,
+    n_passed: usize,
+}
+
+impl Progress {
+    fn new(quiet: bool, n_frames: usize) -> Self {
+        let is_lively = output::is_lively() && !quiet;
+        let bar = if is_lively {
+            ProgressBar::new(n_frames as u64)
+        } else {
+            ProgressBar::hidden()
+        };
+        let style = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
+        if let Ok(style) = ProgressStyle::with_template(style) {
+            bar.set_style(style);
+        }
+        Self {
+            bar,
+            is_lively,
+            quiet,
+            begin: Instant::now(),
+            said: Instant::now(),
+            n_frames,
+            n_solved: 0,
+            n_passed: 0,
+        }
+    }
+
+    fn passed_over(&mut self, n: usize) {
+        self.n_passed += n;
+        self.bar.inc(n as u64);
+    }
+
+    fn solved(&mut self, sequence: &str) {
+        self.n_solved += 1;
+        let each = self.begin.elapsed().as_secs_f64() / self.n_solved as f64;
+        let left = self.n_frames - self.n_solved - self.n_passed;
+        let minutes = each * left as f64 / 60.0;
+        let text = format!("{sequence}: {each:.2} s a frame, {minutes:.1} minutes left");
+        self.bar.set_message(text.clone());
+        self.bar.inc(1);
+        if !self.is_lively && !self.quiet && self.said.elapsed() >= EVERY {
+            self.said = Instant::now();
+            let n = self.n_solved + self.n_passed;
+            output::message(format_args!("{n}/{} frames, {text}", self.n_frames));
+        }
+    }
+
+    fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,132 @@
+//! What is left behind: the report for people, for programs and for papers.
+
+use std::fs;
+
+use evaluation::Bootstrap;
+use experiment::{FrameScore, Group, Measured, Page, Summary, html, latex, score, summarise};
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::Arguments;
+use super::job::{Done, Job};
+use crate::{inputs, output};
+
+/// Writes the report, and prints its short form.
+pub(super) fn write(arguments: &Arguments, job: &Job, done: &Done) -> Result<(), Failure> {
+    let bootstrap = Bootstrap {
+        block: arguments.block,
+        ..Bootstrap::default()
+    };
+    let versions: Vec<String> = job.versions.iter().map(ToString::to_string).collect();
+    let summary = summarise(&measured(done), &versions, &bootstrap);
+    let json = serde_json::to_string_pretty(&summary).or_fail(ExitKind::Run)?;
+    let about = about(arguments, job, done);
+    let page = html(&Page {
+        summary: &summary,
+        versions: &job.versions,
+        about: &about,
+    });
+    for (name, text) in [
+        ("report.json", json),
+        ("report.html", page),
+        ("report.tex", latex(&summary, &job.versions)),
+    ] {
+        let file = arguments.out.join(name);
+        fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
+    }
+    if arguments.json {
+        return output::json(&summary);
+    }
+    print(&summary, job)?;
+    output::line(format_args!(
+        "report: {}",
+        arguments.out.join("report.html").display()
+    ))
+}
+
+fn measured(done: &Done) -> Vec<Measured> {
+    let mut all = Vec::new();
+    for (sequence, records) in &done.sequences {
+        let mut scores: Vec<Vec<FrameScore>> = Vec::new();
+        for frame in &sequence.frames {
+            if let Some(record) = records.iter().find(|it| it.frame == frame.number) {
+                let found = record.found.iter();
+                scores.push(found.map(|it| score(sequence, frame, it)).collect());
+            }
+        }
+        all.push(Measured {
+            dataset: sequence.dataset.clone(),
+            subject: sequence.subject.clone(),
+            action: sequence.action.clone(),
+            scores,
+        });
+    }
+    all
+}
+
+fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)> {
+    let n_frames: usize = done.sequences.iter().map(|it| it.1.len()).sum();
+    let expected = match (&arguments.sigma, arguments.oracle) {
+        (Some(file), _) => file.display().to_string(),
+        (None, true) => "the true errors, a tenth of the person's size allowed".to_owned(),
+        (None, false) => "none".to_owned(),
+    };
+    let size = arguments.size.map_or_else(
+        || format!("{} of the footage", arguments.scale),
+        |[width, height]| format!("{width}x{height}"),
+    );
+    let frames = format!("{n_frames} instants of {} sequences", done.sequences.len());
+    let upright = if job.film.upright { ", upright" } else { "" };
+    [
+        ("model", arguments.model.display().to_string()),
+        ("frames", format!("{frames}, {size}{upright}")),
+        ("expected errors", expected),
+        (
+            "energy",
+            format!(
+                "{:?}, alpha {:?}, beta {}",
+                job.config.energy, job.config.alpha, job.config.beta
+            ),
+        ),
+        (
+            "facing",
+            if job.config.facing {
+                "decided for every view"
+            } else {
+                "as the model names its parts"
+            }
+            .to_owned(),
+        ),
+        ("candidates of a view", job.n_candidates.to_string()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .to_vec()
+}
+
+/// PCP3D of every group, and the gain over the first version.
+fn print(summary: &Summary, job: &Job) -> Result<(), Failure> {
+    let mut head = format!("{:<28} {:>6}", "PCP3D at 0.5, %", "frames");
+    for version in &job.versions {
+        head += &format!(" {:>22}", version.to_string());
+    }
+    output::line(head)?;
+    for group in &summary.groups {
+        output::line(row(group))?;
+    }
+    Ok(())
+}
+
+fn row(group: &Group) -> String {
+    let name = [&group.dataset, &group.subject, &group.action].map(String::as_str);
+    let name: Vec<&str> = name.into_iter().filter(|it| !it.is_empty()).collect();
+    let mut row = format!("{:<28} {:>6}", name.join(" "), group.frames);
+    for it in &group.versions {
+        let gain = it
+            .gain
+            .map_or_else(String::new, |it| format!(" ({it:+.2})"));
+        let value = it
+            .pcp3d
+            .map_or_else(|| "-".to_owned(), |it| format!("{it:.2}{gain}"));
+        row += &format!(" {value:>22}");
+    }
+    row
+}

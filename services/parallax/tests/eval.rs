@@ -1,0 +1,135 @@
+//! `parallax eval` as a user starts it: what it leaves behind, goes on with, and refuses.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::fs;
+use std::path::PathBuf;
+
+use common::{Case, Ended, PLAIN, planted};
+use serde_json::Value;
+
+/// Three views of a planted figure that walks, described as a sequence of `n_frames` whose truth is known.
+fn case(n_frames: usize, n_true: usize) -> Case {
+    let case = Case::new("eval", &[n_frames; 3], PLAIN);
+    let markers: Vec<String> = (0..14).map(|it| format!("M{it}")).collect();
+    let row = |frame: usize| {
+        let joints = planted::joints(frame).concat();
+        let cells: Vec<String> = joints.iter().map(ToString::to_string).collect();
+        format!("{}\t0\t{}", frame + 1, cells.join("\t"))
+    };
+    let rows: Vec<String> = (0..n_true).map(row).collect();
+    let (names, rows) = (markers.join("\t\t\t"), rows.join("\n"));
+    let trc = format!("x\nDataRate\tUnits\n60\tm\nFrame#\tTime\t{names}\n\n{rows}\n");
+    case.write("walk.trc", trc);
+    let camera = |name: &str| format!("[[camera]]\nname = {name:?}\nsource = {name:?}\n");
+    let cameras = ["a", "b", "c"].map(camera).concat();
+    case.write(
+        "walk.toml",
+        format!(
+            "name = \"walk\"\ndataset = \"planted\"\nrig = \"rig.toml\"\n{cameras}\
+             [truth]\ntrc = \"walk.trc\"\nworld_from_file = [\"x\", \"y\", \"z\"]\n\
+             joints = \"parse14\"\nmarkers = {markers:?}\n"
+        ),
+    );
+    case
+}
+
+fn eval(case: &Case, more: &[&str]) -> Ended {
+    let first = [
+        "eval",
+        "walk.toml",
+        "--model",
+        "model.plx",
+        "--out",
+        "out",
+        "--no-upright",
+    ];
+    case.start(&[&first, more].concat()).wait()
+}
+
+fn reports(case: &Case) -> Vec<String> {
+    let files = ["report.html", "report.json", "report.tex"];
+    let read = |it: &str| fs::read_to_string(case.path("out").join(it)).unwrap();
+    files.map(read).to_vec()
+}
+
+fn poses(case: &Case) -> PathBuf {
+    case.path("out/poses/planted-walk.jsonl")
+}
+
+#[test]
+fn a_report_holds_every_version_and_goes_on_where_it_was_cut_off() {
+    let case = case(3, 3);
+    let ended = eval(&case, &["--oracle", "--json", "--quiet"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let summary: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let versions = [
+        "fmp",
+        "geometry",
+        "adaptive",
+        "geometry+all-views",
+        "adaptive+all-views",
+    ];
+    assert_eq!(summary["versions"], serde_json::json!(versions));
+    let group = &summary["groups"][0];
+    assert_eq!(
+        (&group["frames"], &group["action"]),
+        (&3.into(), &"walk".into())
+    );
+    for numbers in group["versions"].as_array().unwrap() {
+        assert!(numbers["pcp3d"].is_number(), "{numbers}");
+    }
+    let whole = reports(&case);
+    assert!(whole[0].contains("<svg") && whole[2].contains("planted"));
+
+    let again = eval(&case, &["--oracle"]);
+    assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
+    assert!(again.stderr.contains("--resume"), "{}", again.stderr);
+
+    // As kill -9 leaves it: one whole frame, and half of another.
+    let kept = fs::read_to_string(poses(&case)).unwrap();
+    let lines: Vec<&str> = kept.lines().collect();
+    let half = &lines[2][..lines[2].len() / 2];
+    fs::write(poses(&case), format!("{}\n{}\n{half}", lines[0], lines[1])).unwrap();
+    let resumed = eval(&case, &["--oracle", "--resume", "--threads", "1"]);
+    assert_eq!(resumed.status.code(), Some(0), "{}", resumed.stderr);
+    assert_eq!(fs::read_to_string(poses(&case)).unwrap(), kept);
+    assert_eq!(reports(&case), whole);
+
+    let other = eval(&case, &["--oracle", "--resume", "--candidates", "2"]);
+    assert_eq!(other.status.code(), Some(4), "{}", other.stderr);
+    assert!(other.stderr.contains("other settings"), "{}", other.stderr);
+}
+
+#[test]
+fn footage_that_ends_before_the_truth_is_told() {
+    let case = case(2, 4);
+    let ended = eval(&case, &["--versions", "fmp"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(ended.stderr.contains("2 frames"), "{}", ended.stderr);
+    assert!(ended.stdout.contains("planted walk"), "{}", ended.stdout);
+}
+
+#[test]
+fn what_cannot_be_done_is_refused() {
+    let case = case(1, 1);
+    case.write("wrong.toml", "alhpa = 1\n");
+    for (more, code, words) in [
+        (&["--versions", "adaptive"][..], 2, "--oracle"),
+        (&["--versions", "fnp"], 2, "fnp"),
+        (&["--size", "12"], 2, "WIDTHxHEIGHT"),
+        (&["--share", "1-0.5"], 2, "nothing lies between"),
+        (&["--fuse", "wrong.toml"], 3, "alhpa"),
+        (&["--fuse", "none.toml"], 4, "none.toml"),
+        (&["walk.toml"], 2, "twice"),
+        (&["nowhere"], 4, "nowhere"),
+        (&["a"], 4, "neither a folder of HumanEva-I"),
+        (&["--size", "30x30"], 4, "30"),
+    ] {
+        let ended = eval(&case, more);
+        let (code_found, stderr) = (ended.status.code(), &ended.stderr);
+        assert_eq!(code_found, Some(code), "{more:?}: {stderr}");
+        assert!(stderr.contains(words), "{more:?}: {stderr}");
+    }
+}

@@ -1,0 +1,296 @@
+//! One frame solved by every version, from single-view solutions and evidence that all share.
+
+use std::sync::Arc;
+
+use fmp::{Model, Responses, Scope};
+use geometry::Camera;
+use kernels::Rgb8View;
+use multiview::{PairEstimate, TypeTables, ViewPlan};
+use nalgebra::UnitVector3;
+use pipeline::{
+    Answer, Combine, EstimatorError, FuseStep, PairAnswer, Skeleton, SkeletonSettings,
+    SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
+};
+use rayon::prelude::*;
+use skeleton::PARSE14;
+
+use crate::{Combining, Found, Terms, Version};
+
+/// Everything but the cameras.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Of the single-view step.
+    pub view: ViewSettings,
+    /// Of fusion, with all terms: versions leave some out. Thresholds in the unit of the expected errors.
+    pub fuse: multiview::Settings,
+    /// Part-type tables of pairs `(first, second)` with `first < second`.
+    pub tables: Vec<(usize, usize, TypeTables)>,
+    /// Of the last step.
+    pub skeleton: SkeletonSettings,
+    /// What is compared.
+    pub versions: Vec<Version>,
+}
+
+/// Says what error is expected of every part of a view.
+///
+/// * view, and the centres of the 26 parts of its best pose, pixels of the frame.
+pub type Expected<'a> = dyn Fn(usize, &[[f64; 2]]) -> Option<Vec<f32>> + Sync + 'a;
+
+/// The versions, ready for the frames of one rig.
+#[derive(Debug)]
+pub struct Bench {
+    setup: Setup,
+    up_in_world: Option<UnitVector3<f64>>,
+    plans: Vec<Arc<ViewPlan>>,
+    views: Vec<ViewStep>,
+    responses: Vec<Vec<f32>>,
+    /// One for each version.
+    fuse: Vec<FuseStep>,
+    footage_from_frame: Vec<[[f64; 3]; 2]>,
+}
+
+/// What the views say about a frame.
+struct Seen<'a> {
+    answers: Vec<Option<Answer>>,
+    evidence: Vec<Option<Responses<'a>>>,
+}
+
+impl Bench {
+    /// Prepares the versions for a rig.
+    ///
+    /// * `cameras`: of the frames, in the order of the views.
+    /// * `footage_from_frame`: for each of them; see [`Film::footage_from_frame`](crate::Film::footage_from_frame).
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError::TooSmall`].
+    pub fn new(
+        setup: Setup,
+        cameras: &[Camera],
+        up_in_world: Option<UnitVector3<f64>>,
+        footage_from_frame: Vec<[[f64; 3]; 2]>,
+    ) -> Result<Self, EstimatorError> {
+        let plans = cameras.iter().map(|camera| plan(&setup.model, camera));
+        let plans: Vec<Arc<ViewPlan>> = plans.collect::<Result<_, _>>()?;
+        let views: Vec<ViewStep> = plans
+            .iter()
+            .map(|it| {
+                let layout = Arc::new(it.layout().clone());
+                ViewStep::new(Arc::clone(&setup.model), layout, setup.view)
+            })
+            .collect();
+        let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
+        let fuse = setup.versions.iter().map(|version| {
+            let settings = settings_of(&setup.fuse, version.terms);
+            let tables = setup.tables.clone();
+            FuseStep::new(Arc::clone(&setup.model), settings, plans.clone(), tables)
+        });
+        Ok(Self {
+            responses: responses.collect(),
+            fuse: fuse.collect(),
+            up_in_world,
+            plans,
+            views,
+            setup,
+            footage_from_frame,
+        })
+    }
+
+    /// The cameras of the frames.
+    pub fn cameras(&self) -> impl Iterator<Item = &Camera> {
+        self.plans.iter().map(|it| it.camera())
+    }
+
+    /// Solves a frame, on rayon's current pool; every frame on its own, so that the result depends on
+    /// nothing but the images.
+    ///
+    /// * `images`: one for each view; `None` for a view that is missing.
+    /// * Returns what each version found, in the order of the setup.
+    ///
+    /// # Panics
+    ///
+    /// If the number of images, or the size of one, is not that of the rig.
+    pub fn solve(
+        &mut self,
+        images: &[Option<Rgb8View<'_>>],
+        expected: &Expected<'_>,
+    ) -> Vec<Found> {
+        assert_eq!(images.len(), self.views.len(), "one image per view");
+        let mut responses = std::mem::take(&mut self.responses);
+        let seen: Vec<Option<ViewEstimate>> = self
+            .views
+            .par_iter()
+            .zip(&mut responses)
+            .zip(images)
+            .map(|((step, responses), image)| {
+                Some(step.run((*image)?, Scope::whole(step.layout()), responses))
+            })
+            .collect();
+        let found = {
+            let seen = self.seen(&seen, &responses, expected);
+            let versions = self.setup.versions.par_iter().enumerate();
+            versions
+                .map(|(nth, version)| self.version(nth, *version, &seen))
+                .collect()
+        };
+        self.responses = responses;
+        found
+    }
+
+    fn seen<'a>(
+        &'a self,
+        found: &'a [Option<ViewEstimate>],
+        responses: &'a [Vec<f32>],
+        expected: &Expected<'_>,
+    ) -> Seen<'a> {
+        let answer = |view: usize| {
+            let it = found[view].as_ref()?;
+            let centres = self.plans[view].centres(it.candidates.first()?);
+            Some(Answer {
+                candidates: it.candidates.clone(),
+                sigma_px: expected(view, &centres),
+            })
+        };
+        let evidence = |view: usize| {
+            let it = found[view].as_ref()?;
+            let layout = self.plans[view].layout();
+            let evidence = Responses::within(layout, &responses[view], &it.levels, it.scope);
+            Some(evidence.with_bounds(&it.bounds))
+        };
+        Seen {
+            answers: (0..self.views.len()).map(answer).collect(),
+            evidence: (0..self.views.len()).map(evidence).collect(),
+        }
+    }
+
+    fn version(&self, nth: usize, version: Version, seen: &Seen<'_>) -> Found {
+        let step = &self.fuse[nth];
+        let answers: Vec<Option<Answer>> = seen
+            .answers
+            .iter()
+            .map(|it| {
+                let mut it = it.clone()?;
+                // Without adaptive selection nothing is expected: the first support is the better score.
+                it.sigma_px = it.sigma_px.filter(|_| version.terms == Terms::Adaptive);
+                Some(it)
+            })
+            .collect();
+        let mut effort = Effort::default();
+        let (pairs, combine) = match (version.terms, version.combining) {
+            (Terms::Single, _) => (Vec::new(), Combine::Mean),
+            (_, Combining::Pairs) => (self.pairs(step, &answers, seen), Combine::Mean),
+            (_, Combining::Consensus) => (self.pairs(step, &answers, seen), Combine::Consensus),
+            (_, Combining::AllViews | Combining::AllViewsMean) => {
+                let n = answers.iter().flatten().count();
+                let weight = match version.combining {
+                    Combining::AllViewsMean => 1.0 / (n.max(2) - 1) as f64,
+                    _ => 1.0,
+                };
+                let start = step.start(&answers);
+                let all = step.all_views(&answers, &seen.evidence, &start, weight);
+                if let Some(all) = &all {
+                    effort.count(all.estimate.iterations.len(), all.estimate.converged);
+                    effort.solutions = all.estimate.iterations.len() as u32;
+                    effort.on = Some(all.estimate.active);
+                }
+                (all.map_or_else(Vec::new, |it| it.as_pairs()), Combine::Mean)
+            }
+        };
+        let settings = SkeletonSettings {
+            combine,
+            ..self.setup.skeleton.clone()
+        };
+        let mut last = SkeletonStep::new(self.plans.clone(), self.up_in_world, settings);
+        let skeleton = last.run(&answers, &pairs);
+        if matches!(version.combining, Combining::Pairs | Combining::Consensus) {
+            effort.of_pairs(&pairs, &skeleton);
+        }
+        self.found(&skeleton, effort)
+    }
+
+    fn pairs(
+        &self,
+        step: &FuseStep,
+        answers: &[Option<Answer>],
+        seen: &Seen<'_>,
+    ) -> Vec<PairAnswer> {
+        let start = step.start(answers);
+        let solve = |pair: [usize; 2]| {
+            let [first, second] = pair.map(|it| seen.evidence[it].as_ref());
+            step.pair(pair, answers, [first?, second?], &start)
+        };
+        let pairs = all_pairs(self.views.len()).into_par_iter();
+        pairs.filter_map(solve).collect()
+    }
+
+    fn found(&self, skeleton: &Skeleton, effort: Effort) -> Found {
+        let joints = skeleton.joints.iter();
+        let joints = joints.map(|it| it.as_ref().ok().map(|it| it.in_world.into()));
+        let view = |(view, it): (usize, &Option<pipeline::FusedView>)| {
+            let rows = self.footage_from_frame[view];
+            let in_footage = |[x, y]: [f64; 2]| rows.map(|row| row[0] * x + row[1] * y + row[2]);
+            let joints = PARSE14.from_parts(&it.as_ref()?.pose.centres_px);
+            Some(joints.into_iter().map(in_footage).collect())
+        };
+        Found {
+            joints: joints.collect(),
+            views: skeleton.views.iter().enumerate().map(view).collect(),
+            iterations: effort.iterations,
+            unsettled: effort.unsettled,
+            solutions: effort.solutions,
+            on: effort.on,
+        }
+    }
+}
+
+/// What a version cost.
+#[derive(Debug, Default)]
+struct Effort {
+    iterations: Vec<u32>,
+    unsettled: u32,
+    solutions: u32,
+    on: Option<f64>,
+}
+
+impl Effort {
+    fn count(&mut self, n: usize, converged: bool) {
+        self.iterations.push(n as u32);
+        self.unsettled += u32::from(!converged);
+    }
+
+    /// Counts the iterations of what was taken, and the solutions of all that was tried.
+    fn of_pairs(&mut self, pairs: &[PairAnswer], skeleton: &Skeleton) {
+        let (mut on, mut n_terms) = (0, 0);
+        for pair in pairs {
+            let [first, second] = pair.views.map(|view| {
+                let view = skeleton.views[view].as_ref();
+                view.is_some_and(|it| it.exchanged)
+            });
+            let is_taken = |it: &&PairEstimate| it.start.exchanged == (first != second);
+            let taken = pair.hypotheses.iter().find(is_taken);
+            if let Some(it) = taken.or(pair.hypotheses.first()) {
+                self.count(it.iterations.len(), it.converged);
+                on += it.active.iter().filter(|it| **it).count();
+                n_terms += it.active.len();
+            }
+            let all = pair.hypotheses.iter().map(|it| it.iterations.len() as u32);
+            self.solutions += all.sum::<u32>();
+        }
+        self.on = (n_terms > 0).then(|| on as f64 / n_terms as f64);
+    }
+}
+
+/// The settings of a version: those of all terms, without the ones it does not have.
+fn settings_of(all: &multiview::Settings, terms: Terms) -> multiview::Settings {
+    let mut settings = all.clone();
+    if terms < Terms::Appearance {
+        settings.beta = 0.0;
+    }
+    if terms < Terms::Adaptive {
+        settings.tau_px = Vec::new();
+        settings.rescue_px = Vec::new();
+    }
+    settings
+}

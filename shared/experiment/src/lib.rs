@@ -1,0 +1,32 @@
+//! The paper's evaluation: versions of the method side by side on one sequence, scored, and reported.
+//!
+//! [`Film`] gives the frames of a sequence, [`Bench`] solves each of them once in every view and then
+//! by every [`Version`], [`Record`] keeps what was found (so that a run can go on), [`score`] compares
+//! it with the truth, and [`Summary`] adds up: as JSON, as one page of HTML ([`html`]) and as LaTeX
+//! ([`latex`]), the paper's own numbers beside ours ([`published()`]).
+//!
+//! Solving and scoring are apart: other thresholds and other truths need no second run.
+#![forbid(unsafe_code)]
+
+mod version;
+
+mod bench;
+mod film;
+mod truth;
+
+mod record;
+mod score;
+mod summary;
+
+mod published;
+mod report;
+
+pub use bench::{Bench, Expected, Setup};
+pub use film::{Film, FilmError, FilmSettings};
+pub use published::published;
+pub use record::{Found, Header, Record, RecordError, read_records};
+pub use report::{Page, html, latex};
+pub use score::{FrameScore, Joints, score, seen};
+pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
+pub use truth::{parse14, part_errors};
+pub use version::{Combining, Terms, Version, VersionError};

@@ -1,0 +1,75 @@
+//! One frame of one version against the truth.
+
+use evaluation::{Point, aligned, joint_errors, segment_errors, segments};
+use geometry::Camera;
+use nalgebra::Point3;
+use sequences::{Frame, Sequence};
+
+use crate::{Found, parse14};
+
+/// How far off one version was in one frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameScore {
+    /// Of the twelve segments, as shares of their length ([`segment_errors`]).
+    pub segments: Vec<Option<f64>>,
+    /// Of the joints, metres; infinite where one was not found.
+    pub joints_m: Vec<Option<f64>>,
+    /// The same after the best alignment; empty where there is none.
+    pub aligned_m: Vec<Option<f64>>,
+    /// For each view the 14 joints that were found (if somebody was) and the true ones, pixels of the
+    /// footage; `None` where a true joint is not known or not seen.
+    pub views: Vec<Option<(Option<Joints>, Joints)>>,
+    /// Single-view solutions of each pair, or of all views at once.
+    pub iterations: Vec<u32>,
+    /// How many of these had not settled.
+    pub unsettled: u32,
+    /// Single-view solutions in all.
+    pub solutions: u32,
+    /// Share of the consistency terms that were switched on.
+    pub on: Option<f64>,
+}
+
+/// The joints of `skeleton::PARSE14` in an image, pixels.
+pub type Joints = [[f64; 2]; 14];
+
+/// Compares what was found with the truth.
+///
+/// * `frame`: of the sequence, the one that was solved.
+pub fn score(sequence: &Sequence, frame: &Frame, found: &Found) -> FrameScore {
+    let truth = &frame.joints;
+    let segments = segments(sequence.joints).map_or_else(Vec::new, Vec::from);
+    let aligned_m = aligned(&found.joints, truth);
+    let aligned_m = aligned_m.map(|it| joint_errors(&it, truth));
+    let in_space = parse14(sequence.joints, truth);
+    let views = sequence.rig.cameras().iter().zip(&sequence.views);
+    let views = views.enumerate().map(|(nth, (camera, view))| {
+        let offset = view.source_offset_px.unwrap_or_default().map(f64::from);
+        let truth = seen(camera, offset, &in_space)?;
+        let found = found.views.get(nth).and_then(Option::as_ref);
+        let found = found.and_then(|it| Joints::try_from(it.as_slice()).ok());
+        Some((found, truth))
+    });
+    FrameScore {
+        segments: segment_errors(&segments, &found.joints, truth),
+        joints_m: joint_errors(&found.joints, truth),
+        aligned_m: aligned_m.unwrap_or_default(),
+        views: views.collect(),
+        iterations: found.iterations.clone(),
+        unsettled: found.unsettled,
+        solutions: found.solutions,
+        on: found.on,
+    }
+}
+
+/// The true joints in an image; `None` if one is not known, or behind the camera.
+///
+/// * `offset`: the calibrated pixel of the image's top-left pixel.
+/// * `joints`: of `skeleton::PARSE14`, metres.
+pub fn seen(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) -> Option<Joints> {
+    let mut seen = [[0.0; 2]; 14];
+    for (seen, joint) in seen.iter_mut().zip(joints) {
+        let at = camera.project(&Point3::from((*joint)?))?;
+        *seen = [at.x - offset[0], at.y - offset[1]];
+    }
+    Some(seen)
+}

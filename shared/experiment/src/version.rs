@@ -1,0 +1,138 @@
+//! The versions of the method that are compared.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Which terms tie the views together; each has those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Terms {
+    /// None: flexible mixtures of parts in every view, then triangulation.
+    Single,
+    /// Distances to epipolar lines.
+    Geometry,
+    /// Part types.
+    Appearance,
+    /// Parts switched off where their expected error is large.
+    Adaptive,
+}
+
+/// How more than two views come together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Combining {
+    /// Pairs of views, and the mean of what they find: the paper's way.
+    Pairs,
+    /// Pairs of views, and what all views can mean together.
+    Consensus,
+    /// All views at once, the terms of all pairs added up.
+    AllViews,
+    /// All views at once, each supported by the mean of the terms of the others.
+    AllViewsMean,
+}
+
+/// One version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Version {
+    /// Which terms.
+    pub terms: Terms,
+    /// How views come together.
+    pub combining: Combining,
+}
+
+/// A text that names no version.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{text:?}: a version is fmp, geometry, appearance or adaptive, and of the last three \
+     +consensus, +all-views or +all-views-mean"
+)]
+pub struct VersionError {
+    /// The text.
+    pub text: String,
+}
+
+const TERMS: [(Terms, &str, &str); 4] = [
+    (Terms::Single, "fmp", "FMP"),
+    (Terms::Geometry, "geometry", "Geom."),
+    (Terms::Appearance, "appearance", "+App."),
+    (Terms::Adaptive, "adaptive", "+Adap."),
+];
+
+const COMBINING: [(Combining, &str, &str); 4] = [
+    (Combining::Pairs, "", ""),
+    (Combining::Consensus, "+consensus", ", consensus"),
+    (Combining::AllViews, "+all-views", ", all views"),
+    (
+        Combining::AllViewsMean,
+        "+all-views-mean",
+        ", all views (mean)",
+    ),
+];
+
+impl Version {
+    /// The baseline: every view alone.
+    pub const SINGLE: Self = Self {
+        terms: Terms::Single,
+        combining: Combining::Pairs,
+    };
+
+    /// What the paper's tables call it.
+    pub fn title(self) -> String {
+        let terms = TERMS.iter().find(|it| it.0 == self.terms);
+        let combining = COMBINING.iter().find(|it| it.0 == self.combining);
+        let words = [terms.map_or("", |it| it.2), combining.map_or("", |it| it.2)];
+        words.concat()
+    }
+}
+
+impl fmt::Display for Version {
+    /// As it is chosen: `geometry+all-views`.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let terms = TERMS.iter().find(|it| it.0 == self.terms);
+        let combining = COMBINING.iter().find(|it| it.0 == self.combining);
+        out.write_str(terms.map_or("", |it| it.1))?;
+        out.write_str(combining.map_or("", |it| it.1))
+    }
+}
+
+impl FromStr for Version {
+    type Err = VersionError;
+
+    fn from_str(text: &str) -> Result<Self, VersionError> {
+        for (terms, name, _) in TERMS {
+            for (combining, suffix, _) in COMBINING {
+                let is_known = terms != Terms::Single || combining == Combining::Pairs;
+                if is_known && text.strip_prefix(name) == Some(suffix) {
+                    return Ok(Self { terms, combining });
+                }
+            }
+        }
+        let text = text.to_owned();
+        Err(VersionError { text })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        for (terms, ..) in TERMS {
+            for (combining, ..) in COMBINING {
+                let version = Version { terms, combining };
+                let got = version.to_string().parse();
+                if terms == Terms::Single && combining != Combining::Pairs {
+                    assert!(got.is_err(), "{version}");
+                } else {
+                    assert_eq!(got, Ok(version));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn other_words_are_refused() {
+        for text in ["", "fmp+consensus", "geometry+", "all-views", "Geometry"] {
+            assert!(text.parse::<Version>().is_err(), "{text}");
+        }
+    }
+}
