@@ -26,6 +26,7 @@ Examples:
     parallax model import parse.mat --out parse.plx     another format's model as our own
     parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
     parallax model judge person.fmp PARSE --only 101-200    how good it is
+    parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
     parallax calib show Calib.toml                      what a calibration file says
 ";
 

@@ -44,6 +44,10 @@ Examples:
 /// What to evaluate, and how.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub(crate) struct Arguments {
     /// The sequences.
     #[arg(required = true, value_name = "SEQUENCE")]
@@ -106,7 +110,10 @@ pub(crate) struct Arguments {
 
 fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
-    let side = |it: &str| it.parse().map_err(|_| format!("{it:?} is no size"));
+    let side = |it: &str| {
+        it.parse::<u32>()
+            .map_err(|error| format!("{it:?}: {error}"))
+    };
     Ok([side(width)?, side(height)?])
 }
 

@@ -104,11 +104,13 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
 
 /// PCP3D of every group, and the gain over the first version.
 fn print(summary: &Summary, job: &Job) -> Result<(), Failure> {
-    let mut head = format!("{:<28} {:>6}", "PCP3D at 0.5, %", "frames");
-    for version in &job.versions {
-        head += &format!(" {:>22}", version.to_string());
-    }
-    output::line(head)?;
+    let mut head = vec![format!("{:<28} {:>6}", "PCP3D at 0.5, %", "frames")];
+    head.extend(
+        job.versions
+            .iter()
+            .map(|it| format!("{:>22}", it.to_string())),
+    );
+    output::line(head.join(" "))?;
     for group in &summary.groups {
         output::line(row(group))?;
     }
@@ -118,15 +120,13 @@ fn print(summary: &Summary, job: &Job) -> Result<(), Failure> {
 fn row(group: &Group) -> String {
     let name = [&group.dataset, &group.subject, &group.action].map(String::as_str);
     let name: Vec<&str> = name.into_iter().filter(|it| !it.is_empty()).collect();
-    let mut row = format!("{:<28} {:>6}", name.join(" "), group.frames);
+    let mut row = vec![format!("{:<28} {:>6}", name.join(" "), group.frames)];
     for it in &group.versions {
         let gain = it
             .gain
             .map_or_else(String::new, |it| format!(" ({it:+.2})"));
-        let value = it
-            .pcp3d
-            .map_or_else(|| "-".to_owned(), |it| format!("{it:.2}{gain}"));
-        row += &format!(" {value:>22}");
+        let value = it.pcp3d.map(|it| format!("{it:.2}{gain}"));
+        row.push(format!("{:>22}", value.unwrap_or_else(|| "-".to_owned())));
     }
-    row
+    row.join(" ")
 }
