@@ -16,6 +16,9 @@ use skeleton::PARSE14;
 
 use crate::{Combining, Found, Terms, Version};
 
+/// Assumptions about facing that all views at once are tried under.
+const N_STARTS: usize = 4;
+
 /// Everything but the cameras.
 #[derive(Debug, Clone)]
 pub struct Setup {
@@ -188,11 +191,10 @@ impl Bench {
                     Combining::AllViewsMean => 1.0 / (n.max(2) - 1) as f64,
                     _ => 1.0,
                 };
-                let start = step.start(&answers);
-                let all = step.all_views(&answers, &seen.evidence, &start, weight);
+                let all = step.all_views(&answers, &seen.evidence, weight, N_STARTS);
                 if let Some(all) = &all {
                     effort.count(all.estimate.iterations.len(), all.estimate.converged);
-                    effort.solutions = all.estimate.iterations.len() as u32;
+                    effort.solutions = all.n_solutions as u32;
                     effort.on = Some(all.estimate.active);
                 }
                 (all.map_or_else(Vec::new, |it| it.as_pairs()), Combine::Mean)

@@ -34,14 +34,53 @@ pub fn choose_start<'a>(
     views: &[ViewAnswer<'a>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Start {
-    let states: Vec<Vec<State>> = views
-        .iter()
-        .enumerate()
-        .map(|(view, answer)| states(settings, answer, view))
-        .collect();
+    let all = views.iter().enumerate();
+    let all = all.map(|(view, answer)| states(settings, answer, view));
+    best_of(settings, views, tables, &all.collect::<Vec<_>>())
+}
+
+/// The best start under every assumption about who sees the person from behind, highest energy first.
+///
+/// There are `2^(n - 1)` of them for `n` views, if `facing` is to be decided, and one if not. Equals keep the order
+/// of the binary numbers that the views from the second on make.
+pub fn rank_starts<'a>(
+    settings: &Settings,
+    views: &[ViewAnswer<'a>],
+    tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
+) -> Vec<Start> {
+    let can_exchange = |it: &ViewAnswer<'_>| it.plan.model().spec().mirror.is_some();
+    let n_free = if settings.facing && views.iter().all(can_exchange) {
+        views.len().saturating_sub(1)
+    } else {
+        0
+    };
+    let start = |pattern: usize| {
+        let states = views.iter().enumerate().map(|(view, answer)| {
+            let n = answer.candidates.len().min(settings.n_candidates.max(1));
+            let exchanged = view > 0 && pattern >> (view - 1) & 1 == 1;
+            let state = |candidate| State {
+                candidate,
+                exchanged,
+            };
+            (0..n).map(state).collect()
+        });
+        best_of(settings, views, tables, &states.collect::<Vec<_>>())
+    };
+    let mut starts: Vec<Start> = (0..1 << n_free).map(start).collect();
+    starts.sort_by(|a, b| b.energy.total_cmp(&a.energy));
+    starts
+}
+
+/// The joint state that the energies of all pairs like best.
+fn best_of<'a>(
+    settings: &Settings,
+    views: &[ViewAnswer<'a>],
+    tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
+    states: &[Vec<State>],
+) -> Start {
     let unary: Vec<Vec<f64>> = views
         .iter()
-        .zip(&states)
+        .zip(states)
         .map(|(answer, states)| {
             let weight = views.len().saturating_sub(1).max(1) as f64;
             let score = |it: &State| f64::from(answer.candidates[it.candidate].score);
@@ -50,7 +89,7 @@ pub fn choose_start<'a>(
         .collect();
     let problem = Problem {
         unary,
-        between: between(settings, views, &states, tables),
+        between: between(settings, views, states, tables),
     };
     let (chosen, energy) = problem.solve();
     let pick = |view: usize| states[view][chosen[view]];

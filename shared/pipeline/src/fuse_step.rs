@@ -6,7 +6,7 @@ use fmp::{Model, Pose, Responses, Solver};
 use multiview::{
     AllViewsEstimate, AllViewsInput, AllViewsStart, Epipolar, PairEstimate, PairInput, PairStart,
     Settings, Start, TypeTables, ViewAnswer, ViewPlan, choose_start, estimate_all_views,
-    estimate_pair,
+    estimate_pair, rank_starts,
 };
 
 /// What a view answered for one frame, besides its evidence.
@@ -45,6 +45,8 @@ pub struct AllViewsAnswer {
     pub exchanged: Vec<bool>,
     /// The result, by index into `views`.
     pub estimate: AllViewsEstimate,
+    /// Single-view solutions from all starts.
+    pub n_solutions: usize,
 }
 
 impl AllViewsAnswer {
@@ -167,20 +169,21 @@ impl FuseStep {
         Some(PairAnswer { views, hypotheses })
     }
 
-    /// Solves all views at once from the joint start.
+    /// Solves all views at once, from the best starts under different assumptions about who sees the
+    /// person from behind; the highest energy at the end decides.
     ///
     /// * `evidence`: of the views that answered.
     /// * `weight`: of the terms of each pair; see [`AllViewsInput::weight`].
+    /// * `n_starts`: how many are tried, at least 1.
     /// * Returns `None` if fewer than two views answered.
     pub fn all_views(
         &self,
         answers: &[Option<Answer>],
         evidence: &[Option<Responses<'_>>],
-        start: &[Option<(usize, bool)>],
         weight: f64,
+        n_starts: usize,
     ) -> Option<AllViewsAnswer> {
-        let present =
-            |it: &usize| answers[*it].is_some() && evidence[*it].is_some() && start[*it].is_some();
+        let present = |it: &usize| answers[*it].is_some() && evidence[*it].is_some();
         let present: Vec<usize> = (0..answers.len()).filter(present).collect();
         if present.len() < 2 {
             return None;
@@ -190,22 +193,35 @@ impl FuseStep {
         let views: Vec<ViewAnswer<'_>> = views.collect();
         let evidence = present.iter().filter_map(|&it| evidence[it].as_ref());
         let evidence: Vec<&Responses<'_>> = evidence.collect();
-        let start: Vec<(usize, bool)> = present.iter().filter_map(|&it| start[it]).collect();
-        let (candidates, exchanged): (Vec<usize>, Vec<bool>) = start.into_iter().unzip();
         let input = AllViewsInput {
             views: &views,
             tables: &|first, second| self.tables(present[first], present[second]),
             weight,
         };
-        let start = AllViewsStart {
-            candidates: &candidates,
-            exchanged: &exchanged,
-        };
-        Some(AllViewsAnswer {
-            estimate: estimate_all_views(&self.solver, &self.settings, &input, &evidence, start),
-            exchanged,
-            views: present,
-        })
+        let mut best: Option<AllViewsAnswer> = None;
+        let mut n_solutions = 0;
+        let starts = rank_starts(&self.settings, &views, input.tables);
+        for start in starts.into_iter().take(n_starts.max(1)) {
+            let from = AllViewsStart {
+                candidates: &start.candidates,
+                exchanged: &start.exchanged,
+            };
+            let estimate =
+                estimate_all_views(&self.solver, &self.settings, &input, &evidence, from);
+            n_solutions += estimate.iterations.len();
+            if best
+                .as_ref()
+                .is_none_or(|it| estimate.energy > it.estimate.energy)
+            {
+                best = Some(AllViewsAnswer {
+                    views: present.clone(),
+                    exchanged: start.exchanged,
+                    estimate,
+                    n_solutions: 0,
+                });
+            }
+        }
+        best.map(|it| AllViewsAnswer { n_solutions, ..it })
     }
 
     fn view_answer<'a>(&'a self, view: usize, answer: &'a Answer) -> ViewAnswer<'a> {

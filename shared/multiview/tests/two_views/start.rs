@@ -1,6 +1,6 @@
 //! The choice of candidates and exchanges, against every combination there is.
 
-use multiview::{Settings, TypeTables, ViewAnswer, choose_start};
+use multiview::{Settings, TypeTables, ViewAnswer, choose_start, rank_starts};
 use proptest::prelude::*;
 
 use crate::oracle;
@@ -13,6 +13,13 @@ fn chosen(scene: &Scene, settings: &Settings) -> multiview::Start {
     let tables =
         |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
     choose_start(settings, &answers, &tables)
+}
+
+fn ranked(scene: &Scene, settings: &Settings) -> Vec<multiview::Start> {
+    let answers: Vec<ViewAnswer<'_>> = scene.views.iter().map(View::answer).collect();
+    let tables =
+        |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
+    rank_starts(settings, &answers, &tables)
 }
 
 /// Sum of eq. 3 over all pairs.
@@ -30,6 +37,30 @@ fn energy(scene: &Scene, settings: &Settings, candidates: &[usize], exchanged: &
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn ranked_starts_are_the_best_under_every_assumption_and_the_first_is_the_start(
+        seed: u64,
+        facing: bool,
+    ) {
+        let scene = Scene::new(seed, 3, &SIZES);
+        let settings = Settings { facing, n_candidates: 3, ..settings(seed) };
+        let starts = ranked(&scene, &settings);
+        prop_assert_eq!(starts.len(), if facing { 4 } else { 1 });
+        prop_assert!(starts.is_sorted_by(|a, b| a.energy >= b.energy));
+        prop_assert!((starts[0].energy - chosen(&scene, &settings).energy).abs() < 1e-4);
+        let mut patterns: Vec<&Vec<bool>> = starts.iter().map(|it| &it.exchanged).collect();
+        patterns.sort();
+        patterns.dedup();
+        prop_assert_eq!(patterns.len(), starts.len(), "every assumption once");
+        for start in &starts {
+            for index in 0..27 {
+                let candidates = [index % 3, index / 3 % 3, index / 9];
+                let other = energy(&scene, &settings, &candidates, &start.exchanged);
+                prop_assert!(other <= start.energy + 1e-4, "{candidates:?}");
+            }
+        }
+    }
 
     #[test]
     fn the_start_is_the_best_of_all_combinations(seed: u64, facing: bool) {
