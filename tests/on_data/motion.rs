@@ -72,12 +72,12 @@ fn other_laboratories_files_are_read_and_an_empty_one_is_named() {
             [low.min(it[axis]), high.max(it[axis])]
         })
     };
+    let [low, high] = span(2);
     println!(
-        "walk: {} {:?} {:?}",
-        walk.units(),
-        walk.labels(),
-        [0, 1, 2].map(span)
+        "walk: {low:.0} to {high:.0} {} above the floor",
+        walk.units()
     );
+    assert!(low > 0.0 && (1600.0..1900.0).contains(&high), "a person");
     for file in ["Gait.c3d", "mocap36.c3d", "badParameterOffset.c3d"] {
         let got = C3d::parse(&std::fs::read(dir.join(file)).unwrap());
         match got {

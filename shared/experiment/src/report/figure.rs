@@ -22,6 +22,7 @@ struct Plot {
 
 const HEIGHT: f64 = 220.0;
 const LEFT: f64 = 34.0;
+const RIGHT: f64 = 24.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = 34.0;
 
@@ -29,7 +30,7 @@ impl Plot {
     /// * `most`: the value at the top.
     fn new(width: f64, most: f64, unit: &str) -> Self {
         let mut out = String::new();
-        let total = [LEFT + width + 8.0, TOP + HEIGHT + BOTTOM];
+        let total = [LEFT + width + RIGHT, TOP + HEIGHT + BOTTOM];
         put(
             &mut out,
             format_args!(
@@ -154,11 +155,9 @@ pub(super) fn histogram(changes: &ChangesOf) -> String {
     }
     for nth in 0..=4 {
         let share = f64::from(nth) / 4.0;
-        let first = changes.bins.first().map_or(0.0, |it| it[0]);
-        plot.word(
-            LEFT + plot.width * share,
-            &format!("{:.0} px", first * (1.0 - 2.0 * share)),
-        );
+        let reach = changes.bins.first().map_or(0.0, |it| it[0].abs());
+        let at = reach * (2.0 * share - 1.0);
+        plot.word(LEFT + plot.width * share, &format!("{at:.0} px"));
     }
     plot.end()
 }

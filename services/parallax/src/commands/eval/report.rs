@@ -74,7 +74,8 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         || format!("{} of the footage", arguments.scale),
         |[width, height]| format!("{width}x{height}"),
     );
-    let frames = format!("{n_frames} instants of {} sequences", done.sequences.len());
+    let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
+    let settings = job.config.settings(job.n_candidates, 1.0);
     let upright = if job.film.upright { ", upright" } else { "" };
     [
         ("model", arguments.model.display().to_string()),
@@ -83,8 +84,8 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         (
             "energy",
             format!(
-                "{:?}, alpha {:?}, beta {}",
-                job.config.energy, job.config.alpha, job.config.beta
+                "{:?}, alpha {}, beta {}, distances up to {} cells",
+                job.config.energy, settings.alpha, settings.beta, settings.max_distance_cells
             ),
         ),
         (
