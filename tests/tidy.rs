@@ -13,7 +13,7 @@ use std::process::Command;
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
     &["geometry", "kernels", "messages", "footage", "join", "mat5", "c3d"],
-    &["runtime", "fmp"],
+    &["runtime", "fmp", "scene"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],
     &["wire", "training", "sequences"],

@@ -1,0 +1,199 @@
+//! The anatomical skeleton: bones, how far joints turn, and where everything is for given angles.
+//!
+//! The frame of the body: x forward, y to the person's left, z up. With all angles at 0 the person
+//! stands with hanging arms, and the frame of every bone is that of the body, at the bone's joint.
+
+mod limits;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+pub(crate) use limits::LIMITS;
+
+/// Number of bones.
+pub(crate) const N_BONES: usize = 19;
+
+pub(crate) const PELVIS: usize = 0;
+pub(crate) const ABDOMEN: usize = 1;
+pub(crate) const CHEST: usize = 2;
+pub(crate) const NECK: usize = 3;
+pub(crate) const HEAD: usize = 4;
+/// First bone of an arm: collar, upper arm, forearm, hand follow each other. Left first.
+pub(crate) const COLLAR: [usize; 2] = [5, 9];
+pub(crate) const UPPER_ARM: [usize; 2] = [6, 10];
+pub(crate) const FOREARM: [usize; 2] = [7, 11];
+pub(crate) const HAND: [usize; 2] = [8, 12];
+/// First bone of a leg: thigh, shin, foot follow each other. Left first.
+pub(crate) const THIGH: [usize; 2] = [13, 16];
+pub(crate) const SHIN: [usize; 2] = [14, 17];
+pub(crate) const FOOT: [usize; 2] = [15, 18];
+
+/// Index of the left side in the pairs above.
+pub(crate) const LEFT: usize = 0;
+/// Index of the right side in the pairs above.
+pub(crate) const RIGHT: usize = 1;
+
+/// The bone that a bone hangs on; the pelvis on none.
+pub(crate) const PARENT: [Option<usize>; N_BONES] = [
+    None,
+    Some(PELVIS),
+    Some(ABDOMEN),
+    Some(CHEST),
+    Some(NECK),
+    Some(CHEST),
+    Some(5),
+    Some(6),
+    Some(7),
+    Some(CHEST),
+    Some(9),
+    Some(10),
+    Some(11),
+    Some(PELVIS),
+    Some(13),
+    Some(14),
+    Some(PELVIS),
+    Some(16),
+    Some(17),
+];
+
+/// +1 for bones of the left side, -1 for those of the right, 0 in the middle.
+pub(crate) fn side_of(bone: usize) -> f64 {
+    match bone {
+        5..=8 | 13..=15 => 1.0,
+        9..=12 | 16..=18 => -1.0,
+        _ => 0.0,
+    }
+}
+
+/// Degrees of flexion, abduction and twist of every joint; the root's are not asked.
+///
+/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold,
+/// toes rise. Abduction: limbs away from the middle, collars up, the trunk bends to the right. Twist:
+/// inward rotation reversed (the front of the limb turns outward); the trunk turns left.
+pub(crate) type Angles = [[f64; 3]; N_BONES];
+
+/// Angles within the limits of the joints.
+pub(crate) fn clamped(angles: &Angles) -> Angles {
+    core::array::from_fn(|bone| {
+        core::array::from_fn(|axis| {
+            let [low, high] = LIMITS[bone][axis];
+            angles[bone][axis].clamp(low, high)
+        })
+    })
+}
+
+/// Where a person is, and how the joints are turned.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pose {
+    /// Frame of the pelvis in the frame that the person stands in.
+    pub(crate) root: Isometry3<f64>,
+    pub(crate) angles: Angles,
+}
+
+/// Lengths of a skeleton, metres.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Bones {
+    /// From the joint of the parent to the joint of the bone, in the parent's frame.
+    pub(crate) offset: [Vector3<f64>; N_BONES],
+    /// Top of the head in the frame of the head.
+    pub(crate) head_top: Vector3<f64>,
+    /// Tip of the toes and back of the heel, on the sole, in the frame of the foot.
+    pub(crate) sole: [Vector3<f64>; 2],
+    /// Tip of the hand in its frame.
+    pub(crate) fingertip: Vector3<f64>,
+}
+
+/// What makes one person's skeleton differ from another's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Proportions {
+    /// Standing height, metres.
+    pub(crate) height: f64,
+    /// Length of the legs and of the arms, and widths of shoulders and hips, 1 for the mean.
+    pub(crate) legs: f64,
+    pub(crate) arms: f64,
+    pub(crate) shoulders: f64,
+    pub(crate) hips: f64,
+}
+
+impl Bones {
+    /// Shares of the height after Drillis & Contini (1966), as reprinted in Winter, *Biomechanics and
+    /// Motor Control of Human Movement*; joints of the trunk between them by eye.
+    pub(crate) fn new(of: &Proportions) -> Self {
+        let h = of.height;
+        let leg = of.legs;
+        // What the legs gain the trunk loses.
+        let trunk = (0.818 - 0.53 * leg - 0.0) / (0.818 - 0.53);
+        let v = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * h;
+        let mut offset = [Vector3::zeros(); N_BONES];
+        offset[ABDOMEN] = v(-0.012, 0.0, 0.055 * trunk);
+        offset[CHEST] = v(0.004, 0.0, 0.10 * trunk);
+        offset[NECK] = v(-0.006, 0.0, 0.142 * trunk);
+        offset[HEAD] = v(0.012, 0.0, 0.075);
+        for (i, side) in [1.0, -1.0].into_iter().enumerate() {
+            offset[COLLAR[i]] = v(0.004, side * 0.018, 0.120 * trunk);
+            offset[UPPER_ARM[i]] = v(-0.008, side * 0.088 * of.shoulders, 0.008);
+            offset[FOREARM[i]] = v(0.0, 0.0, -0.176 * of.arms);
+            offset[HAND[i]] = v(0.0, 0.0, -0.146 * of.arms);
+            offset[THIGH[i]] = v(0.0, side * 0.051 * of.hips, 0.0);
+            offset[SHIN[i]] = v(0.0, 0.0, -0.245 * leg);
+            offset[FOOT[i]] = v(0.0, 0.0, -0.246 * leg);
+        }
+        Self {
+            offset,
+            head_top: v(0.006, 0.0, 0.095),
+            sole: [v(0.108, 0.0, -0.039), v(-0.036, 0.0, -0.039)],
+            fingertip: v(0.006, 0.0, -0.102 * of.arms),
+        }
+    }
+
+    /// The frames of all bones, in the frame that the pose stands in.
+    pub(crate) fn frames(&self, pose: &Pose) -> [Isometry3<f64>; N_BONES] {
+        let mut frames = [pose.root; N_BONES];
+        for bone in 1..N_BONES {
+            let Some(parent) = PARENT[bone] else { continue };
+            let turn = rotation(bone, pose.angles[bone]);
+            let joint = Isometry3::from_parts(Translation3::from(self.offset[bone]), turn);
+            frames[bone] = frames[parent] * joint;
+        }
+        frames
+    }
+
+    /// The 14 joints of `skeleton::PARSE14`, in its order.
+    pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
+        let joint = |bone: usize| Point3::from(frames[bone].translation.vector);
+        // The neck lies between the shoulders as much as on the spine.
+        [
+            joint(FOOT[RIGHT]),
+            joint(SHIN[RIGHT]),
+            joint(THIGH[RIGHT]),
+            joint(THIGH[LEFT]),
+            joint(SHIN[LEFT]),
+            joint(FOOT[LEFT]),
+            joint(HAND[RIGHT]),
+            joint(FOREARM[RIGHT]),
+            joint(UPPER_ARM[RIGHT]),
+            joint(UPPER_ARM[LEFT]),
+            joint(FOREARM[LEFT]),
+            joint(HAND[LEFT]),
+            joint(NECK),
+            frames[HEAD] * Point3::from(self.head_top),
+        ]
+    }
+}
+
+/// The turn of a joint: twist about the bone first, then abduction, then flexion.
+fn rotation(bone: usize, degrees: [f64; 3]) -> UnitQuaternion<f64> {
+    let [flexion, abduction, twist] = degrees.map(f64::to_radians);
+    let side = side_of(bone);
+    let mirror = if side < 0.0 { -1.0 } else { 1.0 };
+    // About +y, z turns to x: the trunk nods, a knee folds backwards; all else swings forward.
+    let forward = match bone {
+        ABDOMEN | CHEST | NECK | HEAD | 14 | 17 => flexion,
+        _ => -flexion,
+    };
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), forward)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), mirror * abduction)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), mirror * twist)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! Chance that is the same every time: hashes of a seed, and smooth noise in space.
+
+use nalgebra::Vector3;
+
+/// A generator of numbers that depend on the seed alone (splitmix64, Steele et al. 2014).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Dice(u64);
+
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(mix(seed.wrapping_add(GOLDEN)))
+    }
+
+    /// Another generator for a purpose of its own, so that one more throw here changes nothing there.
+    pub(crate) fn fork(self, purpose: &str) -> Self {
+        // FNV-1a.
+        let hash = purpose.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, it| {
+            (hash ^ u64::from(it)).wrapping_mul(0x100_0000_01b3)
+        });
+        Self(mix(self.0 ^ hash))
+    }
+
+    /// Another generator for the n-th of many.
+    pub(crate) fn nth(self, n: u64) -> Self {
+        Self(mix(self.0 ^ mix(n.wrapping_add(GOLDEN))))
+    }
+
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(GOLDEN);
+        mix(self.0)
+    }
+
+    /// At least 0, less than 1.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// At least `low`, less than `high`.
+    pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Mean 0, deviation 1, never beyond 3.5 (sum of twelve uniform numbers, cut off).
+    pub(crate) fn normal(&mut self) -> f64 {
+        let sum: f64 = (0..12).map(|_| self.unit()).sum();
+        (sum - 6.0).clamp(-3.5, 3.5)
+    }
+
+    /// True with that probability.
+    pub(crate) fn chance(&mut self, probability: f64) -> bool {
+        self.unit() < probability
+    }
+
+    /// One of several; the first if there is none to choose from is never asked for.
+    pub(crate) fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
+        &from[(self.bits() % from.len() as u64) as usize]
+    }
+}
+
+fn lattice(x: i32, y: i32, z: i32, seed: u32) -> f32 {
+    let mut h = (x as u32).wrapping_mul(0x8da6_b343)
+        ^ (y as u32).wrapping_mul(0xd816_3841)
+        ^ (z as u32).wrapping_mul(0xcb1a_b31f)
+        ^ seed.wrapping_mul(0x9e37_79b9);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
+    h ^= h >> 15;
+    (h >> 8) as f32 / (1 << 23) as f32 - 1.0
+}
+
+/// Smooth noise between -1 and 1, one feature a unit of length (value noise on a cubic lattice).
+pub(crate) fn noise(at: &Vector3<f32>, seed: u32) -> f32 {
+    let cell = at.map(f32::floor);
+    let f = (at - cell).map(|t| t * t * (3.0 - 2.0 * t));
+    let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
+    let along_x = |dy: i32, dz: i32| {
+        let a = lattice(x, y.wrapping_add(dy), z.wrapping_add(dz), seed);
+        let b = lattice(
+            x.wrapping_add(1),
+            y.wrapping_add(dy),
+            z.wrapping_add(dz),
+            seed,
+        );
+        a + (b - a) * f.x
+    };
+    let along_y = |dz: i32| {
+        let [a, b] = [along_x(0, dz), along_x(1, dz)];
+        a + (b - a) * f.y
+    };
+    let [a, b] = [along_y(0), along_y(1)];
+    a + (b - a) * f.z
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn purposes_and_numbers_have_chances_of_their_own() {
+        let dice = Dice::new(1);
+        let mut all: Vec<u64> = ["a", "b"]
+            .map(|it| dice.fork(it).bits())
+            .into_iter()
+            .chain((0..100).map(|it| dice.nth(it).bits()))
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 102);
+    }
+
+    #[test]
+    fn the_mean_and_the_spread_are_those_that_are_said() {
+        let mut dice = Dice::new(7);
+        let throws: Vec<f64> = (0..4000).map(|_| dice.normal()).collect();
+        let mean = throws.iter().sum::<f64>() / 4000.0;
+        let variance = throws.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / 4000.0;
+        assert!(mean.abs() < 0.06 && (variance - 1.0).abs() < 0.08);
+    }
+
+    proptest! {
+        #[test]
+        fn noise_is_bounded_and_smooth(
+            x in -50.0_f32..50.0, y in -50.0_f32..50.0, z in -50.0_f32..50.0, seed: u32,
+        ) {
+            let at = Vector3::new(x, y, z);
+            let here = noise(&at, seed);
+            prop_assert!((-1.0..=1.0).contains(&here));
+            let near = noise(&(at + Vector3::new(1e-3, 0.0, 0.0)), seed);
+            prop_assert!((near - here).abs() < 5e-3);
+        }
+
+        #[test]
+        fn a_range_is_kept(seed: u64, low in -5.0..0.0, high in 0.1..5.0) {
+            let at = Dice::new(seed).range(low, high);
+            prop_assert!((low..high).contains(&at));
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Cloth: its colours, its pattern and its folds.
+
+use nalgebra::{Vector2, Vector3};
+
+use crate::colour::{Linear, srgb};
+use crate::dice::{Dice, noise};
+
+/// What is printed or woven.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Pattern {
+    Plain,
+    /// Around the body, so many a metre.
+    Stripes(f32),
+    /// Along the body, so many a metre.
+    Bars(f32),
+    Checks(f32),
+    /// Threads of two colours.
+    Melange,
+    Blotches(f32),
+    /// One broad stripe at this height, metres above the hips.
+    Band(f32),
+}
+
+impl Pattern {
+    /// Plain ones more often.
+    pub(crate) const ON_TOPS: &'static [Self] = &[
+        Self::Plain,
+        Self::Plain,
+        Self::Plain,
+        Self::Melange,
+        Self::Stripes(14.0),
+        Self::Stripes(26.0),
+        Self::Bars(30.0),
+        Self::Checks(18.0),
+        Self::Blotches(16.0),
+        Self::Band(0.36),
+    ];
+    pub(crate) const ON_BOTTOMS: &'static [Self] = &[
+        Self::Plain,
+        Self::Plain,
+        Self::Plain,
+        Self::Melange,
+        Self::Melange,
+        Self::Bars(24.0),
+        Self::Checks(30.0),
+    ];
+}
+
+/// A piece of cloth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Fabric {
+    colour: Linear,
+    second: Linear,
+    pattern: Pattern,
+    /// How much folds turn the normal.
+    folds: f32,
+    seed: u32,
+}
+
+impl Fabric {
+    pub(crate) const TOPS: &'static [[u8; 3]] = &[
+        [232, 230, 224],
+        [40, 42, 48],
+        [150, 30, 36],
+        [46, 78, 140],
+        [70, 120, 78],
+        [200, 170, 70],
+        [128, 130, 134],
+        [120, 70, 110],
+        [210, 120, 70],
+        [90, 150, 190],
+        [170, 180, 190],
+        [60, 64, 44],
+    ];
+    pub(crate) const BOTTOMS: &'static [[u8; 3]] = &[
+        [44, 56, 84],
+        [70, 88, 124],
+        [30, 30, 34],
+        [120, 108, 88],
+        [86, 84, 82],
+        [168, 156, 132],
+        [60, 48, 42],
+        [44, 60, 50],
+    ];
+
+    pub(crate) fn any(dice: &mut Dice, colours: &[[u8; 3]], patterns: &[Pattern]) -> Self {
+        let colour = srgb(*dice.pick(colours)) * dice.range(0.85, 1.15) as f32;
+        let second = if dice.chance(0.5) {
+            srgb(*dice.pick(colours))
+        } else {
+            colour * dice.range(0.35, 0.7) as f32
+        };
+        Self {
+            colour,
+            second,
+            pattern: *dice.pick(patterns),
+            folds: dice.range(0.25, 0.6) as f32,
+            seed: dice.bits() as u32,
+        }
+    }
+
+    /// The colour at a point.
+    ///
+    /// * `at`: around the body and along it, metres of the cloth.
+    /// * `place`: of the body at rest, metres.
+    pub(crate) fn colour(&self, at: Vector2<f32>, place: &Vector3<f32>) -> Linear {
+        let odd = |it: f32| it.rem_euclid(1.0) < 0.5;
+        let second = match self.pattern {
+            Pattern::Plain => 0.0,
+            Pattern::Stripes(a_metre) => f32::from(odd(at.y * a_metre)),
+            Pattern::Bars(a_metre) => f32::from(odd(at.x * a_metre)),
+            Pattern::Checks(a_metre) => {
+                0.5 * (f32::from(odd(at.x * a_metre)) + f32::from(odd(at.y * a_metre)))
+            }
+            Pattern::Melange => 0.25 + 0.25 * noise(&(place * 250.0), self.seed),
+            Pattern::Blotches(a_metre) => f32::from(noise(&(place * a_metre), self.seed) > 0.15),
+            Pattern::Band(height) => f32::from((at.y - height).abs() < 0.06),
+        };
+        let worn = 1.0 + 0.08 * noise(&(place * 9.0), self.seed ^ 1);
+        (self.colour + (self.second - self.colour) * second) * worn
+    }
+
+    /// What folds add to the normal, in the frame of the body at rest.
+    pub(crate) fn folds(&self, place: &Vector3<f32>) -> Vector3<f32> {
+        // Folds run across limbs more than along them.
+        let at = Vector3::new(place.x * 13.0, place.y * 13.0, place.z * 22.0);
+        let turn = Vector3::new(
+            noise(&at, self.seed ^ 2),
+            noise(&at, self.seed ^ 3),
+            noise(&at, self.seed ^ 4),
+        );
+        turn * self.folds
+    }
+}

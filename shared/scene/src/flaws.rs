@@ -1,0 +1,297 @@
+//! What goes wrong with cameras: noise, blur, exposure, clocks that differ, frames that are lost, calibrations that
+//! are off. All off by default.
+
+use footage::Size;
+use geometry::{Camera, Rig, RigError};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::colour::srgb;
+use crate::dice::Dice;
+
+/// How bad the cameras are.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Flaws {
+    /// Deviation of the noise of every value of a pixel, grey levels.
+    pub noise: f64,
+    /// Deviation of the blur, pixels.
+    pub blur_px: f64,
+    /// Doublings of the light; negative is darker.
+    pub exposure_stops: f64,
+    /// A camera's clock is off by at most this, either way, seconds; the first camera's is right.
+    pub desync_s: f64,
+    /// Probability that a camera drops a frame.
+    pub drop: f64,
+    /// The written rig turns every camera by this angle about an axis by chance, degrees.
+    pub calibration_degrees: f64,
+    /// The written rig moves every camera this far in a direction by chance, millimetres.
+    pub calibration_mm: f64,
+}
+
+/// A flaw that cannot be.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{what} is {got}, expected {low} to {high}")]
+pub struct FlawError {
+    /// Which.
+    pub what: &'static str,
+    /// What was asked for.
+    pub got: f64,
+    /// Least.
+    pub low: f64,
+    /// Most.
+    pub high: f64,
+}
+
+impl Flaws {
+    /// Names of the flaws in settings, in the order of the fields.
+    pub const NAMES: [&'static str; 7] = [
+        "noise",
+        "blur",
+        "exposure",
+        "desync",
+        "drop",
+        "calibration-degrees",
+        "calibration-mm",
+    ];
+
+    /// The flaw of that name.
+    pub fn by_name_mut(&mut self, name: &str) -> Option<&mut f64> {
+        let all = [
+            &mut self.noise,
+            &mut self.blur_px,
+            &mut self.exposure_stops,
+            &mut self.desync_s,
+            &mut self.drop,
+            &mut self.calibration_degrees,
+            &mut self.calibration_mm,
+        ];
+        Self::NAMES
+            .iter()
+            .zip(all)
+            .find(|it| *it.0 == name)
+            .map(|it| it.1)
+    }
+
+    /// Refuses what cannot be.
+    ///
+    /// # Errors
+    ///
+    /// [`FlawError`], the first.
+    pub fn check(mut self) -> Result<(), FlawError> {
+        let limits = [
+            (0.0, 128.0),
+            (0.0, 20.0),
+            (-8.0, 8.0),
+            (0.0, 10.0),
+            (0.0, 0.95),
+            (0.0, 45.0),
+            (0.0, 2000.0),
+        ];
+        for (what, (low, high)) in Self::NAMES.into_iter().zip(limits) {
+            let got = self.by_name_mut(what).map_or(0.0, |it| *it);
+            if !(low..=high).contains(&got) {
+                return Err(FlawError {
+                    what,
+                    got,
+                    low,
+                    high,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a camera's frame is dropped. The first never is.
+    pub(crate) fn drops(&self, dice: Dice, camera: usize, frame: u64) -> bool {
+        frame > 0
+            && dice
+                .fork("drop")
+                .nth(camera as u64)
+                .nth(frame)
+                .chance(self.drop)
+    }
+
+    /// How late a camera's clock is, seconds.
+    pub(crate) fn late_s(&self, dice: Dice, camera: usize) -> f64 {
+        if camera == 0 {
+            return 0.0;
+        }
+        self.desync_s * dice.fork("desync").nth(camera as u64).range(-1.0, 1.0)
+    }
+
+    /// The rig as somebody with a bad calibration would have it.
+    pub(crate) fn written(&self, rig: &Rig, dice: Dice) -> Result<Rig, RigError> {
+        let wrong = |(nth, camera): (usize, &Camera)| {
+            let mut dice = dice.fork("calibration").nth(nth as u64);
+            let mut any = || {
+                let way = Vector3::from_fn(|_, _| dice.normal());
+                way.try_normalize(1e-6).unwrap_or(Vector3::x())
+            };
+            let turn = UnitQuaternion::new(any() * self.calibration_degrees.to_radians());
+            let step = any() * (self.calibration_mm * 1e-3);
+            let off = Isometry3::from_parts(Translation3::from(step), turn);
+            Camera {
+                camera_from_world: off * camera.camera_from_world,
+                ..camera.clone()
+            }
+        };
+        let is_right = self.calibration_degrees == 0.0 && self.calibration_mm == 0.0;
+        if is_right {
+            return Ok(rig.clone());
+        }
+        let cameras = rig.cameras().iter().enumerate().map(wrong).collect();
+        Rig::new(cameras, rig.up_in_world(), rig.source())
+    }
+
+    /// Does to a picture what a bad camera does: exposure, then blur, then noise.
+    pub(crate) fn spoil(&self, dice: Dice, size: Size, rgb: &mut [u8]) {
+        if self.exposure_stops != 0.0 {
+            expose(self.exposure_stops.exp2() as f32, rgb);
+        }
+        if self.blur_px > 0.0 {
+            blur(self.blur_px as f32, size, rgb);
+        }
+        if self.noise > 0.0 {
+            let mut dice = dice.fork("noise");
+            for value in rgb {
+                // The sum of four bytes, of deviation 1 and mean 0.
+                let bits = dice.bits().to_le_bytes();
+                let sum: i32 = bits[..4].iter().map(|it| i32::from(*it)).sum();
+                let throw = (f64::from(sum) - 510.0) / 147.8;
+                *value = (f64::from(*value) + self.noise * throw)
+                    .round()
+                    .clamp(0.0, 255.0) as u8;
+            }
+        }
+    }
+}
+
+fn expose(gain: f32, rgb: &mut [u8]) {
+    let curve: [u8; 256] = core::array::from_fn(|it| {
+        let light = srgb([it as u8; 3]).x * gain;
+        (255.0 * crate::colour::written(light.min(1.0)) + 0.5) as u8
+    });
+    for value in rgb {
+        *value = curve[usize::from(*value)];
+    }
+}
+
+/// A Gaussian over rows, then over columns; the border goes on.
+fn blur(deviation: f32, size: Size, rgb: &mut [u8]) {
+    let reach = (3.0 * deviation).ceil() as usize;
+    let weights: Vec<f32> = (0..=2 * reach)
+        .map(|it| (-0.5 * ((it as f32 - reach as f32) / deviation).powi(2)).exp())
+        .collect();
+    let sum: f32 = weights.iter().sum();
+    let Size { width, height } = size;
+    let mut pass = |n: usize, step: usize, start: usize| {
+        let line: Vec<f32> = (0..n).map(|it| f32::from(rgb[start + it * step])).collect();
+        for at in 0..n {
+            let value: f32 = weights
+                .iter()
+                .enumerate()
+                .map(|(tap, weight)| weight * line[(at + tap).saturating_sub(reach).min(n - 1)])
+                .sum();
+            rgb[start + at * step] = (value / sum + 0.5) as u8;
+        }
+    };
+    for row in 0..height {
+        (0..3).for_each(|it| pass(width, 3, 3 * row * width + it));
+    }
+    for column in 0..width {
+        (0..3).for_each(|it| pass(height, 3 * width, 3 * column + it));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size::new(40, 30);
+
+    fn spoiled(flaws: Flaws) -> Vec<u8> {
+        let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes())
+            .map(|it| (it / 3 % 40 * 6) as u8)
+            .collect();
+        flaws.spoil(Dice::new(1), SIZE, &mut rgb);
+        rgb
+    }
+
+    #[test]
+    fn no_flaw_changes_nothing_and_every_flaw_does_what_it_says() {
+        let plain = spoiled(Flaws::default());
+        let mean = |rgb: &[u8]| rgb.iter().map(|it| f64::from(*it)).sum::<f64>() / rgb.len() as f64;
+        let noisy = spoiled(Flaws {
+            noise: 5.0,
+            ..Flaws::default()
+        });
+        let off = plain
+            .iter()
+            .zip(&noisy)
+            .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        let deviation = (off.sum::<f64>() / plain.len() as f64).sqrt();
+        assert!((deviation - 5.0).abs() < 0.5, "{deviation}");
+        assert!((mean(&noisy) - mean(&plain)).abs() < 0.7);
+        let bright = spoiled(Flaws {
+            exposure_stops: 1.0,
+            ..Flaws::default()
+        });
+        let dark = spoiled(Flaws {
+            exposure_stops: -1.0,
+            ..Flaws::default()
+        });
+        assert!(mean(&bright) > mean(&plain) + 15.0 && mean(&dark) < mean(&plain) - 15.0);
+        let soft = spoiled(Flaws {
+            blur_px: 2.0,
+            ..Flaws::default()
+        });
+        assert!((mean(&soft) - mean(&plain)).abs() < 1.0);
+        assert_eq!(
+            soft[3 * (15 * 40 + 20)],
+            plain[3 * (15 * 40 + 20)],
+            "a ramp stays a ramp"
+        );
+        assert_ne!(soft, plain, "but not at its border");
+    }
+
+    #[test]
+    fn a_bad_calibration_is_off_by_as_much_as_asked() {
+        let rig = crate::rigs::humaneva().unwrap();
+        let flaws = Flaws {
+            calibration_degrees: 2.0,
+            calibration_mm: 30.0,
+            ..Flaws::default()
+        };
+        let written = flaws.written(&rig, Dice::new(5)).unwrap();
+        for (a, b) in rig.cameras().iter().zip(written.cameras()) {
+            let off = b.camera_from_world * a.camera_from_world.inverse();
+            assert!((off.rotation.angle().to_degrees() - 2.0).abs() < 1e-9);
+            assert!((off.translation.vector.norm() - 0.03).abs() < 1e-9);
+        }
+        assert_eq!(Flaws::default().written(&rig, Dice::new(5)).unwrap(), rig);
+    }
+
+    #[test]
+    fn as_many_frames_are_dropped_as_asked_but_never_the_first() {
+        let flaws = Flaws {
+            drop: 0.2,
+            ..Flaws::default()
+        };
+        let n = (0..2000)
+            .filter(|it| flaws.drops(Dice::new(3), 1, *it))
+            .count();
+        assert!((330..470).contains(&n), "{n}");
+        assert!(!(0..50).any(|it| flaws.drops(Dice::new(it), 1, 0)));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_name() {
+        assert_eq!(Flaws::default().check(), Ok(()));
+        for name in Flaws::NAMES {
+            for wrong in [f64::NAN, 1e9, -9.0] {
+                let mut flaws = Flaws::default();
+                *flaws.by_name_mut(name).unwrap() = wrong;
+                assert_eq!(flaws.check().unwrap_err().what, name);
+            }
+        }
+    }
+}

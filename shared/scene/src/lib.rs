@@ -1,0 +1,51 @@
+//! People who do not exist, in rooms that do not exist, as calibrated cameras see them, and where their joints are.
+//!
+//! [`Settings`] say everything: the cameras, the number of the subject, the action, the seed, how bad the
+//! cameras are. A [`Scene`] is made of them, a [`View`] of it makes the pictures of one camera and says what is
+//! true of each ([`truth`]). An [`Address`] is one camera of a scene in one line, `synth://...`, for a process that
+//! shows one camera live. The same settings give the same bits, in whatever order and wherever pictures are made.
+//!
+//! # How
+//!
+//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton; its surface is
+//! made once and follows the bones. Every corner of its small triangles is projected by the camera itself,
+//! distortion included, and a z-buffer with four samples a pixel finds what is seen. The room, cast as rays
+//! through the same camera, does not move and is made once for a camera. One lamp throws soft shadows.
+//!
+//! Renderers on crates.io were weighed and left out: those that are kept up need a GPU or a display, and those that
+//! need none (`euc`, `retrofire`) know no lens and bring more than the hundred lines of `raster`.
+#![forbid(unsafe_code)]
+
+mod colour;
+mod dice;
+
+mod body;
+mod fabric;
+mod flesh;
+mod mesh;
+mod motion;
+mod subject;
+mod wear;
+
+mod light;
+mod photo;
+mod room;
+
+mod backdrop;
+mod painter;
+mod raster;
+mod shadow;
+
+mod flaws;
+mod rigs;
+mod settings;
+
+mod scene;
+pub mod truth;
+
+pub use flaws::{FlawError, Flaws};
+pub use motion::Action;
+pub use photo::photos_in;
+pub use rigs::{RigChoice, RigChoiceError};
+pub use scene::{Scene, SceneError, View};
+pub use settings::{Address, AddressError, Settings};

@@ -1,0 +1,212 @@
+//! What a person does: from an action, a subject and a seed to a pose at any time.
+
+mod gait;
+mod keys;
+mod stance;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::body::{
+    Bones, COLLAR, FOOT, FOREARM, HAND, HEAD, N_BONES, PELVIS, Pose, SHIN, UPPER_ARM, clamped,
+};
+use crate::dice::Dice;
+use crate::room::Block;
+use crate::subject::Subject;
+use stance::Stance;
+
+/// What a person can be seen doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Action {
+    /// Around the middle of the room.
+    Walking,
+    /// The same, faster.
+    Jogging,
+    /// Guard, straight punches, hooks and uppercuts.
+    Boxing,
+    /// Waving, pointing, beckoning, arms crossed, hands on hips.
+    Gestures,
+    /// Throwing a ball and catching it.
+    ThrowCatch,
+    /// Sitting down on a chair and getting up.
+    Chair,
+    /// Picking things up and putting them on a shelf.
+    Grab,
+    /// Leaning on a table, with the hands on the knees, against a pillar.
+    Lean,
+    /// Working at a table.
+    Table,
+    /// Lying on a mat.
+    Lying,
+}
+
+impl Action {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Walking,
+        Self::Jogging,
+        Self::Boxing,
+        Self::Gestures,
+        Self::ThrowCatch,
+        Self::Chair,
+        Self::Grab,
+        Self::Lean,
+        Self::Table,
+        Self::Lying,
+    ];
+
+    /// What it is called on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Walking => "walking",
+            Self::Jogging => "jogging",
+            Self::Boxing => "boxing",
+            Self::Gestures => "gestures",
+            Self::ThrowCatch => "throw-catch",
+            Self::Chair => "chair",
+            Self::Grab => "grab",
+            Self::Lean => "lean",
+            Self::Table => "table",
+            Self::Lying => "lying",
+        }
+    }
+
+    /// The action of that name, if there is one.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.name() == name)
+    }
+}
+
+/// A person who acts.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    pub(crate) bones: Bones,
+    actor: Actor,
+    action: Action,
+}
+
+/// What every action of one performance shares.
+#[derive(Debug, Clone)]
+struct Actor {
+    subject: Subject,
+    dice: Dice,
+    /// Direction that the person faces at first, radians from x to y.
+    heading: f64,
+    /// Where the person stands, or the middle of the way, metres.
+    place: [f64; 2],
+}
+
+impl Motion {
+    /// An action. The same subject, action and seed move the same way.
+    pub(crate) fn new(subject: &Subject, action: Action, seed: u64) -> Self {
+        let dice = Dice::new(seed).fork("motion").fork(action.name());
+        let mut stage = dice.fork("stage");
+        let bones = Bones::new(&subject.proportions);
+        let place = [stage.range(-0.25, 0.25), stage.range(-0.25, 0.25)];
+        let heading = stage.range(0.0, core::f64::consts::TAU);
+        Self {
+            bones,
+            actor: Actor {
+                subject: subject.clone(),
+                dice,
+                heading,
+                place,
+            },
+            action,
+        }
+    }
+
+    /// The pose at a time, in the frame of the stage: metres, z up, the floor at 0.
+    pub(crate) fn pose(&self, seconds: f64) -> Pose {
+        let action = self.action;
+        let mut stance = match action {
+            Action::Walking => gait::walking(&self.actor, seconds),
+            Action::Jogging => gait::jogging(&self.actor, seconds),
+            _ => keys::stance(&self.actor, action, seconds),
+        };
+        stance.live(&self.actor, seconds);
+        self.grounded(&stance)
+    }
+
+    /// Standing height of the person, metres.
+    pub(crate) fn height(&self) -> f64 {
+        self.actor.subject.proportions.height
+    }
+
+    /// Chairs, tables and mats that the action needs, in the frame of the stage.
+    pub(crate) fn furniture(&self) -> Vec<Block> {
+        keys::furniture(self, self.action)
+    }
+
+    /// Puts the person's lowest point on the floor, and the feet (or the pelvis) where they belong.
+    fn grounded(&self, stance: &Stance) -> Pose {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), stance.heading)
+            * UnitQuaternion::from_euler_angles(stance.roll.to_radians(), 0.0, 0.0)
+            * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), stance.pitch.to_radians())
+            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), stance.spin.to_radians());
+        let mut pose = Pose {
+            root: Isometry3::from_parts(Translation3::identity(), turn),
+            angles: clamped(&stance.angles),
+        };
+        let frames = self.bones.frames(&pose);
+        let middle = if stance.planted {
+            let feet = FOOT.map(|it| frames[it].translation.vector);
+            (feet[0] + feet[1]) / 2.0
+        } else {
+            Vector3::zeros()
+        };
+        let [x, y] = stance.place;
+        let z = stance.lift - self.lowest(&frames);
+        pose.root.translation = Translation3::new(x - middle.x, y - middle.y, z);
+        pose
+    }
+
+    /// Height of the lowest point of the body.
+    fn lowest(&self, frames: &[Isometry3<f64>; N_BONES]) -> f64 {
+        let scale = self.actor.subject.proportions.height / 1.75;
+        let soles = FOOT.iter().flat_map(|&foot| {
+            self.bones
+                .sole
+                .map(|it| (frames[foot] * Point3::from(it)).z)
+        });
+        // Radii of the flesh around the joints, metres of a man of 1.75 m.
+        let round = [(PELVIS, 0.105), (2, 0.112), (HEAD, 0.09)].into_iter();
+        let limbs = [
+            (UPPER_ARM, 0.05),
+            (FOREARM, 0.04),
+            (HAND, 0.03),
+            (SHIN, 0.055),
+        ];
+        let limbs = limbs
+            .into_iter()
+            .flat_map(|(pair, r)| pair.map(|it| (it, r)));
+        let joints = round
+            .chain(limbs)
+            .map(|(bone, r)| frames[bone].translation.z - r * scale);
+        soles.chain(joints).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Stance {
+    /// What nobody can hold still: slow sway of every joint, collars that rise with the arms.
+    fn live(&mut self, actor: &Actor, seconds: f64) {
+        for (bone, angles) in self.angles.iter_mut().enumerate() {
+            for (axis, angle) in angles.iter_mut().enumerate() {
+                let mut dice = actor.dice.fork("sway").nth((3 * bone + axis) as u64);
+                let size = dice.range(0.6, 2.2);
+                for hertz in [0.23, 0.61] {
+                    let hertz = hertz * dice.range(0.8, 1.25);
+                    let phase = dice.range(0.0, core::f64::consts::TAU);
+                    *angle += size * (core::f64::consts::TAU * hertz * seconds + phase).sin();
+                }
+            }
+        }
+        for side in 0..2 {
+            let [flexion, abduction, _] = self.angles[UPPER_ARM[side]];
+            let raised = flexion.max(abduction) - 40.0;
+            self.angles[COLLAR[side]][1] += 0.2 * raised.max(0.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! A pose in the making: angles of joints, and how the body stands in the room.
+
+use crate::body::{
+    ABDOMEN, Angles, CHEST, FOOT, FOREARM, HAND, HEAD, N_BONES, NECK, SHIN, THIGH, UPPER_ARM,
+};
+use crate::subject::Subject;
+
+/// Angles in degrees as [`Angles`] has them, before limits and floor are thought of.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stance {
+    pub(super) angles: Angles,
+    /// Direction that the person faces, radians from x to y.
+    pub(super) heading: f64,
+    /// The pelvis nods forward, tips to the right, and turns about the person's own axis, degrees.
+    pub(super) pitch: f64,
+    pub(super) roll: f64,
+    pub(super) spin: f64,
+    /// Where the middle of the feet (or of the hips) is, metres.
+    pub(super) place: [f64; 2],
+    /// Whether `place` is that of the feet.
+    pub(super) planted: bool,
+    /// Height of the lowest point above the floor, metres.
+    pub(super) lift: f64,
+}
+
+impl Stance {
+    /// Standing, in the manner of the subject.
+    pub(super) fn standing(subject: &Subject) -> Self {
+        let manner = subject.manner;
+        let mut it = Self {
+            angles: [[0.0; 3]; N_BONES],
+            heading: 0.0,
+            pitch: 0.0,
+            roll: 0.0,
+            spin: 0.0,
+            place: [0.0; 2],
+            planted: true,
+            lift: 0.0,
+        };
+        it.angles[CHEST][0] = manner.stoop;
+        it.angles[NECK][0] = 4.0 + manner.stoop;
+        it.angles[HEAD][0] = -3.0 - manner.stoop;
+        for side in 0..2 {
+            it.angles[UPPER_ARM[side]] = [3.0, manner.arms_out, -6.0];
+            it.angles[FOREARM[side]] = [manner.elbows, 0.0, -10.0];
+            it.angles[HAND[side]] = [8.0, 0.0, 0.0];
+            it.angles[THIGH[side]] = [1.0, 3.5, manner.toes_out];
+            it.angles[SHIN[side]] = [3.0, 0.0, 0.0];
+        }
+        it
+    }
+
+    pub(super) fn arm(mut self, side: usize, shoulder: [f64; 3], elbow: f64) -> Self {
+        self.angles[UPPER_ARM[side]] = shoulder;
+        self.angles[FOREARM[side]][0] = elbow;
+        self
+    }
+
+    pub(super) fn arms(self, shoulder: [f64; 3], elbow: f64) -> Self {
+        self.arm(0, shoulder, elbow).arm(1, shoulder, elbow)
+    }
+
+    pub(super) fn leg(mut self, side: usize, hip: f64, knee: f64) -> Self {
+        self.angles[THIGH[side]][0] = hip;
+        self.angles[SHIN[side]][0] = knee;
+        self
+    }
+
+    pub(super) fn legs(self, hip: f64, knee: f64) -> Self {
+        self.leg(0, hip, knee).leg(1, hip, knee)
+    }
+
+    /// Bends the trunk forward, to the right, and turns it left.
+    pub(super) fn trunk(mut self, bend: f64, aside: f64, turn: f64) -> Self {
+        self.angles[ABDOMEN][0] += 0.6 * bend;
+        self.angles[CHEST][0] += 0.4 * bend;
+        self.angles[ABDOMEN][1] += 0.5 * aside;
+        self.angles[CHEST][1] += 0.5 * aside;
+        self.angles[ABDOMEN][2] += 0.35 * turn;
+        self.angles[CHEST][2] += 0.65 * turn;
+        self
+    }
+
+    /// Turns the face: down and left.
+    pub(super) fn look(mut self, down: f64, left: f64) -> Self {
+        self.angles[NECK][0] += 0.5 * down;
+        self.angles[HEAD][0] += 0.5 * down;
+        self.angles[NECK][2] += 0.5 * left;
+        self.angles[HEAD][2] += 0.5 * left;
+        self
+    }
+
+    pub(super) fn pitched(mut self, forward: f64) -> Self {
+        self.pitch = forward;
+        self
+    }
+
+    pub(super) fn rolled(mut self, right: f64) -> Self {
+        self.roll = right;
+        self
+    }
+
+    /// Turns the ankles so that the soles lie flat.
+    pub(super) fn flat(mut self) -> Self {
+        for side in 0..2 {
+            let knee = self.angles[SHIN[side]][0];
+            self.angles[FOOT[side]][0] = self.pitch - self.angles[THIGH[side]][0] + knee;
+        }
+        self
+    }
+
+    /// Between this stance and another; the place and the heading are this one's.
+    pub(super) fn towards(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * share;
+        let angles = core::array::from_fn(|bone| {
+            core::array::from_fn(|axis| mix(self.angles[bone][axis], other.angles[bone][axis]))
+        });
+        Self {
+            angles,
+            pitch: mix(self.pitch, other.pitch),
+            roll: mix(self.roll, other.roll),
+            spin: mix(self.spin, other.spin),
+            lift: mix(self.lift, other.lift),
+            ..self.clone()
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Cameras around a stage: those of the public data sets, rings of n, or whatever a rig file says.
+
+use std::path::PathBuf;
+
+use geometry::files::{ParseError, ReadOptions, RigFileError};
+use geometry::{Camera, Intrinsics, Lens, LensModel, Rig, RigError};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3,
+};
+
+/// Which cameras look on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RigChoice {
+    /// The three colour cameras of HumanEva-I as they stood for subject S1, 640x480.
+    HumanEva,
+    /// The four cameras of UMPM, 644x486.
+    Umpm,
+    /// `n` cameras of 640x480 evenly around the stage.
+    Ring {
+        /// How many.
+        n: usize,
+        /// Metres from the middle.
+        radius: f64,
+        /// Metres above the floor.
+        height: f64,
+    },
+    /// A rig file of any format that `geometry::files` reads.
+    File(PathBuf),
+}
+
+/// Why there is no rig.
+#[derive(Debug, thiserror::Error)]
+pub enum RigChoiceError {
+    /// Not one of the forms.
+    #[error("{text:?} is no rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file")]
+    Form {
+        /// What was said.
+        text: String,
+    },
+    /// The file of a preset.
+    #[error("a preset cannot be read")]
+    Preset(#[from] ParseError),
+    /// The rig file.
+    #[error("the rig file cannot be read")]
+    File(#[from] RigFileError),
+    /// The cameras make no rig.
+    #[error("no rig")]
+    Rig(#[from] RigError),
+    /// Where the floor is cannot be known.
+    #[error("the rig does not say which way is up")]
+    NoUp,
+}
+
+const MOST_OF_A_RING: usize = 64;
+
+impl RigChoice {
+    /// Reads what a user writes: `humaneva`, `umpm`, `ring:N[:RADIUS[:HEIGHT]]`, or the path of a file.
+    ///
+    /// # Errors
+    ///
+    /// [`RigChoiceError::Form`] for anything else that has no ending of a file.
+    pub fn parse(text: &str) -> Result<Self, RigChoiceError> {
+        let wrong = || RigChoiceError::Form {
+            text: text.to_owned(),
+        };
+        match text {
+            "humaneva" => return Ok(Self::HumanEva),
+            "umpm" => return Ok(Self::Umpm),
+            _ => {}
+        }
+        let Some(rest) = text.strip_prefix("ring:") else {
+            let is_file = text.contains(['.', '/']);
+            return if is_file {
+                Ok(Self::File(text.into()))
+            } else {
+                Err(wrong())
+            };
+        };
+        let mut fields = rest.split(':');
+        let n = fields.next().and_then(|it| it.parse().ok());
+        let n = n
+            .filter(|it| (1..=MOST_OF_A_RING).contains(it))
+            .ok_or_else(wrong)?;
+        let mut metres = |default: f64, least: f64| match fields.next() {
+            None => Ok(default),
+            Some(text) => {
+                let value: Option<f64> = text.parse().ok();
+                value
+                    .filter(|it| (least..=50.0).contains(it))
+                    .ok_or_else(wrong)
+            }
+        };
+        let ring = Self::Ring {
+            n,
+            radius: metres(4.2, 2.0)?,
+            height: metres(1.5, 0.1)?,
+        };
+        if fields.next().is_some() {
+            Err(wrong())
+        } else {
+            Ok(ring)
+        }
+    }
+
+    /// The cameras.
+    ///
+    /// # Errors
+    ///
+    /// [`RigChoiceError`] for a file that cannot be read.
+    pub fn rig(&self) -> Result<Rig, RigChoiceError> {
+        match self {
+            Self::HumanEva => humaneva(),
+            Self::Umpm => umpm(),
+            Self::Ring { n, radius, height } => Ok(ring(*n, *radius, *height)?),
+            Self::File(path) => Ok(geometry::files::read(path, &ReadOptions::default())?),
+        }
+    }
+}
+
+impl std::fmt::Display for RigChoice {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::HumanEva => out.write_str("humaneva"),
+            Self::Umpm => out.write_str("umpm"),
+            Self::Ring { n, radius, height } => write!(out, "ring:{n}:{radius}:{height}"),
+            Self::File(path) => write!(out, "{}", path.display()),
+        }
+    }
+}
+
+/// The cameras of HumanEva-I: the file says which of the lenses are published and which estimated.
+pub(crate) fn humaneva() -> Result<Rig, RigChoiceError> {
+    let text = include_str!("../../../configs/rigs/humaneva-s1.toml");
+    Ok(geometry::files::own::parse(text, &ReadOptions::default())?)
+}
+
+/// Height of what the cameras of UMPM look at above the floor, metres; an assumption.
+const UMPM_FOCUS: f64 = 0.95;
+
+/// The cameras of UMPM, turned so that z is up and the floor lies at 0.
+///
+/// Their calibration does not say which way is up: their rows are taken to be level.
+fn umpm() -> Result<Rig, RigChoiceError> {
+    let text = include_str!("../../../configs/rigs/umpm-triangle.toml");
+    let rig = geometry::files::own::parse(text, &ReadOptions::default())?;
+    let mut rows = Matrix3::zeros();
+    for camera in rig.cameras() {
+        let row = camera.camera_from_world.rotation.inverse() * Vector3::x();
+        rows += row * row.transpose();
+    }
+    let eigen = rows.symmetric_eigen();
+    let up: Vector3<f64> = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .into_owned();
+    let first = rig.cameras()[0].camera_from_world.rotation.inverse();
+    // y points down in pictures.
+    let up = if (first * Vector3::y()).dot(&up) > 0.0 {
+        -up
+    } else {
+        up
+    };
+    let up = UnitVector3::new_normalize(up);
+    let focus = rig.focus().ok_or(RigChoiceError::NoUp)?;
+    let old_from_new = Isometry3::from_parts(
+        Translation3::from(focus - up.into_inner() * UMPM_FOCUS),
+        upright(&up),
+    );
+    let cameras = rig.cameras().iter().map(|camera| Camera {
+        camera_from_world: camera.camera_from_world * old_from_new,
+        ..camera.clone()
+    });
+    Ok(Rig::new(
+        cameras.collect(),
+        Some(Vector3::z_axis()),
+        rig.source(),
+    )?)
+}
+
+/// The turn that takes z to `up`.
+fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), up).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)
+    })
+}
+
+/// Cameras `c1`, `c2`, ... evenly around the origin, looking at a point 0.9 m above the floor.
+fn ring(n: usize, radius: f64, height: f64) -> Result<Rig, RigError> {
+    let target = Point3::new(0.0, 0.0, 0.9);
+    let camera = |nth: usize| {
+        let angle = core::f64::consts::TAU * nth as f64 / n as f64;
+        let eye = Point3::new(radius * angle.cos(), radius * angle.sin(), height);
+        let forward = (target - eye).normalize_or_x();
+        let right = forward.cross(&Vector3::z()).normalize_or_x();
+        let down = forward.cross(&right);
+        let rows = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
+        Camera {
+            name: format!("c{}", nth + 1),
+            intrinsics: Intrinsics {
+                fx: 620.0,
+                fy: 620.0,
+                cx: 319.5,
+                cy: 239.5,
+                size: [640, 480],
+                lens: Lens::new(LensModel::BrownConrady {
+                    k: [-0.18, 0.06, 0.0, 0.0, 0.0, 0.0],
+                    p: [0.0005, -0.0005],
+                }),
+            },
+            camera_from_world: Isometry3::from_parts(Translation3::from(turn * -eye.coords), turn),
+        }
+    };
+    let source = format!("ring of {n}, {radius} m from the middle");
+    Rig::new(
+        (0..n).map(camera).collect(),
+        Some(Vector3::z_axis()),
+        source,
+    )
+}
+
+trait OrX {
+    fn normalize_or_x(self) -> Self;
+}
+
+impl OrX for Vector3<f64> {
+    /// Of length 1; x for a vector of no length.
+    fn normalize_or_x(self) -> Self {
+        self.try_normalize(1e-9).unwrap_or(Self::x())
+    }
+}
+
+/// Where the stage is: the frame with its origin on the floor, z up.
+///
+/// The floor lies at 0 if the world's z is up and the cameras look at something up to 2 m above that; else
+/// 0.95 m below what they look at.
+///
+/// # Errors
+///
+/// [`RigChoiceError::NoUp`].
+pub(crate) fn world_from_stage(rig: &Rig) -> Result<Isometry3<f64>, RigChoiceError> {
+    let up = rig.up_in_world().ok_or(RigChoiceError::NoUp)?;
+    let single = || {
+        let camera = rig.cameras().first()?;
+        Some(camera.centre_in_world() + camera.axis_in_world().into_inner() * 4.0)
+    };
+    let focus = rig.focus().or_else(single).ok_or(RigChoiceError::NoUp)?;
+    let on_floor = if up.z > 0.999_999 && (0.3..2.0).contains(&focus.z) {
+        Point3::new(focus.x, focus.y, 0.0)
+    } else {
+        focus - up.into_inner() * UMPM_FOCUS
+    };
+    Ok(Isometry3::from_parts(
+        Translation3::from(on_floor),
+        upright(&up),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn angle_between(rig: &Rig, a: usize, b: usize) -> f64 {
+        let axis = |it: usize| rig.cameras()[it].axis_in_world().into_inner();
+        axis(a).xy().angle(&axis(b).xy()).to_degrees()
+    }
+
+    #[test]
+    fn presets_are_what_their_names_say() {
+        let rig = RigChoice::HumanEva.rig().unwrap();
+        assert_eq!(rig.cameras().len(), 3);
+        assert!(
+            rig.cameras()
+                .iter()
+                .all(|it| it.intrinsics.size == [640, 480])
+        );
+        for (a, b) in [(0, 1), (0, 2)] {
+            assert!((angle_between(&rig, a, b) - 90.0).abs() < 25.0);
+        }
+        let rig = RigChoice::Umpm.rig().unwrap();
+        assert_eq!(rig.cameras().len(), 4);
+        for camera in rig.cameras() {
+            assert_eq!(camera.intrinsics.size, [644, 486]);
+            let row = camera.camera_from_world.rotation.inverse() * Vector3::x();
+            assert!(row.z.abs() < 0.03, "{}: rows are level", camera.name);
+            assert!(
+                (1.0..4.0).contains(&camera.centre_in_world().z),
+                "above the floor"
+            );
+        }
+        let rig = RigChoice::parse("ring:8:5:2").unwrap().rig().unwrap();
+        assert_eq!(rig.cameras().len(), 8);
+        assert!((angle_between(&rig, 0, 1) - 45.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_camera_sees_the_middle_of_the_stage() {
+        for choice in ["humaneva", "umpm", "ring:1", "ring:5:4:0.5"] {
+            let rig = RigChoice::parse(choice).unwrap().rig().unwrap();
+            let stage = world_from_stage(&rig).unwrap();
+            for camera in rig.cameras() {
+                let pixel = camera
+                    .project(&(stage * Point3::new(0.0, 0.0, 0.9)))
+                    .unwrap();
+                let [width, height] = camera.intrinsics.size.map(f64::from);
+                let share = [pixel.x / width, pixel.y / height];
+                assert!(
+                    share.iter().all(|it| (0.25..0.75).contains(it)),
+                    "{choice}: {share:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_rig_is_refused() {
+        for text in [
+            "",
+            "ring",
+            "ring:",
+            "ring:0",
+            "ring:65",
+            "ring:3:x",
+            "ring:3:nan",
+            "ring:3:4:1:2",
+            "human",
+        ] {
+            assert!(RigChoice::parse(text).is_err(), "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_rig_or_an_error(text: String) {
+            if let Ok(choice) = RigChoice::parse(&text) {
+                prop_assert_eq!(RigChoice::parse(&choice.to_string()).unwrap(), choice);
+            }
+        }
+    }
+}

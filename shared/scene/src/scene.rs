@@ -1,0 +1,361 @@
+//! A scene put together, and what each of its cameras sees of it.
+
+use std::sync::Arc;
+
+use footage::{FootageError, Size};
+use geometry::{Camera, Rig, RigError};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::backdrop::Backdrop;
+use crate::body::{Bones, CHEST, N_BONES, PELVIS};
+use crate::dice::Dice;
+use crate::light::Light;
+use crate::mesh;
+use crate::motion::Motion;
+use crate::painter::{self, Figure, Painter};
+use crate::photo::{Photo, photos_in};
+use crate::raster::{NOTHING, SUB};
+use crate::rigs::{self, RigChoiceError};
+use crate::room::Room;
+use crate::settings::Settings;
+use crate::subject::Subject;
+use crate::truth::{Header, N_JOINTS, View as SeenJoints};
+use crate::wear::Wear;
+
+/// Why there is no scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The rig.
+    #[error("the rig of the scene")]
+    Rig(#[from] RigChoiceError),
+    /// A photograph for the background.
+    #[error("a background")]
+    Backdrop(#[from] FootageError),
+    /// A calibration as wrong as was asked for is none.
+    #[error("the calibration error")]
+    Calibration(#[from] RigError),
+    /// No such camera.
+    #[error("there is no camera {name:?}, only {}", known.join(", "))]
+    NoCamera {
+        /// What was asked for.
+        name: String,
+        /// Names of the rig.
+        known: Vec<String>,
+    },
+}
+
+/// A person, a performance, a room and a rig.
+#[derive(Debug)]
+pub struct Scene {
+    settings: Settings,
+    rig: Rig,
+    world_from_stage: Isometry3<f64>,
+    motion: Motion,
+    figure: Figure,
+    room: Room,
+    dice: Dice,
+}
+
+/// How much flesh there is around a joint: what is nearer to the camera by more hides it, metres of a person
+/// of 1.75 m, in the order of `skeleton::PARSE14`.
+const FLESH: [f64; N_JOINTS] = [
+    0.07, 0.085, 0.16, 0.16, 0.085, 0.07, 0.055, 0.07, 0.10, 0.10, 0.07, 0.055, 0.10, 0.13,
+];
+
+impl Scene {
+    /// Puts a scene together: makes the surface of the person, furnishes the room.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Rig`].
+    pub fn new(settings: &Settings) -> Result<Self, SceneError> {
+        let rig = settings.rig.rig()?;
+        let world_from_stage = rigs::world_from_stage(&rig)?;
+        let subject = Subject::new(settings.subject);
+        let bones = Bones::new(&subject.proportions);
+        let (flesh, mesh) = mesh::of(&subject, &bones);
+        let wear = Wear::new(&subject, &flesh);
+        let motion = Motion::new(&subject, settings.action, settings.seed);
+        let dice = Dice::new(settings.seed)
+            .fork("scene")
+            .nth(settings.subject)
+            .fork(settings.action.name());
+        let stage_from_world = world_from_stage.inverse();
+        let eyes = rig
+            .cameras()
+            .iter()
+            .map(|it| (stage_from_world * it.centre_in_world()).cast());
+        let eyes: Vec<Point3<f32>> = eyes.collect();
+        let room = Room::new(dice, &eyes, motion.furniture());
+        Ok(Self {
+            settings: settings.clone(),
+            rig,
+            world_from_stage,
+            motion,
+            figure: Figure { mesh, wear },
+            room,
+            dice,
+        })
+    }
+
+    /// What it was made of.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The cameras that take the pictures.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The cameras as a calibration with the asked error has them.
+    ///
+    /// # Errors
+    ///
+    /// [`RigError`] if the error is so large that no rig is left.
+    pub fn written_rig(&self) -> Result<Rig, RigError> {
+        self.settings.flaws.written(&self.rig, self.dice)
+    }
+
+    /// The first line of the truth.
+    pub fn header(&self) -> Header {
+        let up = self.world_from_stage.rotation * Vector3::z();
+        Header {
+            frame_rate_hz: self.settings.rate_hz,
+            up: up.into(),
+            cameras: self
+                .rig
+                .cameras()
+                .iter()
+                .map(|it| it.name.clone())
+                .collect(),
+            ..Header::new(
+                self.settings.subject,
+                self.settings.action.name(),
+                self.settings.seed,
+            )
+        }
+    }
+
+    /// Nominal time of a frame, seconds.
+    pub fn seconds(&self, frame: u64) -> f64 {
+        frame as f64 / self.settings.rate_hz
+    }
+
+    /// The joints of `skeleton::PARSE14` at a time, metres in the world.
+    pub fn joints(&self, seconds: f64) -> [[f64; 3]; N_JOINTS] {
+        let frames = self.motion.bones.frames(&self.motion.pose(seconds));
+        let joints = self.motion.bones.joints(&frames);
+        joints.map(|it| (self.world_from_stage * it).coords.into())
+    }
+
+    /// Number of a camera by its name in the rig or its number.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::NoCamera`].
+    pub fn camera(&self, name: &str) -> Result<usize, SceneError> {
+        let cameras = self.rig.cameras();
+        let by_name = cameras.iter().position(|it| it.name == name);
+        let by_number = || name.parse().ok().filter(|it| *it < cameras.len());
+        by_name
+            .or_else(by_number)
+            .ok_or_else(|| SceneError::NoCamera {
+                name: name.to_owned(),
+                known: cameras.iter().map(|it| it.name.clone()).collect(),
+            })
+    }
+
+    /// When a camera took the picture of a frame, and whether it is that of an earlier one.
+    fn taken(&self, camera: usize, frame: u64) -> (f64, bool) {
+        let flaws = &self.settings.flaws;
+        let mut shown = frame;
+        while flaws.drops(self.dice, camera, shown) {
+            shown -= 1;
+        }
+        let late = flaws.late_s(self.dice, camera);
+        (self.seconds(shown) + late, shown != frame)
+    }
+}
+
+/// One camera of a scene: makes its pictures, in buffers of its own.
+///
+/// Cloning is cheap but for those buffers: the background is shared.
+#[derive(Debug, Clone)]
+pub struct View {
+    scene: Arc<Scene>,
+    camera: usize,
+    /// In the frame of the stage.
+    on_stage: Camera,
+    backdrop: Arc<Backdrop>,
+    painter: Painter,
+}
+
+impl View {
+    /// Looks at the room: takes as long as some pictures.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Backdrop`] if a photograph cannot be read, [`SceneError::NoCamera`].
+    pub fn new(scene: &Arc<Scene>, camera: usize) -> Result<Self, SceneError> {
+        let Some(it) = scene.rig.cameras().get(camera) else {
+            scene.camera(&camera.to_string())?;
+            return Err(SceneError::NoCamera {
+                name: camera.to_string(),
+                known: Vec::new(),
+            });
+        };
+        let on_stage = Camera {
+            camera_from_world: it.camera_from_world * scene.world_from_stage,
+            ..it.clone()
+        };
+        let photo = match &scene.settings.backdrop {
+            None => None,
+            Some(folder) => {
+                let all = photos_in(folder)?;
+                let mut dice = scene.dice.fork("backdrop").nth(camera as u64);
+                Some(Photo::read(dice.pick::<std::path::PathBuf>(&all))?)
+            }
+        };
+        let backdrop = Backdrop::new(&on_stage, &scene.room, photo.as_ref());
+        Ok(Self {
+            scene: Arc::clone(scene),
+            camera,
+            on_stage,
+            backdrop: Arc::new(backdrop),
+            painter: Painter::new(),
+        })
+    }
+
+    /// Width and height of the pictures.
+    pub fn size(&self) -> Size {
+        self.backdrop.size
+    }
+
+    /// Makes the picture of a frame, and says what is true of it.
+    ///
+    /// * `rgb`: `width * height * 3` bytes, all of them written.
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` has another length.
+    pub fn picture(&mut self, frame: u64, rgb: &mut [u8]) -> SeenJoints {
+        assert_eq!(
+            rgb.len(),
+            self.size().rgb_bytes(),
+            "a picture is {} in RGB",
+            self.size()
+        );
+        let (seconds, repeated) = self.scene.taken(self.camera, frame);
+        let frames = self.draw(seconds);
+        let light: &Light = &self.scene.room.light;
+        let subject = painter::Subject {
+            figure: &self.scene.figure,
+            frames: &frames,
+            camera: &self.on_stage,
+            backdrop: &self.backdrop,
+            light,
+        };
+        self.painter.paint(&subject, rgb);
+        let dice = self
+            .scene
+            .dice
+            .fork("spoil")
+            .nth(self.camera as u64)
+            .nth(seconds.to_bits());
+        self.scene
+            .settings
+            .flaws
+            .spoil(dice, self.backdrop.size, rgb);
+        self.seen(&frames, seconds, repeated)
+    }
+
+    /// What is true of the picture of a frame, without the picture.
+    pub fn truth(&mut self, frame: u64) -> SeenJoints {
+        let (seconds, repeated) = self.scene.taken(self.camera, frame);
+        let frames = self.draw(seconds);
+        self.seen(&frames, seconds, repeated)
+    }
+
+    /// How much of every pixel of the last picture the person covers, 0 to 255, row major.
+    pub fn mask(&self) -> Vec<u8> {
+        let size = self.size();
+        let mut mask = vec![0; size.width * size.height];
+        self.painter.mask(&mut mask);
+        mask
+    }
+
+    fn draw(&mut self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
+        let scene = &self.scene;
+        let frames = scene.motion.bones.frames(&scene.motion.pose(seconds));
+        self.painter.draw(&painter::Subject {
+            figure: &scene.figure,
+            frames: &frames,
+            camera: &self.on_stage,
+            backdrop: &self.backdrop,
+            light: &scene.room.light,
+        });
+        frames
+    }
+
+    fn seen(&self, frames: &[Isometry3<f64>; N_BONES], seconds: f64, repeated: bool) -> SeenJoints {
+        let camera = &self.scene.rig.cameras()[self.camera];
+        let joints = self.scene.motion.bones.joints(frames);
+        let in_world = joints.map(|it| self.scene.world_from_stage * it);
+        let pixels = in_world.map(|it| camera.project(&it).map(|it| it.coords.into()));
+        let eye = self.on_stage.centre_in_world();
+        let facing: f64 = [CHEST, PELVIS]
+            .iter()
+            .map(|it| {
+                let to_eye = eye - Point3::from(frames[*it].translation.vector);
+                (frames[*it].rotation * Vector3::x()).dot(&to_eye)
+            })
+            .sum();
+        SeenJoints {
+            camera: camera.name.clone(),
+            seconds,
+            repeated,
+            from_behind: facing < 0.0,
+            visible: core::array::from_fn(|it| self.is_visible(it, &joints[it], pixels[it])),
+            pixels,
+            outline: self.outline(),
+        }
+    }
+
+    /// Whether nothing stands before a joint but the flesh around it.
+    fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
+        let Some([x, y]) = pixel else { return false };
+        let samples = &self.painter.samples;
+        let index = |it: f64, n: usize| {
+            let it = ((it + 0.5) * SUB as f64).floor();
+            (it >= 0.0 && it < n as f64).then_some(it as usize)
+        };
+        let (Some(column), Some(row)) = (index(x, samples.width), index(y, samples.height)) else {
+            return false;
+        };
+        let depth = (self.on_stage.camera_from_world * at).z;
+        let before = depth - 1.0 / f64::from(samples.near[row * samples.width + column]);
+        before < FLESH[joint] * self.scene.motion.height() / 1.75
+    }
+
+    /// Around the samples that see the person, pixels.
+    fn outline(&self) -> Option<[f64; 4]> {
+        let samples = &self.painter.samples;
+        let [x1, y1, x2, y2] = samples.touched;
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for row in y1..y2 {
+            for column in x1..x2 {
+                if samples.triangle[row * samples.width + column] != NOTHING {
+                    low = [low[0].min(column), low[1].min(row)];
+                    high = [high[0].max(column), high[1].max(row)];
+                }
+            }
+        }
+        let pixel = |it: usize| (it / SUB) as f64;
+        (low[0] != usize::MAX)
+            .then(|| [pixel(low[0]), pixel(low[1]), pixel(high[0]), pixel(high[1])])
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,207 @@
+//! Pictures and what is said to be true of them agree.
+
+use std::collections::BTreeSet;
+
+use super::*;
+use crate::Action;
+use crate::rigs::RigChoice;
+
+fn scene(rig: &str, action: Action, subject: u64) -> Arc<Scene> {
+    Arc::new(
+        Scene::new(&Settings {
+            rig: RigChoice::parse(rig).unwrap(),
+            action,
+            subject,
+            ..Settings::default()
+        })
+        .unwrap(),
+    )
+}
+
+fn picture(view: &mut View, frame: u64) -> (Vec<u8>, SeenJoints) {
+    let mut rgb = vec![7; view.size().rgb_bytes()];
+    let seen = view.picture(frame, &mut rgb);
+    (rgb, seen)
+}
+
+/// Exactness: what is written of the picture is the projection of what is written of the world.
+#[test]
+fn joints_on_pictures_are_projections_of_joints_in_the_world() {
+    for rig in ["humaneva", "umpm"] {
+        let scene = scene(rig, Action::Walking, 2);
+        for (nth, camera) in scene.rig().cameras().iter().enumerate() {
+            let mut view = View::new(&scene, nth).unwrap();
+            let seen = view.truth(11);
+            assert_eq!(seen.seconds, scene.seconds(11));
+            for (pixel, joint) in seen.pixels.iter().zip(scene.joints(seen.seconds)) {
+                let projected = camera.project(&joint.into()).unwrap();
+                let [x, y] = pixel.unwrap();
+                assert!((x - projected.x).hypot(y - projected.y) < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn visible_joints_lie_on_the_mask_and_the_mask_in_its_box() {
+    for (nth, action) in Action::ALL.into_iter().enumerate() {
+        let scene = scene("ring:3:4.4:1.6", action, nth as u64);
+        let mut view = View::new(&scene, nth % 3).unwrap();
+        let (_, seen) = picture(&mut view, 40);
+        let (mask, size) = (view.mask(), view.size());
+        let [x1, y1, x2, y2] = seen.outline.unwrap();
+        let mut inside = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+        for (index, _) in mask.iter().enumerate().filter(|it| *it.1 > 0) {
+            let [x, y] = [(index % size.width) as f64, (index / size.width) as f64];
+            inside = [
+                inside[0].min(x),
+                inside[1].min(y),
+                inside[2].max(x),
+                inside[3].max(y),
+            ];
+        }
+        assert_eq!(inside, [x1, y1, x2, y2]);
+        let visible = seen.pixels.iter().zip(seen.visible).filter(|it| it.1);
+        let mut n_visible = 0;
+        for (pixel, _) in visible {
+            let [x, y] = pixel.unwrap();
+            n_visible += 1;
+            assert!(
+                (x1 - 3.0..=x2 + 3.0).contains(&x) && (y1 - 3.0..=y2 + 3.0).contains(&y),
+                "{action:?}"
+            );
+            // Within 3 pixels of what is the person.
+            let near =
+                (-3..=3).flat_map(|dy| (-3..=3).map(move |dx| (x as i64 + dx, y as i64 + dy)));
+            let on = near.filter(|(x, y)| {
+                *x >= 0 && *y >= 0 && *x < size.width as i64 && *y < size.height as i64
+            });
+            let on = on
+                .map(|(x, y)| mask[y as usize * size.width + x as usize])
+                .max();
+            assert!(
+                on > Some(0),
+                "{action:?}: a visible joint beside the person"
+            );
+        }
+        assert!(n_visible >= 4, "{action:?}: {n_visible} joints visible");
+    }
+}
+
+#[test]
+fn what_lies_behind_the_body_is_not_visible() {
+    // Round the ring, every joint of the limbs is hidden from some side and seen from another.
+    let scene = scene("ring:8", Action::Walking, 1);
+    let views = (0..8).map(|it| View::new(&scene, it).unwrap().truth(3).visible);
+    let views: Vec<_> = views.collect();
+    for joint in [1, 4, 6, 7, 10, 11] {
+        let seen: BTreeSet<bool> = views.iter().map(|it| it[joint]).collect();
+        assert_eq!(seen.len(), 2, "joint {joint} is the same from everywhere");
+    }
+}
+
+#[test]
+fn from_the_front_the_left_is_on_the_right_of_the_picture() {
+    let scene = scene("ring:8", Action::Walking, 1);
+    let (mut n_front, mut n_behind) = (0, 0);
+    for camera in 0..8 {
+        let seen = View::new(&scene, camera).unwrap().truth(0);
+        let x = |joint: usize| seen.pixels[joint].unwrap()[0];
+        let width = (x(9) - x(8)) + (x(3) - x(2));
+        if width.abs() > 20.0 {
+            assert_eq!(width < 0.0, seen.from_behind, "camera {camera}");
+            n_front += usize::from(!seen.from_behind);
+            n_behind += usize::from(seen.from_behind);
+        }
+    }
+    assert!(n_front >= 2 && n_behind >= 2);
+}
+
+#[test]
+fn the_same_settings_give_the_same_bits_in_any_order() {
+    let first = scene("ring:2", Action::Boxing, 4);
+    let again = scene("ring:2", Action::Boxing, 4);
+    let mut a = View::new(&first, 1).unwrap();
+    let mut b = View::new(&again, 1).unwrap();
+    let forward: Vec<_> = (0..3).map(|it| picture(&mut a, it)).collect();
+    let mut copy = b.clone();
+    drop(picture(&mut copy, 9));
+    for frame in [2, 0, 1] {
+        assert_eq!(picture(&mut b, frame), forward[frame as usize]);
+        assert_eq!(picture(&mut copy, frame), forward[frame as usize]);
+    }
+    let other = scene("ring:2", Action::Boxing, 5);
+    assert_ne!(picture(&mut View::new(&other, 1).unwrap(), 0), forward[0]);
+}
+
+#[test]
+fn a_person_stands_out_and_throws_a_shadow() {
+    let scene = scene("ring:2", Action::Gestures, 3);
+    let mut view = View::new(&scene, 0).unwrap();
+    let (rgb, _) = picture(&mut view, 5);
+    let mask = view.mask();
+    let (mut covered, mut darker) = (0, 0);
+    for (index, share) in mask.iter().enumerate() {
+        let grey = |it: &[u8]| {
+            it[3 * index..][..3]
+                .iter()
+                .map(|it| i32::from(*it))
+                .sum::<i32>()
+        };
+        let difference = grey(&rgb) - grey(&view.backdrop.bytes);
+        match share {
+            0 => darker += i32::from(difference < -20),
+            _ => covered += 1,
+        }
+        assert!(
+            *share > 0 || difference <= 6,
+            "nothing beside the person gets lighter"
+        );
+    }
+    assert!(covered > 3000, "{covered} pixels of the person");
+    assert!(darker > 300, "{darker} pixels of shadow");
+}
+
+#[test]
+fn late_clocks_and_lost_frames_are_told() {
+    let mut settings = Settings {
+        rig: RigChoice::parse("ring:2").unwrap(),
+        ..Settings::default()
+    };
+    settings.flaws.desync_s = 0.2;
+    settings.flaws.drop = 0.5;
+    let scene = Arc::new(Scene::new(&settings).unwrap());
+    let mut views = [0, 1].map(|it| View::new(&scene, it).unwrap());
+    assert_eq!(
+        views[0].truth(0).seconds,
+        0.0,
+        "the first camera's clock is right"
+    );
+    assert!(views[1].truth(0).seconds != 0.0);
+    let mut before = None;
+    let mut n_repeated = 0;
+    for frame in 0..12 {
+        let (rgb, seen) = picture(&mut views[0], frame);
+        if seen.repeated {
+            n_repeated += 1;
+            assert_eq!(
+                before.as_ref(),
+                Some(&(rgb.clone(), seen.seconds)),
+                "the picture before, again"
+            );
+        } else {
+            assert_eq!(seen.seconds, scene.seconds(frame));
+        }
+        before = Some((rgb, seen.seconds));
+    }
+    assert!(n_repeated > 1);
+}
+
+#[test]
+fn a_camera_is_known_by_name_and_by_number() {
+    let scene = scene("humaneva", Action::Walking, 1);
+    assert_eq!(scene.camera("C2").unwrap(), 1);
+    assert_eq!(scene.camera("2").unwrap(), 2);
+    let said = scene.camera("3").unwrap_err().to_string();
+    assert!(said.contains("C1, C2, C3"), "{said}");
+}

@@ -1,0 +1,293 @@
+//! What a scene is: the settings, and the address that says all of them in one line.
+
+use std::path::PathBuf;
+
+use crate::flaws::{FlawError, Flaws};
+use crate::motion::Action;
+use crate::rigs::{RigChoice, RigChoiceError};
+
+/// Everything that decides what the cameras see. The same settings give the same pictures, bit for bit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The cameras.
+    pub rig: RigChoice,
+    /// Number of the subject: shape, clothes, manners.
+    pub subject: u64,
+    /// What the subject does.
+    pub action: Action,
+    /// What chance begins with: the performance, the room, the lamps.
+    pub seed: u64,
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// Folder of photographs to stand in the place of the room, one for every camera by chance.
+    pub backdrop: Option<PathBuf>,
+    /// How bad the cameras are.
+    pub flaws: Flaws,
+}
+
+impl Default for Settings {
+    /// Subject 1 walks before the cameras of HumanEva, 30 frames a second, no flaws.
+    fn default() -> Self {
+        Self {
+            rig: RigChoice::HumanEva,
+            subject: 1,
+            action: Action::Walking,
+            seed: 1,
+            rate_hz: 30.0,
+            backdrop: None,
+            flaws: Flaws::default(),
+        }
+    }
+}
+
+/// Why an address is none.
+#[derive(Debug, thiserror::Error)]
+pub enum AddressError {
+    /// It does not begin with `synth://`.
+    #[error("an address of a scene begins with synth://")]
+    Scheme,
+    /// The rig.
+    #[error("the rig of the address")]
+    Rig(#[from] RigChoiceError),
+    /// A key that there is not.
+    #[error("unknown key {key:?}, expected one of {}", Address::KEYS.join(", "))]
+    Key {
+        /// What was said.
+        key: String,
+    },
+    /// A key without `=`, or twice.
+    #[error("{text:?} is not one key=value, each key once")]
+    Pair {
+        /// What was said.
+        text: String,
+    },
+    /// A value that cannot be.
+    #[error("{key}={value}: expected {expected}")]
+    Value {
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+        /// What it should be.
+        expected: String,
+    },
+    /// A flaw that cannot be.
+    #[error("a flaw of the address")]
+    Flaw(#[from] FlawError),
+    /// No camera is named.
+    #[error("the address names no camera: camera=NAME or camera=0, 1, ...")]
+    NoCamera,
+}
+
+/// One camera of a scene in one line: `synth://RIG?key=value&key=value`.
+///
+/// ```
+/// let it = scene::Address::parse("synth://humaneva?action=walking&subject=3&seed=1&camera=C1")?;
+/// assert_eq!(it.settings.subject, 3);
+/// assert_eq!(scene::Address::parse(&it.to_string())?, it);
+/// # Ok::<(), scene::AddressError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Address {
+    /// The scene.
+    pub settings: Settings,
+    /// Name of the camera in the rig, or its number there, from 0.
+    pub camera: String,
+    /// Frames that there are.
+    pub n_frames: u64,
+}
+
+const SCHEME: &str = "synth://";
+
+impl Address {
+    /// Keys of an address, before those of the flaws; `camera` must be said.
+    pub const KEYS: [&'static str; 14] = [
+        "camera",
+        "action",
+        "subject",
+        "seed",
+        "rate",
+        "frames",
+        "backdrop",
+        "noise",
+        "blur",
+        "exposure",
+        "desync",
+        "drop",
+        "calibration-degrees",
+        "calibration-mm",
+    ];
+
+    /// Whether a text wants to be an address.
+    pub fn is_one(text: &str) -> bool {
+        text.starts_with(SCHEME)
+    }
+
+    /// Reads an address. What is not said is as in [`Settings::default`]; 300 frames.
+    ///
+    /// # Errors
+    ///
+    /// [`AddressError`], the first from the left.
+    pub fn parse(text: &str) -> Result<Self, AddressError> {
+        let rest = text.strip_prefix(SCHEME).ok_or(AddressError::Scheme)?;
+        let (rig, query) = rest.split_once('?').unwrap_or((rest, ""));
+        let mut it = Self {
+            settings: Settings {
+                rig: RigChoice::parse(rig)?,
+                ..Settings::default()
+            },
+            camera: String::new(),
+            n_frames: 300,
+        };
+        let mut seen: Vec<&str> = Vec::new();
+        for pair in query.split('&').filter(|it| !it.is_empty()) {
+            let wrong = || AddressError::Pair {
+                text: pair.to_owned(),
+            };
+            let (key, value) = pair.split_once('=').ok_or_else(wrong)?;
+            if seen.contains(&key) {
+                return Err(wrong());
+            }
+            seen.push(key);
+            it.set(key, value)?;
+        }
+        it.settings.flaws.check()?;
+        if it.camera.is_empty() {
+            return Err(AddressError::NoCamera);
+        }
+        Ok(it)
+    }
+
+    fn set(&mut self, key: &str, value: &str) -> Result<(), AddressError> {
+        let wrong = |expected: &str| AddressError::Value {
+            key: key.to_owned(),
+            value: value.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let count = || {
+            value
+                .parse::<u64>()
+                .map_err(|_not| wrong("a whole number, 0 or more"))
+        };
+        let settings = &mut self.settings;
+        match key {
+            "camera" => value.clone_into(&mut self.camera),
+            "action" => {
+                let names = Action::ALL.map(Action::name).join(", ");
+                settings.action = Action::by_name(value).ok_or_else(|| wrong(&names))?;
+            }
+            "subject" => settings.subject = count()?,
+            "seed" => settings.seed = count()?,
+            "frames" => self.n_frames = count()?.max(1),
+            "backdrop" => settings.backdrop = Some(value.into()),
+            "rate" => {
+                let rate: Option<f64> = value.parse().ok();
+                let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
+                settings.rate_hz = rate.ok_or_else(|| wrong("0.1 to 1000 frames a second"))?;
+            }
+            _ => {
+                let flaw = settings.flaws.by_name_mut(key);
+                let flaw = flaw.ok_or_else(|| AddressError::Key {
+                    key: key.to_owned(),
+                })?;
+                *flaw = value.parse().map_err(|_not| wrong("a number"))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::fmt::Display for Address {
+    /// The address, with all that is not as in the default.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Settings {
+            rig,
+            subject,
+            action,
+            seed,
+            rate_hz,
+            backdrop,
+            mut flaws,
+        } = self.settings.clone();
+        let (camera, action, n_frames) = (&self.camera, action.name(), self.n_frames);
+        write!(
+            out,
+            "{SCHEME}{rig}?camera={camera}&action={action}&subject={subject}&seed={seed}"
+        )?;
+        write!(out, "&rate={rate_hz}&frames={n_frames}")?;
+        if let Some(folder) = backdrop {
+            write!(out, "&backdrop={}", folder.display())?;
+        }
+        for name in Flaws::NAMES {
+            if let Some(value) = flaws.by_name_mut(name).filter(|it| **it != 0.0) {
+                write!(out, "&{name}={value}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn wrong_addresses_say_what_is_wrong() {
+        let cases = [
+            ("http://x", "begins with synth://"),
+            ("synth://nowhere?camera=0", "rig of the address"),
+            ("synth://umpm", "names no camera"),
+            ("synth://umpm?camera=l&camera=r", "each key once"),
+            ("synth://umpm?camera=l&colour", "key=value"),
+            ("synth://umpm?camera=l&actoin=walking", "unknown key"),
+            ("synth://umpm?camera=l&action=flying", "walking, jogging"),
+            ("synth://umpm?camera=l&seed=-1", "whole number"),
+            ("synth://umpm?camera=l&rate=0", "frames a second"),
+            ("synth://umpm?camera=l&noise=many", "a number"),
+            ("synth://umpm?camera=l&drop=2", "flaw"),
+        ];
+        for (text, expected) in cases {
+            let said = Address::parse(text).unwrap_err().to_string();
+            assert!(said.contains(expected), "{text}: {said}");
+        }
+    }
+
+    #[test]
+    fn the_keys_of_all_flaws_are_told() {
+        for name in Flaws::NAMES {
+            assert!(Address::KEYS.contains(&name));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_an_address_or_an_error(text in "(synth://)?[a-z:/0-9.]{0,12}[?]?[a-z=&0-9.-]{0,40}") {
+            if let Ok(it) = Address::parse(&text) {
+                prop_assert_eq!(Address::parse(&it.to_string()).unwrap(), it);
+            }
+        }
+
+        #[test]
+        fn what_is_written_is_read(
+            subject: u64, seed: u64, action in 0..10_usize, n_frames in 1..u64::MAX,
+            noise in 0.0..50.0, desync in 0.0..1.0, n in 1_usize..60, radius in 2.0..50.0,
+        ) {
+            let it = Address {
+                settings: Settings {
+                    rig: RigChoice::Ring { n, radius, height: 1.5 },
+                    subject,
+                    action: Action::ALL[action],
+                    seed,
+                    rate_hz: 29.97,
+                    backdrop: Some("a folder/of it".into()),
+                    flaws: Flaws { noise, desync_s: desync, ..Flaws::default() },
+                },
+                camera: "c1".to_owned(),
+                n_frames,
+            };
+            prop_assert_eq!(Address::parse(&it.to_string()).unwrap(), it);
+        }
+    }
+}

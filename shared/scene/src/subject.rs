@@ -1,0 +1,220 @@
+//! Who is seen: the sizes, the skin, the hair, the clothes and the manners of a person by number.
+
+use crate::body::Proportions;
+use crate::colour::{Linear, srgb};
+use crate::dice::Dice;
+use crate::fabric::{Fabric, Pattern};
+
+/// A person who does not exist. The same number is the same person, always.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Subject {
+    pub(crate) proportions: Proportions,
+    /// Thickness of trunk and limbs, 1 for the mean.
+    pub(crate) girth: f32,
+    /// Depth of the belly beyond that.
+    pub(crate) belly: f32,
+    /// 0 for the shape of a man, 1 for that of a woman.
+    pub(crate) curves: f32,
+    pub(crate) skin: Linear,
+    pub(crate) hair: Hair,
+    pub(crate) top: Top,
+    pub(crate) bottom: Bottom,
+    pub(crate) shoes: Linear,
+    pub(crate) manner: Manner,
+}
+
+/// Hair of the head and the face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hair {
+    pub(crate) colour: Linear,
+    /// Thickness over the skull, metres; 0 is bald.
+    pub(crate) thickness: f32,
+    /// How far it hangs below the ears, metres.
+    pub(crate) length: f32,
+    pub(crate) beard: bool,
+}
+
+/// What covers the trunk.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Top {
+    pub(crate) fabric: Fabric,
+    /// Share of the arm that is covered, from the shoulder.
+    pub(crate) sleeve: f32,
+    /// How far it hangs below the hip joints (negative: above), metres.
+    pub(crate) hem: f32,
+    /// Between skin and cloth, metres.
+    pub(crate) slack: f32,
+}
+
+/// What covers the legs.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Bottom {
+    pub(crate) fabric: Fabric,
+    /// Share of the leg that is covered, from the hip.
+    pub(crate) leg: f32,
+    pub(crate) slack: f32,
+    pub(crate) is_skirt: bool,
+}
+
+/// How somebody moves: factors and angles that add to every action.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Manner {
+    pub(crate) tempo: f64,
+    pub(crate) energy: f64,
+    pub(crate) arm_swing: f64,
+    /// Degrees that the elbows, the trunk and the shoulders are bent all the time.
+    pub(crate) elbows: f64,
+    pub(crate) stoop: f64,
+    pub(crate) arms_out: f64,
+    pub(crate) toes_out: f64,
+}
+
+const SKINS: &[[u8; 3]] = &[
+    [236, 200, 178],
+    [224, 180, 152],
+    [208, 160, 128],
+    [186, 136, 104],
+    [150, 104, 78],
+    [112, 76, 56],
+    [84, 56, 44],
+];
+const HAIRS: &[[u8; 3]] = &[
+    [24, 20, 18],
+    [48, 32, 24],
+    [84, 56, 36],
+    [130, 92, 54],
+    [176, 140, 88],
+    [150, 146, 140],
+    [96, 40, 22],
+];
+const SHOES: &[[u8; 3]] = &[
+    [28, 26, 26],
+    [74, 50, 36],
+    [226, 224, 218],
+    [110, 112, 118],
+    [150, 34, 34],
+    [40, 54, 96],
+];
+
+impl Subject {
+    pub(crate) fn new(number: u64) -> Self {
+        let dice = Dice::new(number).fork("subject");
+        let mut shape = dice.fork("shape");
+        let woman = shape.chance(0.45);
+        let sign = if woman { 1.0 } else { 0.0 };
+        let proportions = Proportions {
+            height: 1.765 - 0.125 * sign + 0.06 * shape.normal().clamp(-2.2, 2.2),
+            legs: 1.0 + 0.015 * shape.normal(),
+            arms: 1.0 + 0.02 * shape.normal(),
+            shoulders: 1.0 - 0.09 * sign + 0.03 * shape.normal(),
+            hips: 1.0 + 0.06 * sign + 0.03 * shape.normal(),
+        };
+        let girth = (1.0 - 0.06 * sign + 0.07 * shape.normal()).clamp(0.82, 1.2);
+        let mut looks = dice.fork("looks");
+        let skin = srgb(*looks.pick(SKINS)) * looks.range(0.9, 1.08) as f32;
+        Self {
+            proportions,
+            girth: girth as f32,
+            belly: (girth * shape.range(0.94, 1.14)) as f32,
+            curves: sign as f32,
+            skin,
+            hair: hair(&mut looks, woman),
+            top: top(&mut dice.fork("top")),
+            bottom: bottom(&mut dice.fork("bottom"), woman),
+            shoes: srgb(*looks.pick(SHOES)),
+            manner: manner(&mut dice.fork("manner")),
+        }
+    }
+}
+
+fn hair(dice: &mut Dice, woman: bool) -> Hair {
+    let bald = !woman && dice.chance(0.1);
+    let long = dice.chance(if woman { 0.7 } else { 0.08 });
+    Hair {
+        colour: srgb(*dice.pick(HAIRS)),
+        thickness: if bald {
+            0.0
+        } else {
+            dice.range(0.006, 0.02) as f32
+        },
+        length: if long && !bald {
+            dice.range(0.04, 0.16) as f32
+        } else {
+            0.0
+        },
+        beard: !woman && dice.chance(0.25),
+    }
+}
+
+fn top(dice: &mut Dice) -> Top {
+    let sleeve = match dice.unit() {
+        it if it < 0.5 => dice.range(0.22, 0.4),
+        it if it < 0.58 => 0.02,
+        _ => dice.range(0.92, 0.98),
+    };
+    Top {
+        fabric: Fabric::any(dice, Fabric::TOPS, Pattern::ON_TOPS),
+        sleeve: sleeve as f32,
+        hem: dice.range(-0.06, 0.10) as f32,
+        slack: dice.range(0.008, 0.02) as f32,
+    }
+}
+
+fn bottom(dice: &mut Dice, woman: bool) -> Bottom {
+    let is_skirt = woman && dice.chance(0.25);
+    let is_short = dice.chance(0.3);
+    let leg = match (is_skirt, is_short) {
+        (true, _) => dice.range(0.4, 0.62),
+        (_, true) => dice.range(0.32, 0.5),
+        _ => dice.range(0.93, 0.99),
+    };
+    Bottom {
+        fabric: Fabric::any(dice, Fabric::BOTTOMS, Pattern::ON_BOTTOMS),
+        leg: leg as f32,
+        slack: dice.range(0.006, 0.02) as f32,
+        is_skirt,
+    }
+}
+
+fn manner(dice: &mut Dice) -> Manner {
+    Manner {
+        tempo: dice.range(0.88, 1.12),
+        energy: dice.range(0.85, 1.15),
+        arm_swing: dice.range(0.6, 1.3),
+        elbows: dice.range(4.0, 22.0),
+        stoop: dice.range(-2.0, 7.0),
+        arms_out: dice.range(7.0, 14.0),
+        toes_out: dice.range(2.0, 12.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_one_person_and_another_is_another() {
+        assert_eq!(Subject::new(3), Subject::new(3));
+        for number in 0..50 {
+            assert_ne!(Subject::new(number), Subject::new(number + 1));
+        }
+    }
+
+    #[test]
+    fn people_are_of_all_sorts() {
+        let people: Vec<Subject> = (0..200).map(Subject::new).collect();
+        let has = |what: &dyn Fn(&Subject) -> bool| {
+            let n = people.iter().filter(|it| what(it)).count();
+            (4..196).contains(&n)
+        };
+        assert!(has(&|it| it.curves > 0.5));
+        assert!(has(&|it| it.bottom.is_skirt));
+        assert!(has(&|it| it.top.sleeve > 0.5));
+        assert!(has(&|it| it.bottom.leg > 0.7));
+        assert!(has(&|it| it.hair.length > 0.0));
+        assert!(has(&|it| it.hair.beard));
+        for it in &people {
+            assert!((1.4..2.1).contains(&it.proportions.height));
+        }
+    }
+}

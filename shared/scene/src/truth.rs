@@ -1,0 +1,311 @@
+//! What is true of a sequence, as lines of JSON: where the joints are, and what every camera sees of them.
+//!
+//! The format is documented in `TRUTH.md` beside this crate.
+
+use serde::{Deserialize, Serialize};
+use skeleton::JointSet;
+
+/// What the first line of a file says.
+const FORMAT: &str = "parallax-truth";
+const VERSION: u32 = 1;
+
+/// Number of joints, those of `skeleton::PARSE14`.
+pub const N_JOINTS: usize = 14;
+
+/// The first line: what the sequence is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// `"parallax-truth"`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// Number of the subject.
+    pub subject: u64,
+    /// Name of the action.
+    pub action: String,
+    /// What chance was begun with.
+    pub seed: u64,
+    /// Frames a second.
+    pub frame_rate_hz: f64,
+    /// Against gravity, in the world, of length 1.
+    pub up: [f64; 3],
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Names of the cameras.
+    pub cameras: Vec<String>,
+}
+
+/// One frame of all cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frame {
+    /// From 0.
+    pub frame: u64,
+    /// Nominal time, `frame / frame_rate_hz`.
+    pub seconds: f64,
+    /// The joints of `skeleton::PARSE14` at that time, metres in the world.
+    pub joints: [[f64; 3]; N_JOINTS],
+    /// One for every camera of the header.
+    pub views: Vec<View>,
+}
+
+/// One picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct View {
+    /// Name of the camera.
+    pub camera: String,
+    /// When the picture was taken.
+    pub seconds: f64,
+    /// The camera dropped this frame: an earlier picture stands in its place.
+    pub repeated: bool,
+    /// The person's back is turned to the camera.
+    pub from_behind: bool,
+    /// The joints on the picture, pixels, as they were when it was taken; `None` behind the camera.
+    pub pixels: [Option<[f64; 2]>; N_JOINTS],
+    /// Whether the joint can be seen.
+    pub visible: [bool; N_JOINTS],
+    /// Around what is seen of the person, `[x1, y1, x2, y2]` pixels.
+    #[serde(rename = "box")]
+    pub outline: Option<[f64; 4]>,
+}
+
+/// Why a line is not what it should be.
+#[derive(Debug, thiserror::Error)]
+pub enum TruthError {
+    /// Not JSON, or not of these keys.
+    #[error("not a line of a truth file")]
+    Syntax(#[from] serde_json::Error),
+    /// Another format or version.
+    #[error("{format:?} version {version}, expected {FORMAT:?} version {VERSION}")]
+    Version {
+        /// What the line says.
+        format: String,
+        /// What the line says.
+        version: u32,
+    },
+    /// Other joints than ours.
+    #[error("joint {nth} is {got:?}, expected {expected:?}")]
+    Joint {
+        /// From 1.
+        nth: usize,
+        /// What the line says; nothing if there are too few.
+        got: String,
+        /// Its name in `skeleton::PARSE14`; nothing if there are too many.
+        expected: String,
+    },
+    /// More or fewer views than cameras, or of other names.
+    #[error("the views of frame {frame} are not the cameras of the header")]
+    Views {
+        /// Which frame.
+        frame: u64,
+    },
+}
+
+impl Header {
+    /// A header of the joints that we write.
+    pub fn new(subject: u64, action: &str, seed: u64) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            subject,
+            action: action.to_owned(),
+            seed,
+            frame_rate_hz: 0.0,
+            up: [0.0, 0.0, 1.0],
+            joints: names().map(str::to_owned).collect(),
+            cameras: Vec::new(),
+        }
+    }
+
+    /// Reads the first line of a file.
+    ///
+    /// # Errors
+    ///
+    /// [`TruthError`], all but `Views`.
+    pub fn parse(line: &str) -> Result<Self, TruthError> {
+        let header: Self = serde_json::from_str(line)?;
+        if (header.format.as_str(), header.version) != (FORMAT, VERSION) {
+            return Err(TruthError::Version {
+                format: header.format,
+                version: header.version,
+            });
+        }
+        let n = header.joints.len().max(N_JOINTS);
+        for nth in 0..n {
+            let got = header.joints.get(nth).cloned().unwrap_or_default();
+            let expected = names().nth(nth).unwrap_or_default().to_owned();
+            if got != expected {
+                return Err(TruthError::Joint {
+                    nth: nth + 1,
+                    got,
+                    expected,
+                });
+            }
+        }
+        Ok(header)
+    }
+
+    /// Writes it, without the end of the line.
+    ///
+    /// # Errors
+    ///
+    /// None that a header of finite numbers can have.
+    pub fn to_line(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+}
+
+impl Frame {
+    /// Reads a line.
+    ///
+    /// # Errors
+    ///
+    /// [`TruthError::Syntax`], and [`TruthError::Views`] if there is not one view for every camera.
+    pub fn parse(line: &str, header: &Header) -> Result<Self, TruthError> {
+        let frame: Self = serde_json::from_str(line)?;
+        let cameras = frame.views.iter().map(|it| &it.camera);
+        if !cameras.eq(&header.cameras) {
+            return Err(TruthError::Views { frame: frame.frame });
+        }
+        Ok(frame)
+    }
+
+    /// Writes it, without the end of the line.
+    ///
+    /// # Errors
+    ///
+    /// None that a frame of finite numbers can have.
+    pub fn to_line(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+
+    /// The joints of another set, metres in the world.
+    pub fn in_set(&self, set: &JointSet) -> Vec<[f64; 3]> {
+        in_set(&self.joints, set)
+    }
+}
+
+impl View {
+    /// The joints of another set on the picture; `None` if one that they are made of is behind the camera.
+    pub fn in_set(&self, set: &JointSet) -> Option<Vec<[f64; 2]>> {
+        let mut joints = [[0.0; 2]; N_JOINTS];
+        for (joint, pixel) in joints.iter_mut().zip(self.pixels) {
+            *joint = pixel?;
+        }
+        Some(in_set(&joints, set))
+    }
+}
+
+fn names() -> impl Iterator<Item = &'static str> {
+    skeleton::PARSE14.joints.iter().map(|it| it.name)
+}
+
+/// Every set is made of the same parts: goes over those.
+fn in_set<const D: usize>(joints: &[[f64; D]; N_JOINTS], set: &JointSet) -> Vec<[f64; D]> {
+    let mut parts = [[0.0; D]; skeleton::N_PARTS];
+    for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {
+        for part in joint.parts {
+            parts[*part] = *at;
+        }
+    }
+    set.from_parts(&parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use skeleton::{HUMANEVA20, PARSE14, UMPM15};
+
+    use super::*;
+
+    fn header() -> Header {
+        Header {
+            cameras: vec!["a".to_owned()],
+            frame_rate_hz: 30.0,
+            ..Header::new(3, "walking", 7)
+        }
+    }
+
+    fn frame() -> Frame {
+        Frame {
+            frame: 2,
+            seconds: 0.1,
+            joints: core::array::from_fn(|it| [it as f64, 0.5, -1.0]),
+            views: vec![View {
+                camera: "a".to_owned(),
+                seconds: 0.1,
+                repeated: false,
+                from_behind: true,
+                pixels: core::array::from_fn(|it| (it != 3).then_some([it as f64, 2.5])),
+                visible: core::array::from_fn(|it| it % 2 == 0),
+                outline: None,
+            }],
+        }
+    }
+
+    #[test]
+    fn every_joint_of_every_set_is_made_of_the_fourteen() {
+        let known: Vec<usize> = PARSE14
+            .joints
+            .iter()
+            .flat_map(|it| it.parts)
+            .copied()
+            .collect();
+        for set in JointSet::ALL {
+            for joint in set.joints {
+                assert!(
+                    joint.parts.iter().all(|it| known.contains(it)),
+                    "{}",
+                    joint.name
+                );
+            }
+        }
+        let frame = frame();
+        assert_eq!(frame.in_set(&PARSE14), frame.joints);
+        assert_eq!(
+            frame.in_set(&UMPM15)[0],
+            [2.5, 0.5, -1.0],
+            "the middle of the hips"
+        );
+        assert_eq!(frame.in_set(&HUMANEVA20)[19], frame.joints[13], "head");
+        assert_eq!(
+            frame.views[0].in_set(&UMPM15),
+            None,
+            "a joint is behind the camera"
+        );
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_all_else_refused() {
+        let line = header().to_line().unwrap();
+        assert_eq!(Header::parse(&line).unwrap(), header());
+        assert!(Header::parse(&line.replace("parallax-truth", "other")).is_err());
+        assert!(Header::parse(&line.replace("\"version\":1", "\"version\":2")).is_err());
+        assert!(Header::parse(&line.replace("right knee", "right hip")).is_err());
+        assert!(Header::parse(&line.replace("\"seed\"", "\"sede\"")).is_err());
+        let line = frame().to_line().unwrap();
+        assert_eq!(Frame::parse(&line, &header()).unwrap(), frame());
+        assert!(Frame::parse(&line.replace("\"a\"", "\"b\""), &header()).is_err());
+        assert!(Frame::parse(&line.replace("\"box\"", "\"bax\""), &header()).is_err());
+        assert!(Frame::parse(&line.replace("[0.0,0.5,-1.0],", ""), &header()).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_panics(line: String) {
+            drop(Header::parse(&line));
+            drop(Frame::parse(&line, &header()));
+        }
+
+        #[test]
+        fn a_changed_line_is_read_or_refused(at in 0_usize..900, to in "[a-z0-9\\[\\]{},:.\"-]{0,4}") {
+            let mut line = frame().to_line().unwrap();
+            if at < line.len() {
+                line.replace_range(at..(at + 2).min(line.len()), &to);
+            }
+            drop(Frame::parse(&line, &header()));
+        }
+    }
+}
