@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Camera {
     /// The camera of the rig, by its name there.
     pub name: String,
-    /// A video, an image, a folder of images, or a glob such as `frames/*.png`.
+    /// A video, an image, a folder of images, a glob such as `frames/*.png`, or a scene that is made while it
+    /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`.
     pub source: String,
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.

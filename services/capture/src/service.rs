@@ -2,11 +2,12 @@
 
 use core::time::Duration;
 
-use footage::{Fill, FrameView, Pacer, Size, Source, SourceSpec, Warp};
+use footage::{Fill, FrameView, Pacer, Size, SourceSpec, Warp};
 use geometry::Framing;
 use messages::{FrameHeader, Stamp, Status, Timing, topic};
 use runtime::{ExitKind, Failure, OrFail as _, Service, SlicePublisher, Waiter, Woken, now_nanos};
 
+use crate::feed::Feed;
 use crate::place::Place;
 use crate::{Mode, Pace};
 
@@ -40,7 +41,7 @@ const LEAD_NANOS: u64 = 2_000_000_000;
 ///
 /// [`ExitKind::Input`] if the footage cannot be opened, and what the transport says.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
-    let mut source = Source::open(&job.source).or_fail(ExitKind::Input)?;
+    let mut source = Feed::open(&job.source).or_fail(ExitKind::Input)?;
     let n_frames = source.info().n_frames;
     service.health().set_total(n_frames);
     let mut camera = Camera::open(service, job, &source)?;
@@ -81,7 +82,7 @@ struct Camera<'a> {
 }
 
 impl<'a> Camera<'a> {
-    fn open(service: &'a Service, job: &'a Job, source: &Source) -> Result<Self, Failure> {
+    fn open(service: &'a Service, job: &'a Job, source: &Feed) -> Result<Self, Failure> {
         let publisher = service.bus().slice_publisher(&topic::frame(job.view))?;
         let [width, height] = job.framing.out_size().map(|it| it as usize);
         // What lies beside a picture that was turned is nothing; beside one that was not, its border
@@ -113,7 +114,7 @@ impl<'a> Camera<'a> {
     }
 
     /// Waits for the consumers, then passes over what an earlier life of this process has sent.
-    fn go_on(&mut self, source: &mut Source) -> Result<u64, Failure> {
+    fn go_on(&mut self, source: &mut Feed) -> Result<u64, Failure> {
         let patience = self.service.patience_at_start(self.job.patience);
         let n = self
             .publisher
@@ -135,7 +136,7 @@ impl<'a> Camera<'a> {
     /// Waits until frame `at` is due; with a clock that drops frames, passes over those that are past.
     ///
     /// Returns how many were passed over.
-    fn wait_until_due(&mut self, source: &mut Source, at: u64) -> Result<u64, Failure> {
+    fn wait_until_due(&mut self, source: &mut Feed, at: u64) -> Result<u64, Failure> {
         while self.pacer.wait_nanos(at, now_nanos()) > 0 {
             let nanos = self.pacer.wait_nanos(at, now_nanos());
             if self.waiter.wait(Duration::from_nanos(nanos))? == Woken::Stop {

@@ -4,7 +4,7 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
 use crate::commands::{
-    calib, config, deployments, detect, eval, fuse_frame, model, run, service, train,
+    calib, config, deployments, detect, eval, fuse_frame, model, run, service, synth, train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -27,6 +27,7 @@ Examples:
     parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
     parallax model judge person.fmp PARSE --only 101-200    how good it is
     parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
+    parallax synth out/walk --actions walking           pictures of people who do not exist, with the truth
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -98,6 +99,8 @@ pub(crate) enum Command {
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),
+    /// Make sequences of people who do not exist, with the truth.
+    Synth(Box<synth::Arguments>),
     /// Show which deployments run, and what dead ones have left in shared memory.
     Status(deployments::StatusArguments),
     /// Remove what dead deployments have left in shared memory.

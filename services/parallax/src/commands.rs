@@ -10,6 +10,7 @@ pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod service;
+pub(crate) mod synth;
 pub(crate) mod train;
 
 use std::process::ExitCode;
@@ -34,6 +35,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Config(it) => config::run(&it),
         Command::Status(it) => deployments::status(&it),
         Command::Clean(it) => deployments::clean(&it),
+        Command::Synth(it) => synth::run(&it, cli.globals),
         Command::Service(it) => service::run(&it),
     }
 }

@@ -7,6 +7,7 @@ mod rules;
 
 use std::path::{Path, PathBuf};
 
+use scene::Address;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use error::ConfigError;
@@ -104,7 +105,10 @@ impl Deployment {
             *path = base.join(&path);
         }
         for camera in &mut self.cameras {
-            camera.source = base.join(&camera.source).to_string_lossy().into_owned();
+            camera.source = match Address::is_one(&camera.source) {
+                true => Address::relative_to(&camera.source, base),
+                false => base.join(&camera.source).to_string_lossy().into_owned(),
+            };
         }
         if let Some(table) = &mut self.quality.table {
             *table = base.join(&table);

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use capture::Feed;
 use fmp::Model;
-use footage::{Source, SourceSpec};
+use footage::SourceSpec;
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
@@ -65,15 +66,14 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
         .cameras
         .iter()
         .map(|camera| {
-            let opened = Source::open(&source(camera, &deployment.capture));
-            let opened = opened.or_fail(ExitKind::Input).map_err(|failure| {
+            let seen = Feed::look(&source(camera, &deployment.capture));
+            let info = seen.or_fail(ExitKind::Input).map_err(|failure| {
                 failure.with_hint(format!(
-                    "the `source` of camera {:?} is a video, an image, a folder of images or a glob; \
+                    "the `source` of camera {:?} is a video, an image, a folder of images, a glob or a scene (synth://...); \
                      relative paths are relative to the deployment file",
                     camera.name
                 ))
             })?;
-            let info = opened.info();
             Ok(Footage {
                 size: [info.size.width as u32, info.size.height as u32],
                 n_frames: info.n_frames,

@@ -62,7 +62,12 @@ impl SourceSpec {
     }
 
     /// How many of `n_frames` are handed out.
-    pub(crate) fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError`] of numbers that no footage can satisfy, or this one cannot.
+    pub fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
+        self.check()?;
         if self.start >= n_frames {
             return Err(FootageError::StartBeyondEnd {
                 path: self.path.clone(),

@@ -47,5 +47,5 @@ pub use flaws::{FlawError, Flaws};
 pub use motion::Action;
 pub use photo::photos_in;
 pub use rigs::{RigChoice, RigChoiceError};
-pub use scene::{Scene, SceneError, View};
+pub use scene::{Scene, SceneError, View, camera_of};
 pub use settings::{Address, AddressError, Settings};

@@ -155,15 +155,7 @@ impl Scene {
     ///
     /// [`SceneError::NoCamera`].
     pub fn camera(&self, name: &str) -> Result<usize, SceneError> {
-        let cameras = self.rig.cameras();
-        let by_name = cameras.iter().position(|it| it.name == name);
-        let by_number = || name.parse().ok().filter(|it| *it < cameras.len());
-        by_name
-            .or_else(by_number)
-            .ok_or_else(|| SceneError::NoCamera {
-                name: name.to_owned(),
-                known: cameras.iter().map(|it| it.name.clone()).collect(),
-            })
+        camera_of(&self.rig, name)
     }
 
     /// When a camera took the picture of a frame, and whether it is that of an earlier one.
@@ -176,6 +168,23 @@ impl Scene {
         let late = flaws.late_s(self.dice, camera);
         (self.seconds(shown) + late, shown != frame)
     }
+}
+
+/// Number of a camera of a rig by its name or its number, from 0.
+///
+/// # Errors
+///
+/// [`SceneError::NoCamera`].
+pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
+    let cameras = rig.cameras();
+    let by_name = cameras.iter().position(|it| it.name == name);
+    let by_number = || name.parse().ok().filter(|it| *it < cameras.len());
+    by_name
+        .or_else(by_number)
+        .ok_or_else(|| SceneError::NoCamera {
+            name: name.to_owned(),
+            known: cameras.iter().map(|it| it.name.clone()).collect(),
+        })
 }
 
 /// One camera of a scene: makes its pictures, in buffers of its own.
@@ -198,13 +207,8 @@ impl View {
     ///
     /// [`SceneError::Backdrop`] if a photograph cannot be read, [`SceneError::NoCamera`].
     pub fn new(scene: &Arc<Scene>, camera: usize) -> Result<Self, SceneError> {
-        let Some(it) = scene.rig.cameras().get(camera) else {
-            scene.camera(&camera.to_string())?;
-            return Err(SceneError::NoCamera {
-                name: camera.to_string(),
-                known: Vec::new(),
-            });
-        };
+        let camera = camera_of(&scene.rig, &camera.to_string())?;
+        let it = &scene.rig.cameras()[camera];
         let on_stage = Camera {
             camera_from_world: it.camera_from_world * scene.world_from_stage,
             ..it.clone()

@@ -1,6 +1,6 @@
 //! What a scene is: the settings, and the address that says all of them in one line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::flaws::{FlawError, Flaws};
 use crate::motion::Action;
@@ -156,6 +156,21 @@ impl Address {
             return Err(AddressError::NoCamera);
         }
         Ok(it)
+    }
+
+    /// The address with relative paths taken as relative to `base`; what is no address stays as it is.
+    #[must_use]
+    pub fn relative_to(text: &str, base: &Path) -> String {
+        let Ok(mut it) = Self::parse(text) else {
+            return text.to_owned();
+        };
+        if let RigChoice::File(path) = &mut it.settings.rig {
+            *path = base.join(&path);
+        }
+        if let Some(folder) = &mut it.settings.backdrop {
+            *folder = base.join(&folder);
+        }
+        it.to_string()
     }
 
     fn set(&mut self, key: &str, value: &str) -> Result<(), AddressError> {

@@ -51,7 +51,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("output", "folder for the results"),
     (
         "camera",
-        "name in the rig, source (video, image, folder, glob), source_offset_px of a cropped source",
+        "name in the rig, source (video, image, folder, glob, synth://...), source_offset_px of a cropped source",
     ),
     (
         "capture.mode",

@@ -32,9 +32,8 @@ proptest! {
         let pose = motion.pose(seconds);
         let frames = motion.bones.frames(&pose);
         for bone in 0..N_BONES {
-            for axis in 0..3 {
-                let [low, high] = LIMITS[bone][axis];
-                prop_assert!((low..=high).contains(&pose.angles[bone][axis]));
+            for ([low, high], angle) in LIMITS[bone].iter().zip(pose.angles[bone]) {
+                prop_assert!((*low..=*high).contains(&angle));
             }
             if let Some(parent) = PARENT[bone] {
                 let length = (frames[bone].translation.vector - frames[parent].translation.vector).norm();

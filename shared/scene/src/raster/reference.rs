@@ -67,7 +67,7 @@ mod tests {
         };
         let corners: Vec<Corner> = points.iter().map(corner).collect();
         let mut samples = Samples::default();
-        samples.begin(128, 96, &[0.0; 128 * 96]);
+        samples.begin(128, 96, &vec![0.0; 128 * 96]);
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             samples.draw(index as u32, triangle.map(|it| &corners[it as usize]));
         }

@@ -1,0 +1,271 @@
+//! Where pictures come from: footage, or a scene that is made while it runs.
+
+use std::sync::Arc;
+
+use footage::{FootageError, FrameView, Size, Source, SourceSpec};
+use scene::{Address, AddressError, Scene, SceneError, View};
+
+/// Why there are no pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum FeedError {
+    /// The footage, or which of its frames.
+    #[error(transparent)]
+    Footage(#[from] FootageError),
+    /// The address of a scene.
+    #[error("{address}")]
+    Address {
+        /// As the user wrote it.
+        address: String,
+        /// What is wrong with it.
+        source: AddressError,
+    },
+    /// The scene of an address.
+    #[error("{address}")]
+    Scene {
+        /// As the user wrote it.
+        address: String,
+        /// What is wrong with it.
+        source: SceneError,
+    },
+}
+
+/// What is known of a camera's pictures before the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeedInfo {
+    /// Size of every picture.
+    pub size: Size,
+    /// Frames that will be handed out.
+    pub n_frames: u64,
+    /// Frames handed out per second of the scene, where it is known.
+    pub frame_rate_hz: Option<f64>,
+}
+
+/// The pictures of a camera, in order: footage, or `synth://` (see [`Address`]).
+#[derive(Debug)]
+pub enum Feed {
+    /// Files.
+    Footage(Source),
+    /// A scene.
+    Scene(Box<Stage>),
+}
+
+/// A camera of a scene.
+#[derive(Debug)]
+pub struct Stage {
+    info: FeedInfo,
+    view: View,
+    rate_hz: f64,
+    /// Index of the next frame, and frames left.
+    index: u64,
+    step: u64,
+    n_left: u64,
+    rgb: Vec<u8>,
+}
+
+impl Feed {
+    /// What is known of a camera's pictures; a scene is not made for it.
+    ///
+    /// # Errors
+    ///
+    /// [`FeedError`].
+    pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
+        if !Address::is_one(&spec.path) {
+            return Ok(Self::Footage(Source::open(spec)?).info());
+        }
+        let address = address(spec)?;
+        let in_scene = |source: SceneError| failed(spec, source);
+        let rig = address
+            .settings
+            .rig
+            .rig()
+            .map_err(|it| in_scene(it.into()))?;
+        let camera = scene::camera_of(&rig, &address.camera).map_err(in_scene)?;
+        let [width, height] = rig.cameras()[camera].intrinsics.size.map(|it| it as usize);
+        info(spec, &address, Size::new(width, height))
+    }
+
+    /// Opens the pictures. A scene is put together here, which takes about a second.
+    ///
+    /// # Errors
+    ///
+    /// [`FeedError`].
+    pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
+        if !Address::is_one(&spec.path) {
+            return Ok(Self::Footage(Source::open(spec)?));
+        }
+        let address = address(spec)?;
+        let in_scene = |source: SceneError| failed(spec, source);
+        let scene = Arc::new(Scene::new(&address.settings).map_err(in_scene)?);
+        let camera = scene.camera(&address.camera).map_err(in_scene)?;
+        let view = View::new(&scene, camera).map_err(in_scene)?;
+        let info = info(spec, &address, view.size())?;
+        Ok(Self::Scene(Box::new(Stage {
+            info,
+            rgb: vec![0; view.size().rgb_bytes()],
+            view,
+            rate_hz: address.settings.rate_hz,
+            index: spec.start,
+            step: spec.step,
+            n_left: info.n_frames,
+        })))
+    }
+
+    /// What is known of the pictures.
+    pub fn info(&self) -> FeedInfo {
+        match self {
+            Self::Footage(source) => FeedInfo {
+                size: source.info().size,
+                n_frames: source.info().n_frames,
+                frame_rate_hz: source.info().frame_rate_hz,
+            },
+            Self::Scene(stage) => stage.info,
+        }
+    }
+
+    /// The next frame, in a buffer of the feed's own; `None` at the end, and ever after.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError`]; a scene has none.
+    pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
+        match self {
+            Self::Footage(source) => source.next_frame(),
+            Self::Scene(stage) => Ok(stage.next_frame()),
+        }
+    }
+
+    /// Passes over the next `n` frames, and returns how many there were.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError`]; a scene has none.
+    pub fn skip(&mut self, n: u64) -> Result<u64, FootageError> {
+        match self {
+            Self::Footage(source) => source.skip(n),
+            Self::Scene(stage) => {
+                let n = n.min(stage.n_left);
+                stage.pass(n);
+                Ok(n)
+            }
+        }
+    }
+}
+
+impl Stage {
+    fn pass(&mut self, n: u64) {
+        self.n_left -= n;
+        self.index = self.index.saturating_add(n.saturating_mul(self.step));
+    }
+
+    fn next_frame(&mut self) -> Option<FrameView<'_>> {
+        if self.n_left == 0 {
+            return None;
+        }
+        let index = self.index;
+        let seen = self.view.picture(index, &mut self.rgb);
+        tracing::trace!(
+            index,
+            seconds = seen.seconds,
+            repeated = seen.repeated,
+            "made a picture"
+        );
+        self.pass(1);
+        Some(FrameView {
+            index,
+            time_s: Some(index as f64 / self.rate_hz),
+            rgb: &self.rgb,
+        })
+    }
+}
+
+fn address(spec: &SourceSpec) -> Result<Address, FeedError> {
+    Address::parse(&spec.path).map_err(|source| FeedError::Address {
+        address: spec.path.clone(),
+        source,
+    })
+}
+
+fn failed(spec: &SourceSpec, source: SceneError) -> FeedError {
+    FeedError::Scene {
+        address: spec.path.clone(),
+        source,
+    }
+}
+
+fn info(spec: &SourceSpec, address: &Address, size: Size) -> Result<FeedInfo, FeedError> {
+    let n_frames = spec.n_delivered(address.n_frames)?;
+    Ok(FeedInfo {
+        size,
+        n_frames,
+        frame_rate_hz: Some(address.settings.rate_hz / spec.step as f64),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PATH: &str = "synth://ring:2?camera=1&rate=20&frames=10";
+
+    fn frames(spec: &SourceSpec, skip: u64) -> Vec<(u64, Vec<u8>)> {
+        let mut feed = Feed::open(spec).unwrap();
+        assert_eq!(feed.info(), Feed::look(spec).unwrap());
+        assert_eq!(feed.skip(skip).unwrap(), skip.min(feed.info().n_frames));
+        let mut all = Vec::new();
+        while let Some(frame) = feed.next_frame().unwrap() {
+            assert_eq!(frame.time_s, Some(frame.index as f64 / 20.0));
+            all.push((frame.index, frame.rgb.to_vec()));
+        }
+        assert_eq!(feed.next_frame().unwrap(), None);
+        assert_eq!(feed.skip(3).unwrap(), 0);
+        all
+    }
+
+    #[test]
+    fn a_scene_hands_out_frames_as_footage_does() {
+        let whole = frames(&SourceSpec::new(PATH), 0);
+        assert_eq!(whole.len(), 10);
+        let part = SourceSpec {
+            start: 1,
+            step: 3,
+            count: Some(9),
+            ..SourceSpec::new(PATH)
+        };
+        let info = Feed::look(&part).unwrap();
+        assert_eq!((info.n_frames, info.frame_rate_hz), (3, Some(20.0 / 3.0)));
+        assert_eq!(info.size, Size::new(640, 480));
+        let picked: Vec<_> = [1, 4, 7].map(|it| whole[it].clone()).into();
+        assert_eq!(frames(&part, 0), picked);
+        assert_eq!(frames(&part, 2), picked[2..]);
+        assert_eq!(frames(&part, 9), []);
+    }
+
+    #[test]
+    fn what_cannot_be_opened_says_why() {
+        let refused = |spec: &SourceSpec| {
+            let error: &dyn std::error::Error = &Feed::look(spec).unwrap_err();
+            let causes = core::iter::successors(Some(error), |it| it.source());
+            causes
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(": ")
+        };
+        let path = |path: &str| SourceSpec::new(path);
+        assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
+        assert!(refused(&path("synth://ring:2")).contains("names no camera"));
+        assert!(refused(&path("synth://nobody.toml?camera=0")).contains("rig"));
+        assert!(refused(&path("nothing/here.mp4")).contains("no such footage"));
+        let beyond = SourceSpec {
+            start: 10,
+            ..path(PATH)
+        };
+        assert!(refused(&beyond).contains("lies beyond"));
+        assert!(
+            refused(&SourceSpec {
+                step: 0,
+                ..path(PATH)
+            })
+            .contains("step")
+        );
+    }
+}

@@ -1,0 +1,293 @@
+//! `parallax synth`: sequences of people who do not exist, with the truth.
+
+mod chosen;
+mod files;
+mod sequence;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use scene::{Action, Flaws, RigChoice, Settings};
+use serde_json::{Value, json};
+
+use crate::cli::Globals;
+use crate::{inputs, output};
+use chosen::{actions, rig, subjects};
+use sequence::{People, Sequence};
+
+const HELP: &str = "\
+A folder OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), \
+rig.toml, the pictures (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and on every \
+picture, what is visible, when it was taken) and people.jsonl (the same as annotated people, for `train fmp` and \
+`model judge`; people-as-seen.jsonl with left and right as published models call them). The format is in \
+shared/scene/TRUTH.md. Several subjects or actions make a folder each, OUT/s1-walking, and people.jsonl of all.
+
+The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: \
+shape, clothes, manners. The seed chooses the performance, the room and the lamps.
+
+RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]] (metres; 4.2 and 1.5 if not \
+given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
+
+With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
+from which each capture process makes its own pictures while it runs, and the truth is that of the same pictures.
+
+With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
+\"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.
+
+Exit codes: 0 done; 2 the command line is wrong, or OUT is not empty; 4 a rig file, a backdrop or the output folder; \
+5 the rig does not say which way is up; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax synth out/walk --model person.mat && parallax run out/walk/deployment.toml
+    parallax synth out/set --subjects 1-20 --actions all --rate 2 --frames 10 --rig ring:4:6.5 --format jpg
+    parallax model judge person.mat out/set/people-as-seen.jsonl
+    parallax synth out/bad --noise 8 --blur 1 --desync 0.04 --drop 0.05 --calibration-degrees 1
+    parallax synth out/live --live --frames 900 --rig umpm --actions gestures --model person.mat";
+
+/// How pictures are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Lossless.
+    Png,
+    /// Smaller, and as most cameras would have it (quality 95).
+    Jpg,
+}
+
+/// Who does what before which cameras.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Folder to write; absent or empty.
+    out: PathBuf,
+    /// The cameras: humaneva, umpm, ring:N[:RADIUS[:HEIGHT]], or a rig file.
+    #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
+    rig: RigChoice,
+    /// Numbers of the subjects: 3, or 1-20,25.
+    #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
+    subjects: Subjects,
+    /// What they do: names with commas, or all.
+    #[arg(long, value_name = "LIST", default_value = "walking", value_parser = actions)]
+    actions: Actions,
+    /// Seed of the performance, the room and the lamps.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Frames of every camera.
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    frames: u64,
+    /// Frames a second; few make pictures that differ.
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = chosen::rate)]
+    rate: f64,
+    /// How pictures are stored.
+    #[arg(long, value_enum, default_value_t = Format::Png)]
+    format: Format,
+    /// Write no masks.
+    #[arg(long)]
+    no_masks: bool,
+    /// Put a photograph of this folder behind the person, in the place of a room.
+    #[arg(long, value_name = "DIR")]
+    backdrop: Option<PathBuf>,
+    /// The model that the deployment names.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Write no pictures: cameras of the deployment make them while it runs.
+    #[arg(long)]
+    live: bool,
+    /// What is wrong with the cameras.
+    #[command(flatten)]
+    flaws: FlawArguments,
+    /// Threads; one a core if not given. The files do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print a summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+type Subjects = Vec<u64>;
+type Actions = Vec<Action>;
+
+/// What is wrong with the cameras; nothing if not given.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Flaws of the cameras")]
+struct FlawArguments {
+    /// Deviation of the noise, grey levels.
+    #[arg(long, value_name = "LEVELS", default_value_t = 0.0)]
+    noise: f64,
+    /// Deviation of the blur, pixels.
+    #[arg(long, value_name = "PX", default_value_t = 0.0)]
+    blur: f64,
+    /// Doublings of the light, negative for darker.
+    #[arg(
+        long,
+        value_name = "STOPS",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    exposure: f64,
+    /// Clocks of all cameras but the first are off by at most this, seconds.
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    desync: f64,
+    /// Share of frames that a camera drops; the picture before stands in their place.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    drop: f64,
+    /// rig.toml has every camera turned by this, degrees; the truth is exact.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
+    calibration_degrees: f64,
+    /// rig.toml has every camera moved by this, millimetres; the truth is exact.
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
+    calibration_mm: f64,
+}
+
+impl FlawArguments {
+    fn flaws(self) -> Result<Flaws, Failure> {
+        let flaws = Flaws {
+            noise: self.noise,
+            blur_px: self.blur,
+            exposure_stops: self.exposure,
+            desync_s: self.desync,
+            drop: self.drop,
+            calibration_degrees: self.calibration_degrees,
+            calibration_mm: self.calibration_mm,
+        };
+        flaws.check().or_fail(ExitKind::Usage)?;
+        Ok(flaws)
+    }
+}
+
+/// Writes all sequences.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let flaws = arguments.flaws.flaws()?;
+    begin(&arguments.out)?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let threads = arguments.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|it| format!("synth-{it}"))
+        .build()
+        .or_fail(ExitKind::Run)?;
+    let bar = bar(arguments, globals)?;
+    let begin = Instant::now();
+    let is_one = arguments.subjects.len() * arguments.actions.len() == 1;
+    let mut all = People::default();
+    let mut sequences = Vec::new();
+    for &subject in &arguments.subjects {
+        for &action in &arguments.actions {
+            let name = format!("s{subject}-{}", action.name());
+            let folder = if is_one {
+                arguments.out.clone()
+            } else {
+                arguments.out.join(&name)
+            };
+            let settings = Settings {
+                rig: absolute(&arguments.rig),
+                subject,
+                action,
+                seed: arguments.seed,
+                rate_hz: arguments.rate,
+                backdrop: arguments.backdrop.as_deref().map(absolute_path),
+                flaws,
+            };
+            let sequence = Sequence::new(arguments, settings, &folder, &name)?;
+            let people = pool.install(|| sequence.write(&stop, &bar))?;
+            sequences.push(report(&sequence, &people));
+            people.write(&folder)?;
+            all.append(&name, people);
+        }
+    }
+    bar.finish_and_clear();
+    if !is_one {
+        all.write(&arguments.out)?;
+    }
+    tell(arguments, globals, sequences, begin.elapsed().as_secs_f64())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the folder; refuses one in which something lies.
+fn begin(out: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(out).map_err(|error| inputs::in_file(out, &error))?;
+    let mut inside = std::fs::read_dir(out).map_err(|error| inputs::in_file(out, &error))?;
+    if inside.next().is_some() {
+        let message = format!("{} is not empty", out.display());
+        return Err(
+            Failure::new(ExitKind::Usage, message).with_hint("name a folder that is not there yet")
+        );
+    }
+    Ok(())
+}
+
+/// A rig that is found from any working folder.
+fn absolute(rig: &RigChoice) -> RigChoice {
+    match rig {
+        RigChoice::File(path) => RigChoice::File(absolute_path(path)),
+        other => other.clone(),
+    }
+}
+
+fn absolute_path(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+fn bar(arguments: &Arguments, globals: Globals) -> Result<ProgressBar, Failure> {
+    let rig = arguments.rig.rig().map_err(chosen::no_rig)?;
+    let n = arguments.subjects.len() * arguments.actions.len() * rig.cameras().len();
+    let bar = if globals.quiet || !output::is_lively() {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(n as u64 * arguments.frames)
+    };
+    let style = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(style) {
+        bar.set_style(style);
+    }
+    Ok(bar)
+}
+
+fn report(sequence: &Sequence<'_>, people: &People) -> Value {
+    json!({
+        "folder": sequence.folder(),
+        "subject": sequence.settings().subject,
+        "action": sequence.settings().action.name(),
+        "seed": sequence.settings().seed,
+        "pictures": sequence.n_pictures(),
+        "people": people.len(),
+    })
+}
+
+fn tell(
+    arguments: &Arguments,
+    globals: Globals,
+    sequences: Vec<Value>,
+    seconds: f64,
+) -> Result<(), Failure> {
+    let pictures = sequences.iter().filter_map(|it| it["pictures"].as_u64());
+    let pictures: u64 = pictures.sum();
+    let rate = pictures as f64 / seconds.max(1e-9);
+    if arguments.json {
+        return output::json(&json!({
+            "schema_version": 1,
+            "sequences": sequences,
+            "seconds": seconds,
+            "pictures_per_second": rate,
+        }));
+    }
+    if !globals.quiet {
+        let (n, out) = (sequences.len(), arguments.out.display());
+        let what = if arguments.live {
+            "frames of cameras"
+        } else {
+            "pictures"
+        };
+        output::message(format_args!(
+            "{out}: {n} sequences, {pictures} {what} in {seconds:.1} s ({rate:.1} a second)"
+        ));
+    }
+    Ok(())
+}
+
+/// The same scene on every thread.
+type Shared = Arc<scene::Scene>;

@@ -1,0 +1,232 @@
+//! One sequence: its pictures made on all threads, its truth, its deployment.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use datasets::Person;
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use scene::truth::{Frame, View as Seen};
+use scene::{Scene, SceneError, Settings, View};
+
+use super::{Arguments, Shared, files};
+use crate::inputs;
+
+/// Frames that one thread makes one after the other, of one camera.
+const CHUNK: u64 = 8;
+
+/// A sequence to be written.
+#[derive(Debug)]
+pub(super) struct Sequence<'a> {
+    arguments: &'a Arguments,
+    scene: Shared,
+    folder: PathBuf,
+    name: String,
+}
+
+impl<'a> Sequence<'a> {
+    /// Puts the scene together and makes the folders.
+    pub(super) fn new(
+        arguments: &'a Arguments,
+        settings: Settings,
+        folder: &Path,
+        name: &str,
+    ) -> Result<Self, Failure> {
+        let scene = Arc::new(Scene::new(&settings).map_err(failed)?);
+        let it = Self {
+            arguments,
+            scene,
+            folder: folder.to_owned(),
+            name: name.to_owned(),
+        };
+        let mut folders = vec![folder.to_owned()];
+        for camera in it.scene.rig().cameras() {
+            if !arguments.live {
+                folders.push(folder.join("cameras").join(&camera.name));
+                if !arguments.no_masks {
+                    folders.push(folder.join("masks").join(&camera.name));
+                }
+            }
+        }
+        for folder in folders {
+            std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        }
+        Ok(it)
+    }
+
+    pub(super) fn settings(&self) -> &Settings {
+        self.scene.settings()
+    }
+
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn n_cameras(&self) -> usize {
+        self.scene.rig().cameras().len()
+    }
+
+    pub(super) fn n_pictures(&self) -> u64 {
+        self.arguments.frames * self.n_cameras() as u64
+    }
+
+    /// Writes everything but the annotated people, which are handed back.
+    pub(super) fn write(&self, stop: &Stop, bar: &ProgressBar) -> Result<People, Failure> {
+        bar.set_message(self.name.clone());
+        let views: Result<Vec<View>, SceneError> = (0..self.n_cameras())
+            .into_par_iter()
+            .map(|it| View::new(&self.scene, it))
+            .collect();
+        let views = views.map_err(failed)?;
+        let n_chunks = self.arguments.frames.div_ceil(CHUNK);
+        let tasks: Vec<(usize, u64)> = (0..n_chunks)
+            .flat_map(|chunk| (0..views.len()).map(move |camera| (camera, chunk)))
+            .collect();
+        let seen: Result<Vec<Vec<Seen>>, Failure> = tasks
+            .par_iter()
+            .map(|&(camera, chunk)| {
+                let mut view = views[camera].clone();
+                let last = (CHUNK * (chunk + 1)).min(self.arguments.frames);
+                (CHUNK * chunk..last)
+                    .map(|frame| {
+                        if stop.is_requested() {
+                            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
+                        }
+                        let seen = self.picture(&mut view, frame)?;
+                        bar.inc(1);
+                        Ok(seen)
+                    })
+                    .collect()
+            })
+            .collect();
+        let frames = self.frames(&seen?, views.len());
+        files::truth(
+            &self.folder.join("truth.jsonl"),
+            &self.scene.header(),
+            &frames,
+        )?;
+        files::rigs(&self.folder, &self.scene)?;
+        files::deployment(&self.folder, &self.name, self.arguments, &self.scene)?;
+        Ok(self.people(&frames))
+    }
+
+    /// Makes and writes one picture.
+    fn picture(&self, view: &mut View, frame: u64) -> Result<Seen, Failure> {
+        if self.arguments.live {
+            return Ok(view.truth(frame));
+        }
+        let size = view.size();
+        let mut rgb = vec![0; size.rgb_bytes()];
+        let seen = view.picture(frame, &mut rgb);
+        let name = format!("{frame:06}");
+        let folder = self.folder.join("cameras").join(&seen.camera);
+        files::picture(&folder, &name, self.arguments.format, size, &rgb)?;
+        if !self.arguments.no_masks {
+            let folder = self.folder.join("masks").join(&seen.camera);
+            files::mask(&folder.join(format!("{name}.png")), size, &view.mask())?;
+        }
+        Ok(seen)
+    }
+
+    /// From chunks of one camera to frames of all.
+    fn frames(&self, seen: &[Vec<Seen>], n_cameras: usize) -> Vec<Frame> {
+        let frame = |frame: u64| {
+            let (chunk, within) = ((frame / CHUNK) as usize, (frame % CHUNK) as usize);
+            let of_camera = |camera: usize| seen[chunk * n_cameras + camera][within].clone();
+            let seconds = self.scene.seconds(frame);
+            Frame {
+                frame,
+                seconds,
+                joints: self.scene.joints(seconds),
+                views: (0..n_cameras).map(of_camera).collect(),
+            }
+        };
+        (0..self.arguments.frames).map(frame).collect()
+    }
+
+    /// Everybody who is in a picture; a picture that repeats the one before is no other.
+    fn people(&self, frames: &[Frame]) -> People {
+        let mut people = People::default();
+        if self.arguments.live {
+            return people;
+        }
+        for frame in frames {
+            for seen in frame
+                .views
+                .iter()
+                .filter(|it| !it.repeated && it.outline.is_some())
+            {
+                let file = files::name(&format!("{:06}", frame.frame), self.arguments.format);
+                let image = Path::new("cameras").join(&seen.camera).join(file);
+                let unknown = [f64::NAN; 2];
+                let person = Person {
+                    image,
+                    row: String::new(),
+                    joints: seen.pixels.iter().map(|it| it.unwrap_or(unknown)).collect(),
+                    visible: seen.visible.to_vec(),
+                };
+                let name = format!("{}-{}-{:06}", self.name, seen.camera, frame.frame);
+                people.0.push((person, name, seen.from_behind));
+            }
+        }
+        people
+    }
+}
+
+/// Annotated people: the person, the name, and whether they are seen from behind.
+#[derive(Debug, Default)]
+pub(super) struct People(Vec<(Person, String, bool)>);
+
+/// The joint on the other side, in the order of `skeleton::PARSE14`.
+const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
+
+impl People {
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Adds those of a sequence in a folder of that name.
+    pub(super) fn append(&mut self, folder: &str, others: Self) {
+        self.0
+            .extend(others.0.into_iter().map(|(mut person, name, behind)| {
+                person.image = Path::new(folder).join(&person.image);
+                (person, name, behind)
+            }));
+    }
+
+    /// Writes both files of annotations; none if there is nobody.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), Failure> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        let (mut anatomical, mut as_seen) = (String::new(), String::new());
+        for (person, name, behind) in &self.0 {
+            let line = datasets::to_line(person, Some(name)).or_fail(ExitKind::Run)?;
+            anatomical += &(line.clone() + "\n");
+            let line = if *behind {
+                let mirrored = Person {
+                    joints: MIRROR.map(|it| person.joints[it]).to_vec(),
+                    visible: MIRROR.map(|it| person.visible[it]).to_vec(),
+                    ..person.clone()
+                };
+                datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?
+            } else {
+                line
+            };
+            as_seen += &(line + "\n");
+        }
+        files::text(&folder.join("people.jsonl"), &anatomical)?;
+        files::text(&folder.join("people-as-seen.jsonl"), &as_seen)
+    }
+}
+
+fn failed(error: SceneError) -> Failure {
+    match error {
+        SceneError::Rig(error) => super::chosen::no_rig(error),
+        SceneError::Calibration(_) => Failure::new(ExitKind::Usage, error),
+        SceneError::Backdrop(_) | SceneError::NoCamera { .. } => {
+            Failure::new(ExitKind::Input, error)
+        }
+    }
+}
