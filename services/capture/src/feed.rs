@@ -44,7 +44,7 @@ pub struct FeedInfo {
 #[derive(Debug)]
 pub enum Feed {
     /// Files.
-    Footage(Source),
+    Footage(Box<Source>),
     /// A scene.
     Scene(Box<Stage>),
 }
@@ -70,7 +70,7 @@ impl Feed {
     /// [`FeedError`].
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
         if !Address::is_one(&spec.path) {
-            return Ok(Self::Footage(Source::open(spec)?).info());
+            return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
         }
         let address = address(spec)?;
         let in_scene = |source: SceneError| failed(spec, source);
@@ -91,7 +91,7 @@ impl Feed {
     /// [`FeedError`].
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
         if !Address::is_one(&spec.path) {
-            return Ok(Self::Footage(Source::open(spec)?));
+            return Ok(Self::Footage(Box::new(Source::open(spec)?)));
         }
         let address = address(spec)?;
         let in_scene = |source: SceneError| failed(spec, source);

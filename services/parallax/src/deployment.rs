@@ -105,9 +105,10 @@ impl Deployment {
             *path = base.join(&path);
         }
         for camera in &mut self.cameras {
-            camera.source = match Address::is_one(&camera.source) {
-                true => Address::relative_to(&camera.source, base),
-                false => base.join(&camera.source).to_string_lossy().into_owned(),
+            camera.source = if Address::is_one(&camera.source) {
+                Address::relative_to(&camera.source, base)
+            } else {
+                base.join(&camera.source).to_string_lossy().into_owned()
             };
         }
         if let Some(table) = &mut self.quality.table {

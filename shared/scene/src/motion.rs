@@ -98,7 +98,10 @@ struct Actor {
 impl Motion {
     /// An action. The same subject, action and seed move the same way.
     pub(crate) fn new(subject: &Subject, action: Action, seed: u64) -> Self {
-        let dice = Dice::new(seed).fork("motion").fork(action.name());
+        let dice = Dice::new(seed)
+            .fork("motion")
+            .nth(subject.number)
+            .fork(action.name());
         let mut stage = dice.fork("stage");
         let bones = Bones::new(&subject.proportions);
         let place = [stage.range(-0.25, 0.25), stage.range(-0.25, 0.25)];

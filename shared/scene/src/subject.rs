@@ -8,6 +8,7 @@ use crate::fabric::{Fabric, Pattern};
 /// A person who does not exist. The same number is the same person, always.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Subject {
+    pub(crate) number: u64,
     pub(crate) proportions: Proportions,
     /// Thickness of trunk and limbs, 1 for the mean.
     pub(crate) girth: f32,
@@ -113,6 +114,7 @@ impl Subject {
         let mut looks = dice.fork("looks");
         let skin = srgb(*looks.pick(SKINS)) * looks.range(0.9, 1.08) as f32;
         Self {
+            number,
             proportions,
             girth: girth as f32,
             belly: (girth * shape.range(0.94, 1.14)) as f32,

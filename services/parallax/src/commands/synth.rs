@@ -162,6 +162,7 @@ impl FlawArguments {
 /// Writes all sequences.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let flaws = arguments.flaws.flaws()?;
+    arguments.rig.rig().map_err(chosen::no_rig)?;
     begin(&arguments.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let threads = arguments.threads.map_or(0, usize::from);
@@ -192,7 +193,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
                 backdrop: arguments.backdrop.as_deref().map(absolute_path),
                 flaws,
             };
-            let sequence = Sequence::new(arguments, settings, &folder, &name)?;
+            let sequence = Sequence::new(arguments, &settings, &folder, &name)?;
             let people = pool.install(|| sequence.write(&stop, &bar))?;
             sequences.push(report(&sequence, &people));
             people.write(&folder)?;
@@ -203,7 +204,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if !is_one {
         all.write(&arguments.out)?;
     }
-    tell(arguments, globals, sequences, begin.elapsed().as_secs_f64())?;
+    tell(
+        arguments,
+        globals,
+        &sequences,
+        begin.elapsed().as_secs_f64(),
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -261,7 +267,7 @@ fn report(sequence: &Sequence<'_>, people: &People) -> Value {
 fn tell(
     arguments: &Arguments,
     globals: Globals,
-    sequences: Vec<Value>,
+    sequences: &[Value],
     seconds: f64,
 ) -> Result<(), Failure> {
     let pictures = sequences.iter().filter_map(|it| it["pictures"].as_u64());

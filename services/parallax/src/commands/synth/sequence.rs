@@ -29,11 +29,11 @@ impl<'a> Sequence<'a> {
     /// Puts the scene together and makes the folders.
     pub(super) fn new(
         arguments: &'a Arguments,
-        settings: Settings,
+        settings: &Settings,
         folder: &Path,
         name: &str,
     ) -> Result<Self, Failure> {
-        let scene = Arc::new(Scene::new(&settings).map_err(failed)?);
+        let scene = Arc::new(Scene::new(settings).map_err(failed)?);
         let it = Self {
             arguments,
             scene,

@@ -1,0 +1,219 @@
+//! Sequences of people who do not exist, from the command to the last process of a deployment.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use common::{Case, Ended};
+use geometry::files::ReadOptions;
+use scene::truth::{Frame, Header};
+
+/// A folder with a model that takes milliseconds.
+fn case(name: &str) -> Case {
+    Case::new(name, &[1, 1], "")
+}
+
+fn synth(case: &Case, arguments: &[&str]) -> Ended {
+    let all: Vec<&str> = [&["synth"], arguments].concat();
+    case.start(&all).wait()
+}
+
+/// Two cameras, three frames, and the planted model.
+const SMALL: [&str; 8] = [
+    "--rig",
+    "ring:2",
+    "--frames",
+    "3",
+    "--model",
+    "model.plx",
+    "--rate",
+    "10",
+];
+
+/// Runs a written deployment with small frames; its 2D results.
+fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
+    let file = format!("{folder}/deployment.toml");
+    case.edit(&file, "synth-s1-walking-1", &case.name);
+    let small = [
+        "run",
+        &file,
+        "--set",
+        "capture.size=[160,120]",
+        "--set",
+        "record.overlay_every=0",
+    ];
+    let ended = case.start(&[&small, more].concat()).wait();
+    case.assert_nothing_left();
+    let results = case.path(folder).join("out/pose2d.jsonl");
+    (ended, fs::read_to_string(results).unwrap_or_default())
+}
+
+#[test]
+fn what_is_written_runs_and_a_live_scene_gives_the_same_bits() {
+    let case = case("synth-run");
+    let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let (ended, from_files) = run(&case, "files", &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert_eq!(from_files.lines().count(), 6, "three frames of two views");
+
+    let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(!case.path("live/cameras").exists(), "no pictures");
+    let truth = |folder: &str| fs::read_to_string(case.path(folder).join("truth.jsonl")).unwrap();
+    assert_eq!(truth("live"), truth("files"));
+    let lossless = [
+        "--set",
+        "capture.mode=lossless",
+        "--set",
+        "capture.pace=fast",
+    ];
+    let (ended, live) = run(&case, "live", &lossless);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert_eq!(live, from_files);
+}
+
+#[test]
+fn a_live_scene_keeps_up_with_the_clock() {
+    let case = case("synth-clock");
+    let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.edit("live/deployment.toml", "frames=3", "frames=20");
+    let (ended, lines) = run(&case, "live", &["--set", "supervise.deadline_ms=2000"]);
+    // On a machine that is busy frames may be passed over, which is told.
+    assert!(
+        matches!(ended.status.code(), Some(0 | 7)),
+        "{}",
+        ended.stderr
+    );
+    assert!(lines.lines().count() >= 2, "{lines}");
+}
+
+#[test]
+fn the_truth_is_the_projection_of_the_exact_rig() {
+    let case = case("synth-truth");
+    let flaws = [
+        "flawed",
+        "--desync",
+        "0.1",
+        "--calibration-degrees",
+        "1",
+        "--noise",
+        "3",
+        "--no-masks",
+    ];
+    let ended = synth(&case, &[&flaws, &SMALL[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let rig = |name: &str| {
+        geometry::files::read(&case.path("flawed").join(name), &ReadOptions::default()).unwrap()
+    };
+    let (exact, written) = (rig("rig-exact.toml"), rig("rig.toml"));
+    assert_ne!(exact.cameras(), written.cameras());
+    let text = fs::read_to_string(case.path("flawed/truth.jsonl")).unwrap();
+    let mut lines = text.lines();
+    let header = Header::parse(lines.next().unwrap()).unwrap();
+    let frames: Vec<Frame> = lines.map(|it| Frame::parse(it, &header).unwrap()).collect();
+    assert_eq!(frames.len(), 3);
+    let mut off = BTreeSet::new();
+    for frame in &frames {
+        for (view, camera) in frame.views.iter().zip(exact.cameras()) {
+            let late = view.seconds - frame.seconds;
+            off.insert((view.camera.clone(), (late * 1e6).round() as i64));
+            for (pixel, joint) in view.pixels.iter().zip(frame.joints) {
+                let projected = camera.project(&joint.into()).unwrap();
+                let [x, y] = pixel.unwrap();
+                let error = (x - projected.x).hypot(y - projected.y);
+                // A camera whose clock is right sees the joints where they are at the nominal time.
+                assert_eq!(error < 1e-6, late == 0.0, "{}: {error} px", view.camera);
+            }
+        }
+    }
+    assert_eq!(off.len(), 2, "every clock is off by one amount: {off:?}");
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let case = case("synth-threads");
+    for threads in ["1", "3"] {
+        let arguments = [
+            threads,
+            "--threads",
+            threads,
+            "--format",
+            "jpg",
+            "--drop",
+            "0.3",
+        ];
+        let ended = synth(&case, &[&arguments, &SMALL[..]].concat());
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    }
+    for file in [
+        "cameras/c1/000001.jpg",
+        "cameras/c2/000002.jpg",
+        "masks/c2/000001.png",
+        "truth.jsonl",
+        "people.jsonl",
+    ] {
+        let bytes = |folder: &str| fs::read(case.path(folder).join(file)).unwrap();
+        assert!(bytes("1") == bytes("3"), "{file}");
+    }
+}
+
+#[test]
+fn several_sequences_have_a_folder_each_and_one_list_of_people() {
+    let case = case("synth-many");
+    let many = [
+        "many",
+        "--subjects",
+        "2-3",
+        "--actions",
+        "walking,lying",
+        "--json",
+    ];
+    let ended = synth(&case, &[&many, &SMALL[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let report: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(report["sequences"].as_array().unwrap().len(), 4);
+    let options = datasets::ReadOptions {
+        n_joints: Some(14),
+        ..datasets::ReadOptions::default()
+    };
+    for list in [
+        "people.jsonl",
+        "people-as-seen.jsonl",
+        "s2-lying/people.jsonl",
+    ] {
+        let read = datasets::read(&case.path("many").join(list), &options).unwrap();
+        let expected = if list.starts_with("s2") { 6 } else { 24 };
+        assert_eq!(read.people.len() + read.problems.len(), expected, "{list}");
+        let pictures = read
+            .problems
+            .iter()
+            .filter(|it| matches!(it.fault, datasets::Fault::Image(_)));
+        assert_eq!(pictures.count(), 0, "every picture is there");
+    }
+}
+
+#[test]
+fn what_cannot_be_made_is_refused_with_the_right_code() {
+    let case = case("synth-refused");
+    let code = |arguments: &[&str]| {
+        let ended = synth(&case, arguments);
+        (ended.status.code(), ended.stderr)
+    };
+    for (arguments, expected, words) in [
+        (&["."][..], 2, "not empty"),
+        (&["a", "--rig", "nowhere"], 2, "ring:N"),
+        (&["a", "--actions", "flying"], 2, "walking"),
+        (&["a", "--subjects", "3-1"], 2, "1-20,25"),
+        (&["a", "--drop", "2"], 2, "drop"),
+        (&["x", "--rig", "absent.toml"], 4, "absent.toml"),
+        (&["y", "--backdrop", "absent"], 4, "absent"),
+    ] {
+        let (got, said) = code(arguments);
+        assert_eq!(got, Some(expected), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
