@@ -1,5 +1,4 @@
 //! Sequences of people who do not exist, from the command to the last process of a deployment.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
 
