@@ -64,7 +64,7 @@ enum Format {
 pub(crate) struct Arguments {
     /// Folder to write; absent or empty.
     out: PathBuf,
-    /// The cameras: humaneva, umpm, ring:N[:RADIUS[:HEIGHT]], or a rig file.
+    /// The cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
     #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
     rig: RigChoice,
     /// Numbers of the subjects: 3, or 1-20,25.
