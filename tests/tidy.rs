@@ -12,7 +12,9 @@ use std::process::Command;
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
-    &["geometry", "kernels", "messages", "footage", "join", "mat5", "c3d"],
+    &[
+        "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d",
+    ],
     &["runtime", "fmp", "scene"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "modelpage"],

@@ -18,6 +18,7 @@ mod models;
 mod motion;
 mod multi_view;
 mod parse_set;
+mod shipped;
 mod single_view;
 mod tiles;
 mod tracked;

@@ -22,8 +22,8 @@ pub(crate) struct Deployment {
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
-    /// Trained model.
-    pub model: PathBuf,
+    /// Trained model; the one that ships with Parallax if not given.
+    pub model: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
     /// The cameras, in the order in which views are numbered.
@@ -101,8 +101,11 @@ impl Deployment {
 
     /// Takes every relative path as relative to `base`.
     fn resolve(&mut self, base: &Path) {
-        for path in [&mut self.rig, &mut self.model, &mut self.output] {
+        for path in [&mut self.rig, &mut self.output] {
             *path = base.join(&path);
+        }
+        if let Some(model) = &mut self.model {
+            *model = base.join(&model);
         }
         for camera in &mut self.cameras {
             camera.source = if Address::is_one(&camera.source) {

@@ -1,5 +1,6 @@
 //! The files that a deployment names: read before anything is started.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,6 +16,28 @@ use serde::{Deserialize, Serialize};
 use viewquality::{Table, Tau};
 
 use crate::deployment::Deployment;
+
+/// The model that ships with Parallax (`configs/models/person.md` is its card).
+const PERSON: &[u8] = include_bytes!("../../../configs/models/person.fmp");
+
+/// The named model, or the one that ships with Parallax.
+pub(crate) fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
+    path.map_or_else(shipped, model)
+}
+
+/// The bytes of the named model file, or of the model that ships with Parallax.
+pub(crate) fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
+    let Some(path) = path else {
+        return Ok(Cow::Borrowed(PERSON));
+    };
+    let bytes = fs::read(path).map_err(|error| in_file(path, &error))?;
+    Ok(Cow::Owned(bytes))
+}
+
+fn shipped() -> Result<Arc<Model>, Failure> {
+    let spec = fmp::files::own::decode(PERSON).or_fail(ExitKind::Input)?;
+    Model::new(spec).map(Arc::new).or_fail(ExitKind::Input)
+}
 
 /// Reads the model, of whichever format.
 pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {

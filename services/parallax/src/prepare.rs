@@ -47,7 +47,7 @@ impl Prepared {
     /// Reads model and rig, and prepares the views.
     pub(crate) fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
-        let model = inputs::model(&deployment.model)?;
+        let model = inputs::model_or_shipped(deployment.model.as_deref())?;
         let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
         let mut views = Vec::new();
         for (index, camera) in deployment.cameras.iter().enumerate() {

@@ -75,6 +75,34 @@ fn what_is_written_runs_and_a_live_scene_gives_the_same_bits() {
 }
 
 #[test]
+fn without_a_model_the_one_that_ships_finds_the_person() {
+    let case = case("synth-shipped");
+    let three = ["--rig", "ring:3:5.5", "--frames", "1", "--no-masks"];
+    let ended = synth(&case, &[&["walk"], &three[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let truth = fs::read_to_string(case.path("walk/truth.jsonl")).unwrap();
+    let mut lines = truth.lines();
+    let header = Header::parse(lines.next().unwrap()).unwrap();
+    let frame = Frame::parse(lines.next().unwrap(), &header).unwrap();
+    let pictures = header.cameras.iter();
+    let pictures: Vec<String> = pictures.map(|it| format!("walk/cameras/{it}")).collect();
+    let pictures: Vec<&str> = pictures.iter().map(String::as_str).collect();
+    let detect = [&["detect"], &pictures[..], &["--max", "1", "--json"]].concat();
+    let ended = case.start(&detect).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let mut n_found = 0;
+    for (line, view) in ended.stdout.lines().zip(&frame.views) {
+        let found: serde_json::Value = serde_json::from_str(line).unwrap();
+        let neck = &found["detections"][0]["joints"]["neck"];
+        let [u, v] = [0, 1].map(|it| neck[it].as_f64().unwrap_or(f64::INFINITY));
+        let [x, y] = view.pixels[12].unwrap();
+        let [_, top, _, bottom] = view.outline.unwrap();
+        n_found += usize::from((u - x).hypot(v - y) < 0.1 * (bottom - top));
+    }
+    assert!(n_found >= 2, "{n_found} of 3 necks: {}", ended.stdout);
+}
+
+#[test]
 fn a_live_scene_keeps_up_with_the_clock() {
     let case = case("synth-clock");
     let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());

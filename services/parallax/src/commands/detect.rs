@@ -25,17 +25,17 @@ With --json one line per image, best detection first:
 Pixels of the image, the centre of its top-left pixel is (0, 0); types and levels count from 1.
 
 Examples:
-    parallax detect photo.jpg --model parse.mat
+    parallax detect photo.jpg
     parallax detect folder/ --model parse.mat --threshold -0.5 --json > people.jsonl
-    parallax detect *.png --model parse.mat --overlay drawn/
-    parallax detect folder/ --model parse.mat --sheet sheet.png")]
+    parallax detect *.png --overlay drawn/
+    parallax detect folder/ --sheet sheet.png")]
 pub(crate) struct Arguments {
     /// Images, or folders of images.
     #[arg(required = true)]
     images: Vec<PathBuf>,
-    /// The model file.
+    /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
-    model: PathBuf,
+    model: Option<PathBuf>,
     /// Lowest score of a detection; the trained threshold, but at most -1, if not given.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
 
 /// Detects.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let model = inputs::model(&arguments.model)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let detector = Detector {
         settings: CandidateSettings {
             threshold: arguments.threshold.unwrap_or(model.detection_threshold()) as f32,

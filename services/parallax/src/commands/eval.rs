@@ -52,9 +52,9 @@ pub(crate) struct Arguments {
     /// The sequences.
     #[arg(required = true, value_name = "SEQUENCE")]
     sequences: Vec<PathBuf>,
-    /// The model file.
+    /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
-    model: PathBuf,
+    model: Option<PathBuf>,
     /// Where the report goes.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -135,7 +135,7 @@ fn share(text: &str) -> Result<[f64; 2], String> {
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let sequences = sequences(arguments)?;
-    let model = inputs::model(&arguments.model)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;
     let sigma = match &arguments.sigma {
         Some(file) => Some(inputs::quality_table(file, model.n_parts())?),
@@ -269,7 +269,7 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
         Ok::<_, Failure>(fingerprint(&bytes))
     };
-    let model = digest(&arguments.model)?;
+    let model = fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
     let mut tables = Vec::new();
     for file in config.compatibility.iter().flat_map(|it| &it.files) {

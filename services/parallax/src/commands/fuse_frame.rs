@@ -43,9 +43,9 @@ pub(crate) struct Arguments {
     /// The calibration.
     #[arg(long, value_name = "FILE")]
     rig: PathBuf,
-    /// The model file.
+    /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
-    model: PathBuf,
+    model: Option<PathBuf>,
     /// Which energy.
     #[arg(long, value_enum, default_value_t = Energy::Paper)]
     energy: Energy,
@@ -125,7 +125,7 @@ struct View {
 
 /// Fuses.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let model = inputs::model(&arguments.model)?;
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let rig = inputs::rig(
         std::slice::from_ref(&arguments.rig),
         &ReadOptions::default(),

@@ -43,11 +43,11 @@ Exit codes: 0 done; 2 the command line is wrong, or OUT is not empty; 4 a rig fi
 5 the rig does not say which way is up; 130 stopped by Ctrl-C.
 
 Examples:
-    parallax synth out/walk --model person.mat && parallax run out/walk/deployment.toml
+    parallax synth out/walk && parallax run out/walk/deployment.toml
     parallax synth out/set --subjects 1-20 --actions all --rate 2 --frames 10 --rig ring:4:6.5 --format jpg
     parallax model judge person.mat out/set/people-as-seen.jsonl
     parallax synth out/bad --noise 8 --blur 1 --desync 0.04 --drop 0.05 --calibration-degrees 1
-    parallax synth out/live --live --frames 900 --rig umpm --actions gestures --model person.mat";
+    parallax synth out/live --live --frames 900 --rig umpm --actions gestures";
 
 /// How pictures are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -91,7 +91,7 @@ pub(crate) struct Arguments {
     /// Put a photograph of this folder behind the person, in the place of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// The model that the deployment names.
+    /// The model that the deployment names; without it the person model that ships with Parallax.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Write no pictures: cameras of the deployment make them while it runs.

@@ -47,7 +47,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "name of the deployment: its processes share memory under it",
     ),
     ("rig", "calibration of the cameras"),
-    ("model", "trained model"),
+    (
+        "model",
+        "trained model; without it the one that ships with Parallax",
+    ),
     ("output", "folder for the results"),
     (
         "camera",

@@ -66,7 +66,7 @@ impl Loaded {
 }
 
 /// What stands in the place of a file that only the defaults are asked of.
-const NO_FILE: &str = "name = \"\"\nrig = \"\"\nmodel = \"\"\noutput = \"\"\ncamera = []\n";
+const NO_FILE: &str = "name = \"\"\nrig = \"\"\noutput = \"\"\ncamera = []\n";
 
 impl Loaded {
     /// The defaults alone; the keys that have none are empty.
@@ -215,7 +215,10 @@ workers = 2
         let loaded = read(SHORT, &[]).unwrap();
         let folder = loaded.deployment.rig.parent().unwrap();
         assert!(folder.is_absolute() && loaded.deployment.rig.ends_with("rig.toml"));
-        assert_eq!(loaded.deployment.model, Path::new("/models/m.mat"));
+        assert_eq!(
+            loaded.deployment.model.as_deref(),
+            Some(Path::new("/models/m.mat"))
+        );
         assert!(Path::new(&loaded.deployment.cameras[0].source).starts_with(folder));
         assert_eq!(loaded.deployment.cameras[1].source, "/videos/b.mp4");
     }

@@ -76,9 +76,13 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
     );
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
     let settings = job.config.settings(job.n_candidates, 1.0);
+    let model = arguments.model.as_ref();
+    let model = model.map_or("the one that ships".to_owned(), |it| {
+        it.display().to_string()
+    });
     let upright = if job.film.upright { ", upright" } else { "" };
     [
-        ("model", arguments.model.display().to_string()),
+        ("model", model),
         ("frames", format!("{frames}, {size}{upright}")),
         ("expected errors", expected),
         (

@@ -86,9 +86,6 @@ pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a deployment says where no model was named.
-const NO_MODEL: &str = "person.mat";
-
 /// Writes the deployment.
 pub(super) fn deployment(
     folder: &Path,
@@ -98,24 +95,17 @@ pub(super) fn deployment(
 ) -> Result<(), Failure> {
     let settings = scene.settings();
     let quoted = |it: &str| toml::Value::from(it).to_string();
-    let model = arguments
-        .model
-        .as_deref()
-        .map(|it| absolute_path(it).display().to_string());
-    let hint = if model.is_none() {
-        "   # any model of people: see `parallax model --help`"
-    } else {
-        ""
-    };
-    let model = model.unwrap_or_else(|| NO_MODEL.to_owned());
+    let model = arguments.model.as_deref().map_or(String::new(), |it| {
+        let file = absolute_path(it).display().to_string();
+        format!("model = {}\n", quoted(&file))
+    });
     let (rate, seed) = (settings.rate_hz, settings.seed);
     let mut text = format!(
         "# Written by `parallax synth`: subject {}, {}, seed {seed}. The truth is in truth.jsonl.\n\n\
-         name = {}\nrig = \"rig.toml\"\nmodel = {}{hint}\noutput = \"out\"\n",
+         name = {}\nrig = \"rig.toml\"\n{model}output = \"out\"\n",
         settings.subject,
         settings.action.name(),
         quoted(&format!("synth-{name}-{seed}")),
-        quoted(&model),
     );
     for camera in scene.rig().cameras() {
         let source = if arguments.live {
