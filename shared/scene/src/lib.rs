@@ -12,8 +12,7 @@
 //! distortion included, and a z-buffer with four samples a pixel finds what is seen. The room, cast as rays
 //! through the same camera, does not move and is made once for a camera. One lamp throws soft shadows.
 //!
-//! Published renderers were weighed and left out: those that are kept up need a GPU or a display, and those that
-//! need none (`euc`, `retrofire`) know no lens and bring more than the hundred lines of `raster`.
+//! Published software renderers (`euc`, `retrofire`) know no lens and bring more than the hundred lines of `raster`.
 #![forbid(unsafe_code)]
 
 mod colour;
