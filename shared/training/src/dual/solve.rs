@@ -138,10 +138,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         if slope > 0.0 && room <= group.cost * FULL {
             return self.exchange(at, slope);
         }
-        if entry.squared_norm <= 0.0 {
-            return false;
-        }
-        let wanted = slope / entry.squared_norm;
+        let wanted = newton(slope, entry.squared_norm);
         self.change(at, wanted.clamp(-entry.share, room.max(0.0))) && slope.abs() > RESTING
     }
 
@@ -157,10 +154,10 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         };
         let (to, from) = (&self.entries[at], &self.entries[giver]);
         let curvature = to.squared_norm + from.squared_norm - 2.0 * to.x.dot_sparse(&from.x);
-        if least >= slope || curvature <= 0.0 {
+        if least >= slope {
             return false;
         }
-        let share = ((slope - least) / curvature).min(from.share);
+        let share = newton(slope - least, curvature).min(from.share);
         let moved = self.change(giver, -share) | self.change(at, share);
         moved && slope - least > RESTING
     }
@@ -181,6 +178,18 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
             }
         }
         true
+    }
+}
+
+/// How far to go along a slope; where it does not bend (an example of zeros, a twin of another), as
+/// far as may be.
+fn newton(slope: f64, curvature: f64) -> f64 {
+    if curvature > 0.0 {
+        slope / curvature
+    } else if slope == 0.0 {
+        0.0
+    } else {
+        f64::INFINITY.copysign(slope)
     }
 }
 

@@ -63,6 +63,23 @@ fn of_a_group_only_the_worst_example_counts() {
 }
 
 #[test]
+fn an_example_of_zeros_takes_what_its_group_has() {
+    // No solution meets its margin: the loss is its cost, of which the dual knows once it has it all.
+    let mut machine = Machine::new(1, 0..0);
+    machine.add(cost(0, 0.3), "zeros", demand(&[0.0], 1.0), 0.0);
+    let gap = solve(&mut machine, EXACT);
+    assert_eq!((gap.primal, gap.dual, gap.n_support), (0.3, 0.3, 1));
+    machine.add(
+        cost(0, 0.3),
+        "zeros that miss more",
+        demand(&[0.0], 2.0),
+        0.0,
+    );
+    let gap = solve(&mut machine, EXACT);
+    assert_eq!((gap.primal, gap.dual, gap.n_support), (0.6, 0.6, 1));
+}
+
+#[test]
 fn what_may_not_be_negative_is_not() {
     let mut machine = Machine::new(2, 1..2);
     machine.add(cost(0, 5.0), (), demand(&[1.0, -1.0], 1.0), 0.0);
@@ -103,7 +120,9 @@ proptest! {
         let mut machine = filled(&examples);
         let before = machine.gap();
         prop_assert!(before.dual <= before.primal + 1e-9);
-        let gap = solve(&mut machine, Effort { tolerance: 1e-4, max_passes: 3000 });
+        // Groups that pull against each other along a direction that hardly costs anything settle
+        // slowly: a few of ten thousand such problems need more than 3000 passes.
+        let gap = solve(&mut machine, Effort { tolerance: 1e-4, max_passes: 100_000 });
         prop_assert!(gap.dual <= gap.primal + 1e-6);
         prop_assert!(gap.relative() <= 1e-4 || gap.primal < 1e-9, "{gap:?}");
     }
