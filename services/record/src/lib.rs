@@ -15,6 +15,7 @@ mod latency;
 mod overlay;
 mod pose2d;
 mod pose3d;
+mod times;
 mod trc;
 
 mod folder;

@@ -10,7 +10,8 @@ use crate::latency::Report;
 use crate::lines::Lines;
 use crate::summary::Tally;
 use crate::{
-    Config, Folder, FolderError, FrameRecord, Latency, Scene, Summary, overlay, pose2d, pose3d, trc,
+    Config, Folder, FolderError, FrameRecord, Latency, Scene, Summary, overlay, pose2d, pose3d,
+    times, trc,
 };
 
 const LATENCY: &str = "latency.json";
@@ -27,6 +28,7 @@ pub struct Output {
     pose3d_jsonl: Lines,
     pose3d_csv: Lines,
     pose2d_jsonl: Lines,
+    times_jsonl: Lines,
     trc_rows: Option<Lines>,
     overlays: Option<PathBuf>,
     epipolar_part: usize,
@@ -73,6 +75,7 @@ impl Output {
             pose3d_csv.append(&format!("{}\n", pose3d::CSV_HEADER))?;
         }
         let (pose3d_jsonl, pose2d_jsonl) = (lines("pose3d.jsonl")?, lines("pose2d.jsonl")?);
+        let times_jsonl = lines("times.jsonl")?;
         let trc_rows = if config.trc { Some(lines(TRC)?) } else { None };
         let overlays = if config.overlay_every > 0 {
             Some(folder.folder("overlays")?)
@@ -82,6 +85,7 @@ impl Output {
         Ok(Self {
             pose3d_jsonl,
             pose2d_jsonl,
+            times_jsonl,
             pose3d_csv,
             trc_rows,
             overlays,
@@ -106,6 +110,7 @@ impl Output {
             self.pose3d_jsonl.append(&format!("{line}\n")),
             self.pose3d_csv.append(&rows),
             self.pose2d_jsonl.append(&lines),
+            self.times_jsonl.append(&times::json_line(scene, record)),
             self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
         ];
         for outcome in outcomes {
@@ -259,6 +264,7 @@ mod tests {
             "pose3d.jsonl",
             "pose3d.trc",
             "summary.json",
+            "times.jsonl",
         ];
         assert_eq!(names, expected);
         assert_eq!(text(&dir, "pose3d.jsonl").lines().count(), 2);

@@ -136,6 +136,20 @@ impl Child {
     }
 }
 
+/// Ends a process at once, as a crash would (SIGKILL): for faults that are made on purpose.
+///
+/// Call it where the process cannot have been reaped yet, for example from what a supervisor tells between its
+/// `Started` and its `Died`: a number that is free again may be another's.
+///
+/// # Errors
+///
+/// There is no such process, or it belongs to somebody else.
+pub fn kill(pid: u32) -> io::Result<()> {
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    let pid = pid.ok_or(io::ErrorKind::InvalidInput)?;
+    Ok(kill_process(pid, Signal::KILL)?)
+}
+
 impl Drop for Child {
     fn drop(&mut self) {
         if let Ok(None) = self.try_wait() {
@@ -181,7 +195,7 @@ mod tests {
     use std::process::ExitStatus;
     use std::time::Instant;
 
-    use super::{Child, wait_for_any};
+    use super::{Child, kill, wait_for_any};
 
     /// What takes longer will never happen.
     const WATCHDOG: Duration = Duration::from_mins(1);
@@ -226,6 +240,19 @@ mod tests {
         child.kill();
         let (_, status) = run(&mut child);
         assert_eq!(status.signal(), Some(9));
+    }
+
+    #[test]
+    fn a_process_is_killed_by_its_number_and_a_number_that_is_none_is_refused() {
+        use std::os::unix::process::ExitStatusExt as _;
+        let mut child = shell("exec sleep 600");
+        kill(child.pid()).unwrap();
+        let (_, status) = run(&mut child);
+        assert_eq!(status.signal(), Some(9));
+        for none in [0, u32::MAX] {
+            let error = kill(none).unwrap_err();
+            assert_eq!(error.kind(), std::io::ErrorKind::InvalidInput);
+        }
     }
 
     #[test]
