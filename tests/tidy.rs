@@ -17,7 +17,7 @@ const LAYERS: &[&[&str]] = &[
     ],
     &["runtime", "fmp", "scene"],
     &["multiview", "viewquality"],
-    &["pipeline", "evaluation", "datasets", "modelpage"],
+    &["pipeline", "evaluation", "datasets", "modelpage", "runpage"],
     &["wire", "training", "sequences"],
     &["experiment"],
     &[

@@ -1,0 +1,120 @@
+use serde_json::Value;
+
+use super::*;
+use crate::{Eye, Moment};
+
+fn page() -> Page {
+    let moment = |frame: u64, gone: Option<&str>| Moment {
+        frame,
+        seconds: frame as f64 / 5.0,
+        found: vec![Some([0.0, 0.0, 1.7]), None],
+        truth: vec![[0.001, 0.0, 1.75], [0.0, 0.0, 0.9]],
+        views: vec![None, gone.map(str::to_owned)],
+    };
+    let eye = |name: &str| Eye {
+        name: name.to_owned(),
+        at: [4.0, 0.0, 1.5],
+        axis: [-1.0, 0.0, 0.0],
+    };
+    let limit = |what: &str, held| Limit {
+        what: what.to_owned(),
+        asked: "at least 1".to_owned(),
+        got: "2".to_owned(),
+        held,
+    };
+    Page {
+        title: "A <run>".to_owned(),
+        lead: "Nobody & nothing".to_owned(),
+        limits: vec![limit("results", true), limit("pause", false)],
+        space: Space {
+            joints: vec!["head".to_owned(), "left hip".to_owned()],
+            limbs: vec![(0, 1)],
+            eyes: vec![eye("c1"), eye("</script>")],
+            up: [0.0, 0.0, 1.0],
+            moments: vec![moment(0, None), moment(4, Some("process lost"))],
+        },
+        marks: vec![Mark {
+            seconds: 0.4,
+            what: "killed".to_owned(),
+        }],
+        tables: vec![Table {
+            heading: "Latency".to_owned(),
+            note: String::new(),
+            columns: vec!["stage".to_owned(), "p50".to_owned()],
+            rows: vec![vec!["pose".to_owned(), "12.0".to_owned()]],
+        }],
+        legend: "Skeletons".to_owned(),
+        strips: vec![Strip {
+            caption: "frame 4".to_owned(),
+            pictures: vec![
+                Picture {
+                    caption: "c1".to_owned(),
+                    jpeg: Ok(vec![255, 216]),
+                },
+                Picture {
+                    caption: "c2".to_owned(),
+                    jpeg: Err("process lost".to_owned()),
+                },
+            ],
+        }],
+    }
+}
+
+#[test]
+fn the_page_asks_for_nothing_outside_itself() {
+    let html = html(&page());
+    for outside in ["http:", "https:", "url(", "@import", "<link", "<iframe"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    let sources = html
+        .match_indices("src=\"")
+        .map(|it| &html[it.0 + 5..it.0 + 10]);
+    assert_eq!(sources.collect::<Vec<_>>(), ["data:"]);
+    assert!(html.contains("default-src 'none'"));
+}
+
+#[test]
+fn the_data_of_the_script_is_what_was_found_in_millimetres() {
+    let html = html(&page());
+    let begin = html.find("id=\"data\">").unwrap() + 10;
+    let end = begin + html[begin..].find("</script>").unwrap();
+    let data: Value = serde_json::from_str(&html[begin..end]).unwrap();
+    assert_eq!(
+        data["moments"][1]["truth"][0],
+        serde_json::json!([1, 0, 1750])
+    );
+    assert_eq!(data["moments"][1]["found"][1], Value::Null);
+    assert_eq!(data["moments"][1]["views"][1], "process lost");
+    assert_eq!(data["eyes"][1]["name"], "</script>");
+    let scripts = html.matches("</script>").count();
+    assert_eq!(scripts, 2, "a name has ended the script");
+}
+
+#[test]
+fn a_missed_limit_is_said_at_the_top_and_in_its_row() {
+    let missed = html(&page());
+    assert!(missed.contains("1 of 2 limits missed"));
+    assert_eq!(missed.matches("<td class=\"missed\">").count(), 1);
+    let mut good = page();
+    good.limits[1].held = true;
+    assert!(html(&good).contains("All 2 limits held"));
+}
+
+#[test]
+fn a_view_that_was_not_there_is_seen_in_the_timeline_and_among_the_pictures() {
+    let html = html(&page());
+    assert_eq!(html.matches("class=\"there\"").count(), 3);
+    assert_eq!(html.matches("class=\"gone\"").count(), 1);
+    assert!(html.contains("<div class=\"none\">c2: process lost</div>"));
+    assert!(html.contains("A &lt;run&gt;"));
+}
+
+#[test]
+fn the_script_finds_every_element_that_it_asks_for() {
+    let html = html(&page());
+    let asked = SCRIPT.split("element(\"").skip(1);
+    let names = asked.map(|it| it.split('"').next().unwrap());
+    for name in names {
+        assert!(html.contains(&format!("id=\"{name}\"")), "{name}");
+    }
+}
