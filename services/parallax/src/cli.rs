@@ -4,7 +4,7 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
 use crate::commands::{
-    calib, config, deployments, detect, eval, fuse_frame, model, run, service, synth, train,
+    calib, config, demo, deployments, detect, eval, fuse_frame, model, run, service, synth, train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -18,6 +18,7 @@ consists of one process per stage and camera, all started and watched by `parall
 
 const EXAMPLES: &str = "\
 Examples:
+    parallax demo                                       everything at work, and a report; needs nothing
     parallax run configs/pose2sim-balancing.toml        four cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
@@ -79,6 +80,8 @@ impl Globals {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Show everything at work: four cameras that do not exist, one of them killed, and a report.
+    Demo(demo::Arguments),
     /// Run a deployment: all its processes, from footage to 3D.
     Run(run::Arguments),
     /// Find people in single images.

@@ -2,6 +2,7 @@
 
 pub(crate) mod calib;
 pub(crate) mod config;
+pub(crate) mod demo;
 pub(crate) mod deployments;
 pub(crate) mod detect;
 pub(crate) mod eval;
@@ -25,6 +26,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         init_logging("parallax", cli.globals.level());
     }
     match cli.command {
+        Command::Demo(it) => demo::run(&it, cli.globals),
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),

@@ -88,7 +88,8 @@ impl Watcher {
         self.bar.finish_and_clear();
     }
 
-    fn say(&self, text: &str) {
+    /// Shows a line above the bar.
+    pub(crate) fn say(&self, text: &str) {
         self.bar.suspend(|| output::message(text));
     }
 
@@ -161,6 +162,26 @@ impl Report {
             views: ViewReport::all(resolved, outcome, &recorded["summary"]),
             recorded,
         }
+    }
+
+    /// What became of the frames of every view.
+    pub(crate) fn views(&self) -> &[ViewReport] {
+        &self.views
+    }
+
+    /// The processes that were restarted, and how often.
+    pub(crate) fn restarts(&self) -> &[(String, u32)] {
+        &self.restarts
+    }
+
+    /// The processes that were given up.
+    pub(crate) fn given_up(&self) -> &[String] {
+        &self.given_up
+    }
+
+    /// What the recorder wrote about the run; null if it did not.
+    pub(crate) fn recorded(&self) -> &Value {
+        &self.recorded
     }
 
     /// How the run ended, if not well.

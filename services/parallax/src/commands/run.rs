@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use clap::Args;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory};
-use supervise::Plan;
+use supervise::{Event, Plan};
+use tracing::Level;
 
 use crate::cli::Globals;
-use crate::deployment::Loaded;
+use crate::deployment::{Deployment, Loaded};
 use crate::plan::{self, Resolved};
 use crate::prepare::Prepared;
 use crate::summary::{Report, Watcher};
@@ -19,7 +20,7 @@ use crate::{inputs, output};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A second Ctrl-C ends the run at once. The output folder holds pose3d.jsonl, pose3d.csv, pose3d.trc,
-pose2d.jsonl, latency.json, summary.json, deployment.json and overlays/; files of an earlier run are
+pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and overlays/; files of an earlier run are
 replaced when the new ones are whole, until then they are called *.part.
 
 Examples:
@@ -49,29 +50,84 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(out) = &arguments.out {
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     }
-    let resolved = Resolved::new(&loaded.deployment)?;
-    let prepared = Prepared::new(&resolved)?;
-    prepared.check_predictions(&resolved)?;
-    let folder = &resolved.deployment.output;
-    let file = folder.join("deployment.json");
-    let plan = plan::plan(&resolved, &prepared, &file, globals.level())?;
+    let planned = Planned::new(&loaded.deployment, globals.level())?;
     if arguments.dry_run {
-        return show(&plan);
+        return show(&planned.plan);
     }
-    std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
-    resolved.write(&file)?;
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let begin = Instant::now();
-    let mut watcher = Watcher::new(&resolved, globals.quiet);
-    let outcome = supervise::run(&plan, &stop, &mut |event| watcher.note(&event));
-    watcher.finish();
-    let report = Report::new(&resolved, plan.session, &outcome?, begin.elapsed());
+    let report = planned.carry_out(globals, &mut |_| None)?;
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {
         output::line(report.text())?;
     }
     Ok(ExitCode::from(report.kind().map_or(0, ExitKind::status)))
+}
+
+/// A deployment that can be started.
+#[derive(Debug)]
+pub(crate) struct Planned {
+    /// What every process is given.
+    resolved: Resolved,
+    /// Its processes and topics.
+    plan: Plan,
+}
+
+impl Planned {
+    /// Reads what the deployment names, and deals the work to processes.
+    pub(crate) fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
+        let resolved = Resolved::new(deployment)?;
+        let prepared = Prepared::new(&resolved)?;
+        prepared.check_predictions(&resolved)?;
+        let file = file_of(deployment);
+        let plan = plan::plan(&resolved, &prepared, &file, log)?;
+        Ok(Self { resolved, plan })
+    }
+
+    /// The run, which is the time of its planning too: `runtime::now_nanos`.
+    pub(crate) fn session(&self) -> u64 {
+        self.plan.session
+    }
+
+    /// Its processes.
+    pub(crate) fn processes(&self) -> impl Iterator<Item = &str> {
+        self.plan.processes.iter().map(|it| it.name.as_str())
+    }
+
+    /// Runs it, shows its progress, and says what became of it.
+    ///
+    /// * `onlooker`: is told everything that happens; what it answers is shown.
+    pub(crate) fn carry_out(
+        &self,
+        globals: Globals,
+        onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
+    ) -> Result<Report, Failure> {
+        let deployment = &self.resolved.deployment;
+        let folder = &deployment.output;
+        std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+        self.resolved.write(&file_of(deployment))?;
+        let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+        let begin = Instant::now();
+        let mut watcher = Watcher::new(&self.resolved, globals.quiet);
+        let outcome = supervise::run(&self.plan, &stop, &mut |event| {
+            watcher.note(&event);
+            if let Some(said) = onlooker(&event).filter(|_| !globals.quiet) {
+                watcher.say(&said);
+            }
+        });
+        watcher.finish();
+        let elapsed = begin.elapsed();
+        Ok(Report::new(
+            &self.resolved,
+            self.plan.session,
+            &outcome?,
+            elapsed,
+        ))
+    }
+}
+
+/// The resolved deployment, which every process reads.
+fn file_of(deployment: &Deployment) -> PathBuf {
+    deployment.output.join("deployment.json")
 }
 
 /// Processes, topics and memory.

@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::cli::Globals;
 use crate::{inputs, output};
+pub(crate) use chosen::rate;
 use chosen::{actions, rig, subjects};
 use sequence::{People, Sequence};
 

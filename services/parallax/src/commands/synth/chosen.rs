@@ -53,7 +53,8 @@ pub(super) fn actions(text: &str) -> Result<Vec<Action>, String> {
     Ok(actions)
 }
 
-pub(super) fn rate(text: &str) -> Result<f64, String> {
+/// Frames a second, for the command line.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
     rate.ok_or_else(|| "expected 0.1 to 1000 frames a second".to_owned())

@@ -1,0 +1,201 @@
+//! `parallax demo`: four cameras that do not exist, every process, one of them killed on purpose, and a report.
+
+mod cost;
+mod limits;
+mod page;
+mod report;
+mod results;
+mod score;
+mod stage;
+mod strike;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use runtime::{ExitKind, Failure, now_nanos};
+use scene::Action;
+
+use super::run::Planned;
+use crate::cli::Globals;
+use crate::deployment::Loaded;
+use crate::{inputs, output};
+use limits::Asked;
+use report::Report;
+use results::Moment;
+use stage::Stage;
+use strike::{Strike, Times};
+
+const HELP: &str = "\
+Nothing is needed but this program: the pictures are made by the camera processes while they run (a person who does \
+not exist, see `parallax synth --help`), the model is the one that ships. Four cameras around the person, 320x240 \
+pixels, keep up with the clock; every stage and camera is a process of its own, as in `parallax run`. When two fifths \
+of the frames have passed, the process of camera c3 is killed (SIGKILL), as a crash would: the other three go on, the \
+supervisor starts it again, and it joins in at the frame that the clock is at.
+
+What it leaves in OUT: report.html (open it in a browser: the skeleton in space, which turns, beside the truth; who \
+was there when; what the killed camera cost; latency of every stage; every frame accounted for; pictures with \
+skeletons), report.json (the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs \
+them again), and run/, the results as any run leaves them. Files of an earlier demo are replaced.
+
+It judges itself, by limits that a broken pipeline would miss: of the frames 10 % have a result (slow machines pass \
+frames over, which is counted), of the results 90 % a skeleton; PCP3D of all results is at least --min-pcp3d; the \
+killed camera is back within --max-return-ms; the others gave results without it meanwhile, with no pause longer than \
+--max-pause-ms; what became of every frame of every view is known, but for two that a killed process may have held; \
+no other process failed; all results were written.
+
+Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
+wrong; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax demo
+    parallax demo --seconds 60 --action boxing --subject 4 --out /tmp/boxing
+    parallax demo --no-kill --json";
+
+/// What to show.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// Folder for the report and all that it is made of.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    out: PathBuf,
+    /// Frames of every camera.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
+    frames: u64,
+    /// How long the cameras run, seconds; instead of --frames.
+    #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
+    seconds: Option<u32>,
+    /// Frames a second.
+    #[arg(long, value_name = "HZ", default_value_t = 5.0, value_parser = super::synth::rate)]
+    rate: f64,
+    /// What the person does; `parallax synth --help` names the actions.
+    #[arg(long, value_name = "NAME", default_value = "walking", value_parser = stage::action)]
+    action: Action,
+    /// Number of the person: shape, clothes, manners.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    subject: u64,
+    /// Seed of the performance, the room and the lamps.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Kill no process.
+    #[arg(long)]
+    no_kill: bool,
+    /// Limits that can be asked for.
+    #[command(flatten)]
+    limits: Asked,
+    /// Name of the deployment: two that run at once need two.
+    #[arg(long, value_name = "NAME", default_value = "demo")]
+    name: String,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    fn n_frames(&self) -> u64 {
+        let of_seconds = |it: u32| ((f64::from(it) * self.rate).round() as u64).max(1);
+        self.seconds.map_or(self.frames, of_seconds)
+    }
+}
+
+/// A place in space, metres in the world.
+type Point = [f64; 3];
+
+/// The camera that is killed, from 0.
+const VICTIM: usize = 2;
+/// When: after this share of the frames.
+const KILL_AFTER: f64 = 0.4;
+
+/// Runs the demo, and judges it.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stage = Stage::new(arguments, stage::absolute(&arguments.out)?)?;
+    let loaded = Loaded::read(&stage.write(arguments)?, &[])?;
+    let planned = Planned::new(&loaded.deployment, globals.level())?;
+    let processes: Vec<String> = planned.processes().map(str::to_owned).collect();
+    announce(arguments, globals, &stage, processes.len());
+    let mut strike = (!arguments.no_kill).then(|| {
+        let camera = &stage.rig.cameras()[VICTIM].name;
+        Strike::new(VICTIM, camera, KILL_AFTER * arguments.n_frames() as f64)
+    });
+    let ran = planned.carry_out(globals, &mut |event| {
+        strike
+            .as_mut()
+            .and_then(|it| it.note(event, now_nanos(), runtime::kill))
+    })?;
+    if ran.kind() == Some(ExitKind::Interrupted) {
+        output::message("stopped: nothing is judged, and no report written");
+        return Ok(ExitCode::from(ExitKind::Interrupted.status()));
+    }
+    let cameras: Vec<String> = stage
+        .rig
+        .cameras()
+        .iter()
+        .map(|it| it.name.clone())
+        .collect();
+    let moments = results::read(&loaded.deployment.output, &cameras)?;
+    let run = Run {
+        cameras: &cameras,
+        n_frames: arguments.n_frames(),
+        rate_hz: arguments.rate,
+        processes: &processes,
+        ran: &ran,
+        truth: &stage.truth(moments.iter().map(|it| it.frame))?,
+        moments: &moments,
+        killed: strike.as_ref().map(Strike::times),
+        session: planned.session(),
+    };
+    let report = Report::new(&run, &arguments.limits);
+    let json = report.json(&run);
+    let page = page::page(&run, &report, &stage, &loaded.deployment.output);
+    write(&stage.folder, "report.json", &format!("{json:#}\n"))?;
+    write(&stage.folder, "report.html", &runpage::html(&page))?;
+    if arguments.json {
+        output::json(&json)?;
+    } else if !globals.quiet {
+        output::line(ran.text())?;
+        output::line(report.text(&stage.folder))?;
+    }
+    let status = if report.is_held() {
+        0
+    } else {
+        ExitKind::Limit.status()
+    };
+    Ok(ExitCode::from(status))
+}
+
+fn announce(arguments: &Arguments, globals: Globals, stage: &Stage, n_processes: usize) {
+    if globals.quiet {
+        return;
+    }
+    let (frames, rate) = (arguments.n_frames(), arguments.rate);
+    output::message(format_args!(
+        "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
+        stage.folder.display()
+    ));
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
+    let file = folder.join(name);
+    std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))
+}
+
+/// A run that is over, and all that is known of it.
+#[derive(Debug, Clone, Copy)]
+struct Run<'a> {
+    /// Names, in the order of the rig.
+    cameras: &'a [String],
+    /// Frames of every camera, and how many a second.
+    n_frames: u64,
+    rate_hz: f64,
+    /// Names of all processes but the supervisor.
+    processes: &'a [String],
+    /// What `run` says of it.
+    ran: &'a crate::summary::Report,
+    /// The results, and where the joints were.
+    moments: &'a [Moment],
+    truth: &'a [Vec<Point>],
+    /// What became of the camera that was to be killed, if one was.
+    killed: Option<Times>,
+    /// When the run was planned.
+    session: u64,
+}

@@ -1,0 +1,290 @@
+//! The limits by which the demo judges itself.
+
+use clap::Args;
+use runpage::Limit;
+
+use super::cost::Cost;
+use super::score::Score;
+use crate::views::ViewReport;
+
+/// Least share of the frames that must have a result, percent: below it little was seen of anything.
+const LEAST_RESULTS: f64 = 10.0;
+/// Least share of the results that must have a skeleton, percent.
+const LEAST_SKELETONS: f64 = 90.0;
+/// What a process that is killed may hold, and what its last report may not have counted: frames.
+const HELD: u64 = 2;
+
+/// Limits that can be asked for.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Limits")]
+pub(super) struct Asked {
+    /// Least PCP3D at gamma 0.5 over all results, percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
+    min_pcp3d: f64,
+    /// Longest time until the killed camera has a frame in a result again, milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 8000.0)]
+    max_return_ms: f64,
+    /// Longest time without a result while the killed camera is away, milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 2000.0)]
+    max_pause_ms: f64,
+}
+
+/// What is judged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured<'a> {
+    /// Frames that the cameras were to take.
+    pub n_frames: u64,
+    /// Results, and those of them with a skeleton.
+    pub n_results: [usize; 2],
+    /// Against the truth.
+    pub score: &'a Score,
+    /// Of the killed camera, if one was to be killed.
+    pub cost: Option<&'a Cost>,
+    /// The frames of every view.
+    pub views: &'a [ViewReport],
+    /// Processes that ended without being asked to, other than the one that was killed.
+    pub failed: &'a [String],
+    /// Results that were not written.
+    pub n_unwritten: u64,
+}
+
+/// Judges a run.
+pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
+    let [results, skeletons] = it.n_results;
+    let mut limits = vec![
+        at_least(
+            "frames with a result, %",
+            LEAST_RESULTS,
+            share(results, it.n_frames as usize),
+        ),
+        at_least(
+            "of these with a skeleton, %",
+            LEAST_SKELETONS,
+            share(skeletons, results),
+        ),
+        at_least("PCP3D at 0.5, %", asked.min_pcp3d, it.score.pcp3d_percent),
+    ];
+    if let Some(cost) = it.cost {
+        let without = (cost.results_without_it as f64, cost.killed_at_ms.is_some());
+        limits.extend([
+            at_most(
+                "killed camera back after, ms",
+                asked.max_return_ms,
+                cost.back_ms,
+            ),
+            at_least(
+                "results of the others meanwhile",
+                1.0,
+                without.1.then_some(without.0),
+            ),
+            at_most(
+                "longest pause of results meanwhile, ms",
+                asked.max_pause_ms,
+                cost.longest_pause_ms,
+            ),
+        ]);
+    }
+    let unanswered: u64 = it.views.iter().map(|it| it.unanswered).sum();
+    let may_be_lost = if it.cost.is_some() { HELD } else { 0 };
+    limits.extend([
+        at_most(
+            "frames whose end is not known",
+            may_be_lost as f64,
+            Some(unanswered as f64),
+        ),
+        Limit {
+            what: "processes that failed by themselves".to_owned(),
+            asked: "none".to_owned(),
+            got: if it.failed.is_empty() {
+                "none".to_owned()
+            } else {
+                it.failed.join(", ")
+            },
+            held: it.failed.is_empty(),
+        },
+        at_most("results not written", 0.0, Some(it.n_unwritten as f64)),
+    ]);
+    limits
+}
+
+fn share(n: usize, of: usize) -> Option<f64> {
+    (of > 0).then(|| 100.0 * n as f64 / of as f64)
+}
+
+fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
+    limit(
+        what,
+        format!("at least {asked}"),
+        got,
+        got.is_some_and(|it| it >= asked),
+    )
+}
+
+fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
+    limit(
+        what,
+        format!("at most {asked}"),
+        got,
+        got.is_some_and(|it| it <= asked),
+    )
+}
+
+/// What was not measured has not held.
+fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
+    let digits = |it: f64| usize::from(it.fract() != 0.0);
+    Limit {
+        what: what.to_owned(),
+        asked,
+        got: got.map_or_else(
+            || "nothing".to_owned(),
+            |it| format!("{it:.0$}", digits(it)),
+        ),
+        held,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ASKED: Asked = Asked {
+        min_pcp3d: 50.0,
+        max_return_ms: 8000.0,
+        max_pause_ms: 2000.0,
+    };
+
+    fn score(pcp3d_percent: Option<f64>) -> Score {
+        Score {
+            frames: 90,
+            pcp3d_percent,
+            mpjpe_mm: None,
+            lost_percent: None,
+            segments: Vec::new(),
+        }
+    }
+
+    fn cost() -> Cost {
+        Cost {
+            killed_at_ms: Some(9000.0),
+            back_ms: Some(1200.0),
+            results_without_it: 4,
+            longest_pause_ms: Some(420.0),
+            ..Cost::default()
+        }
+    }
+
+    fn view(unanswered: u64) -> ViewReport {
+        ViewReport {
+            name: "c1".to_owned(),
+            frames: 100,
+            used: 100 - unanswered,
+            empty: 0,
+            late: 0,
+            dropped: 0,
+            unanswered,
+            missing: Vec::new(),
+        }
+    }
+
+    /// What a good run leaves.
+    struct Run {
+        n_results: [usize; 2],
+        score: Score,
+        cost: Option<Cost>,
+        views: Vec<ViewReport>,
+        failed: Vec<String>,
+        n_unwritten: u64,
+    }
+
+    impl Run {
+        fn changed(change: impl FnOnce(&mut Self)) -> Self {
+            let mut run = Self {
+                n_results: [90, 88],
+                score: score(Some(70.0)),
+                cost: Some(cost()),
+                views: vec![view(1), view(1)],
+                failed: Vec::new(),
+                n_unwritten: 0,
+            };
+            change(&mut run);
+            run
+        }
+
+        fn changed_cost(&mut self, change: fn(&mut Cost)) {
+            self.cost.iter_mut().for_each(change);
+        }
+
+        fn limits(&self) -> Vec<Limit> {
+            let measured = Measured {
+                n_frames: 100,
+                n_results: self.n_results,
+                score: &self.score,
+                cost: self.cost.as_ref(),
+                views: &self.views,
+                failed: &self.failed,
+                n_unwritten: self.n_unwritten,
+            };
+            judge(&ASKED, &measured)
+        }
+    }
+
+    /// The limits that a changed run misses, by what they measure.
+    fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
+        let limits = Run::changed(change).limits().into_iter();
+        limits.filter(|it| !it.held).map(|it| it.what).collect()
+    }
+
+    #[test]
+    fn a_good_run_misses_nothing() {
+        assert_eq!(missed(|_| ()), Vec::<String>::new());
+        assert_eq!(Run::changed(|_| ()).limits().len(), 9);
+    }
+
+    #[test]
+    fn every_limit_can_be_missed_alone() {
+        type Change = fn(&mut Run);
+        let changes: [(Change, &str); 10] = [
+            (|it| it.n_results = [9, 9], "frames with a result, %"),
+            (|it| it.n_results = [90, 80], "of these with a skeleton, %"),
+            (|it| it.score = score(Some(49.9)), "PCP3D at 0.5, %"),
+            (|it| it.score = score(None), "PCP3D at 0.5, %"),
+            (
+                |it| it.changed_cost(|it| it.back_ms = Some(8001.0)),
+                "killed camera back after, ms",
+            ),
+            (
+                |it| it.changed_cost(|it| it.back_ms = None),
+                "killed camera back after, ms",
+            ),
+            (
+                |it| it.changed_cost(|it| it.results_without_it = 0),
+                "results of the others meanwhile",
+            ),
+            (
+                |it| it.changed_cost(|it| it.longest_pause_ms = Some(2001.0)),
+                "longest pause of results meanwhile, ms",
+            ),
+            (|it| it.views[0] = view(2), "frames whose end is not known"),
+            (
+                |it| it.failed.push("pose-1".to_owned()),
+                "processes that failed by themselves",
+            ),
+        ];
+        for (change, expected) in changes {
+            assert_eq!(missed(change), [expected]);
+        }
+        assert_eq!(missed(|it| it.n_unwritten = 1), ["results not written"]);
+    }
+
+    #[test]
+    fn a_camera_that_was_to_be_killed_and_was_not_is_a_miss() {
+        let got = missed(|it| it.cost = Some(Cost::default()));
+        assert_eq!(got.len(), 3, "{got:?}");
+    }
+
+    #[test]
+    fn where_nobody_is_killed_no_frame_may_be_lost() {
+        let got = missed(|it| it.cost = None);
+        assert_eq!(got, ["frames whose end is not known"]);
+    }
+}

@@ -1,0 +1,312 @@
+//! The page of the demo: what of its numbers stands where, and which pictures are shown.
+
+use std::path::Path;
+
+use image::codecs::jpeg::JpegEncoder;
+use runpage::{Eye, Mark, Page, Picture, Space, Strip, Table};
+use serde_json::Value;
+use skeleton::PARSE14;
+
+use super::cost::Cost;
+use super::report::Report;
+use super::results::Moment;
+use super::stage::Stage;
+use super::{Run, VICTIM};
+
+const JPEG_QUALITY: u8 = 88;
+
+/// Puts the page together.
+///
+/// * `folder`: results of the run, with the pictures.
+pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path) -> Page {
+    let clock = Clock::new(run);
+    let mut tables = Vec::new();
+    if let Some(cost) = &report.cost {
+        tables.push(of_cost(cost, &run.cameras[VICTIM]));
+    }
+    tables.extend([accuracy(report), latency(run), accounts(run)]);
+    Page {
+        title: "Parallax: the demo".to_owned(),
+        lead: format!(
+            "{} cameras saw a person who does not exist, {} frames at {} a second; {} processes ({}) and their \
+             supervisor made skeletons in space of it, {} of them.",
+            run.cameras.len(),
+            run.n_frames,
+            run.rate_hz,
+            run.processes.len(),
+            run.processes.join(", "),
+            run.moments.len(),
+        ),
+        limits: report.limits.clone(),
+        space: space(run, stage),
+        marks: marks(report.cost.as_ref(), &clock),
+        tables,
+        legend: "Thick and coloured: the pose that all views agreed on, right red, left blue; thin and grey: what the \
+                 view found alone; yellow lines: where the other views say that one shoulder must lie."
+            .to_owned(),
+        strips: strips(run, report.cost.as_ref(), folder),
+    }
+}
+
+/// From the clock of the run to seconds since the first frame.
+struct Clock {
+    first_ms: f64,
+}
+
+impl Clock {
+    fn new(run: &Run<'_>) -> Self {
+        let begin = |it: &Moment| Some(it.captured_ms()? - 1000.0 * it.frame as f64 / run.rate_hz);
+        let first = run.moments.iter().filter_map(begin).reduce(f64::min);
+        Self {
+            first_ms: first.unwrap_or(0.0),
+        }
+    }
+
+    fn seconds(&self, ms: f64) -> f64 {
+        (ms - self.first_ms) / 1000.0
+    }
+}
+
+fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
+    let Some(killed) = cost.and_then(|it| it.killed_at_ms) else {
+        return Vec::new();
+    };
+    let mark = |ms: f64, what: &str| Mark {
+        seconds: clock.seconds(ms),
+        what: what.to_owned(),
+    };
+    let back = cost.and_then(|it| it.back_ms);
+    let back = back.map(|it| mark(killed + it, "back"));
+    [mark(killed, "killed")].into_iter().chain(back).collect()
+}
+
+fn space(run: &Run<'_>, stage: &Stage) -> Space {
+    let moment = |(it, truth): (&Moment, &Vec<super::Point>)| runpage::Moment {
+        frame: it.frame,
+        seconds: it.frame as f64 / run.rate_hz,
+        found: it.joints.clone(),
+        truth: truth.clone(),
+        views: it.views.iter().map(|it| it.missing.clone()).collect(),
+    };
+    let up = stage.rig.up_in_world();
+    Space {
+        joints: PARSE14.joints.iter().map(|it| it.name.to_owned()).collect(),
+        limbs: PARSE14.limbs.to_vec(),
+        eyes: stage
+            .rig
+            .cameras()
+            .iter()
+            .map(|it| Eye {
+                name: it.name.clone(),
+                at: it.centre_in_world().coords.into(),
+                axis: it.axis_in_world().into_inner().into(),
+            })
+            .collect(),
+        up: up.map_or([0.0, 0.0, 1.0], |it| it.into_inner().into()),
+        moments: run.moments.iter().zip(run.truth).map(moment).collect(),
+    }
+}
+
+fn table<const N: usize>(heading: &str, note: &str, columns: [&str; N]) -> Table {
+    Table {
+        heading: heading.to_owned(),
+        note: note.to_owned(),
+        columns: columns.map(str::to_owned).into(),
+        rows: Vec::new(),
+    }
+}
+
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |it| format!("{it:.digits$}"))
+}
+
+fn of_cost(cost: &Cost, camera: &str) -> Table {
+    let note = format!(
+        "The process of {camera} was killed (SIGKILL) while it worked. Times are counted from there; only frames that \
+         a result has count as back."
+    );
+    let mut table = table("What the killed camera cost", &note, ["", ""]);
+    let ms = |it: Option<f64>| it.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"));
+    let count = |it: Option<u64>| it.map_or_else(|| "–".to_owned(), |it| it.to_string());
+    table.rows = [
+        ("its death was noticed after", ms(cost.noticed_ms)),
+        ("it was started again after", ms(cost.restarted_ms)),
+        (
+            "it sent a frame that has a result again after",
+            ms(cost.back_ms),
+        ),
+        ("its last frame before", count(cost.last_frame)),
+        ("its first frame after", count(cost.first_frame)),
+        (
+            "its frames in between, without a part in any result",
+            count(cost.frames_lost),
+        ),
+        (
+            "results of the other views in that time",
+            cost.results_without_it.to_string(),
+        ),
+        (
+            "longest time between two results then",
+            ms(cost.longest_pause_ms),
+        ),
+        (
+            "longest time between two results before the kill",
+            ms(cost.usual_pause_ms),
+        ),
+    ]
+    .map(|(what, value)| vec![what.to_owned(), value])
+    .into();
+    table
+}
+
+fn accuracy(report: &Report) -> Table {
+    let note = "PCP3D at gamma 0.5: segments whose ends are off by at most half their length in the mean; MPJPE: mean \
+                distance of the joints.";
+    let mut columns = vec![String::new()];
+    columns.extend(report.scores.iter().map(|it| it.0.to_owned()));
+    let scores = || report.scores.iter().map(|it| &it.1);
+    let row = |what: &str, cells: Vec<String>| [vec![what.to_owned()], cells].concat();
+    let mut rows = vec![
+        row(
+            "results",
+            scores().map(|it| it.frames.to_string()).collect(),
+        ),
+        row(
+            "PCP3D, %",
+            scores().map(|it| number(it.pcp3d_percent, 1)).collect(),
+        ),
+        row(
+            "MPJPE, mm",
+            scores().map(|it| number(it.mpjpe_mm, 0)).collect(),
+        ),
+        row(
+            "joints not found, %",
+            scores().map(|it| number(it.lost_percent, 1)).collect(),
+        ),
+    ];
+    for (nth, (name, _)) in report.scores[0].1.segments.iter().enumerate() {
+        let cells = scores().map(|it| number(it.segments[nth].1, 0));
+        rows.push(row(&format!("{name}, %"), cells.collect()));
+    }
+    Table {
+        columns,
+        rows,
+        ..table("Accuracy against the truth", note, [])
+    }
+}
+
+fn latency(run: &Run<'_>) -> Table {
+    let note = "Milliseconds of computing, by stage; end to end is from the capture of a frame to its skeleton in \
+                space, waiting for busy processes included. The cameras draw their pictures, which real ones do not.";
+    let mut table = table("Latency", note, ["stage", "frames", "p50", "p99", "max"]);
+    let latency = &run.ran.recorded()["latency"];
+    let stages = ["capture", "pose", "quality", "fuse", "triangulate"]
+        .map(|it| (it, &latency["stages"][it]));
+    let all = stages
+        .into_iter()
+        .chain([("end to end", &latency["end_to_end"])]);
+    let cell = |it: &Value| number(it.as_f64(), 1);
+    table.rows = all
+        .filter(|it| !it.1.is_null())
+        .map(|(name, it)| {
+            let count = it["count"].as_u64().unwrap_or(0).to_string();
+            let times = ["p50_ms", "p99_ms", "max_ms"].map(|key| cell(&it[key]));
+            [vec![name.to_owned(), count], times.into()].concat()
+        })
+        .collect();
+    table
+}
+
+fn accounts(run: &Run<'_>) -> Table {
+    let note = "Every frame of every view once: used in a result; nobody found; answered too late; passed over for want \
+                of time, or while its process was away; not known, since a killed process held it.";
+    let columns = [
+        "view",
+        "frames",
+        "used",
+        "empty",
+        "late",
+        "passed over",
+        "not known",
+    ];
+    let mut table = table("Frames accounted for", note, columns);
+    table.rows = run
+        .ran
+        .views()
+        .iter()
+        .map(|it| {
+            let counts = [
+                it.frames,
+                it.used,
+                it.empty,
+                it.late,
+                it.dropped,
+                it.unanswered,
+            ];
+            [
+                vec![it.name.clone()],
+                counts.map(|it| it.to_string()).into(),
+            ]
+            .concat()
+        })
+        .collect();
+    table
+}
+
+/// Some frames in all views: the first that was drawn, one before the kill, one without the camera, the last.
+fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
+    let file = |camera: &String, frame: u64| {
+        folder
+            .join("overlays")
+            .join(camera)
+            .join(format!("{frame:06}.png"))
+    };
+    let is_drawn = |it: &&Moment| {
+        run.cameras
+            .iter()
+            .any(|camera| file(camera, it.frame).exists())
+    };
+    let drawn: Vec<&Moment> = run.moments.iter().filter(is_drawn).collect();
+    let shown = chosen(&drawn, cost.and_then(|it| it.last_frame));
+    let picture = |moment: &Moment, view: usize| Picture {
+        caption: run.cameras[view].clone(),
+        jpeg: jpeg(&file(&run.cameras[view], moment.frame)).map_err(|_none| {
+            let why = moment.views[view].missing.as_deref();
+            why.unwrap_or("no picture").to_owned()
+        }),
+    };
+    let strip = |it: &&Moment| Strip {
+        caption: format!("frame {}, {:.1} s", it.frame, it.frame as f64 / run.rate_hz),
+        pictures: (0..run.cameras.len())
+            .map(|view| picture(it, view))
+            .collect(),
+    };
+    shown.iter().map(strip).collect()
+}
+
+/// * `killed_at`: the last frame of the killed camera.
+fn chosen<'a>(drawn: &[&'a Moment], killed_at: Option<u64>) -> Vec<&'a Moment> {
+    let middle = drawn.get(drawn.len() / 2).map_or(0, |it| it.frame);
+    let killed_at = killed_at.unwrap_or(middle);
+    let whole = |it: &&&Moment| it.views.iter().all(|it| it.missing.is_none());
+    let (before, after): (Vec<&Moment>, Vec<&Moment>) =
+        drawn.iter().partition(|it| it.frame <= killed_at);
+    let without = after.iter().find(|it| it.views[VICTIM].missing.is_some());
+    let last = [
+        before.iter().find(whole),
+        before.iter().rev().find(whole),
+        without,
+        after.iter().rev().find(whole),
+    ];
+    let mut shown: Vec<&Moment> = last.into_iter().flatten().copied().collect();
+    shown.dedup_by_key(|it| it.frame);
+    shown
+}
+
+/// A picture of the recorder, smaller.
+fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
+    let picture = image::open(file)?.into_rgb8();
+    let mut bytes = Vec::new();
+    picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
+    Ok(bytes)
+}

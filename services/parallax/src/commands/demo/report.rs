@@ -1,0 +1,138 @@
+//! What the demo found out: numbers, verdicts, and both as text and as JSON.
+
+use core::fmt::Write as _;
+use std::path::Path;
+
+use runpage::Limit;
+use serde_json::{Value, json};
+
+use super::cost::Cost;
+use super::limits::{self, Asked, Measured};
+use super::results::Moment;
+use super::score::{GAMMA, Score, score};
+use super::{Run, VICTIM};
+
+/// What the demo found out.
+#[derive(Debug)]
+pub(super) struct Report {
+    /// Against the truth: all results, those with every view, those without the killed one.
+    pub scores: [(&'static str, Score); 3],
+    /// What the killed camera cost, if one was to be killed.
+    pub cost: Option<Cost>,
+    /// The verdicts.
+    pub limits: Vec<Limit>,
+}
+
+impl Report {
+    /// Judges a run.
+    pub(super) fn new(run: &Run<'_>, asked: &Asked) -> Self {
+        let of = |wanted: &dyn Fn(&Moment) -> bool| {
+            let pairs = run.moments.iter().zip(run.truth);
+            let those = pairs.filter(|it| wanted(it.0));
+            score(those.map(|it| (&it.0.joints[..], &it.1[..])))
+        };
+        let scores = [
+            ("all results", of(&|_| true)),
+            (
+                "with every camera",
+                of(&|it| it.views.iter().all(|it| it.missing.is_none())),
+            ),
+            (
+                "without the killed one",
+                of(&|it| it.views[VICTIM].missing.is_some()),
+            ),
+        ];
+        let cost = run
+            .killed
+            .map(|it| Cost::new(VICTIM, it, run.session, run.moments));
+        let posed = run.moments.iter().filter(|it| it.is_posed()).count();
+        let count = |key: &str| run.ran.recorded()["summary"][key].as_u64();
+        let unwritten = ["writes_failed", "frames_not_recorded"].map(count);
+        let measured = Measured {
+            n_frames: run.n_frames,
+            n_results: [run.moments.len(), posed],
+            score: &scores[0].1,
+            cost: cost.as_ref(),
+            views: run.ran.views(),
+            failed: &failed(run, cost.as_ref()),
+            n_unwritten: unwritten.iter().flatten().sum(),
+        };
+        let limits = limits::judge(asked, &measured);
+        Self {
+            scores,
+            cost,
+            limits,
+        }
+    }
+
+    /// Whether no limit was missed.
+    pub(super) fn is_held(&self) -> bool {
+        self.limits.iter().all(|it| it.held)
+    }
+
+    /// For programs; `report.json`.
+    pub(super) fn json(&self, run: &Run<'_>) -> Value {
+        let limit = |it: &Limit| json!({ "what": it.what, "asked": it.asked, "measured": it.got, "held": it.held });
+        let [all, complete, without] = &self.scores;
+        json!({
+            "schema_version": 1,
+            "held": self.is_held(),
+            "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
+            "frames": run.n_frames,
+            "frames_with_result": run.moments.len(),
+            "frame_rate_hz": run.rate_hz,
+            "processes": run.processes,
+            "gamma": GAMMA,
+            "accuracy": { "all": all.1, "every_camera": complete.1, "without_killed": without.1 },
+            "killed_camera": self.cost.as_ref().map(|_| &run.cameras[VICTIM]),
+            "killed": self.cost,
+            "run": run.ran.json(),
+        })
+    }
+
+    /// For people.
+    pub(super) fn text(&self, folder: &Path) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _infallible = self.write(&mut text, folder);
+        text.trim_end().to_owned()
+    }
+
+    fn write(&self, text: &mut String, folder: &Path) -> core::fmt::Result {
+        writeln!(text, "\naccuracy against the truth")?;
+        for (name, score) in &self.scores {
+            if let (Some(pcp3d), Some(mpjpe)) = (score.pcp3d_percent, score.mpjpe_mm) {
+                let frames = score.frames;
+                writeln!(
+                    text,
+                    "  {name:<24} PCP3D {pcp3d:>5.1} %   MPJPE {mpjpe:>4.0} mm   {frames} results"
+                )?;
+            }
+        }
+        writeln!(text, "limits")?;
+        for it in &self.limits {
+            let word = if it.held { "held  " } else { "MISSED" };
+            writeln!(
+                text,
+                "  {word} {:<40} {:>12}   {}",
+                it.what, it.asked, it.got
+            )?;
+        }
+        writeln!(text, "report {}", folder.join("report.html").display())
+    }
+}
+
+/// Processes that ended without being asked to, but for the one that was killed, once.
+fn failed(run: &Run<'_>, cost: Option<&Cost>) -> Vec<String> {
+    let killed = format!("capture-{VICTIM}");
+    let was_killed = cost.is_some_and(|it| it.killed_at_ms.is_some());
+    let by_themselves = run.ran.restarts().iter().filter_map(|(name, n)| {
+        let asked_for = u32::from(was_killed && *name == killed);
+        (*n > asked_for).then_some(name)
+    });
+    let given_up = run.ran.given_up().iter();
+    let mut failed: Vec<String> = by_themselves.chain(given_up).cloned().collect();
+    failed.sort();
+    failed.dedup();
+    failed
+}

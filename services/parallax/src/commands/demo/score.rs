@@ -1,0 +1,108 @@
+//! How far what was found is from the truth: PCP3D and MPJPE of some results.
+
+use evaluation::{joint_errors, segment_errors, segments};
+use serde::Serialize;
+use skeleton::PARSE14;
+
+use super::Point;
+
+/// The threshold of PCP3D, by convention.
+pub(super) const GAMMA: f64 = 0.5;
+
+/// Errors over some results.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Score {
+    /// Results that were judged.
+    pub frames: usize,
+    /// Percentage of segments whose mean end error is at most half their length; a segment that was not found
+    /// is wrong. None without results.
+    pub pcp3d_percent: Option<f64>,
+    /// Mean distance of the joints that were found, millimetres.
+    pub mpjpe_mm: Option<f64>,
+    /// Joints that were not found, percent.
+    pub lost_percent: Option<f64>,
+    /// PCP3D of every segment.
+    pub segments: Vec<(&'static str, Option<f64>)>,
+}
+
+/// Compares results with the truth.
+///
+/// * `pairs`: the joints of `skeleton::PARSE14` that were found, and where they are, metres.
+pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
+    let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
+    // By segment: right ones, and all.
+    let mut right = vec![[0_usize; 2]; segments.len()];
+    let (mut distances, mut n_joints, mut frames) = (Vec::new(), 0_usize, 0);
+    for (found, truth) in pairs {
+        let truth: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
+        let errors = segment_errors(&segments, found, &truth);
+        for (count, error) in right.iter_mut().zip(errors.iter().flatten()) {
+            count[0] += usize::from(*error <= GAMMA);
+            count[1] += 1;
+        }
+        let errors = joint_errors(found, &truth);
+        n_joints += errors.len();
+        distances.extend(errors.into_iter().flatten().filter(|it| it.is_finite()));
+        frames += 1;
+    }
+    let share = |n: usize, of: usize| (of > 0).then(|| 100.0 * n as f64 / of as f64);
+    let all = right
+        .iter()
+        .fold([0; 2], |sum, it| [sum[0] + it[0], sum[1] + it[1]]);
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    Score {
+        frames,
+        pcp3d_percent: share(all[0], all[1]),
+        mpjpe_mm: (!distances.is_empty()).then_some(1000.0 * mean),
+        lost_percent: share(n_joints - distances.len(), n_joints),
+        segments: segments
+            .iter()
+            .zip(&right)
+            .map(|(it, count)| (it.name, share(count[0], count[1])))
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fourteen joints in a row, 0.1 m apart.
+    fn truth() -> Vec<Point> {
+        (0..14).map(|it| [0.1 * f64::from(it), 0.0, 0.0]).collect()
+    }
+
+    #[test]
+    fn the_truth_itself_is_right_and_a_long_way_off_is_wrong() {
+        let truth = truth();
+        let found: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
+        let far: Vec<Option<Point>> = truth.iter().map(|it| Some([it[0], 9.0, 0.0])).collect();
+        let pair = |it| (it, &truth[..]);
+        let good = score([pair(&found[..])].into_iter());
+        assert_eq!(
+            (good.frames, good.pcp3d_percent, good.mpjpe_mm),
+            (1, Some(100.0), Some(0.0))
+        );
+        let both = score([pair(&found[..]), pair(&far[..])].into_iter());
+        assert_eq!((both.frames, both.pcp3d_percent), (2, Some(50.0)));
+        assert!((both.mpjpe_mm.unwrap() - 4500.0).abs() < 1e-9);
+        assert_eq!(both.segments.len(), 12);
+    }
+
+    #[test]
+    fn what_was_not_found_is_wrong_but_has_no_distance() {
+        let (truth, nothing) = (truth(), vec![None; 14]);
+        let got = score([(&nothing[..], &truth[..])].into_iter());
+        assert_eq!((got.pcp3d_percent, got.mpjpe_mm), (Some(0.0), None));
+        assert_eq!(got.lost_percent, Some(100.0));
+    }
+
+    #[test]
+    fn without_results_there_are_no_numbers() {
+        let got = score(core::iter::empty());
+        assert_eq!(
+            (got.frames, got.pcp3d_percent, got.lost_percent),
+            (0, None, None)
+        );
+    }
+}

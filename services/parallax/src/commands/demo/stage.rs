@@ -1,0 +1,161 @@
+//! The person, the cameras and the deployment of the demo.
+
+use std::path::{Path, PathBuf};
+
+use geometry::files::Format as RigFormat;
+use geometry::{Camera, Intrinsics, Rig};
+use runtime::{ExitKind, Failure, OrFail as _};
+use scene::{Action, Address, RigChoice, Scene, Settings};
+
+use super::{Arguments, Point};
+use crate::inputs;
+
+/// Cameras, evenly around the stage.
+const N_CAMERAS: usize = 4;
+/// How far from its middle, and how high, metres.
+const RADIUS: f64 = 4.2;
+const HEIGHT: f64 = 1.5;
+/// Pixels of a picture per pixel of a ring's: 320x240, so that two cores can make and solve four of them.
+const SCALE: f64 = 0.5;
+/// Every so manieth frame is drawn.
+const OVERLAY_EVERY: u64 = 4;
+
+/// Who is seen by whom.
+#[derive(Debug)]
+pub(super) struct Stage {
+    pub folder: PathBuf,
+    pub rig: Rig,
+    pub settings: Settings,
+}
+
+impl Stage {
+    /// Makes the cameras, and the folder.
+    ///
+    /// * `folder`: absolute.
+    pub(super) fn new(arguments: &Arguments, folder: PathBuf) -> Result<Self, Failure> {
+        std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        let ring = RigChoice::Ring {
+            n: N_CAMERAS,
+            radius: RADIUS,
+            height: HEIGHT,
+        };
+        let ring = ring.rig().or_fail(ExitKind::Run)?;
+        let cameras = ring.cameras().iter().map(smaller).collect();
+        Ok(Self {
+            rig: Rig::new(cameras, ring.up_in_world(), ring.source()).or_fail(ExitKind::Run)?,
+            settings: Settings {
+                rig: RigChoice::File(folder.join("rig.toml")),
+                subject: arguments.subject,
+                action: arguments.action,
+                seed: arguments.seed,
+                rate_hz: arguments.rate,
+                ..Settings::default()
+            },
+            folder,
+        })
+    }
+
+    /// Writes the rig and the deployment; its file.
+    pub(super) fn write(&self, arguments: &Arguments) -> Result<PathBuf, Failure> {
+        let rig = self.folder.join("rig.toml");
+        geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
+        let file = self.folder.join("deployment.toml");
+        let text = self.deployment(arguments);
+        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
+        Ok(file)
+    }
+
+    fn deployment(&self, arguments: &Arguments) -> String {
+        let quoted = |it: &str| toml::Value::from(it).to_string();
+        let settings = Settings {
+            rig: RigChoice::File(PathBuf::from("rig.toml")),
+            ..self.settings.clone()
+        };
+        let camera = |it: &Camera| {
+            let address = Address {
+                settings: settings.clone(),
+                camera: it.name.clone(),
+                n_frames: arguments.n_frames(),
+            };
+            let (name, source) = (quoted(&it.name), quoted(&address.to_string()));
+            format!("\n[[camera]]\nname = {name}\nsource = {source}\n")
+        };
+        let cameras: Vec<String> = self.rig.cameras().iter().map(camera).collect();
+        format!(
+            "# Written by `parallax demo`: subject {}, {}, before cameras that make their pictures while they run.\n\
+             # The same without a killed camera and without the truth: parallax run deployment.toml\n\n\
+             name = {}\nrig = \"rig.toml\"\noutput = \"run\"\n{}\n\
+             [capture]\nmode = \"realtime\"       # keep up with the clock; what there is no time for is dropped and counted\n\
+             pace = \"realtime\"\nframe_rate_hz = {:?}\n\n\
+             [pose]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n\
+             [record]\noverlay_every = {OVERLAY_EVERY}\n",
+            self.settings.subject,
+            self.settings.action.name(),
+            quoted(&arguments.name),
+            cameras.concat(),
+            self.settings.rate_hz,
+        )
+    }
+
+    /// Where the joints of `skeleton::PARSE14` are in some frames, metres in the world.
+    pub(super) fn truth(
+        &self,
+        frames: impl Iterator<Item = u64>,
+    ) -> Result<Vec<Vec<Point>>, Failure> {
+        let scene = Scene::new(&self.settings).or_fail(ExitKind::Run)?;
+        let joints = frames.map(|it| scene.joints(scene.seconds(it)).to_vec());
+        Ok(joints.collect())
+    }
+}
+
+/// The camera with pictures of fewer pixels.
+fn smaller(camera: &Camera) -> Camera {
+    let it = camera.intrinsics;
+    // The centre of the top-left pixel is at 0.
+    let centre = |at: f64| SCALE * (at + 0.5) - 0.5;
+    Camera {
+        intrinsics: Intrinsics {
+            fx: SCALE * it.fx,
+            fy: SCALE * it.fy,
+            cx: centre(it.cx),
+            cy: centre(it.cy),
+            size: it.size.map(|side| (SCALE * f64::from(side)) as u32),
+            lens: it.lens,
+        },
+        ..camera.clone()
+    }
+}
+
+/// The action of a name, for the command line.
+pub(super) fn action(name: &str) -> Result<Action, String> {
+    let known = || Action::ALL.map(Action::name).join(", ");
+    Action::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
+}
+
+/// An absolute path, for processes that work in any folder.
+pub(super) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
+    std::path::absolute(folder).or_fail(ExitKind::Usage)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn a_smaller_picture_shows_the_same_in_half_the_pixels() {
+        let ring = RigChoice::parse("ring:4").unwrap().rig().unwrap();
+        for camera in ring.cameras() {
+            let half = smaller(camera);
+            assert_eq!(half.intrinsics.size, [320, 240]);
+            for point in [Point3::new(0.0, 0.0, 0.9), Point3::new(0.5, -0.3, 1.7)] {
+                let whole = camera.project(&point).unwrap();
+                let seen = half.project(&point).unwrap();
+                // A pixel of the half picture covers two by two.
+                assert!((2.0 * seen.x + 0.5 - whole.x).abs() < 1e-9);
+                assert!((2.0 * seen.y + 0.5 - whole.y).abs() < 1e-9);
+            }
+        }
+    }
+}
