@@ -38,11 +38,11 @@ was there when; what the killed camera cost; latency of every stage; every frame
 skeletons), report.json (the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs \
 them again), and run/, the results as any run leaves them. Files of an earlier demo are replaced.
 
-It judges itself, by limits that a broken pipeline would miss: of the frames 10 % have a result (slow machines pass \
-frames over, which is counted), of the results 90 % a skeleton; PCP3D of all results is at least --min-pcp3d; the \
-killed camera is back within --max-return-ms; the others gave results without it meanwhile, with no pause longer than \
---max-pause-ms; what became of every frame of every view is known, but for two that a killed process may have held; \
-no other process failed; all results were written.
+It judges itself, by limits that a broken pipeline would miss: --min-results of the frames have a result, \
+--min-skeletons of these a skeleton, and PCP3D of all of them is at least --min-pcp3d; the killed camera is back within \
+--max-return-ms; the others gave results without it meanwhile, with no pause longer than --max-pause-ms; what became \
+of every frame of every view is known, but for two that a killed process may have held; no other process failed; all \
+results were written.
 
 Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
@@ -77,6 +77,9 @@ pub(crate) struct Arguments {
     /// Seed of the performance, the room and the lamps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// How long a stage waits for a view that is late, milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..=60_000))]
+    deadline_ms: u64,
     /// Kill no process.
     #[arg(long)]
     no_kill: bool,

@@ -7,10 +7,6 @@ use super::cost::Cost;
 use super::score::Score;
 use crate::views::ViewReport;
 
-/// Least share of the frames that must have a result, percent: below it little was seen of anything.
-const LEAST_RESULTS: f64 = 10.0;
-/// Least share of the results that must have a skeleton, percent.
-const LEAST_SKELETONS: f64 = 90.0;
 /// What a process that is killed may hold, and what its last report may not have counted: frames.
 const HELD: u64 = 2;
 
@@ -18,6 +14,12 @@ const HELD: u64 = 2;
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 pub(super) struct Asked {
+    /// Least share of the frames with a result, percent; slow machines pass frames over, which is counted.
+    #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
+    min_results: f64,
+    /// Least share of the results with a skeleton, percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
+    min_skeletons: f64,
     /// Least PCP3D at gamma 0.5 over all results, percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     min_pcp3d: f64,
@@ -54,12 +56,12 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
     let mut limits = vec![
         at_least(
             "frames with a result, %",
-            LEAST_RESULTS,
+            asked.min_results,
             share(results, it.n_frames as usize),
         ),
         at_least(
             "of these with a skeleton, %",
-            LEAST_SKELETONS,
+            asked.min_skeletons,
             share(skeletons, results),
         ),
         at_least("PCP3D at 0.5, %", asked.min_pcp3d, it.score.pcp3d_percent),
@@ -148,6 +150,8 @@ mod tests {
     use super::*;
 
     const ASKED: Asked = Asked {
+        min_results: 10.0,
+        min_skeletons: 90.0,
         min_pcp3d: 50.0,
         max_return_ms: 8000.0,
         max_pause_ms: 2000.0,

@@ -1,0 +1,92 @@
+//! The demo, as a new user starts it, but shorter: real processes, a real kill, the report.
+
+mod common;
+
+use std::fs;
+
+use common::{Case, Ended};
+use serde_json::{Value, json};
+
+/// Runs a short demo in a folder of its own; the folder, how it ended, and `report.json`.
+fn demo(name: &str, more: &[&str]) -> (Case, Ended, Value) {
+    let case = Case::new(name, &[1, 1], "");
+    let plain = ["demo", "--out", "demo", "--name", &case.name, "--json"];
+    let ended = case.start(&[&plain, more].concat()).wait();
+    case.assert_nothing_left();
+    let report = fs::read_to_string(case.path("demo/report.json")).unwrap_or_default();
+    let report = serde_json::from_str(&report).unwrap_or(Value::Null);
+    (case, ended, report)
+}
+
+/// The limits that were missed.
+fn missed(report: &Value) -> Vec<&str> {
+    let limits = report["limits"].as_array().unwrap();
+    let missed = limits.iter().filter(|it| it["held"] == false);
+    missed.map(|it| it["what"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
+    // Patient: a machine that is busy may take its time.
+    let patient = ["--max-return-ms", "30000", "--max-pause-ms", "20000"];
+    let short = ["--frames", "30", "--rate", "2", "--min-pcp3d", "30"];
+    let lenient = ["--min-results", "5", "--min-skeletons", "30"];
+    let (case, ended, report) = demo("demo", &[&short[..], &patient, &lenient].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
+    assert_eq!(missed(&report), Vec::<&str>::new());
+    let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(
+        printed, report,
+        "the same on standard output and in the file"
+    );
+
+    let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
+    let killed = &report["killed"];
+    assert_eq!(report["killed_camera"], "c3");
+    assert!(
+        number(&killed["back_ms"]) > number(&killed["restarted_ms"]),
+        "{killed:#}"
+    );
+    assert!(
+        killed["first_frame"].as_u64() > killed["last_frame"].as_u64(),
+        "{killed:#}"
+    );
+    assert!(number(&killed["results_without_it"]) >= 1.0, "{killed:#}");
+    let restarts = json!([{ "process": "capture-2", "restarts": 1 }]);
+    assert_eq!(report["run"]["restarts"], restarts);
+    let accuracy = &report["accuracy"]["all"];
+    let [pcp3d, mpjpe] = ["pcp3d_percent", "mpjpe_mm"].map(|key| number(&accuracy[key]));
+    assert!((30.0..=100.0).contains(&pcp3d), "{accuracy:#}");
+    assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");
+    for view in report["run"]["views"].as_array().unwrap() {
+        let parts = ["used", "empty", "late", "dropped", "unanswered"];
+        let sum: u64 = parts.iter().map(|it| view[it].as_u64().unwrap()).sum();
+        assert_eq!(sum, 30, "{view:#}");
+    }
+
+    let page = fs::read_to_string(case.path("demo/report.html")).unwrap();
+    for words in [
+        "All 9 limits held",
+        "killed",
+        "process lost",
+        "data:image/jpeg;base64,",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(page.len() < 4_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn a_missed_limit_has_an_exit_code_of_its_own_and_is_named() {
+    let impossible = ["--frames", "12", "--no-kill", "--min-pcp3d", "101"];
+    let (case, ended, report) = demo("demo-missed", &impossible);
+    assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
+    assert!(missed(&report).contains(&"PCP3D at 0.5, %"), "{report:#}");
+    assert_eq!(
+        (&report["held"], &report["killed"]),
+        (&json!(false), &Value::Null)
+    );
+    assert_eq!(report["run"]["restarts"], json!([]), "nobody was killed");
+    let page = fs::read_to_string(case.path("demo/report.html")).unwrap();
+    assert!(page.contains("limits missed"));
+}
