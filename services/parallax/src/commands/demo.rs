@@ -9,7 +9,7 @@ mod score;
 mod stage;
 mod strike;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
@@ -23,7 +23,7 @@ use crate::{inputs, output};
 use limits::Asked;
 use report::Report;
 use results::Moment;
-use stage::Stage;
+use stage::{REPORTS, Stage};
 use strike::{Strike, Times};
 
 const HELP: &str = "\
@@ -150,8 +150,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let report = Report::new(&run, &arguments.limits);
     let json = report.json(&run);
     let page = page::page(&run, &report, &stage, &loaded.deployment.output);
-    write(&stage.folder, "report.json", &format!("{json:#}\n"))?;
-    write(&stage.folder, "report.html", &runpage::html(&page))?;
+    for (name, text) in REPORTS
+        .into_iter()
+        .zip([format!("{json:#}\n"), runpage::html(&page)])
+    {
+        let file = stage.folder.join(name);
+        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
+    }
     if arguments.json {
         output::json(&json)?;
     } else if !globals.quiet {
@@ -175,11 +180,6 @@ fn announce(arguments: &Arguments, globals: Globals, stage: &Stage, n_processes:
         "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
         stage.folder.display()
     ));
-}
-
-fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
-    let file = folder.join(name);
-    std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))
 }
 
 /// A run that is over, and all that is known of it.

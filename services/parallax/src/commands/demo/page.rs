@@ -292,13 +292,13 @@ fn chosen<'a>(drawn: &[&'a Moment], killed_at: Option<u64>) -> Vec<&'a Moment> {
     let (before, after): (Vec<&Moment>, Vec<&Moment>) =
         drawn.iter().partition(|it| it.frame <= killed_at);
     let without = after.iter().find(|it| it.views[VICTIM].missing.is_some());
-    let last = [
+    let four = [
         before.iter().find(whole),
         before.iter().rev().find(whole),
         without,
         after.iter().rev().find(whole),
     ];
-    let mut shown: Vec<&Moment> = last.into_iter().flatten().copied().collect();
+    let mut shown: Vec<&Moment> = four.into_iter().flatten().copied().collect();
     shown.dedup_by_key(|it| it.frame);
     shown
 }
@@ -309,4 +309,50 @@ fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = Vec::new();
     picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::results::Seen;
+    use super::*;
+
+    /// A frame that was drawn, with all four cameras or without the killed one.
+    fn drawn(frame: u64, is_whole: bool) -> Moment {
+        let mut views = vec![Seen::default(); 4];
+        views[VICTIM].missing = (!is_whole).then(|| "process lost".to_owned());
+        Moment {
+            frame,
+            sent_ms: 0.0,
+            joints: Vec::new(),
+            views,
+        }
+    }
+
+    fn frames(of: &[(u64, bool)], killed_at: Option<u64>) -> Vec<u64> {
+        let moments: Vec<Moment> = of.iter().map(|it| drawn(it.0, it.1)).collect();
+        let all: Vec<&Moment> = moments.iter().collect();
+        chosen(&all, killed_at).iter().map(|it| it.frame).collect()
+    }
+
+    #[test]
+    fn pictures_are_of_before_the_kill_of_the_absence_and_of_afterwards() {
+        let run = [
+            (0, true),
+            (4, true),
+            (8, false),
+            (12, true),
+            (44, false),
+            (48, false),
+            (52, true),
+            (96, true),
+        ];
+        assert_eq!(frames(&run, Some(40)), [0, 12, 44, 96]);
+    }
+
+    #[test]
+    fn where_little_was_drawn_little_is_shown_and_nothing_twice() {
+        assert_eq!(frames(&[], Some(40)), [0; 0]);
+        assert_eq!(frames(&[(4, true)], Some(40)), [4]);
+        assert_eq!(frames(&[(0, true), (4, true), (8, true)], None), [0, 4, 8]);
+    }
 }

@@ -20,6 +20,9 @@ const SCALE: f64 = 0.5;
 /// Every so manieth frame is drawn.
 const OVERLAY_EVERY: u64 = 4;
 
+/// What is written at the end: for programs, for people.
+pub(super) const REPORTS: [&str; 2] = ["report.json", "report.html"];
+
 /// Who is seen by whom.
 #[derive(Debug)]
 pub(super) struct Stage {
@@ -34,6 +37,13 @@ impl Stage {
     /// * `folder`: absolute.
     pub(super) fn new(arguments: &Arguments, folder: PathBuf) -> Result<Self, Failure> {
         std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        // An earlier demo's must not be taken for this one's.
+        for name in REPORTS {
+            let file = folder.join(name);
+            if file.exists() {
+                std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
+            }
+        }
         let ring = RigChoice::Ring {
             n: N_CAMERAS,
             radius: RADIUS,
