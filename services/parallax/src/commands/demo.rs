@@ -40,7 +40,8 @@ them again), and run/, the results as any run leaves them. Files of an earlier d
 
 It judges itself, by limits that a broken pipeline would miss: --min-results of the frames have a result, \
 --min-skeletons of these a skeleton, and PCP3D of all of them is at least --min-pcp3d; the killed camera is back within \
---max-return-ms; the others gave results without it meanwhile, with no pause longer than --max-pause-ms; what became \
+--max-return-ms; the others gave results without it meanwhile, if it was away for longer than \
+results are apart and a stage waits, with no pause longer than --max-pause-ms; what became \
 of every frame of every view is known, but for two that a killed process may have held; no other process failed; all \
 results were written.
 
@@ -140,6 +141,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         cameras: &cameras,
         n_frames: arguments.n_frames(),
         rate_hz: arguments.rate,
+        deadline_ms: arguments.deadline_ms as f64,
         processes: &processes,
         ran: &ran,
         truth: &stage.truth(moments.iter().map(|it| it.frame))?,
@@ -190,6 +192,8 @@ struct Run<'a> {
     /// Frames of every camera, and how many a second.
     n_frames: u64,
     rate_hz: f64,
+    /// How long a stage waits for a view that is late.
+    deadline_ms: f64,
     /// Names of all processes but the supervisor.
     processes: &'a [String],
     /// What `run` says of it.

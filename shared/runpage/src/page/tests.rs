@@ -1,3 +1,5 @@
+//! What the page says where, and that it asks for nothing.
+
 use serde_json::Value;
 
 use super::*;

@@ -22,7 +22,7 @@ pub(super) struct Cost {
     pub first_frame: Option<u64>,
     /// Its frames in between.
     pub frames_lost: Option<u64>,
-    /// Results that the other views gave without it while it was away.
+    /// Results that the other views gave of the frames in between.
     pub results_without_it: usize,
     /// Longest time between two results while it was away.
     pub longest_pause_ms: Option<f64>,
@@ -54,9 +54,10 @@ impl Cost {
             .iter()
             .find(|it| it.views[view].shot.is_some_and(|it| it.epoch > 0));
         let end = end.map_or(f64::INFINITY, |it| it.sent_ms);
-        let away = moments.iter().filter(|it| {
-            it.sent_ms > killed_at && it.sent_ms < end && it.views[view].missing.is_some()
-        });
+        // By frames, for what was taken meanwhile may have its result a little later.
+        let after_last = |it: &&Moment| last.is_none_or(|last| it.frame > last.0);
+        let before_first = |it: &&Moment| first.is_none_or(|first| it.frame < first.0);
+        let away = moments.iter().filter(after_last).filter(before_first);
         Self {
             killed_at_ms: Some(killed_at),
             noticed_ms: times.noticed.map(after),

@@ -42,6 +42,8 @@ pub(super) struct Measured<'a> {
     pub score: &'a Score,
     /// Of the killed camera, if one was to be killed.
     pub cost: Option<&'a Cost>,
+    /// How long a stage waits for a view that is late.
+    pub deadline_ms: f64,
     /// The frames of every view.
     pub views: &'a [ViewReport],
     /// Processes that ended without being asked to, other than the one that was killed.
@@ -67,18 +69,15 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
         at_least("PCP3D at 0.5, %", asked.min_pcp3d, it.score.pcp3d_percent),
     ];
     if let Some(cost) = it.cost {
-        let without = (cost.results_without_it as f64, cost.killed_at_ms.is_some());
+        let results = cost.killed_at_ms.map(|_| cost.results_without_it as f64);
+        let least = f64::from(u8::from(must_be_seen(cost, it.deadline_ms)));
         limits.extend([
             at_most(
                 "killed camera back after, ms",
                 asked.max_return_ms,
                 cost.back_ms,
             ),
-            at_least(
-                "results of the others meanwhile",
-                1.0,
-                without.1.then_some(without.0),
-            ),
+            at_least("results of the others meanwhile", least, results),
             at_most(
                 "longest pause of results meanwhile, ms",
                 asked.max_pause_ms,
@@ -107,6 +106,13 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
         at_most("results not written", 0.0, Some(it.n_unwritten as f64)),
     ]);
     limits
+}
+
+/// Whether it was away for so long that the others must have given results meanwhile: longer than results
+/// are apart anyway, and than a stage waits for a view.
+fn must_be_seen(cost: &Cost, deadline_ms: f64) -> bool {
+    let away = cost.back_ms.unwrap_or(f64::INFINITY);
+    away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms
 }
 
 fn share(n: usize, of: usize) -> Option<f64> {
@@ -172,6 +178,7 @@ mod tests {
             killed_at_ms: Some(9000.0),
             back_ms: Some(1200.0),
             results_without_it: 4,
+            usual_pause_ms: Some(300.0),
             longest_pause_ms: Some(420.0),
             ..Cost::default()
         }
@@ -224,6 +231,7 @@ mod tests {
                 n_results: self.n_results,
                 score: &self.score,
                 cost: self.cost.as_ref(),
+                deadline_ms: 500.0,
                 views: &self.views,
                 failed: &self.failed,
                 n_unwritten: self.n_unwritten,
@@ -284,6 +292,19 @@ mod tests {
     fn a_camera_that_was_to_be_killed_and_was_not_is_a_miss() {
         let got = missed(|it| it.cost = Some(Cost::default()));
         assert_eq!(got.len(), 3, "{got:?}");
+    }
+
+    #[test]
+    fn who_was_back_at_once_was_not_missed() {
+        let back = |ms: f64| {
+            move |it: &mut Run| {
+                if let Some(cost) = &mut it.cost {
+                    (cost.results_without_it, cost.back_ms) = (0, Some(ms));
+                }
+            }
+        };
+        assert_eq!(missed(back(1099.0)), Vec::<String>::new());
+        assert_eq!(missed(back(1101.0)), ["results of the others meanwhile"]);
     }
 
     #[test]

@@ -142,7 +142,7 @@ fn of_cost(cost: &Cost, camera: &str) -> Table {
             count(cost.frames_lost),
         ),
         (
-            "results of the other views in that time",
+            "results of the other views of these frames",
             cost.results_without_it.to_string(),
         ),
         (

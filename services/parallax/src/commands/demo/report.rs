@@ -53,6 +53,7 @@ impl Report {
             n_results: [run.moments.len(), posed],
             score: &scores[0].1,
             cost: cost.as_ref(),
+            deadline_ms: run.deadline_ms,
             views: run.ran.views(),
             failed: &failed(run, cost.as_ref()),
             n_unwritten: unwritten.iter().flatten().sum(),
