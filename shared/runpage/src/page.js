@@ -25,7 +25,7 @@ const floor = among(up, 0.01);
 const middle = [[east, among(east, 0.5)], [north, among(north, 0.5)], [up, floor + 0.9]]
   .reduce((sum, [axis, at]) => add(sum, axis, at), [0, 0, 0]);
 
-const view = { yaw: 0.6, pitch: 0.3, far: 6.5 };
+const view = { yaw: 0.6, pitch: 0.35, far: 8 };
 let nth = 0;
 let playing = true;
 
@@ -79,7 +79,7 @@ function drawStage(moment) {
 
 function colourOf(from, to) {
   const side = (joint) => ["right", "left"].find((it) => data.joints[joint].startsWith(it));
-  return { right: "#ef6a7c", left: "#6f94ff" }[side(from) || side(to)] || "#45c9b6";
+  return { right: "#e69f00", left: "#56b4e9" }[side(from) || side(to)] || "#45c9b6";
 }
 
 function draw() {

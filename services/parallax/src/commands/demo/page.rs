@@ -41,8 +41,8 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
         space: space(run, stage),
         marks: marks(report.cost.as_ref(), &clock),
         tables,
-        legend: "Thick and coloured: the pose that all views agreed on, right red, left blue; thin and grey: what the \
-                 view found alone; yellow lines: where the other views say that one shoulder must lie."
+        legend: "Thick: the pose that all views agreed on, right orange, left blue; thin and grey: what the view found \
+                 alone; pink: where the other views say that the right wrist must lie."
             .to_owned(),
         strips: strips(run, report.cost.as_ref(), folder),
     }
