@@ -8,8 +8,8 @@ use kernels::Rgb8View;
 use multiview::{PairEstimate, TypeTables, ViewPlan};
 use nalgebra::UnitVector3;
 use pipeline::{
-    Answer, Combine, EstimatorError, FuseStep, PairAnswer, Skeleton, SkeletonSettings,
-    SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
+    AllViewsAnswer, Answer, Combine, EstimatorError, FuseStep, PairAnswer, Skeleton,
+    SkeletonSettings, SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
 };
 use rayon::prelude::*;
 use skeleton::PARSE14;
@@ -180,35 +180,39 @@ impl Bench {
                 Some(it)
             })
             .collect();
-        let mut effort = Effort::default();
-        let (pairs, combine) = match (version.terms, version.combining) {
-            (Terms::Single, _) => (Vec::new(), Combine::Mean),
-            (_, Combining::Pairs) => (self.pairs(step, &answers, seen), Combine::Mean),
-            (_, Combining::Consensus) => (self.pairs(step, &answers, seen), Combine::Consensus),
-            (_, Combining::AllViews | Combining::AllViewsMean) => {
-                let n = answers.iter().flatten().count();
-                let weight = match version.combining {
-                    Combining::AllViewsMean => 1.0 / (n.max(2) - 1) as f64,
-                    _ => 1.0,
-                };
-                let all = step.all_views(&answers, &seen.evidence, weight, N_STARTS);
-                if let Some(all) = &all {
-                    effort.count(all.estimate.iterations.len(), all.estimate.converged);
-                    effort.solutions = all.n_solutions as u32;
-                    effort.on = Some(all.estimate.active);
-                }
-                (all.map_or_else(Vec::new, |it| it.as_pairs()), Combine::Mean)
-            }
+        let combine = match version.combining {
+            Combining::Consensus => Combine::Consensus,
+            _ => Combine::Mean,
         };
         let settings = SkeletonSettings {
             combine,
             ..self.setup.skeleton.clone()
         };
         let mut last = SkeletonStep::new(self.plans.clone(), self.up_in_world, settings);
-        let skeleton = last.run(&answers, &pairs);
-        if matches!(version.combining, Combining::Pairs | Combining::Consensus) {
-            effort.of_pairs(&pairs, &skeleton);
-        }
+        let mut effort = Effort::default();
+        let skeleton = match (version.terms, version.combining) {
+            (Terms::Single, _) => last.run(&answers, &[]),
+            (_, Combining::Pairs | Combining::Consensus) => {
+                let pairs = self.pairs(step, &answers, seen);
+                let skeleton = last.run(&answers, &pairs);
+                effort.of_pairs(&pairs, &skeleton);
+                skeleton
+            }
+            (_, Combining::AllViews | Combining::AllViewsMean) => {
+                let n = answers.iter().flatten().count();
+                let weight = match version.combining {
+                    Combining::AllViewsMean => 1.0 / (n.max(2) - 1) as f64,
+                    _ => 1.0,
+                };
+                match step.all_views(&answers, &seen.evidence, weight, N_STARTS) {
+                    Some(all) => {
+                        effort.of_all_views(&all);
+                        last.run_all_views(&answers, &all)
+                    }
+                    None => last.run(&answers, &[]),
+                }
+            }
+        };
         self.found(&skeleton, effort)
     }
 
@@ -257,6 +261,16 @@ struct Effort {
 }
 
 impl Effort {
+    /// Counts the iterations of the highest energy, and the solutions of all that was tried.
+    fn of_all_views(&mut self, all: &AllViewsAnswer) {
+        let estimates = all.hypotheses.iter().map(|it| &it.estimate);
+        self.solutions = estimates.clone().map(|it| it.iterations.len() as u32).sum();
+        if let Some(it) = estimates.max_by(|a, b| a.energy.total_cmp(&b.energy)) {
+            self.count(it.iterations.len(), it.converged);
+            self.on = Some(it.active);
+        }
+    }
+
     fn count(&mut self, n: usize, converged: bool) {
         self.iterations.push(n as u32);
         self.unsettled += u32::from(!converged);

@@ -17,24 +17,27 @@ pub type Exchanges = u32;
 
 /// The assignments of exchanges that the pairs like best.
 ///
-/// A pair tells only whether its two views agree, so the first view that has a pair is never exchanged
-/// here; exchanging all views is another matter (see [`FacingFilter`]).
+/// A pair tells only whether its two views agree, so the first view that is there is never exchanged
+/// here; exchanging all views is another matter (see [`FacingFilter`]). Of a view without a pair the
+/// energies say nothing: it is exchanged and not.
 ///
-/// * Returns at most `limit` assignments with the sum of the pairs' energies, best first; views without
-///   a pair are not exchanged.
+/// * `present`: bit `v` is set if view `v` is there; the pairs' views are.
+/// * Returns at most `limit` assignments with the sum of the pairs' energies, best first.
 ///
 /// # Panics
 ///
-/// If there are more than 16 views, or a pair names a view that does not exist.
-pub fn rank_facing(n_views: usize, pairs: &[PairEnergies], limit: usize) -> Vec<(Exchanges, f64)> {
-    assert!(n_views <= MAX_VIEWS, "at most {MAX_VIEWS} views");
-    assert!(
-        pairs.iter().flat_map(|it| it.views).all(|it| it < n_views),
-        "views of the rig"
-    );
-    let seen: Vec<usize> = (0..n_views)
-        .filter(|view| pairs.iter().any(|it| it.views.contains(view)))
+/// If there are more than 16 views.
+pub fn rank_facing(
+    present: Exchanges,
+    pairs: &[PairEnergies],
+    limit: usize,
+) -> Vec<(Exchanges, f64)> {
+    let paired = pairs.iter().flat_map(|it| it.views);
+    let present = paired.fold(present, |mask, view| mask | 1 << view);
+    let seen: Vec<usize> = (0..Exchanges::BITS as usize)
+        .filter(|view| is_exchanged(present, *view))
         .collect();
+    assert!(seen.len() <= MAX_VIEWS, "at most {MAX_VIEWS} views");
     let spread = |free: u32| {
         let later = seen.iter().skip(1).enumerate();
         later.fold(0, |mask, (i, view)| mask | (free >> i & 1) << view)
@@ -202,7 +205,7 @@ mod tests {
             pair(0, 2, 1.0, 1.5),
             pair(1, 2, 1.0, 1.5),
         ];
-        let got = rank_facing(3, &pairs, 8);
+        let got = rank_facing(0b111, &pairs, 8);
         assert_eq!(got.len(), 4);
         assert_eq!(got[0], (0b100, 5.0));
     }
@@ -215,18 +218,21 @@ mod tests {
             pair(0, 2, 1.0, 2.0),
             pair(1, 2, 1.2, 1.0),
         ];
-        assert_eq!(rank_facing(3, &pairs, 1)[0].0, 0b100);
+        assert_eq!(rank_facing(0b111, &pairs, 1)[0].0, 0b100);
     }
 
     #[test]
-    fn a_view_without_a_pair_is_left_alone() {
-        let got = rank_facing(3, &[pair(1, 2, 0.0, 1.0)], 8);
+    fn a_view_that_is_missing_is_left_alone() {
+        let got = rank_facing(0b110, &[pair(1, 2, 0.0, 1.0)], 8);
         assert_eq!(got, [(0b100, 1.0), (0b000, 0.0)]);
     }
 
     #[test]
-    fn without_pairs_nothing_is_exchanged() {
-        assert_eq!(rank_facing(2, &[], 8), [(0, 0.0)]);
+    fn of_a_view_without_a_pair_both_are_possible() {
+        let got = rank_facing(0b111, &[pair(1, 2, 0.0, 1.0)], 8);
+        let opposite = [(0b010, 1.0), (0b100, 1.0)];
+        assert_eq!(got, [opposite, [(0b000, 0.0), (0b110, 0.0)]].concat());
+        assert_eq!(rank_facing(0b11, &[], 8), [(0b00, 0.0), (0b10, 0.0)]);
     }
 
     #[test]

@@ -41,34 +41,17 @@ pub struct PairAnswer {
 pub struct AllViewsAnswer {
     /// The views that answered, ascending.
     pub views: Vec<usize>,
-    /// Whether left and right of each were taken to be exchanged with respect to the first.
-    pub exchanged: Vec<bool>,
-    /// The result, by index into `views`.
-    pub estimate: AllViewsEstimate,
-    /// Single-view solutions from all starts.
-    pub n_solutions: usize,
+    /// One estimate per assumption about facing; never empty.
+    pub hypotheses: Vec<AllViewsHypothesis>,
 }
 
-impl AllViewsAnswer {
-    /// The same as answers of pairs, which is what the last step takes: every pair of a view has its one pose.
-    pub fn as_pairs(&self) -> Vec<PairAnswer> {
-        let estimate = &self.estimate;
-        let pair = |[first, second]: [usize; 2]| PairAnswer {
-            views: [self.views[first], self.views[second]],
-            hypotheses: vec![PairEstimate {
-                start: PairStart {
-                    candidates: [0, 0],
-                    exchanged: self.exchanged[first] != self.exchanged[second],
-                },
-                energy: estimate.energy,
-                iterations: Vec::new(),
-                converged: estimate.converged,
-                active: Vec::new(),
-                poses: [first, second].map(|it| estimate.poses[it].clone()),
-            }],
-        };
-        all_pairs(self.views.len()).into_iter().map(pair).collect()
-    }
+/// What all views found at once under one assumption about facing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AllViewsHypothesis {
+    /// Whether left and right of each view were taken to be exchanged with respect to the first.
+    pub exchanged: Vec<bool>,
+    /// The result, by index into the views that answered.
+    pub estimate: AllViewsEstimate,
 }
 
 impl FuseStep {
@@ -170,7 +153,7 @@ impl FuseStep {
     }
 
     /// Solves all views at once, from the best starts under different assumptions about who sees the
-    /// person from behind; the highest energy at the end decides.
+    /// person from behind.
     ///
     /// * `evidence`: of the views that answered.
     /// * `weight`: of the terms of each pair; see [`AllViewsInput::weight`].
@@ -198,30 +181,22 @@ impl FuseStep {
             tables: &|first, second| self.tables(present[first], present[second]),
             weight,
         };
-        let mut best: Option<AllViewsAnswer> = None;
-        let mut n_solutions = 0;
-        let starts = rank_starts(&self.settings, &views, input.tables);
-        for start in starts.into_iter().take(n_starts.max(1)) {
+        let mut starts = rank_starts(&self.settings, &views, input.tables);
+        starts.truncate(n_starts.max(1));
+        let solve = |start: Start| {
             let from = AllViewsStart {
                 candidates: &start.candidates,
                 exchanged: &start.exchanged,
             };
-            let estimate =
-                estimate_all_views(&self.solver, &self.settings, &input, &evidence, from);
-            n_solutions += estimate.iterations.len();
-            if best
-                .as_ref()
-                .is_none_or(|it| estimate.energy > it.estimate.energy)
-            {
-                best = Some(AllViewsAnswer {
-                    views: present.clone(),
-                    exchanged: start.exchanged,
-                    estimate,
-                    n_solutions: 0,
-                });
+            AllViewsHypothesis {
+                estimate: estimate_all_views(&self.solver, &self.settings, &input, &evidence, from),
+                exchanged: start.exchanged,
             }
-        }
-        best.map(|it| AllViewsAnswer { n_solutions, ..it })
+        };
+        Some(AllViewsAnswer {
+            hypotheses: starts.into_iter().map(solve).collect(),
+            views: present,
+        })
     }
 
     fn view_answer<'a>(&'a self, view: usize, answer: &'a Answer) -> ViewAnswer<'a> {

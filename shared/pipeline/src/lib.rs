@@ -5,12 +5,13 @@
 #![forbid(unsafe_code)]
 
 mod fuse_step;
+mod fused;
 mod skeleton_step;
 mod view_step;
 
 mod estimate;
 
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
-pub use fuse_step::{AllViewsAnswer, Answer, FuseStep, PairAnswer, all_pairs};
+pub use fuse_step::{AllViewsAnswer, AllViewsHypothesis, Answer, FuseStep, PairAnswer, all_pairs};
 pub use skeleton_step::{Combine, FusedView, Skeleton, SkeletonSettings, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

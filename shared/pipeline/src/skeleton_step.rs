@@ -6,13 +6,13 @@ use fmp::Pose;
 use geometry::{Observation, TriangulateError, Triangulated};
 use multiview::{
     ConsensusSettings, Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose,
-    PairEnergies, PairEstimate, Sightings, ViewPlan, anatomical, anatomical_evidence, average,
-    consensus, is_exchanged, rank_facing,
+    Sightings, ViewPlan, anatomical, anatomical_evidence, average, consensus, is_exchanged,
 };
 use nalgebra::{Point2, Point3, UnitVector3};
 use skeleton::{JointSet, PARSE14};
 
-use crate::{Answer, PairAnswer};
+use crate::fused::Fused;
+use crate::{AllViewsAnswer, Answer, PairAnswer};
 
 /// How a view's pose is made of those of its pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -100,9 +100,6 @@ pub struct SkeletonStep {
     filter: FacingFilter,
 }
 
-/// Assignments of facing that are compared with all views at once.
-const N_HYPOTHESES: usize = 16;
-
 impl SkeletonStep {
     /// Prepares the step for the views of a rig, in the rig's order.
     pub fn new(
@@ -125,12 +122,27 @@ impl SkeletonStep {
     pub fn run(&mut self, answers: &[Option<Answer>], pairs: &[PairAnswer]) -> Skeleton {
         let mut pairs: Vec<&PairAnswer> = pairs.iter().collect();
         pairs.sort_by_key(|it| it.views);
+        self.settle(answers, &Fused::Pairs(pairs))
+    }
+
+    /// Settles one frame whose views were solved at once.
+    ///
+    /// * `answers`: the single-view answers; a view that was not solved keeps its own.
+    pub fn run_all_views(
+        &mut self,
+        answers: &[Option<Answer>],
+        found: &AllViewsAnswer,
+    ) -> Skeleton {
+        self.settle(answers, &Fused::AllViews(found))
+    }
+
+    fn settle(&mut self, answers: &[Option<Answer>], found: &Fused<'_>) -> Skeleton {
         let (exchanged, facing_margin) = if self.settings.facing && self.can_exchange() {
-            self.decide_facing(answers, &pairs)
+            self.decide_facing(answers, found)
         } else {
             (0, f64::INFINITY)
         };
-        let candidates = self.candidates(answers, &pairs, exchanged);
+        let candidates = self.candidates(answers, found, exchanged);
         let views = match self.settings.combine {
             Combine::Mean => fuse(&candidates, exchanged),
             Combine::Consensus => self.agreed(&candidates, exchanged),
@@ -142,7 +154,7 @@ impl SkeletonStep {
         Skeleton {
             joints,
             views,
-            n_pairs: pairs.len(),
+            n_pairs: found.n_pairs(),
             facing_margin,
         }
     }
@@ -156,42 +168,28 @@ impl SkeletonStep {
     }
 
     /// Which views see the person from behind, and by what margin.
-    fn decide_facing(
-        &mut self,
-        answers: &[Option<Answer>],
-        pairs: &[&PairAnswer],
-    ) -> (Exchanges, f64) {
-        let energies: Vec<PairEnergies> = pairs
-            .iter()
-            .filter_map(|it| match &it.hypotheses[..] {
-                [same, opposite] => Some(PairEnergies {
-                    views: it.views,
-                    same_or_opposite: [same.energy, opposite.energy],
-                }),
-                _ => None,
-            })
-            .collect();
-        let hypotheses: Vec<FacingHypothesis> =
-            rank_facing(self.plans.len(), &energies, N_HYPOTHESES)
-                .into_iter()
-                .map(|(exchanges, energy)| {
-                    let views = self.agreed(&self.candidates(answers, pairs, exchanges), exchanges);
-                    let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec);
-                    let joints: Vec<Option<Point3<f64>>> = PARSE14
-                        .joints
-                        .iter()
-                        .map(|it| parts[it.parts[0]].as_ref().ok().map(|it| it.in_world))
-                        .collect();
-                    FacingHypothesis {
-                        exchanges,
-                        energy: energy + self.agreement(&views, &parts),
-                        anatomy: anatomical_evidence(&joints, self.up_in_world),
-                    }
-                })
-                .collect();
+    fn decide_facing(&mut self, answers: &[Option<Answer>], found: &Fused<'_>) -> (Exchanges, f64) {
         let present = answers.iter().enumerate().fold(0, |mask, (view, it)| {
             mask | Exchanges::from(it.is_some()) << view
         });
+        let hypotheses: Vec<FacingHypothesis> = found
+            .facing(present)
+            .into_iter()
+            .map(|(exchanges, energy)| {
+                let views = self.agreed(&self.candidates(answers, found, exchanges), exchanges);
+                let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec);
+                let joints: Vec<Option<Point3<f64>>> = PARSE14
+                    .joints
+                    .iter()
+                    .map(|it| parts[it.parts[0]].as_ref().ok().map(|it| it.in_world))
+                    .collect();
+                FacingHypothesis {
+                    exchanges,
+                    energy: energy + self.agreement(&views, &parts),
+                    anatomy: anatomical_evidence(&joints, self.up_in_world),
+                }
+            })
+            .collect();
         let facing = self
             .filter
             .decide(&self.settings.facing_filter, &hypotheses, present);
@@ -227,11 +225,11 @@ impl SkeletonStep {
         -self.settings.agreement * parts.iter().map(of_part).sum::<f64>()
     }
 
-    /// What the pairs of every view found under an assignment of facing.
+    /// What every view was found to be, by each of its pairs or by all views, under an assignment of facing.
     fn candidates(
         &self,
         answers: &[Option<Answer>],
-        pairs: &[&PairAnswer],
+        found: &Fused<'_>,
         exchanged: Exchanges,
     ) -> Vec<Option<Candidates>> {
         let of_view = |view: usize| {
@@ -245,13 +243,11 @@ impl SkeletonStep {
                 cell_px: plan.scale(usize::from(pose.level)),
                 centres_px: anatomical(&plan.centres(pose), mirror),
             };
-            let found = pairs.iter().filter_map(|pair| {
-                let side = pair.views.iter().position(|it| *it == view)?;
-                let estimate = chosen(pair, exchanged)?;
-                Some(candidate(estimate.energy, &estimate.poses[side]))
-            });
+            let found = found.poses(view, exchanged).into_iter();
             Some(Candidates {
-                found: found.collect(),
+                found: found
+                    .map(|(energy, pose)| candidate(energy, pose))
+                    .collect(),
                 own: candidate(f64::from(best.score), best),
             })
         };
@@ -390,14 +386,4 @@ fn by_view(mut found: Triangulated, views: impl Iterator<Item = usize>) -> Trian
         found.residuals_px[view] = residuals[i];
     }
     found
-}
-
-/// The hypothesis of a pair that agrees with the joint decision.
-fn chosen(pair: &PairAnswer, exchanged: Exchanges) -> Option<&PairEstimate> {
-    let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
-    let opposite = first != second;
-    pair.hypotheses
-        .iter()
-        .find(|it| it.start.exchanged == opposite)
-        .or_else(|| pair.hypotheses.first())
 }

@@ -1,0 +1,90 @@
+//! What fusion found, by pairs or by all views at once, under every assumption about facing.
+
+use fmp::Pose;
+use multiview::{Exchanges, PairEnergies, PairEstimate, is_exchanged, rank_facing};
+
+use crate::{AllViewsAnswer, AllViewsHypothesis, PairAnswer};
+
+/// Assignments of facing that are compared with all views at once.
+const N_HYPOTHESES: usize = 16;
+
+/// What fusion found, either way.
+pub(crate) enum Fused<'a> {
+    /// In ascending order of their views.
+    Pairs(Vec<&'a PairAnswer>),
+    AllViews(&'a AllViewsAnswer),
+}
+
+impl<'a> Fused<'a> {
+    pub(crate) fn n_pairs(&self) -> usize {
+        match self {
+            Self::Pairs(pairs) => pairs.len(),
+            Self::AllViews(it) => it.views.len() * (it.views.len() - 1) / 2,
+        }
+    }
+
+    /// The assumptions about facing that are worth a look, with the energy of all views.
+    pub(crate) fn facing(&self, present: Exchanges) -> Vec<(Exchanges, f64)> {
+        match self {
+            Self::Pairs(pairs) => {
+                let energies = pairs.iter().filter_map(|it| match &it.hypotheses[..] {
+                    [same, opposite] => Some(PairEnergies {
+                        views: it.views,
+                        same_or_opposite: [same.energy, opposite.energy],
+                    }),
+                    _ => None,
+                });
+                rank_facing(present, &energies.collect::<Vec<_>>(), N_HYPOTHESES)
+            }
+            Self::AllViews(it) => {
+                let all = it.hypotheses.iter();
+                all.map(|of| (exchanges(it, of), of.estimate.energy))
+                    .collect()
+            }
+        }
+    }
+
+    /// What a view was found to be under an assumption about facing: a pose of each of its pairs, or
+    /// the one of all views, with its energy.
+    pub(crate) fn poses(&self, view: usize, exchanged: Exchanges) -> Vec<(f64, &'a Pose)> {
+        match self {
+            Self::Pairs(pairs) => {
+                let of_pair = |pair: &&'a PairAnswer| {
+                    let side = pair.views.iter().position(|it| *it == view)?;
+                    let estimate = chosen(pair, exchanged)?;
+                    Some((estimate.energy, &estimate.poses[side]))
+                };
+                pairs.iter().filter_map(of_pair).collect()
+            }
+            Self::AllViews(found) => {
+                let all = found.views.iter().fold(0, |mask, view| mask | (1 << view));
+                let fits = |it: &&AllViewsHypothesis| {
+                    [exchanged & all, !exchanged & all].contains(&exchanges(found, it))
+                };
+                let chosen = found.hypotheses.iter().find(fits);
+                let chosen = chosen.or_else(|| found.hypotheses.first());
+                let place = found.views.iter().position(|it| *it == view);
+                let pose = |(it, place): (&'a AllViewsHypothesis, usize)| {
+                    (it.estimate.energy, &it.estimate.poses[place])
+                };
+                chosen.zip(place).map(pose).into_iter().collect()
+            }
+        }
+    }
+}
+
+/// The views that a hypothesis takes to be exchanged with respect to the first.
+fn exchanges(found: &AllViewsAnswer, hypothesis: &AllViewsHypothesis) -> Exchanges {
+    let each = found.views.iter().zip(&hypothesis.exchanged);
+    each.fold(0, |mask, (view, it)| mask | Exchanges::from(*it) << view)
+}
+
+/// The hypothesis of a pair that agrees with the joint decision.
+fn chosen(pair: &PairAnswer, exchanged: Exchanges) -> Option<&PairEstimate> {
+    let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
+    let opposite = first != second;
+    pair.hypotheses
+        .iter()
+        .find(|it| it.start.exchanged == opposite)
+        .or_else(|| pair.hypotheses.first())
+}
