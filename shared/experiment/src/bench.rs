@@ -17,7 +17,7 @@ use skeleton::PARSE14;
 use crate::{Combining, Found, Terms, Version};
 
 /// Assumptions about facing that all views at once are tried under.
-const N_STARTS: usize = 4;
+const N_STARTS: usize = 2;
 
 /// Everything but the cameras.
 #[derive(Debug, Clone)]
