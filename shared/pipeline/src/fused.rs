@@ -88,3 +88,67 @@ fn chosen(pair: &PairAnswer, exchanged: Exchanges) -> Option<&PairEstimate> {
         .find(|it| it.start.exchanged == opposite)
         .or_else(|| pair.hypotheses.first())
 }
+
+#[cfg(test)]
+mod tests {
+    use fmp::Placement;
+    use multiview::AllViewsEstimate;
+
+    use super::*;
+
+    /// A pose that is told from others by the place of its only part.
+    fn pose(x: u16) -> Pose {
+        let at = Placement {
+            x,
+            y: 0,
+            mixture: 0,
+        };
+        Pose {
+            score: 0.0,
+            level: 0,
+            parts: vec![at],
+        }
+    }
+
+    /// Views 1, 2 and 4 of a rig, under two assumptions.
+    fn answer() -> AllViewsAnswer {
+        let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
+            exchanged: exchanged.to_vec(),
+            estimate: AllViewsEstimate {
+                energy,
+                iterations: Vec::new(),
+                converged: true,
+                active: 1.0,
+                poses: (0..3).map(|view| pose(x + view)).collect(),
+            },
+        };
+        AllViewsAnswer {
+            views: vec![1, 2, 4],
+            hypotheses: vec![
+                hypothesis([false, true, false], 5.0, 10),
+                hypothesis([false, false, true], 3.0, 20),
+            ],
+        }
+    }
+
+    #[test]
+    fn all_views_at_once_rank_facing_by_their_energies() {
+        let answer = answer();
+        let got = Fused::AllViews(&answer).facing(0b11110);
+        assert_eq!(got, [(0b00100, 5.0), (0b10000, 3.0)]);
+    }
+
+    #[test]
+    fn a_view_has_the_pose_of_the_assumption_that_was_chosen_or_of_its_complement() {
+        let answer = answer();
+        let found = Fused::AllViews(&answer);
+        let place = |view, exchanged| {
+            let poses = found.poses(view, exchanged);
+            poses.iter().map(|it| it.1.parts[0].x).collect::<Vec<_>>()
+        };
+        assert_eq!(place(2, 0b00100), [11]);
+        assert_eq!(place(2, 0b10000), [21]);
+        assert_eq!(place(4, 0b00110), [22], "all but view 4");
+        assert_eq!(place(0, 0b00100), [0_u16; 0], "it did not answer");
+    }
+}
