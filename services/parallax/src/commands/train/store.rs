@@ -1,7 +1,7 @@
 //! What a training leaves on the disk: its checkpoint, and at the end the model.
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -17,6 +17,8 @@ use super::folder_of;
 pub(super) struct Store {
     out: PathBuf,
     state: Mutex<State>,
+    /// Held as long as this training runs; the system lets go of it however the process ends.
+    _mine: File,
 }
 
 /// What is on the disk.
@@ -51,7 +53,8 @@ impl Store {
     ///
     /// # Errors
     ///
-    /// There is no place for the model, or a checkpoint that is not to be gone on from.
+    /// There is no place for the model, another training is writing it, or there is a checkpoint that is not
+    /// to be gone on from.
     pub(super) fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| {
             let message = format!("--out {}: {what}", out.display());
@@ -66,6 +69,7 @@ impl Store {
         let store = Self {
             out: out.to_owned(),
             state: Mutex::default(),
+            _mine: claim(out)?,
         };
         let checkpoint = store.checkpoint();
         if !resume && checkpoint.exists() {
@@ -176,6 +180,7 @@ impl Store {
     /// being written.
     pub(super) fn interrupted(&self) -> Failure {
         let state = self.lock();
+        self.let_go();
         let State {
             n_done,
             n_steps,
@@ -209,8 +214,44 @@ impl Store {
         self.out.with_file_name(name)
     }
 
+    /// Tidies up the file that said whose the model is; without it nothing is lost.
+    fn let_go(&self) {
+        drop(fs::remove_file(claim_of(&self.out)));
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        self.let_go();
+    }
+}
+
+fn claim_of(out: &Path) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(out.file_name().unwrap_or_default());
+    name.push(".lock");
+    out.with_file_name(name)
+}
+
+/// Makes sure that no other training writes the same model.
+fn claim(out: &Path) -> Result<File, Failure> {
+    let path = claim_of(out);
+    let file = File::create(&path).map_err(|error| {
+        let message = format!("cannot write {}: {error}", path.display());
+        Failure::new(ExitKind::Usage, message)
+    })?;
+    match file.try_lock() {
+        // A file system that cannot lock is no reason not to train.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+        Err(TryLockError::WouldBlock) => {
+            let message = format!("--out {}: another training is writing it", out.display());
+            Err(Failure::new(ExitKind::Usage, message)
+                .with_hint("wait for it, or write to another --out"))
+        }
     }
 }
 

@@ -86,6 +86,19 @@ fn with_payload(bytes: &[u8], payload: &[u8]) -> Vec<u8> {
 }
 
 #[test]
+fn a_model_is_written_by_one_training_at_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("person.fmp");
+    let first = Store::new(&out, false).unwrap();
+    let second = Store::new(&out, false).unwrap_err().to_string();
+    assert!(second.contains("another training is writing it"), "{second}");
+    drop(first);
+    drop(Store::new(&out, false).unwrap());
+    let left = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 0, "nothing stays behind");
+}
+
+#[test]
 fn what_was_written_goes_on_as_if_nothing_had_been() {
     let (plan, settings) = plan();
     let bytes = bytes_of(&plan, &settings);
