@@ -233,6 +233,7 @@ pub(crate) fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> Ty
     TypeTables {
         conditional: conditional.map(Arc::new),
         joint: Arc::new(joint),
+        exchanged: None,
     }
 }
 

@@ -123,6 +123,7 @@ pub(crate) fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables
     Ok(TypeTables {
         conditional: [Arc::new(first), Arc::new(second)],
         joint: Arc::new(joint),
+        exchanged: None,
     })
 }
 

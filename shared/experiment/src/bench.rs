@@ -5,10 +5,10 @@ use std::sync::Arc;
 use fmp::{Model, Responses, Scope};
 use geometry::Camera;
 use kernels::Rgb8View;
-use multiview::{PairEstimate, TypeTables, ViewPlan};
+use multiview::{PairEstimate, ViewPlan};
 use nalgebra::UnitVector3;
 use pipeline::{
-    AllViewsAnswer, Answer, Combine, EstimatorError, FuseStep, PairAnswer, Skeleton,
+    AllViewsAnswer, Answer, Combine, EstimatorError, FuseStep, PairAnswer, PairTables, Skeleton,
     SkeletonSettings, SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
 };
 use rayon::prelude::*;
@@ -28,8 +28,8 @@ pub struct Setup {
     pub view: ViewSettings,
     /// Of fusion, with all terms: versions leave some out. Thresholds in the unit of the expected errors.
     pub fuse: multiview::Settings,
-    /// Part-type tables of pairs `(first, second)` with `first < second`.
-    pub tables: Vec<(usize, usize, TypeTables)>,
+    /// Part-type tables.
+    pub tables: PairTables,
     /// Of the last step.
     pub skeleton: SkeletonSettings,
     /// What is compared.

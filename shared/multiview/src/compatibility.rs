@@ -178,6 +178,11 @@ impl Compatibility {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
     }
 
+    /// The table whose part `i` is this one's `parts[i]`.
+    pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
+        Self::of(parts.iter().map(|&it| self.values[it].clone()).collect())
+    }
+
     /// `p(type in second view | type in first view)` of a joint table.
     #[must_use]
     pub fn conditional(&self) -> Self {
@@ -185,7 +190,8 @@ impl Compatibility {
         Self::of(self.values.iter().map(normalised).collect())
     }
 
-    fn of(values: Vec<DMatrix<f64>>) -> Self {
+    /// A table of given values, one matrix a part: rows are types in the first view.
+    pub fn of(values: Vec<DMatrix<f64>>) -> Self {
         let unseen = |it: &DMatrix<f64>| it.row_iter().filter(|row| row.sum() <= 0.0).count();
         Self {
             n_unseen: values.iter().map(unseen).sum(),

@@ -3,7 +3,7 @@
 use fmp::{Extra, Pose};
 
 use crate::term::Term;
-use crate::{Compatibility, PairInput, Settings};
+use crate::{Compatibility, PairInput, Settings, ViewAnswer};
 
 /// Everything about the terms of a pair that does not change from one iteration to the next.
 #[derive(Debug)]
@@ -19,16 +19,17 @@ pub(crate) struct PairTerms<'a> {
 impl<'a> PairTerms<'a> {
     /// The terms of a pair.
     ///
-    /// * `exchanged`: the second view shows the other side of the body. Type tables are learned on
-    ///   views as the model names their parts, so an exchanged pair goes without the appearance term.
+    /// * `exchanged`: the second view shows the other side of the body; such a pair has a table of its
+    ///   own, or goes without the appearance term.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let model = pair.views[0].plan.model();
         let counterpart = counterparts(model, exchanged);
         let active = active_parts(settings, pair, &counterpart);
-        let table = pair
-            .tables
-            .filter(|_| !exchanged && settings.beta != 0.0)
-            .map(|it| it.joint.as_ref());
+        let table = pair.tables.filter(|_| settings.beta != 0.0);
+        let table = table.and_then(|it| match exchanged {
+            false => Some(it.joint.as_ref()),
+            true => it.exchanged.as_deref(),
+        });
         Self {
             settings,
             pair,
@@ -126,11 +127,13 @@ impl Extra for Consistency<'_> {
         if !self.pair_terms.is_active(self.target, part) {
             return 0.0;
         }
-        let other = usize::from(self.support.parts[self.pair_terms.partner(part)].mixture);
+        let partner = self.pair_terms.partner(part);
+        let other = usize::from(self.support.parts[partner].mixture);
+        // The table goes by the parts of the first view.
         let joint = if self.target == 0 {
             table.value(part, mixture, other)
         } else {
-            table.value(part, other, mixture)
+            table.value(partner, other, mixture)
         };
         (self.pair_terms.settings.beta * joint) as f32
     }
@@ -180,9 +183,10 @@ pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
 
 /// Eq. 6: a part is off if either view's expected error exceeds its threshold.
 fn active_parts(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> Vec<bool> {
+    let thresholds = pair.views.map(|it| thresholds(settings, &it));
     let off = |view: usize, part: usize| {
         let sigma = pair.views[view].sigma_px.and_then(|it| it.get(part));
-        let tau = settings.tau_px.get(part);
+        let tau = thresholds[view].get(part);
         matches!((sigma, tau), (Some(sigma), Some(tau)) if sigma > tau)
     };
     counterpart
@@ -190,4 +194,14 @@ fn active_parts(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]
         .enumerate()
         .map(|(part, &other)| !off(0, part) && !off(1, other))
         .collect()
+}
+
+/// The thresholds `tau` of a view, pixels.
+fn thresholds(settings: &Settings, view: &ViewAnswer<'_>) -> Vec<f32> {
+    let unit = match view.candidates.first() {
+        Some(best) if settings.tau_px.is_empty() => view.plan.size(best) / 10.0,
+        _ => return settings.tau_px.clone(),
+    };
+    let tenths = settings.tau_tenths.iter();
+    tenths.map(|it| it * unit as f32).collect()
 }

@@ -22,10 +22,12 @@ mod optimise;
 mod start;
 
 mod anatomy;
+mod angle;
 mod compatibility;
 
 pub use all_views::{AllViewsEstimate, AllViewsInput, AllViewsStart, estimate_all_views};
 pub use anatomy::anatomical_evidence;
+pub use angle::{AngleTables, angle_between};
 pub use average::{FusedPose, anatomical, average};
 pub use compatibility::{Compatibility, CompatibilityError};
 pub use consensus::{ConsensusSettings, Sightings, consensus};

@@ -21,8 +21,30 @@ pub enum EnergyKind {
 pub struct TypeTables {
     /// `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
     pub conditional: [Arc<Compatibility>; 2],
-    /// `p(type in first, type in second)`, for [`EnergyKind::Paper`].
+    /// `p(type in first, type in second)`, or another value of two types, for [`EnergyKind::Paper`].
     pub joint: Arc<Compatibility>,
+    /// The same for views of which one sees the person's other side: rows are types of the first view's
+    /// part, columns those of the part of the second view that shows the same limb. `None`: such views
+    /// go without the term.
+    pub exchanged: Option<Arc<Compatibility>>,
+}
+
+impl TypeTables {
+    /// The tables of the same views, the second one named first.
+    ///
+    /// * `mirror`: the part on the other side of every part; the parts themselves if the model has no sides.
+    #[must_use]
+    pub fn reversed(&self, mirror: &[usize]) -> Self {
+        let [first, second] = &self.conditional;
+        Self {
+            conditional: [Arc::clone(second), Arc::clone(first)],
+            joint: Arc::new(self.joint.transposed()),
+            exchanged: self
+                .exchanged
+                .as_ref()
+                .map(|it| Arc::new(it.transposed().permuted(mirror))),
+        }
+    }
 }
 
 /// Settings of the optimiser; the defaults are the documentation.
@@ -49,6 +71,9 @@ pub struct Settings {
     /// Expected error above which a part is switched off, pixels of the frame, one per part; empty:
     /// never.
     pub tau_px: Vec<f32>,
+    /// The same in tenths of the person's size in the view, the longer side of the rectangle around the centres of
+    /// its best pose; where `tau_px` is empty.
+    pub tau_tenths: Vec<f32>,
     /// `Released` only: difference of the expected errors beyond which the better of two views that
     /// are both off is switched on again, pixels, one per part (the median training errors); empty:
     /// never.
@@ -69,6 +94,7 @@ impl Default for Settings {
             max_iterations: 12,
             epsilon_px: 0.1,
             tau_px: Vec::new(),
+            tau_tenths: Vec::new(),
             rescue_px: Vec::new(),
             facing: true,
             n_candidates: 8,

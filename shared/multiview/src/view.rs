@@ -88,6 +88,20 @@ impl ViewPlan {
         self.cells(part, level)[cell]
     }
 
+    /// How large the person of a pose is: the longer side of the rectangle around the centres of its parts, pixels
+    /// of the frame.
+    pub fn size(&self, pose: &Pose) -> f64 {
+        let centres = self.centres(pose);
+        let side = |axis: usize| {
+            let values = centres.iter().map(|it| it[axis]);
+            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+                [low.min(it), high.max(it)]
+            });
+            high - low
+        };
+        side(0).max(side(1)).max(0.0)
+    }
+
     /// Centres of all parts of a pose, pixels of the frame.
     pub fn centres(&self, pose: &Pose) -> Vec<[f64; 2]> {
         pose.centres(&self.model, &self.layout)

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use fmp::{ImageTooSmall, Layout, Model, Responses, Scope, Tracker};
 use geometry::Camera;
 use kernels::Rgb8View;
-use multiview::{Settings, TypeTables, ViewPlan};
+use multiview::{Settings, ViewPlan};
 use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    Answer, FuseStep, PairAnswer, Skeleton, SkeletonSettings, SkeletonStep, ViewEstimate,
-    ViewSettings, ViewStep, all_pairs,
+    Answer, FuseStep, PairAnswer, PairTables, Skeleton, SkeletonSettings, SkeletonStep,
+    ViewEstimate, ViewSettings, ViewStep, all_pairs,
 };
 
 /// Why an estimator could not be made.
@@ -179,8 +179,8 @@ pub struct EstimatorSettings {
     pub view: ViewSettings,
     /// Of the fusion step.
     pub fuse: Settings,
-    /// Part-type tables of pairs `(first, second)` with `first < second`.
-    pub tables: Vec<(usize, usize, TypeTables)>,
+    /// Part-type tables.
+    pub tables: PairTables,
     /// Of the last step.
     pub skeleton: SkeletonSettings,
 }

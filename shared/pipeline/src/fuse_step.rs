@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use fmp::{Model, Pose, Responses, Solver};
 use multiview::{
-    AllViewsEstimate, AllViewsInput, AllViewsStart, Epipolar, PairEstimate, PairInput, PairStart,
-    Settings, Start, TypeTables, ViewAnswer, ViewPlan, choose_start, estimate_all_views,
-    estimate_pair, rank_starts,
+    AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, PairEstimate, PairInput,
+    PairStart, Settings, Start, TypeTables, ViewAnswer, ViewPlan, angle_between, choose_start,
+    estimate_all_views, estimate_pair, rank_starts,
 };
 
 /// What a view answered for one frame, besides its evidence.
@@ -18,13 +18,22 @@ pub struct Answer {
     pub sigma_px: Option<Vec<f32>>,
 }
 
+/// The part-type tables of a rig.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PairTables {
+    /// Of pairs `(first, second)` of views with `first < second`.
+    pub of_pairs: Vec<(usize, usize, TypeTables)>,
+    /// Of all other pairs, by the angle under which they see the person.
+    pub by_angle: Option<Arc<AngleTables>>,
+}
+
 /// The fusion step for a rig.
 #[derive(Debug)]
 pub struct FuseStep {
     solver: Solver,
     settings: Settings,
     plans: Vec<Arc<ViewPlan>>,
-    tables: Vec<(usize, usize, TypeTables)>,
+    tables: PairTables,
 }
 
 /// What a pair found: one estimate per assumption about facing.
@@ -58,12 +67,11 @@ impl FuseStep {
     /// Prepares the step.
     ///
     /// * `plans`: the views of the rig, in the rig's order.
-    /// * `tables`: part-type tables of pairs `(first, second)` with `first < second`.
     pub fn new(
         model: Arc<Model>,
         settings: Settings,
         plans: Vec<Arc<ViewPlan>>,
-        tables: Vec<(usize, usize, TypeTables)>,
+        tables: PairTables,
     ) -> Self {
         Self {
             solver: Solver::new(model),
@@ -88,7 +96,10 @@ impl FuseStep {
             .iter()
             .filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)))
             .collect();
-        let tables = |first: usize, second: usize| self.tables(present[first], present[second]);
+        let tables = |first: usize, second: usize| {
+            let places = [present[first], present[second]];
+            self.tables(places, [&views[first], &views[second]])
+        };
         let Start {
             candidates,
             exchanged,
@@ -112,13 +123,14 @@ impl FuseStep {
         start: &[Option<(usize, bool)>],
     ) -> Option<PairAnswer> {
         let [first, second] = views;
+        let each = [
+            self.view_answer(first, answers[first].as_ref()?),
+            self.view_answer(second, answers[second].as_ref()?),
+        ];
         let input = PairInput {
-            views: [
-                self.view_answer(first, answers[first].as_ref()?),
-                self.view_answer(second, answers[second].as_ref()?),
-            ],
+            views: each,
             epipolar: Epipolar::new(&self.plans[first], &self.plans[second]),
-            tables: self.tables(first, second),
+            tables: self.tables(views, each.each_ref()),
         };
         let (candidate_a, exchanged_a) = start[first]?;
         let (candidate_b, exchanged_b) = start[second]?;
@@ -178,7 +190,10 @@ impl FuseStep {
         let evidence: Vec<&Responses<'_>> = evidence.collect();
         let input = AllViewsInput {
             views: &views,
-            tables: &|first, second| self.tables(present[first], present[second]),
+            tables: &|first, second| {
+                let places = [present[first], present[second]];
+                self.tables(places, [&views[first], &views[second]])
+            },
             weight,
         };
         let mut starts = rank_starts(&self.settings, &views, input.tables);
@@ -207,11 +222,14 @@ impl FuseStep {
         }
     }
 
-    fn tables(&self, first: usize, second: usize) -> Option<&TypeTables> {
-        self.tables
-            .iter()
-            .find(|it| (it.0, it.1) == (first, second))
-            .map(|it| &it.2)
+    /// The tables of a pair: its own, or those of the angle under which its views see the person.
+    fn tables(&self, pair: [usize; 2], views: [&ViewAnswer<'_>; 2]) -> Option<&TypeTables> {
+        let mut own = self.tables.of_pairs.iter();
+        if let Some(own) = own.find(|it| [it.0, it.1] == pair) {
+            return Some(&own.2);
+        }
+        let by_angle = self.tables.by_angle.as_ref()?;
+        by_angle.at(angle_between(views[0], views[1])?)
     }
 }
 

@@ -12,6 +12,8 @@ mod view_step;
 mod estimate;
 
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
-pub use fuse_step::{AllViewsAnswer, AllViewsHypothesis, Answer, FuseStep, PairAnswer, all_pairs};
+pub use fuse_step::{
+    AllViewsAnswer, AllViewsHypothesis, Answer, FuseStep, PairAnswer, PairTables, all_pairs,
+};
 pub use skeleton_step::{Combine, FusedView, Skeleton, SkeletonSettings, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

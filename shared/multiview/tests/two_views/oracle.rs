@@ -42,10 +42,16 @@ pub(crate) fn between(
         }
         sum -= settings.alpha * distance2(scene, settings, views, poses, parts);
         // The scene has tables of its first two views.
-        if views == [0, 1] && !exchanged {
-            let types = [0, 1].map(|side| usize::from(poses[side].parts[part].mixture));
+        if views == [0, 1] {
+            let types = [0, 1].map(|side| usize::from(poses[side].parts[parts[side]].mixture));
             assert!(types.iter().all(|it| *it < N_TYPES));
-            sum += settings.beta * scene.tables.joint.value(part, types[0], types[1]);
+            let other_side = scene.tables.exchanged.as_ref();
+            let table = if exchanged {
+                other_side.unwrap()
+            } else {
+                &scene.tables.joint
+            };
+            sum += settings.beta * table.value(part, types[0], types[1]);
         }
     }
     sum

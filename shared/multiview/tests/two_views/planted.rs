@@ -332,8 +332,10 @@ fn tables(noise: &mut Noise) -> TypeTables {
     let conditional = [table(), table()];
     let (joint, _) =
         Compatibility::joint_from_conditionals(&conditional[0], &conditional[1]).unwrap();
+    let exchanged = Some(Arc::new(table()));
     TypeTables {
         conditional: conditional.map(Arc::new),
         joint: Arc::new(joint),
+        exchanged,
     }
 }
