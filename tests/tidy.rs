@@ -17,7 +17,14 @@ const LAYERS: &[&[&str]] = &[
     ],
     &["runtime", "fmp", "scene"],
     &["multiview", "viewquality"],
-    &["pipeline", "evaluation", "datasets", "modelpage", "runpage"],
+    &[
+        "pipeline",
+        "evaluation",
+        "datasets",
+        "modelpage",
+        "consistency",
+        "runpage",
+    ],
     &["wire", "training", "sequences"],
     &["experiment"],
     &[

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use consistency::Learned;
 use multiview::{EnergyKind, Settings};
 use serde::{Deserialize, Serialize};
 use viewquality::TrainingErrors;
@@ -12,10 +13,14 @@ use viewquality::TrainingErrors;
 pub struct Config {
     /// Which energy.
     pub energy: Energy,
+    /// What was learned about several views: tables, weights, thresholds, joints.
+    pub consistency: Option<PathBuf>,
+    /// The rig of that file whose pairs of cameras these are; tables go by angle without it.
+    pub consistency_rig: Option<String>,
     /// Weight of the geometric term.
     pub alpha: Option<f64>,
     /// Weight of the part-type term.
-    pub beta: f64,
+    pub beta: Option<f64>,
     /// Distance beyond which the geometric term grows no more, cells.
     pub max_distance_cells: Option<f64>,
     /// Part-type tables, a pair of views each.
@@ -38,8 +43,10 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             energy: Energy::Paper,
+            consistency: None,
+            consistency_rig: None,
             alpha: None,
-            beta: 0.03,
+            beta: None,
             max_distance_cells: None,
             compatibility: Vec::new(),
             tau: Tau::Named(TauName::None),
@@ -57,22 +64,43 @@ impl Config {
     ///
     /// * `n_candidates`: most candidates that a view offers.
     /// * `frame_scale`: pixels of the frame per pixel of the footage, in which `tau` is given.
-    pub fn settings(&self, n_candidates: usize, frame_scale: f32) -> Settings {
+    /// * `learned`: the content of the file `consistency`; its weights are those of the paper's energy where this
+    ///   says nothing else.
+    pub fn settings(
+        &self,
+        n_candidates: usize,
+        frame_scale: f32,
+        learned: Option<&Learned>,
+    ) -> Settings {
         let scaled = |px: Vec<f32>| px.into_iter().map(|it| it * frame_scale).collect();
         let (energy, defaults) = match self.energy {
             Energy::Paper => (EnergyKind::Paper, Settings::default()),
             Energy::Released => (EnergyKind::Released, Settings::released()),
         };
+        let weights = learned.filter(|_| self.energy == Energy::Paper);
+        let weights = weights.map(|it| it.weights);
+        let defaults = match weights {
+            None => defaults,
+            Some(it) => Settings {
+                alpha: it.alpha,
+                beta: it.beta,
+                max_distance_cells: it.max_distance_cells.unwrap_or(f64::INFINITY),
+                ..defaults
+            },
+        };
+        let is_learned = self.tau == Tau::Named(TauName::Learned);
+        let tau_tenths = learned.filter(|_| is_learned);
         Settings {
             energy,
             alpha: self.alpha.unwrap_or(defaults.alpha),
-            beta: self.beta,
+            beta: self.beta.unwrap_or(defaults.beta),
             max_distance_cells: self
                 .max_distance_cells
                 .unwrap_or(defaults.max_distance_cells),
             max_iterations: self.max_iterations,
             epsilon_px: self.epsilon_px,
             tau_px: scaled(self.tau.px()),
+            tau_tenths: tau_tenths.map_or_else(Vec::new, |it| it.tau_tenths.clone()),
             rescue_px: scaled(self.tau.rescue_px()),
             facing: self.facing,
             n_candidates,
@@ -95,7 +123,7 @@ pub enum Energy {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "expected \"none\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", \
+    expecting = "expected \"none\", \"learned\", \"humaneva\", \"humaneva-median\", \"umpm\", \"umpm-median\", \
                  one number per part, or { file = \"...\" }"
 )]
 pub enum Tau {
@@ -121,6 +149,9 @@ pub enum TauName {
     /// No part is ever switched off.
     #[serde(rename = "none")]
     None,
+    /// Those of the file `consistency`, in tenths of the person's size.
+    #[serde(rename = "learned")]
+    Learned,
     /// Those of the authors' program for `HumanEva`: median training error plus inaccuracy.
     #[serde(rename = "humaneva")]
     HumanEva,
@@ -141,7 +172,7 @@ impl Tau {
             return None;
         };
         match name {
-            TauName::None => None,
+            TauName::None | TauName::Learned => None,
             TauName::HumanEva | TauName::HumanEvaMedian => Some(TrainingErrors::HUMANEVA),
             TauName::Umpm | TauName::UmpmMedian => Some(TrainingErrors::UMPM),
         }
@@ -195,7 +226,7 @@ mod tests {
     fn the_defaults_are_those_of_the_optimiser() {
         let expected = Settings::default();
         assert_eq!(
-            Config::default().settings(expected.n_candidates, 1.0),
+            Config::default().settings(expected.n_candidates, 1.0, None),
             expected
         );
     }
@@ -209,7 +240,7 @@ mod tests {
         );
         assert_eq!(px(TauName::UmpmMedian), TrainingErrors::UMPM.median_px);
         assert!(px(TauName::Umpm)[0] > px(TauName::UmpmMedian)[0]);
-        assert_eq!(px(TauName::None), []);
+        assert!(px(TauName::None).is_empty());
     }
 
     #[test]
@@ -218,6 +249,9 @@ mod tests {
             energy: Energy::Released,
             ..Config::default()
         };
-        assert_eq!(config.settings(1, 1.0).alpha, Settings::released().alpha);
+        assert_eq!(
+            config.settings(1, 1.0, None).alpha,
+            Settings::released().alpha
+        );
     }
 }

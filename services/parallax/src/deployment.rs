@@ -117,6 +117,9 @@ impl Deployment {
         if let Some(table) = &mut self.quality.table {
             *table = base.join(&table);
         }
+        if let Some(file) = &mut self.fuse.consistency {
+            *file = base.join(&file);
+        }
         if let fuse::Tau::File(tau) = &mut self.fuse.tau {
             tau.file = base.join(&tau.file);
         }

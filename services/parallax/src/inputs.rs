@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use capture::Feed;
+use consistency::{Appearance, Learned, Shape};
 use fmp::Model;
 use footage::SourceSpec;
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
+use pipeline::PairTables;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Table, Tau};
@@ -127,6 +129,71 @@ pub(crate) fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables
     })
 }
 
+/// Reads what was learned about several views, if a file is named, and sees that it goes with the model.
+pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
+    let Some(file) = file else {
+        return Ok(None);
+    };
+    let learned = Learned::parse(&text(file)?).map_err(|error| in_file(file, &error))?;
+    let checked = learned.check_model(&shape(model));
+    checked.map_err(|error| in_file(file, &error))?;
+    Ok(Some(learned))
+}
+
+/// Types of every part of a model, and the parts on the other side.
+pub(crate) fn shape(model: &Model) -> Shape {
+    let parts = 0..model.n_parts();
+    let mirror = model.spec().mirror.clone();
+    Shape {
+        n_types: parts.clone().map(|part| model.n_types(part)).collect(),
+        mirror: mirror.unwrap_or_else(|| parts.collect()),
+    }
+}
+
+/// The part-type tables of some cameras: those that are named, and of the other pairs what was learned.
+pub(crate) fn pair_tables(
+    config: &fuse::Config,
+    learned: Option<&Learned>,
+    model: &Model,
+    cameras: &[&str],
+) -> Result<PairTables, Failure> {
+    let index = |name: &String| cameras.iter().position(|it| it == name);
+    let mut of_pairs = Vec::new();
+    for entry in &config.compatibility {
+        let [Some(first), Some(second)] = entry.views.each_ref().map(index) else {
+            continue;
+        };
+        let mut files = entry.files.each_ref().map(PathBuf::as_path);
+        if first > second {
+            files.reverse();
+        }
+        of_pairs.push((
+            first.min(second),
+            first.max(second),
+            type_tables(files, model)?,
+        ));
+    }
+    let Some(learned) = learned else {
+        let by_angle = None;
+        return Ok(PairTables { of_pairs, by_angle });
+    };
+    let appearance = match config.energy {
+        fuse::Energy::Paper => learned.weights.appearance,
+        fuse::Energy::Released => Appearance::Joint,
+    };
+    if let Some(rig) = &config.consistency_rig {
+        let Some(own) = learned.of_rig(rig, cameras, appearance) else {
+            let message = format!("`fuse.consistency_rig`: no rig {rig:?} was learned");
+            return Err(Failure::new(ExitKind::Config, message));
+        };
+        of_pairs.extend(own);
+    }
+    Ok(PairTables {
+        of_pairs,
+        by_angle: Some(Arc::new(learned.by_angle(appearance))),
+    })
+}
+
 /// Reads a table of expected errors.
 pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
@@ -194,4 +261,21 @@ pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
         prepared.pairs.len(),
         prepared.model.n_parts()
     ))
+}
+
+/// FNV-1a, 64 bits: to tell files apart, not to keep anybody out.
+pub(crate) fn fingerprint(bytes: &[u8]) -> u64 {
+    let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fingerprint_is_that_of_the_published_function() {
+        assert_eq!(fingerprint(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(fingerprint(b"a"), 0xaf63_dc4c_8601_ec8c);
+    }
 }

@@ -1,12 +1,11 @@
 //! From a deployment and its footage to what the stages work with.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use fmp::Model;
 use geometry::files::ReadOptions;
 use geometry::{Framing, OutSize, Rig, upright_roll};
-use multiview::{TypeTables, ViewPlan};
+use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use pipeline::{EstimatorSettings, SkeletonSettings, all_pairs};
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -158,18 +157,17 @@ fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
         .pairs
         .iter()
         .filter_map(|names| indices(deployment, names))
-        .map(|(pair, _)| pair)
         .collect();
     pairs.sort_unstable();
     pairs.dedup();
     pairs
 }
 
-/// The two cameras, ascending, and whether that exchanged them.
-fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<([usize; 2], bool)> {
+/// The two cameras, ascending.
+fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<[usize; 2]> {
     let index = |name: &String| deployment.cameras.iter().position(|it| it.name == *name);
     let [first, second] = [index(&names[0])?, index(&names[1])?];
-    Some(([first.min(second), first.max(second)], first > second))
+    Some([first.min(second), first.max(second)])
 }
 
 fn settings(
@@ -179,17 +177,9 @@ fn settings(
 ) -> Result<EstimatorSettings, Failure> {
     let scales = views.iter().map(|it| frame_scale(&it.framing));
     let frame_scale = scales.sum::<f64>() / views.len().max(1) as f64;
-    let mut tables: Vec<(usize, usize, TypeTables)> = Vec::new();
-    for entry in &deployment.fuse.compatibility {
-        let Some(([first, second], swapped)) = indices(deployment, &entry.views) else {
-            continue;
-        };
-        let mut files: [&Path; 2] = [&entry.files[0], &entry.files[1]];
-        if swapped {
-            files.reverse();
-        }
-        tables.push((first, second, inputs::type_tables(files, model)?));
-    }
+    let learned = inputs::learned(deployment.fuse.consistency.as_deref(), model)?;
+    let names: Vec<&str> = views.iter().map(|it| it.name.as_str()).collect();
+    let tables = inputs::pair_tables(&deployment.fuse, learned.as_ref(), model, &names)?;
     let mut fuse = deployment.fuse.clone();
     if let fuse::Tau::File(tau) = &fuse.tau {
         fuse.tau = fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
@@ -202,14 +192,19 @@ fn settings(
         );
         return Err(Failure::new(ExitKind::Config, message));
     }
-    let joints = JointSet::by_name(&deployment.triangulate.joints);
     let defaults = SkeletonSettings::default();
+    let joints = JointSet::by_name(&deployment.triangulate.joints).unwrap_or(defaults.joints);
     Ok(EstimatorSettings {
         view: deployment.pose.settings(),
-        fuse: fuse.settings(deployment.pose.candidates, frame_scale as f32),
+        fuse: fuse.settings(
+            deployment.pose.candidates,
+            frame_scale as f32,
+            learned.as_ref(),
+        ),
         tables,
         skeleton: SkeletonSettings {
-            joints: joints.unwrap_or(defaults.joints),
+            joints,
+            joint_map: learned.and_then(|it| it.joint_map(joints)),
             triangulation: geometry::Settings {
                 loss_px: deployment.triangulate.loss_px,
                 ..defaults.triangulation

@@ -43,7 +43,7 @@ fn the_released_energy() {
     let n_candidates = pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
-            fuse: config.settings(n_candidates, 1.0),
+            fuse: config.settings(n_candidates, 1.0, None),
             ..EstimatorSettings::default()
         },
         ..OneProcess::default()
@@ -82,7 +82,7 @@ fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
     let n_candidates = pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
-            fuse: config.settings(n_candidates, 1.0),
+            fuse: config.settings(n_candidates, 1.0, None),
             ..EstimatorSettings::default()
         },
         sigma_px: Some(sigma_px),

@@ -1,5 +1,7 @@
 //! One frame solved by every version, from single-view solutions and evidence that all share.
 
+mod sight;
+
 use std::sync::Arc;
 
 use fmp::{Model, Responses, Scope};
@@ -12,7 +14,7 @@ use pipeline::{
     SkeletonSettings, SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
 };
 use rayon::prelude::*;
-use skeleton::PARSE14;
+use skeleton::{JointMap, PARSE14};
 
 use crate::{Combining, Found, Terms, Version};
 
@@ -26,14 +28,34 @@ pub struct Setup {
     pub model: Arc<Model>,
     /// Of the single-view step.
     pub view: ViewSettings,
-    /// Of fusion, with all terms: versions leave some out. Thresholds in the unit of the expected errors.
+    /// Of the last step.
+    pub skeleton: SkeletonSettings,
+    /// From parts to the joints of `skeleton::PARSE14` that are judged in images; a choice of parts without it.
+    pub joint_map: Option<Arc<JointMap>>,
+    /// What is compared.
+    pub trials: Vec<Trial>,
+}
+
+/// A version with its settings.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// Which version.
+    pub version: Version,
+    /// Of fusion. Thresholds in the unit of the expected errors.
     pub fuse: multiview::Settings,
     /// Part-type tables.
     pub tables: PairTables,
-    /// Of the last step.
-    pub skeleton: SkeletonSettings,
-    /// What is compared.
-    pub versions: Vec<Version>,
+}
+
+impl Trial {
+    /// A version of settings with all terms: those that the version does not have are left out.
+    pub fn of(version: Version, all: &multiview::Settings, tables: &PairTables) -> Self {
+        Self {
+            version,
+            fuse: settings_of(all, version.terms),
+            tables: tables.clone(),
+        }
+    }
 }
 
 /// Says what error is expected of every part of a view.
@@ -85,10 +107,9 @@ impl Bench {
             })
             .collect();
         let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
-        let fuse = setup.versions.iter().map(|version| {
-            let settings = settings_of(&setup.fuse, version.terms);
-            let tables = setup.tables.clone();
-            FuseStep::new(Arc::clone(&setup.model), settings, plans.clone(), tables)
+        let fuse = setup.trials.iter().map(|it| {
+            let model = Arc::clone(&setup.model);
+            FuseStep::new(model, it.fuse.clone(), plans.clone(), it.tables.clone())
         });
         Ok(Self {
             responses: responses.collect(),
@@ -122,24 +143,29 @@ impl Bench {
     ) -> Vec<Found> {
         assert_eq!(images.len(), self.views.len(), "one image per view");
         let mut responses = std::mem::take(&mut self.responses);
-        let seen: Vec<Option<ViewEstimate>> = self
-            .views
-            .par_iter()
-            .zip(&mut responses)
-            .zip(images)
-            .map(|((step, responses), image)| {
-                Some(step.run((*image)?, Scope::whole(step.layout()), responses))
-            })
-            .collect();
+        let seen = self.look(images, &mut responses);
         let found = {
             let seen = self.seen(&seen, &responses, expected);
-            let versions = self.setup.versions.par_iter().enumerate();
-            versions
-                .map(|(nth, version)| self.version(nth, *version, &seen))
+            let trials = self.setup.trials.par_iter().enumerate();
+            trials
+                .map(|(nth, it)| self.version(nth, it.version, &seen))
                 .collect()
         };
         self.responses = responses;
         found
+    }
+
+    /// Every view alone.
+    fn look(
+        &self,
+        images: &[Option<Rgb8View<'_>>],
+        responses: &mut [Vec<f32>],
+    ) -> Vec<Option<ViewEstimate>> {
+        let views = self.views.par_iter().zip(responses).zip(images);
+        let look = |((step, responses), image): ((&ViewStep, &mut Vec<f32>), &Option<_>)| {
+            Some(step.run((*image)?, Scope::whole(step.layout()), responses))
+        };
+        views.map(look).collect()
     }
 
     fn seen<'a>(
@@ -237,7 +263,11 @@ impl Bench {
         let view = |(view, it): (usize, &Option<pipeline::FusedView>)| {
             let rows = self.footage_from_frame[view];
             let in_footage = |[x, y]: [f64; 2]| rows.map(|row| row[0] * x + row[1] * y + row[2]);
-            let joints = PARSE14.from_parts(&it.as_ref()?.pose.centres_px);
+            let centres = &it.as_ref()?.pose.centres_px;
+            let joints = match &self.setup.joint_map {
+                Some(map) => map.from_parts(centres),
+                None => PARSE14.from_parts(centres),
+            };
             Some(joints.into_iter().map(in_footage).collect())
         };
         Found {
@@ -306,6 +336,7 @@ fn settings_of(all: &multiview::Settings, terms: Terms) -> multiview::Settings {
     }
     if terms < Terms::Adaptive {
         settings.tau_px = Vec::new();
+        settings.tau_tenths = Vec::new();
         settings.rescue_px = Vec::new();
     }
     settings

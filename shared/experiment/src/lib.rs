@@ -21,12 +21,12 @@ mod summary;
 mod published;
 mod report;
 
-pub use bench::{Bench, Expected, Setup};
+pub use bench::{Bench, Expected, Setup, Trial};
 pub use film::{Film, FilmError, FilmSettings};
 pub use published::published;
 pub use record::{Found, Header, Record, RecordError, read_records};
 pub use report::{Page, html, latex};
 pub use score::{FrameScore, Joints, score, seen};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
-pub use truth::{parse14, part_errors};
+pub use truth::{parse14, part_errors, part_errors_and_facing, size};
 pub use version::{Combining, Terms, Version, VersionError};

@@ -58,18 +58,21 @@ pub fn part_errors(
     joints: &[[f64; 2]],
     may_be_exchanged: bool,
 ) -> Option<Vec<f32>> {
+    let (errors, _) = part_errors_and_facing(centres, joints, may_be_exchanged)?;
+    Some(errors)
+}
+
+/// The same, and whether left and right are exchanged.
+pub fn part_errors_and_facing(
+    centres: &[[f64; 2]],
+    joints: &[[f64; 2]],
+    may_be_exchanged: bool,
+) -> Option<(Vec<f32>, bool)> {
     if centres.len() != N_PARTS || joints.iter().flatten().any(|it| !it.is_finite()) {
         return None;
     }
     let truth = parts(joints);
-    let side = |axis: usize| {
-        let values = joints.iter().map(|it| it[axis]);
-        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
-            [low.min(it), high.max(it)]
-        });
-        high - low + 1.0
-    };
-    let tenth = 0.1 * side(0).max(side(1));
+    let tenth = 0.1 * size(joints);
     let errors = |exchanged: bool| -> Vec<f32> {
         let of = |part: usize| truth[if exchanged { MIRROR[part] } else { part }];
         let error = |(part, at): (usize, &[f64; 2])| {
@@ -80,15 +83,27 @@ pub fn part_errors(
     };
     let plain = errors(false);
     if !may_be_exchanged {
-        return Some(plain);
+        return Some((plain, false));
     }
     let other = errors(true);
     let sum = |it: &[f32]| it.iter().sum::<f32>();
     Some(if sum(&other) < sum(&plain) {
-        other
+        (other, true)
     } else {
-        plain
+        (plain, false)
     })
+}
+
+/// The size of a person: the longer side of the rectangle around the joints, pixels.
+pub fn size(joints: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let values = joints.iter().map(|it| it[axis]);
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+            [low.min(it), high.max(it)]
+        });
+        high - low + 1.0
+    };
+    side(0).max(side(1))
 }
 
 #[cfg(test)]

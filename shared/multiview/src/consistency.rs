@@ -26,9 +26,12 @@ impl<'a> PairTerms<'a> {
         let counterpart = counterparts(model, exchanged);
         let active = active_parts(settings, pair, &counterpart);
         let table = pair.tables.filter(|_| settings.beta != 0.0);
-        let table = table.and_then(|it| match exchanged {
-            false => Some(it.joint.as_ref()),
-            true => it.exchanged.as_deref(),
+        let table = table.and_then(|it| {
+            if exchanged {
+                it.exchanged.as_deref()
+            } else {
+                Some(it.joint.as_ref())
+            }
         });
         Self {
             settings,

@@ -9,7 +9,7 @@ use multiview::{
     Sightings, ViewPlan, anatomical, anatomical_evidence, average, consensus, is_exchanged,
 };
 use nalgebra::{Point2, Point3, UnitVector3};
-use skeleton::{JointSet, PARSE14};
+use skeleton::{JointMap, JointSet, PARSE14};
 
 use crate::fused::Fused;
 use crate::{AllViewsAnswer, Answer, PairAnswer};
@@ -29,6 +29,8 @@ pub enum Combine {
 pub struct SkeletonSettings {
     /// Which joints to triangulate.
     pub joints: &'static JointSet,
+    /// From parts to these joints, as learned; each the mean of its own parts without it.
+    pub joint_map: Option<Arc<JointMap>>,
     /// How to triangulate.
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, cells of the level it was found on.
@@ -53,6 +55,7 @@ impl Default for SkeletonSettings {
     fn default() -> Self {
         Self {
             joints: &PARSE14,
+            joint_map: None,
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
             combine: Combine::default(),
@@ -148,8 +151,9 @@ impl SkeletonStep {
             Combine::Consensus => self.agreed(&candidates, exchanged),
         };
         let n_joints = self.settings.joints.joints.len();
-        let joints = self.triangulate(&views, n_joints, |centres| {
-            self.settings.joints.from_parts(centres)
+        let joints = self.triangulate(&views, n_joints, |centres| match &self.settings.joint_map {
+            Some(map) => map.from_parts(centres),
+            None => self.settings.joints.from_parts(centres),
         });
         Skeleton {
             joints,

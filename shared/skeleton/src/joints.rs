@@ -55,6 +55,41 @@ impl JointSet {
     }
 }
 
+/// A linear map from parts to joints, learned from people whose joints are known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointMap {
+    weights: Vec<Vec<f64>>,
+}
+
+impl JointMap {
+    /// From a row of weights, one for each part, for every joint; a row sums to 1.
+    ///
+    /// * Returns `None` if the rows are not of one length, or there are none.
+    #[must_use]
+    pub fn new(weights: Vec<Vec<f64>>) -> Option<Self> {
+        let n_parts = weights.first()?.len();
+        let fits = weights.iter().all(|it| it.len() == n_parts);
+        fits.then_some(Self { weights })
+    }
+
+    /// The joints of a pose, from the centres of its parts.
+    ///
+    /// * `centres`: one value per part; any space that can be averaged (2D pixels, 3D metres).
+    #[must_use]
+    pub fn from_parts<const D: usize>(&self, centres: &[[f64; D]]) -> Vec<[f64; D]> {
+        let joint = |row: &Vec<f64>| {
+            let mut sum = [0.0; D];
+            for (weight, centre) in row.iter().zip(centres) {
+                for (sum, value) in sum.iter_mut().zip(centre) {
+                    *sum += weight * value;
+                }
+            }
+            sum
+        };
+        self.weights.iter().map(joint).collect()
+    }
+}
+
 const fn joint(name: &'static str, parts: &'static [usize]) -> Joint {
     Joint { name, parts }
 }

@@ -4,7 +4,7 @@ mod job;
 mod report;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -17,6 +17,8 @@ use viewquality::Table;
 use crate::cli::Globals;
 use crate::inputs;
 use job::Job;
+
+pub(super) use job::no_film;
 
 const HELP: &str = "\
 SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax synth`, or a description \
@@ -64,6 +66,9 @@ pub(crate) struct Arguments {
     /// Settings of fusion.
     #[arg(long, value_name = "FILE")]
     fuse: Option<PathBuf>,
+    /// What was learned about several views (`train consistency`), instead of what FILE says.
+    #[arg(long, value_name = "FILE")]
+    consistency: Option<PathBuf>,
     /// Table of expected errors, as the authors released it.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
@@ -108,7 +113,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT")?;
     let side = |it: &str| {
         it.parse::<u32>()
@@ -137,6 +142,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;
+    let learned = inputs::learned(config.consistency.as_deref(), &model)?;
     let sigma = match &arguments.sigma {
         Some(file) => Some(inputs::quality_table(file, model.n_parts())?),
         None => None,
@@ -161,6 +167,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         quiet: globals.quiet,
         model,
         config,
+        learned,
         sigma,
         poses,
         stop,
@@ -207,7 +214,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     Ok(all)
 }
 
-fn unread(error: SequenceError) -> Failure {
+pub(super) fn unread(error: SequenceError) -> Failure {
     let kind = match &error {
         SequenceError::Rig(geometry::files::RigFileError::Read { .. }) => ExitKind::Input,
         SequenceError::Rig(_) | SequenceError::Cameras { .. } => ExitKind::Calibration,
@@ -217,7 +224,21 @@ fn unread(error: SequenceError) -> Failure {
 }
 
 fn config(arguments: &Arguments) -> Result<Config, Failure> {
-    let Some(file) = &arguments.fuse else {
+    let mut config = fuse_section(arguments.fuse.as_deref())?;
+    if let Some(file) = &arguments.consistency {
+        config.consistency = Some(file.clone());
+    }
+    let needs_file = config.tau == fuse::Tau::Named(fuse::TauName::Learned);
+    if needs_file && config.consistency.is_none() {
+        let message = "`tau = \"learned\"` needs `consistency`, or --consistency";
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    Ok(config)
+}
+
+/// Reads a section `[fuse]`, if there is one.
+fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
+    let Some(file) = file else {
         return Ok(Config::default());
     };
     let text = inputs::text(file)?;
@@ -226,6 +247,9 @@ fn config(arguments: &Arguments) -> Result<Config, Failure> {
         Failure::new(ExitKind::Config, message)
     })?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
+    if let Some(file) = &mut config.consistency {
+        *file = folder.join(&file);
+    }
     for table in &mut config.compatibility {
         table.files = table.files.each_ref().map(|it| folder.join(it));
     }
@@ -248,7 +272,7 @@ fn versions(
         return Ok(arguments.versions.clone());
     }
     let mut names = vec!["geometry"];
-    if !config.compatibility.is_empty() {
+    if !config.compatibility.is_empty() || config.consistency.is_some() {
         names.push("appearance");
     }
     if expects {
@@ -267,12 +291,13 @@ fn versions(
 fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
         let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
-        Ok::<_, Failure>(fingerprint(&bytes))
+        Ok::<_, Failure>(inputs::fingerprint(&bytes))
     };
-    let model = fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
+    let model = inputs::fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
     let mut tables = Vec::new();
-    for file in config.compatibility.iter().flat_map(|it| &it.files) {
+    let files = config.compatibility.iter().flat_map(|it| &it.files);
+    for file in files.chain(&config.consistency) {
         tables.push(digest(file)?);
     }
     let fuse = toml::to_string(config).or_fail(ExitKind::Run)?;
@@ -288,12 +313,6 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
     ))
 }
 
-/// FNV-1a, 64 bits: to tell files apart, not to keep anybody out.
-fn fingerprint(bytes: &[u8]) -> u64 {
-    let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,11 +325,5 @@ mod tests {
         for text in ["0.8", "1-0.8", "0.5-0.5", "0-2", "nan-1"] {
             assert!(share(text).is_err(), "{text}");
         }
-    }
-
-    #[test]
-    fn the_fingerprint_is_that_of_the_published_function() {
-        assert_eq!(fingerprint(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(fingerprint(b"a"), 0xaf63_dc4c_8601_ec8c);
     }
 }

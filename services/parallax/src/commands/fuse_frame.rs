@@ -49,7 +49,10 @@ pub(crate) struct Arguments {
     /// Which energy.
     #[arg(long, value_enum, default_value_t = Energy::Paper)]
     energy: Energy,
-    /// Weight of the geometric term; by energy if not given.
+    /// What was learned about several views: part-type tables, weights, thresholds, joints.
+    #[arg(long, value_name = "FILE")]
+    consistency: Option<PathBuf>,
+    /// Weight of the geometric term; as learned, else by energy, if not given.
     #[arg(long)]
     alpha: Option<f64>,
     /// Weight of the part-type term.
@@ -61,7 +64,7 @@ pub(crate) struct Arguments {
     /// Expected errors in pixels: one line per view, one number per part.
     #[arg(long, value_name = "FILE")]
     sigma: Option<PathBuf>,
-    /// Thresholds of the expected errors: none, humaneva or umpm.
+    /// Thresholds of the expected errors: none, learned, humaneva or umpm.
     #[arg(long, value_enum, default_value_t = Threshold::None)]
     tau: Threshold,
     /// Most candidates of a view.
@@ -110,6 +113,8 @@ pub(crate) enum Combine {
 pub(crate) enum Threshold {
     /// No part is switched off.
     None,
+    /// Those of --consistency.
+    Learned,
     /// Those of the authors' program for HumanEva.
     Humaneva,
     /// Those of the authors' program for UMPM.
@@ -221,49 +226,69 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
     })
 }
 
-fn settings(
-    arguments: &Arguments,
-    model: &Model,
-    views: &[View],
-) -> Result<EstimatorSettings, Failure> {
-    let released = arguments.energy == Energy::Released;
+/// What the command line says about fusion.
+fn config(arguments: &Arguments) -> fuse::Config {
     let defaults = fuse::Config::default();
-    let facing = arguments.facing.unwrap_or(!released);
-    let config = fuse::Config {
-        energy: if released {
+    let is_released = arguments.energy == Energy::Released;
+    fuse::Config {
+        energy: if is_released {
             fuse::Energy::Released
         } else {
             fuse::Energy::Paper
         },
         alpha: arguments.alpha,
-        beta: arguments.beta.unwrap_or(defaults.beta),
+        beta: arguments.beta,
         tau: Tau::Named(match arguments.tau {
             Threshold::None => TauName::None,
+            Threshold::Learned => TauName::Learned,
             Threshold::Humaneva => TauName::HumanEva,
             Threshold::Umpm => TauName::Umpm,
         }),
-        facing,
+        facing: arguments.facing.unwrap_or(!is_released),
         max_iterations: arguments.max_iterations.unwrap_or(defaults.max_iterations),
         epsilon_px: arguments.epsilon.unwrap_or(defaults.epsilon_px),
         ..defaults
-    };
+    }
+}
+
+fn settings(
+    arguments: &Arguments,
+    model: &Model,
+    views: &[View],
+) -> Result<EstimatorSettings, Failure> {
+    let learned = inputs::learned(arguments.consistency.as_deref(), model)?;
+    if arguments.tau == Threshold::Learned && learned.is_none() {
+        let message = "--tau learned needs --consistency";
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
+    let config = config(arguments);
     let view = ViewSettings::default();
-    let n_candidates = arguments
-        .candidates
-        .unwrap_or(if released { 1 } else { view.n_candidates });
-    let tables = match &arguments.ptc[..] {
-        [] => Vec::new(),
-        [first, second] => vec![(0, 1, inputs::type_tables([first, second], model)?)],
+    let n_candidates = match (arguments.candidates, arguments.energy) {
+        (Some(n), _) => n,
+        (None, Energy::Released) => 1,
+        (None, Energy::Paper) => view.n_candidates,
+    };
+    let names: Vec<&str> = views
+        .iter()
+        .map(|it| it.framing.camera().name.as_str())
+        .collect();
+    let mut tables = inputs::pair_tables(&config, learned.as_ref(), model, &names)?;
+    match &arguments.ptc[..] {
+        [] => (),
+        [first, second] => {
+            let own = inputs::type_tables([first, second], model)?;
+            tables.of_pairs.push((0, 1, own));
+        }
         _ => {
             return Err(Failure::new(
                 ExitKind::Usage,
                 "--ptc is given twice, or not at all",
             ));
         }
-    };
+    }
     let scale = views.iter().map(|it| frame_scale(&it.framing)).sum::<f64>() / views.len() as f64;
     Ok(EstimatorSettings {
-        fuse: config.settings(n_candidates, scale as f32),
+        fuse: config.settings(n_candidates, scale as f32, learned.as_ref()),
         view: ViewSettings {
             n_candidates,
             ..view
@@ -271,11 +296,12 @@ fn settings(
         tables,
         skeleton: SkeletonSettings {
             joints: arguments.joints,
+            joint_map: learned.and_then(|it| it.joint_map(arguments.joints)),
             combine: match arguments.combine {
                 Combine::Mean => pipeline::Combine::Mean,
                 Combine::Consensus => pipeline::Combine::Consensus,
             },
-            facing,
+            facing: config.facing,
             ..SkeletonSettings::default()
         },
     })

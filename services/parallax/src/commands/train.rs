@@ -1,7 +1,8 @@
-//! `parallax train`: a model from annotated people.
+//! `parallax train`: a model from annotated people, and what several views have in common.
 
 mod alarms;
 mod album;
+mod consistency;
 mod data;
 mod leave;
 mod per_dataset;
@@ -68,6 +69,8 @@ Examples:
 pub(crate) enum Command {
     /// Train a flexible mixture of parts: the model that finds people in single views.
     Fmp(Box<Arguments>),
+    /// Learn what several views of a person have in common: part types, weights, thresholds, joints.
+    Consistency(Box<consistency::Arguments>),
 }
 
 /// What to train on, and how.
@@ -106,7 +109,10 @@ pub(crate) struct Arguments {
 
 /// Trains until the model is written, or it is told to stop.
 pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failure> {
-    let Command::Fmp(arguments) = command;
+    let arguments = match command {
+        Command::Fmp(it) => it,
+        Command::Consistency(it) => return consistency::run(&it, globals),
+    };
     let settings = settings(&arguments)?;
     if arguments.print_settings {
         output::line(

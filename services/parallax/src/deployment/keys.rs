@@ -149,13 +149,24 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "paper, or released: what the authors' program computes",
     ),
     (
-        "fuse.alpha",
-        "weight of the geometric term; 0.01 per squared cell (paper), 0.07 (released)",
+        "fuse.consistency",
+        "what `parallax train consistency` learned: part-type tables, weights, thresholds, joints",
     ),
-    ("fuse.beta", "weight of the part-type term"),
+    (
+        "fuse.consistency_rig",
+        "rig of that file whose cameras these are; tables go by the angle between two cameras without it",
+    ),
+    (
+        "fuse.alpha",
+        "weight of the geometric term; as learned, else 0.002 per squared cell (paper), 0.07 (released)",
+    ),
+    (
+        "fuse.beta",
+        "weight of the part-type term; as learned, else 0.03",
+    ),
     (
         "fuse.max_distance_cells",
-        "distance beyond which the geometric term grows no more; none without it",
+        "distance beyond which the geometric term grows no more; as learned, else none",
     ),
     (
         "fuse.compatibility",
@@ -163,7 +174,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "fuse.tau",
-        "expected error that switches a part off: none, humaneva, humaneva-median, umpm, umpm-median, one per part or { file = ... }, pixels of the footage",
+        "expected error that switches a part off: none, learned, humaneva, humaneva-median, umpm, umpm-median, one per part or { file = ... }, pixels of the footage",
     ),
     (
         "fuse.facing",

@@ -113,7 +113,14 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
     within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
     within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
     not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
-    not_negative("fuse.beta", it.beta)?;
+    not_negative("fuse.beta", it.beta.unwrap_or(0.0))?;
+    let needs_file = it.tau == fuse::Tau::Named(fuse::TauName::Learned);
+    demand(
+        !needs_file || it.consistency.is_some(),
+        "fuse.tau",
+        "\"learned\"",
+        "thresholds, or `fuse.consistency` to name the file that has them",
+    )?;
     not_negative("fuse.epsilon_px", it.epsilon_px)?;
     if let Some(cells) = it.max_distance_cells {
         positive("fuse.max_distance_cells", cells)?;

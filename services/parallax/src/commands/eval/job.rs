@@ -6,17 +6,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use consistency::Learned;
 use experiment::{
-    Bench, Film, FilmError, FilmSettings, Header, Record, Setup, Version, parse14, part_errors,
-    read_records, seen,
+    Bench, Film, FilmError, FilmSettings, Header, Record, Setup, Trial, Version, parse14,
+    part_errors, read_records, seen,
 };
 use fmp::Model;
 use fuse::Config;
 use indicatif::{ProgressBar, ProgressStyle};
-use multiview::TypeTables;
 use pipeline::{SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
+use skeleton::PARSE14;
 use viewquality::Table;
 
 use crate::{inputs, output};
@@ -28,6 +29,7 @@ const EVERY: Duration = Duration::from_secs(10);
 pub(super) struct Job {
     pub(super) model: Arc<Model>,
     pub(super) config: Config,
+    pub(super) learned: Option<Learned>,
     pub(super) versions: Vec<Version>,
     pub(super) settings: String,
     pub(super) film: FilmSettings,
@@ -158,46 +160,37 @@ impl Job {
         if let fuse::Tau::File(tau) = &config.tau {
             config.tau = fuse::Tau::Given(inputs::tau(&tau.file, self.model.n_parts())?);
         }
-        let mut fuse = config.settings(self.n_candidates, mean);
+        let learned = self.learned.as_ref();
+        let mut fuse = config.settings(self.n_candidates, mean, learned);
         if self.oracle {
-            fuse.tau_px = vec![1.0; self.model.n_parts()];
+            // The true errors are in tenths of the person's size.
+            let tau = learned.filter(|_| !fuse.tau_tenths.is_empty());
+            fuse.tau_px = match tau {
+                Some(learned) => learned.tau_tenths.clone(),
+                None => vec![1.0; self.model.n_parts()],
+            };
             fuse.rescue_px = Vec::new();
         }
+        let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
+        let tables = inputs::pair_tables(&config, learned, &self.model, &cameras)?;
+        let trial = |version: &Version| Trial::of(*version, &fuse, &tables);
         let setup = Setup {
             model: Arc::clone(&self.model),
             view: ViewSettings {
                 n_candidates: self.n_candidates,
                 ..ViewSettings::default()
             },
-            tables: self.tables(sequence)?,
+            trials: self.versions.iter().map(trial).collect(),
+            joint_map: learned.and_then(|it| it.joint_map(&PARSE14)),
             skeleton: SkeletonSettings {
                 joints: sequence.joints,
+                joint_map: learned.and_then(|it| it.joint_map(sequence.joints)),
                 facing: fuse.facing,
                 ..SkeletonSettings::default()
             },
-            fuse,
-            versions: self.versions.clone(),
         };
         let up = sequence.rig.up_in_world();
         Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
-    }
-
-    /// Tables of part types of the sequence's pairs of cameras.
-    fn tables(&self, sequence: &Sequence) -> Result<Vec<(usize, usize, TypeTables)>, Failure> {
-        let index = |name: &String| sequence.views.iter().position(|it| it.camera == *name);
-        let mut tables = Vec::new();
-        for entry in &self.config.compatibility {
-            let [Some(first), Some(second)] = entry.views.each_ref().map(index) else {
-                continue;
-            };
-            let mut files = entry.files.each_ref().map(PathBuf::as_path);
-            if first > second {
-                files.reverse();
-            }
-            let read = inputs::type_tables(files, &self.model)?;
-            tables.push((first.min(second), first.max(second), read));
-        }
-        Ok(tables)
     }
 
     /// The true joints in the frames of every view, where they stand in for expected errors.
@@ -216,7 +209,7 @@ impl Job {
     }
 }
 
-fn no_film(error: FilmError) -> Failure {
+pub(in crate::commands) fn no_film(error: FilmError) -> Failure {
     let kind = match &error {
         FilmError::Footage { .. } => ExitKind::Input,
         FilmError::Framing { .. } | FilmError::Warp { .. } => ExitKind::Calibration,

@@ -75,7 +75,9 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         |[width, height]| format!("{width}x{height}"),
     );
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
-    let settings = job.config.settings(job.n_candidates, 1.0);
+    let settings = job
+        .config
+        .settings(job.n_candidates, 1.0, job.learned.as_ref());
     let model = arguments.model.as_ref();
     let model = model.map_or("the one that ships".to_owned(), |it| {
         it.display().to_string()

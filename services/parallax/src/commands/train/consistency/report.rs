@@ -1,0 +1,91 @@
+//! What is said about what was learned.
+
+use runtime::Failure;
+use serde_json::{Value, json};
+
+use super::Arguments;
+use super::work::Done;
+use crate::cli::Globals;
+use crate::output;
+use ::consistency::{Appearance, Point};
+
+/// Version of the JSON.
+const SCHEMA: u32 = 1;
+
+/// Prints the summary.
+pub(super) fn say(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+    if arguments.json {
+        output::json(&summary(arguments, done))
+    } else if globals.quiet {
+        Ok(())
+    } else {
+        output::line(text(arguments, done))
+    }
+}
+
+fn summary(arguments: &Arguments, done: &Done) -> Value {
+    let bins = done.bins.iter();
+    let joints = done.joints.iter();
+    json!({
+        "schema_version": SCHEMA,
+        "file": arguments.out,
+        "learned_from": done.learned.learned,
+        "weights": done.learned.weights,
+        "tau_tenths": done.learned.tau_tenths,
+        "single": done.single,
+        "surface": done.surface,
+        "bins": bins.map(|(n, lift)| json!({"half_circle": n, "lift": lift})).collect::<Vec<_>>(),
+        "joints": joints.map(|(ridge, error)| json!({"ridge": ridge, "rms": error})).collect::<Vec<_>>(),
+        "seconds": done.seconds,
+    })
+}
+
+fn text(arguments: &Arguments, done: &Done) -> String {
+    let from = done.learned.learned;
+    let mut lines = vec![format!(
+        "{}: {} views of {} instants, weights chosen on {} more, in {:.0} s",
+        arguments.out.display(),
+        from.views,
+        from.instants,
+        from.held_out,
+        done.seconds
+    )];
+    lines.push(
+        "bins of half the circle, and what tables of so many know of people held out:".to_owned(),
+    );
+    for (n, lift) in &done.bins {
+        let lift = lift.map_or_else(|| "-".to_owned(), |it| format!("{it:.4}"));
+        lines.push(format!("    {n:3}  {lift}"));
+    }
+    lines.push("joints: error in sizes of the person".to_owned());
+    for (ridge, error) in &done.joints {
+        let ridge = ridge.map_or_else(|| "parts alone".to_owned(), |it| format!("ridge {it:e}"));
+        lines.push(format!("    {ridge:12} {error:.4}"));
+    }
+    lines.push(format!(
+        "{:>8} {:>6} {:>6} {:>6} {:>7} {:>7} {:>6}",
+        "alpha", "cap", "form", "beta", "area", "PCP3D", "iter."
+    ));
+    lines.extend(done.single.iter().map(|it| row(it, "")));
+    for it in &done.surface {
+        let is_chosen = it.weights == done.learned.weights;
+        lines.push(row(it, if is_chosen { "  <- chosen" } else { "" }));
+    }
+    lines.join("\n")
+}
+
+fn row(point: &Point, mark: &str) -> String {
+    let it = &point.weights;
+    let cap = it
+        .max_distance_cells
+        .map_or_else(|| "-".to_owned(), |it| it.to_string());
+    let form = match (it.beta > 0.0, it.appearance) {
+        (false, _) => "-",
+        (true, Appearance::Joint) => "joint",
+        (true, Appearance::Lift) => "lift",
+    };
+    format!(
+        "{:8} {cap:>6} {form:>6} {:6} {:7.2} {:7.2} {:6.2}{mark}",
+        it.alpha, it.beta, point.area, point.pcp3d, point.iterations
+    )
+}

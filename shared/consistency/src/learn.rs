@@ -1,0 +1,264 @@
+//! From single views and their truth to what views have in common.
+
+use std::f64::consts::PI;
+
+use skeleton::{JointSet, N_PARTS, PARENT};
+
+use crate::counts::{Counts, Shape};
+use crate::joints::{JointFit, JointSample};
+use crate::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
+
+/// How to learn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Bins of half the circle.
+    pub n_bins: usize,
+    /// Error up to which the type of a part counts, its parent's too; tenths of the person's size.
+    pub max_error: f32,
+    /// Mean error of a person up to which it shows where joints lie among parts, the same unit.
+    pub max_mean_error: f32,
+    /// Observations by chance added to every table.
+    pub smoothing: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            n_bins: 12,
+            max_error: 0.5,
+            max_mean_error: 0.8,
+            smoothing: 20.0,
+        }
+    }
+}
+
+/// The best pose of one view, and the truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// Type of every part.
+    pub types: Vec<u8>,
+    /// Centres of all parts, pixels; parts as the model names them.
+    pub centres: Vec<[f64; 2]>,
+    /// Error of every part, tenths of the person's size.
+    pub errors: Vec<f32>,
+    /// Whether the truth says that left and right are exchanged: the person is seen from behind.
+    pub exchanged: bool,
+    /// Size of the person, pixels.
+    pub size: f64,
+    /// The true joints of the joint set, pixels; `None` where one is not known.
+    pub joints: Vec<Option<[f64; 2]>>,
+}
+
+/// Two views of one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair<'a> {
+    /// Their sightings.
+    pub views: [&'a Sighting; 2],
+    /// The angle from the first to the second as seen from the person (`multiview::angle_between`), radians.
+    pub angle: Option<f64>,
+    /// What the two cameras are called, where their pair is to be learned by name too.
+    pub cameras: Option<[&'a str; 2]>,
+}
+
+/// Why nothing was learned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LearnError {
+    /// No view was right enough.
+    #[error("of {views} views none is near the truth: nothing can be learned of them")]
+    Nothing {
+        /// Views seen.
+        views: u64,
+    },
+}
+
+/// Learns from one instant after the other; the order does not matter but for rounding in the joints.
+#[derive(Debug, Clone)]
+pub struct Learner {
+    settings: Settings,
+    shape: Shape,
+    ring: Vec<Counts>,
+    named: Vec<NamedPair>,
+    /// Of every part.
+    errors: Vec<Vec<f32>>,
+    joints: JointFit,
+    from: LearnedFrom,
+}
+
+impl Learner {
+    /// Knows nothing yet.
+    pub fn new(shape: Shape, settings: Settings) -> Self {
+        Self {
+            ring: vec![Counts::new(&shape); settings.n_bins.max(1)],
+            errors: vec![Vec::new(); shape.n_types.len()],
+            named: Vec::new(),
+            joints: JointFit::default(),
+            from: LearnedFrom::default(),
+            settings,
+            shape,
+        }
+    }
+
+    /// Takes one view in.
+    ///
+    /// * `set`: of its joints.
+    pub fn see(&mut self, view: &Sighting, set: &'static JointSet) {
+        self.from.views += 1;
+        for (all, error) in self.errors.iter_mut().zip(&view.errors) {
+            all.push(*error);
+        }
+        let mean = view.errors.iter().sum::<f32>() / view.errors.len().max(1) as f32;
+        if view.centres.len() != N_PARTS || mean > self.settings.max_mean_error {
+            return;
+        }
+        let part = |it: usize| view.centres[self.shape.partner(it, view.exchanged)];
+        let centres: Vec<[f64; 2]> = (0..N_PARTS).map(part).collect();
+        for (joint, at) in set.joints.iter().zip(&view.joints) {
+            if let Some(at) = at {
+                self.joints.add(&JointSample {
+                    centres: &centres,
+                    joint: *at,
+                    parts: joint.parts,
+                    size: view.size,
+                });
+            }
+        }
+    }
+
+    /// Takes two views of one instant in.
+    pub fn see_pair(&mut self, pair: &Pair<'_>) {
+        let [first, second] = pair.views;
+        let exchanged = first.exchanged != second.exchanged;
+        for part in 0..self.shape.n_types.len() {
+            let partner = self.shape.partner(part, exchanged);
+            if !self.is_right(first, part) || !self.is_right(second, partner) {
+                continue;
+            }
+            let types = [first.types[part], second.types[partner]].map(usize::from);
+            if let Some(angle) = pair.angle {
+                let n = self.ring.len();
+                let bin = ((angle.abs() / PI * n as f64) as usize).min(n - 1);
+                if angle >= 0.0 {
+                    self.ring[bin].add(&self.shape, part, types, exchanged);
+                } else {
+                    let types = [types[1], types[0]];
+                    self.ring[bin].add(&self.shape, partner, types, exchanged);
+                }
+            }
+            if let Some(cameras) = pair.cameras {
+                self.add_named(cameras, part, types, exchanged);
+            }
+        }
+    }
+
+    fn add_named(&mut self, cameras: [&str; 2], part: usize, types: [usize; 2], exchanged: bool) {
+        let at = self.named.iter().position(|it| it.cameras == cameras);
+        let at = at.unwrap_or_else(|| {
+            self.named.push(NamedPair {
+                cameras: cameras.map(str::to_owned),
+                counts: Counts::new(&self.shape),
+            });
+            self.named.len() - 1
+        });
+        self.named[at]
+            .counts
+            .add(&self.shape, part, types, exchanged);
+    }
+
+    /// A type says something where its part and the parent, which it is about, are right.
+    fn is_right(&self, view: &Sighting, part: usize) -> bool {
+        let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
+        let right = |it: usize| {
+            view.errors
+                .get(it)
+                .is_some_and(|it| *it <= self.settings.max_error)
+        };
+        right(part) && right(parent)
+    }
+
+    /// Counts an instant whose views were taken in.
+    pub fn end_instant(&mut self) {
+        self.from.instants += 1;
+    }
+
+    /// What is known about joints.
+    pub fn joints(&self) -> &JointFit {
+        &self.joints
+    }
+
+    /// How likely the types of others are, given their angle: the mean over all parts of `ln p(a, b) / (p(a) p(b))`,
+    /// by tables of this one; above 0 if the tables know something.
+    pub fn lift_on(&self, other: &Self) -> Option<f64> {
+        let marginals = crate::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (own, theirs) in self.ring.iter().zip(&other.ring) {
+            for exchanged in [false, true] {
+                let joint = own.joint(&self.shape, &marginals, self.settings.smoothing, exchanged);
+                for (part, cells) in theirs.of(exchanged).iter().enumerate() {
+                    let (rows, cols) = (joint[part].column_sum(), joint[part].row_sum());
+                    for (cell, count) in cells.iter().enumerate().filter(|it| *it.1 > 0) {
+                        let at = (cell / cols.len(), cell % cols.len());
+                        let lift = joint[part][at] / (rows[at.0] * cols[at.1]);
+                        sum += f64::from(*count) * lift.ln();
+                        n += f64::from(*count);
+                    }
+                }
+            }
+        }
+        (n > 0.0).then(|| sum / n)
+    }
+
+    /// All that was learned.
+    ///
+    /// * `rig`: what the pairs of cameras that were learned by name belong to.
+    ///
+    /// # Errors
+    ///
+    /// [`LearnError::Nothing`].
+    pub fn learned(
+        &self,
+        fingerprint: String,
+        weights: Weights,
+        rig: Option<&str>,
+        ridge: Option<f64>,
+    ) -> Result<Learned, LearnError> {
+        if self.ring.iter().all(|it| it.total() == 0) {
+            return Err(LearnError::Nothing {
+                views: self.from.views,
+            });
+        }
+        let (format, version) = Learned::head();
+        let rigs = rig.map(|name| NamedRig {
+            name: name.to_owned(),
+            pairs: self.named.clone(),
+        });
+        let sets = JointSet::ALL.into_iter();
+        Ok(Learned {
+            format,
+            version,
+            model: ModelOf {
+                fingerprint,
+                shape: self.shape.clone(),
+            },
+            learned: self.from,
+            weights,
+            tau_tenths: self.errors.iter().map(|it| median(it)).collect(),
+            smoothing: self.settings.smoothing,
+            ring: self.ring.clone(),
+            rigs: rigs.into_iter().collect(),
+            joints: ridge.map_or_else(Vec::new, |ridge| {
+                sets.map(|it| self.joints.solve(it, ridge)).collect()
+            }),
+        })
+    }
+}
+
+/// The middle one; of an even number the lower.
+fn median(values: &[f32]) -> f32 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    let middle = sorted.len().saturating_sub(1) / 2;
+    // Four digits are more than pictures tell.
+    sorted
+        .get(middle)
+        .map_or(0.0, |it| (it * 1e4).round() / 1e4)
+}

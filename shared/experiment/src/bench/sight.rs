@@ -1,0 +1,89 @@
+//! Single views against the truth: what the terms between views are learned from.
+
+use consistency::{Learner, Pair, Sighting};
+use evaluation::Point;
+use kernels::Rgb8View;
+use multiview::{ViewAnswer, angle_between};
+use nalgebra::Point3;
+use sequences::Sequence;
+
+use super::Bench;
+use crate::{parse14, part_errors_and_facing, seen, size};
+
+impl Bench {
+    /// Solves every view of an instant alone, and lets learners see them.
+    ///
+    /// * `joints`: the true joints of the sequence's joint set, metres.
+    /// * `by_name`: learn the pairs of cameras by their names, too.
+    ///
+    /// # Panics
+    ///
+    /// If the number of images, or the size of one, is not that of the rig.
+    pub fn learn(
+        &mut self,
+        learners: &mut [Learner],
+        (sequence, joints): (&Sequence, &[Option<Point>]),
+        images: &[Option<Rgb8View<'_>>],
+        by_name: bool,
+    ) {
+        assert_eq!(images.len(), self.views.len(), "one image per view");
+        let mut responses = std::mem::take(&mut self.responses);
+        let found = self.look(images, &mut responses);
+        self.responses = responses;
+        let answer = |view: usize| {
+            let found = found[view].as_ref()?;
+            (!found.candidates.is_empty()).then_some(ViewAnswer {
+                plan: &self.plans[view],
+                candidates: &found.candidates,
+                sigma_px: None,
+            })
+        };
+        let sight = |view: usize| {
+            let answer = answer(view)?;
+            Some((answer, sighting(&answer, sequence, joints)?))
+        };
+        let views: Vec<Option<(ViewAnswer<'_>, Sighting)>> = (0..found.len()).map(sight).collect();
+        for learner in &mut *learners {
+            let sightings = views.iter().flatten();
+            sightings.for_each(|it| learner.see(&it.1, sequence.joints));
+            learner.end_instant();
+        }
+        for [first, second] in pipeline::all_pairs(views.len()) {
+            if let [Some(a), Some(b)] = [&views[first], &views[second]] {
+                let names = [first, second].map(|it| sequence.views[it].camera.as_str());
+                let pair = Pair {
+                    views: [&a.1, &b.1],
+                    angle: angle_between(&a.0, &b.0),
+                    cameras: by_name.then_some(names),
+                };
+                for learner in &mut *learners {
+                    learner.see_pair(&pair);
+                }
+            }
+        }
+    }
+}
+
+fn sighting(
+    answer: &ViewAnswer<'_>,
+    sequence: &Sequence,
+    joints: &[Option<Point>],
+) -> Option<Sighting> {
+    let best = answer.candidates.first()?;
+    let camera = answer.plan.camera();
+    let centres = answer.plan.centres(best);
+    let truth = seen(camera, [0.0; 2], &parse14(sequence.joints, joints))?;
+    let (errors, exchanged) = part_errors_and_facing(&centres, &truth, true)?;
+    let project = |joint: &Option<Point>| {
+        let at = camera.project(&Point3::from((*joint)?))?;
+        Some([at.x, at.y])
+    };
+    Some(Sighting {
+        types: best.parts.iter().map(|it| it.mixture).collect(),
+        centres,
+        errors,
+        exchanged,
+        size: size(&truth),
+        joints: joints.iter().map(project).collect(),
+    })
+}
