@@ -6,6 +6,7 @@ mod work;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use ::consistency::Learned;
 use clap::Args;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::Sequence;
@@ -30,7 +31,7 @@ With --json one object: the weights, every choice that was tried and how it did,
 people by the number of bins, the error of joints with and without the map.
 
 Exit codes: 0 done; 2 the command line; 4 a sequence or a model, or nothing could be learned; 5 a calibration; 130 \
-interrupted.
+interrupted; OUT then holds the tables with the default weights, if weights were being tried.
 
 Examples:
     parallax synth out/ring --rig ring:6 --subjects 1-8 --actions walking,boxing,gestures --frames 6 --rate 1
@@ -53,6 +54,9 @@ pub(crate) struct Arguments {
     /// Subjects that the weights are chosen on, separated by commas; without it the last fourth of them.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
+    /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
+    #[arg(long, value_name = "N", default_value_t = 48)]
+    tries: usize,
     /// Learn the pairs of these cameras by name too; all sequences are of one rig.
     #[arg(long, value_name = "NAME")]
     rig: Option<String>,
@@ -97,10 +101,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .or_fail(ExitKind::Run)?;
     let work = Work::new(arguments, globals, model, stop);
     let fingerprint = format!("{:016x}", inputs::fingerprint(&bytes));
-    let done = pool.install(|| work.run(&train, &held, &fingerprint))?;
-    let text = done.learned.write().or_fail(ExitKind::Run)?;
-    let wrong = |error: std::io::Error| inputs::in_file(&arguments.out, &error);
-    std::fs::write(&arguments.out, text).map_err(wrong)?;
+    let keep = |learned: &Learned| {
+        let text = learned.write().or_fail(ExitKind::Run)?;
+        let wrong = |error: std::io::Error| inputs::in_file(&arguments.out, &error);
+        std::fs::write(&arguments.out, text).map_err(wrong)
+    };
+    let done = pool.install(|| work.run(&train, &held, &fingerprint, &keep))?;
     report::say(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
 }

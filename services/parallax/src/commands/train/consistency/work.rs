@@ -62,11 +62,14 @@ impl<'a> Work<'a> {
     }
 
     /// Learns, and chooses.
+    ///
+    /// * `keep`: is given what was learned before the weights are chosen, with those of the settings, and after.
     pub(super) fn run(
         &self,
         train: &[Sequence],
         held: &[Sequence],
         fingerprint: &str,
+        keep: &dyn Fn(&Learned) -> Result<(), Failure>,
     ) -> Result<Done, Failure> {
         let learners = self.look(train, "learning")?;
         let others = self.look(held, "looking at people held out")?;
@@ -81,10 +84,13 @@ impl<'a> Work<'a> {
         let joints = joint_errors(learner, other);
         let ridge = smallest(&joints).filter(|_| !self.arguments.no_joints);
         let first = self.learned(learner, Weights::default(), fingerprint, ridge)?;
-        let (single, surface) = self.choose(held, &first)?;
+        keep(&first)?;
+        let tried = self.thinned(held);
+        let (single, surface) = self.choose(&tried, &first)?;
         let weights = best(&surface).map_or(first.weights, |it| it.weights);
         let mut learned = self.learned(learner, weights, fingerprint, ridge)?;
-        learned.learned.held_out = held.iter().map(|it| it.frames.len() as u64).sum();
+        learned.learned.held_out = tried.iter().map(|it| it.frames.len() as u64).sum();
+        keep(&learned)?;
         Ok(Done {
             learned,
             bins,
@@ -93,6 +99,23 @@ impl<'a> Work<'a> {
             surface,
             seconds: self.begin.elapsed().as_secs_f64(),
         })
+    }
+
+    /// Some instants of people held out, evenly over all of them.
+    fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
+        let n: usize = held.iter().map(|it| it.frames.len()).sum();
+        let most = self.arguments.tries.min(n);
+        let mut seen = 0;
+        let thin = |sequence: &Sequence| {
+            let mut sequence = sequence.clone();
+            sequence.frames.retain(|_| {
+                seen += 1;
+                // Whether the share that is wanted has grown by a whole instant.
+                seen * most / n > (seen - 1) * most / n
+            });
+            sequence
+        };
+        held.iter().map(thin).collect()
     }
 
     fn learned(
@@ -205,7 +228,9 @@ impl<'a> Work<'a> {
             for frame in &sequence.frames {
                 if self.stop.is_requested() {
                     let failure = Failure::new(ExitKind::Interrupted, "interrupted");
-                    return Err(failure.with_hint("nothing was written"));
+                    return Err(failure.with_hint(
+                        "what was learned until then is in OUT, if it came to trying weights",
+                    ));
                 }
                 let images = film.at(frame.index).map_err(no_film)?;
                 visit(&mut bench, sequence, frame, &images);
