@@ -1,4 +1,4 @@
-//! `parallax eval` as a user starts it: what it leaves behind, goes on with, and refuses.
+//! `parallax eval`, and `parallax train consistency` before it, as a user starts them: what they leave behind, go on with, and refuse.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
@@ -33,6 +33,22 @@ fn case(n_frames: usize, n_true: usize) -> Case {
         ),
     );
     case
+}
+
+/// The same walk by two people.
+fn two_people(case: &Case) {
+    let walk = fs::read_to_string(case.path("walk.toml")).unwrap();
+    for subject in ["ann", "bob"] {
+        let named = format!("subject = {subject:?}\n{walk}");
+        let named = named.replace("name = \"walk\"", &format!("name = \"{subject} walk\""));
+        case.write(&format!("{subject}.toml"), named);
+    }
+}
+
+fn learn(case: &Case, more: &[&str]) -> Ended {
+    let model = ["--model", "model.plx", "--no-upright", "--tries", "1"];
+    let first = ["train", "consistency", "ann.toml", "bob.toml"];
+    case.start(&[&first, &model[..], more].concat()).wait()
 }
 
 fn eval(case: &Case, more: &[&str]) -> Ended {
@@ -132,4 +148,72 @@ fn what_cannot_be_done_is_refused() {
         assert_eq!(code_found, Some(code), "{more:?}: {stderr}");
         assert!(stderr.contains(words), "{more:?}: {stderr}");
     }
+}
+
+#[test]
+fn what_views_have_in_common_is_learned_and_used() {
+    let case = case(2, 2);
+    two_people(&case);
+    let out = [
+        "--out",
+        "a.consistency",
+        "--rig",
+        "hall",
+        "--json",
+        "--quiet",
+    ];
+    let ended = learn(&case, &out);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(said["learned_from"]["views"], 6, "{said}");
+    assert_eq!(said["learned_from"]["held_out"], 1, "{said}");
+    assert!(said["surface"].as_array().unwrap().len() > 20, "{said}");
+
+    let again = learn(
+        &case,
+        &["--out", "b.consistency", "--rig", "hall", "--threads", "1"],
+    );
+    assert_eq!(again.status.code(), Some(0), "{}", again.stderr);
+    assert!(again.stdout.contains("<- chosen"), "{}", again.stdout);
+    let [a, b] = ["a", "b"].map(|it| fs::read(case.path(&format!("{it}.consistency"))).unwrap());
+    assert!(a == b, "the file does not depend on the number of threads");
+
+    case.write(
+        "hall.toml",
+        "consistency = \"a.consistency\"\nconsistency_rig = \"hall\"\n",
+    );
+    let used = eval(&case, &["--fuse", "hall.toml", "--json"]);
+    assert_eq!(used.status.code(), Some(0), "{}", used.stderr);
+    let summary: Value = serde_json::from_str(&used.stdout).unwrap();
+    let versions = summary["versions"].as_array().unwrap();
+    assert!(versions.contains(&"appearance".into()), "{versions:?}");
+}
+
+#[test]
+fn a_consistency_file_that_cannot_be_used_is_refused() {
+    let case = case(1, 1);
+    two_people(&case);
+    case.write("wrong.consistency", "{\"format\": \"x\", \"version\": 1}");
+    case.write("learned.toml", "tau = \"learned\"\n");
+    for (more, code, words) in [
+        (
+            &["--consistency", "none.consistency"][..],
+            4,
+            "none.consistency",
+        ),
+        (
+            &["--consistency", "wrong.consistency"],
+            4,
+            "parallax-consistency",
+        ),
+        (&["--fuse", "learned.toml"], 3, "--consistency"),
+    ] {
+        let ended = eval(&case, more);
+        let (code_found, stderr) = (ended.status.code(), &ended.stderr);
+        assert_eq!(code_found, Some(code), "{more:?}: {stderr}");
+        assert!(stderr.contains(words), "{more:?}: {stderr}");
+    }
+    let ended = learn(&case, &["--out", "c.consistency", "--hold-out", "eve"]);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("only ann, bob"), "{}", ended.stderr);
 }

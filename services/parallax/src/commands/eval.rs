@@ -28,7 +28,7 @@ Versions: fmp (every view alone, then triangulation), geometry, appearance (part
 (parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
 geometry+consensus by what all views can mean; geometry+all-views supports each view by all others at \
 once, geometry+all-views-mean by the mean of their terms. Without --versions: all for which there is what \
-they need (tables of part types for appearance; --sigma or --oracle for adaptive), pairs and all views.
+they need (tables of part types, or --consistency, for appearance; --sigma or --oracle for adaptive), pairs and all views.
 
 --fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
