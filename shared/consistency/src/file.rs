@@ -151,7 +151,7 @@ pub struct JointWeights {
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// It is not JSON of this layout.
-    #[error("no consistency file")]
+    #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// It is something else, or of another version.
     #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]

@@ -211,7 +211,6 @@ fn said(change: impl Fn(&mut serde_json::Value)) -> String {
     change(&mut value);
     match Learned::parse(&value.to_string()) {
         Ok(_) => "fine".to_owned(),
-        Err(FileError::Json(error)) => error.to_string(),
         Err(error) => error.to_string(),
     }
 }
