@@ -44,7 +44,8 @@
 //! # A cap on distances
 //!
 //! `max_distance_cells` 4 or 8 changes little on synthetic people: 43.2 and 43.8 against 43.4 on 44 instants before the cameras of
-//! `HumanEva-I` and UMPM. The default stays without one, which is the paper's form; the file may say otherwise.
+//! `HumanEva-I` and UMPM. On the 14 frames of the balancing person 4 costs (68.5 against 73.2). The default stays without one,
+//! which is the paper's form; the file may say otherwise.
 #![forbid(unsafe_code)]
 
 mod settings;
