@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use consistency::Learned;
-use multiview::{EnergyKind, Settings};
+use multiview::{EnergyKind, Settings, SwitchBy};
 use serde::{Deserialize, Serialize};
 use viewquality::TrainingErrors;
 
@@ -27,6 +27,8 @@ pub struct Config {
     pub compatibility: Vec<Compatibility>,
     /// Expected error above which a part is switched off.
     pub tau: Tau,
+    /// Whose expected error counts, in the paper's energy.
+    pub switch: Switch,
     /// Decide for every view whether it sees the person from behind.
     pub facing: bool,
     /// Fusion processes; the pairs are dealt to them in turn.
@@ -50,6 +52,7 @@ impl Default for Config {
             max_distance_cells: None,
             compatibility: Vec::new(),
             tau: Tau::Named(TauName::None),
+            switch: Switch::Either,
             facing: true,
             workers: 1,
             max_iterations: 12,
@@ -102,6 +105,10 @@ impl Config {
             tau_px: scaled(self.tau.px()),
             tau_tenths: tau_tenths.map_or_else(Vec::new, |it| it.tau_tenths.clone()),
             rescue_px: scaled(self.tau.rescue_px()),
+            switch: match self.switch {
+                Switch::Either => SwitchBy::Either,
+                Switch::Support => SwitchBy::Support,
+            },
             facing: self.facing,
             n_candidates,
         }
@@ -117,6 +124,17 @@ pub enum Energy {
     Paper,
     /// What the authors' program computes.
     Released,
+}
+
+/// Whose expected error switches a part off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Switch {
+    /// That of either view, as in the paper.
+    #[default]
+    Either,
+    /// That of the view that supports the other.
+    Support,
 }
 
 /// Thresholds of the expected error.

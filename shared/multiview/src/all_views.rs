@@ -225,6 +225,14 @@ impl<'a> Pairs<'a> {
         }
     }
 
+    /// The same with the terms that are on while `view` is solved.
+    fn for_target(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
+        match self.of(view, other) {
+            (terms, 0) => terms.for_target(0, pose, others),
+            (terms, side) => terms.for_target(side, others, pose),
+        }
+    }
+
     /// What all other views add to a target.
     fn supports<'b>(&'b self, target: usize, poses: &'b [Pose], known: &mut Known) -> Supports<'b> {
         let others = (0..poses.len()).filter(|it| *it != target);
@@ -240,7 +248,7 @@ impl<'a> Pairs<'a> {
 
     fn active(&self) -> f64 {
         let all = self.terms.iter().flatten().flat_map(PairTerms::active);
-        let (on, n) = all.fold((0, 0), |(on, n), it| (on + usize::from(*it), n + 1));
+        let (on, n) = all.fold((0, 0), |(on, n), it| (on + usize::from(it), n + 1));
         f64::from(on as u32) / f64::from(n.max(1))
     }
 }
@@ -317,22 +325,20 @@ impl State {
         self.own.iter().sum::<f64>() + pairs.map(|(a, b)| self.between[a][b]).sum::<f64>()
     }
 
-    /// Takes a pose over if the energy rises.
+    /// Takes a pose over if the energy rises, as the view sees it.
     fn take_if_better(&mut self, view: usize, own: f64, pose: Pose, pairs: &Pairs<'_>) {
-        let value = |other: usize| {
-            if other == view {
-                0.0
-            } else {
-                pairs.between(view, &pose, other, &self.poses[other])
-            }
+        let others = (0..self.poses.len()).filter(|it| *it != view);
+        let seen = |pose: &Pose| -> f64 {
+            let others = others.clone();
+            let terms = others.map(|it| pairs.for_target(view, pose, it, &self.poses[it]));
+            terms.sum()
         };
-        let terms: Vec<f64> = (0..self.poses.len()).map(value).collect();
-        let before = self.own[view] + self.between[view].iter().sum::<f64>();
-        if own + terms.iter().sum::<f64>() > before {
-            for (other, &it) in terms.iter().enumerate() {
-                self.between[other][view] = it;
+        if own + seen(&pose) > self.own[view] + seen(&self.poses[view]) {
+            for other in others {
+                let value = pairs.between(view, &pose, other, &self.poses[other]);
+                self.between[other][view] = value;
+                self.between[view][other] = value;
             }
-            self.between[view] = terms;
             self.own[view] = own;
             self.poses[view] = pose;
         }

@@ -3,7 +3,7 @@
 use fmp::{Extra, Pose};
 
 use crate::term::Term;
-use crate::{Compatibility, PairInput, Settings, ViewAnswer};
+use crate::{Compatibility, PairInput, Settings, SwitchBy, ViewAnswer};
 
 /// Everything about the terms of a pair that does not change from one iteration to the next.
 #[derive(Debug)]
@@ -12,7 +12,8 @@ pub(crate) struct PairTerms<'a> {
     pair: &'a PairInput<'a>,
     /// `counterpart[i]` of the second view is the anatomical part that `i` of the first view shows.
     counterpart: Vec<usize>,
-    active: Vec<bool>,
+    /// `[target][part of the first view]`.
+    active: [Vec<bool>; 2],
     table: Option<&'a Compatibility>,
 }
 
@@ -42,17 +43,29 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// The switches `a_i` of eq. 6, by part of the first view.
-    pub(crate) fn active(&self) -> &[bool] {
-        &self.active
+    /// The switches `a_i` of eq. 6, by part of the first view: on if the terms are on for either view.
+    pub(crate) fn active(&self) -> Vec<bool> {
+        let [first, second] = &self.active;
+        first.iter().zip(second).map(|(a, b)| *a || *b).collect()
     }
 
-    /// Value of the two consistency sums of eq. 3 for two given poses.
+    /// Value of the two consistency sums of eq. 3 for two given poses; the mean of what either view
+    /// makes of them, where the switches differ.
     pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
+        let value = self.for_target(0, first, second);
+        if self.active[0] == self.active[1] {
+            value
+        } else {
+            0.5 * (value + self.for_target(1, first, second))
+        }
+    }
+
+    /// The same, with the terms that are on while `target` is solved.
+    pub(crate) fn for_target(&self, target: usize, first: &Pose, second: &Pose) -> f64 {
         let plan = self.pair.views[0].plan;
-        let fixed = Consistency::new(self, 0, second);
+        let fixed = Consistency::switched(self, [0, target], second);
         let scale2 = plan.scale(usize::from(first.level)).powi(2);
-        (0..self.active.len())
+        (0..self.counterpart.len())
             .map(|part| {
                 let at = plan.ideal_centre(first, part);
                 let distance2 = fixed.terms[part].map_or(0.0, |it| it.distance2(at, scale2));
@@ -68,8 +81,9 @@ impl<'a> PairTerms<'a> {
         self.counterpart[part]
     }
 
-    fn is_active(&self, target: usize, part: usize) -> bool {
-        self.active[if target == 0 {
+    /// Whether the terms of `part` of view `view` are on while view `target` is solved.
+    fn is_active(&self, [view, target]: [usize; 2], part: usize) -> bool {
+        self.active[target][if view == 0 {
             part
         } else {
             self.counterpart[part]
@@ -82,19 +96,31 @@ impl<'a> PairTerms<'a> {
 pub(crate) struct Consistency<'a> {
     pair_terms: &'a PairTerms<'a>,
     target: usize,
+    /// The view whose switches count: the target, but where two poses are only judged.
+    switches: usize,
     support: &'a Pose,
     terms: Vec<Option<Term>>,
 }
 
 impl<'a> Consistency<'a> {
     pub(crate) fn new(pair_terms: &'a PairTerms<'a>, target: usize, support: &'a Pose) -> Self {
+        Self::switched(pair_terms, [target; 2], support)
+    }
+
+    fn switched(
+        pair_terms: &'a PairTerms<'a>,
+        [target, switches]: [usize; 2],
+        support: &'a Pose,
+    ) -> Self {
         let settings = pair_terms.settings;
         let plan = pair_terms.pair.views[1 - target].plan;
         let support_from_target = pair_terms.pair.epipolar.support_from_target(target == 0);
         let scale = plan.scale(usize::from(support.level));
         let terms = (0..support.parts.len())
             .map(|part| {
-                pair_terms.is_active(target, part).then_some(())?;
+                pair_terms
+                    .is_active([target, switches], part)
+                    .then_some(())?;
                 let at = plan.ideal_centre(support, pair_terms.partner(part));
                 Term::new(support_from_target, at, scale, settings.max_distance_cells)
             })
@@ -102,9 +128,17 @@ impl<'a> Consistency<'a> {
         Self {
             pair_terms,
             target,
+            switches,
             support,
             terms,
         }
+    }
+}
+
+impl Consistency<'_> {
+    fn is_active(&self, part: usize) -> bool {
+        self.pair_terms
+            .is_active([self.target, self.switches], part)
     }
 }
 
@@ -127,7 +161,7 @@ impl Extra for Consistency<'_> {
         let Some(table) = self.pair_terms.table else {
             return 0.0;
         };
-        if !self.pair_terms.is_active(self.target, part) {
+        if !self.is_active(part) {
             return 0.0;
         }
         let partner = self.pair_terms.partner(part);
@@ -155,7 +189,7 @@ impl Extra for Consistency<'_> {
     }
 
     fn key(&self, part: usize) -> Option<u64> {
-        let is_active = self.pair_terms.is_active(self.target, part);
+        let is_active = self.is_active(part);
         let partner = self.pair_terms.partner(part);
         Some(if is_active {
             support_key(self.support, partner)
@@ -184,19 +218,32 @@ pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
     }
 }
 
-/// Eq. 6: a part is off if either view's expected error exceeds its threshold.
-fn active_parts(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> Vec<bool> {
+/// Eq. 6, by the view that is solved and by part of the first view: a part is off if an expected error of it that
+/// counts exceeds its threshold.
+fn active_parts(
+    settings: &Settings,
+    pair: &PairInput<'_>,
+    counterpart: &[usize],
+) -> [Vec<bool>; 2] {
     let thresholds = pair.views.map(|it| thresholds(settings, &it));
     let off = |view: usize, part: usize| {
         let sigma = pair.views[view].sigma_px.and_then(|it| it.get(part));
         let tau = thresholds[view].get(part);
         matches!((sigma, tau), (Some(sigma), Some(tau)) if sigma > tau)
     };
-    counterpart
-        .iter()
-        .enumerate()
-        .map(|(part, &other)| !off(0, part) && !off(1, other))
-        .collect()
+    let by_part = |on: &dyn Fn(bool, bool) -> bool| -> Vec<bool> {
+        let parts = counterpart.iter().enumerate();
+        parts
+            .map(|(part, &other)| on(off(0, part), off(1, other)))
+            .collect()
+    };
+    match settings.switch {
+        SwitchBy::Either => {
+            let both = by_part(&|first, second| !first && !second);
+            [both.clone(), both]
+        }
+        SwitchBy::Support => [by_part(&|_, second| !second), by_part(&|first, _| !first)],
+    }
 }
 
 /// The thresholds `tau` of a view, pixels.

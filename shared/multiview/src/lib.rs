@@ -80,7 +80,7 @@ pub use facing::{
 };
 pub use heat_map::heat_map;
 pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair};
-pub use settings::{EnergyKind, Settings, TypeTables};
+pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;
 pub use view::{ViewAnswer, ViewPlan};

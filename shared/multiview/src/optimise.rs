@@ -95,7 +95,6 @@ fn paper(
     let terms = PairTerms::new(settings, pair, start.exchanged);
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
-    let mut between = terms.between(&poses[0], &poses[1]);
     let mut target = 1 - initial_support(pair, &poses);
     let mut again = evidence.map(|it| solver.again(it));
     let (mut iterations, mut converged) = (Vec::new(), false);
@@ -113,21 +112,23 @@ fn paper(
         ));
         let better = found.and_then(|pose| {
             let score = own_score(solver, evidence[target], &pose);
+            let between = |a: &Pose, b: &Pose| terms.for_target(target, a, b);
             let term = match target {
-                0 => terms.between(&pose, &poses[1]),
-                _ => terms.between(&poses[0], &pose),
+                0 => between(&pose, &poses[1]),
+                _ => between(&poses[0], &pose),
             };
-            (score + term > own[target] + between).then_some((pose, score, term))
+            let before = own[target] + between(&poses[0], &poses[1]);
+            (score + term > before).then_some((pose, score))
         });
         let (mut moved_px, mut same_types) = (0.0, true);
-        if let Some((pose, score, term)) = better {
+        if let Some((pose, score)) = better {
             moved_px = mean_movement(pair.views[target].plan, &poses[target], &pose);
             same_types = types(&poses[target]).eq(types(&pose));
-            (poses[target], own[target], between) = (pose, score, term);
+            (poses[target], own[target]) = (pose, score);
         }
         iterations.push(Iteration {
             target,
-            score: own[0] + own[1] + between,
+            score: own[0] + own[1] + terms.between(&poses[0], &poses[1]),
             moved_px,
             pose: poses[target].clone(),
         });
@@ -140,10 +141,10 @@ fn paper(
     }
     PairEstimate {
         start,
-        energy: own[0] + own[1] + between,
+        energy: own[0] + own[1] + terms.between(&poses[0], &poses[1]),
         iterations,
         converged,
-        active: terms.active().to_vec(),
+        active: terms.active(),
         poses,
     }
 }

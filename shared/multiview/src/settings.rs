@@ -16,6 +16,18 @@ pub enum EnergyKind {
     Released,
 }
 
+/// Whose expected error switches the terms of a part off, in the paper's energy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SwitchBy {
+    /// That of either view: the paper's eq. 6.
+    #[default]
+    Either,
+    /// That of the support alone, as in the authors' program: a view that can tell goes on helping one that
+    /// cannot, and is not asked to follow it. Each view then has an energy of its own; that of a pair is
+    /// their mean, and may fall on the way.
+    Support,
+}
+
 /// The part-type tables of one pair of views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TypeTables {
@@ -71,6 +83,8 @@ pub struct Settings {
     /// Expected error above which a part is switched off, pixels of the frame, one per part; empty:
     /// never.
     pub tau_px: Vec<f32>,
+    /// Whose expected error counts.
+    pub switch: SwitchBy,
     /// The same in tenths of the person's size in the view, the longer side of the rectangle around the centres of
     /// its best pose; where `tau_px` is empty.
     pub tau_tenths: Vec<f32>,
@@ -94,6 +108,7 @@ impl Default for Settings {
             max_iterations: 12,
             epsilon_px: 0.1,
             tau_px: Vec::new(),
+            switch: SwitchBy::default(),
             tau_tenths: Vec::new(),
             rescue_px: Vec::new(),
             facing: true,

@@ -91,7 +91,10 @@ fn a_model_is_written_by_one_training_at_a_time() {
     let out = folder.path().join("person.fmp");
     let first = Store::new(&out, false).unwrap();
     let second = Store::new(&out, false).unwrap_err().to_string();
-    assert!(second.contains("another training is writing it"), "{second}");
+    assert!(
+        second.contains("another training is writing it"),
+        "{second}"
+    );
     drop(first);
     drop(Store::new(&out, false).unwrap());
     let left = fs::read_dir(folder.path()).unwrap().count();
