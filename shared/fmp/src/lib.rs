@@ -14,6 +14,7 @@ mod cuts;
 mod extract;
 mod features;
 mod layout;
+mod local;
 mod model;
 mod pose;
 mod pyramid;
@@ -24,6 +25,7 @@ mod track;
 
 pub use extract::Extractor;
 pub use layout::{ImageTooSmall, Layout, LevelLayout};
+pub use local::{LocalScore, local_scores};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 pub use pose::{Placement, Pose};
 pub use pyramid::FeaturePyramid;
