@@ -1,0 +1,273 @@
+//! What a network's file says of itself: its ONNX `metadata_props`.
+
+use std::collections::BTreeMap;
+
+use crate::{EVIDENCE_VERSION, Normalisation, TileShape};
+
+/// Names of the entries.
+pub mod key {
+    /// Version of these entries: `1`. All others may be left out; see [`Card`](super::Card).
+    pub const VERSION: &str = "parallax.version";
+    /// Height and width of the tile: `160x64`.
+    pub const TILE: &str = "parallax.tile";
+    /// Mean of red, green and blue, from 0 to 1, separated by white space or commas.
+    pub const MEAN: &str = "parallax.mean";
+    /// Deviation of red, green and blue, above 0.
+    pub const STD: &str = "parallax.std";
+    /// Version of the layout of the second input; left out by networks that look at the tile only.
+    pub const EVIDENCE: &str = "parallax.evidence";
+    /// What the output counts in: `pixels`, `relative` or `log-relative`.
+    pub const OUTPUT: &str = "parallax.output";
+    /// Which network this is, for people.
+    pub const IDENTITY: &str = "parallax.identity";
+    /// Thresholds of the switch, one per part; see [`Card::tau`](super::Card::tau).
+    pub const TAU: &str = "parallax.tau";
+}
+
+/// The only version of the entries.
+const VERSION: u32 = 1;
+/// Share of the tile's height that is 1 in the logarithm.
+const LOG_UNIT: f64 = 0.01;
+/// Largest side of a tile, pixels.
+const MAX_SIDE: usize = 1024;
+
+/// What the numbers of an output are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Unit {
+    /// Expected error `e`, pixels of the original image.
+    #[default]
+    Pixels,
+    /// `e / h`, with `h` the height of the tile in pixels of the original image.
+    Relative,
+    /// `ln(1 + e / (0.01 h))`.
+    LogRelative,
+}
+
+impl Unit {
+    /// As it stands in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pixels => "pixels",
+            Self::Relative => "relative",
+            Self::LogRelative => "log-relative",
+        }
+    }
+
+    fn by_name(name: &str) -> Option<Self> {
+        let all = [Self::Pixels, Self::Relative, Self::LogRelative];
+        all.into_iter().find(|it| it.name() == name)
+    }
+
+    /// What a network should say of an error.
+    ///
+    /// * `error`: distance from the truth, and `tile_height`: what the tile shows, in the same pixels.
+    pub fn label(self, error: f64, tile_height: f64) -> f64 {
+        match self {
+            Self::Pixels => error,
+            Self::Relative => error / tile_height,
+            Self::LogRelative => (error / (LOG_UNIT * tile_height)).ln_1p(),
+        }
+    }
+
+    /// The expected error that a network says, in the pixels of `tile_height`; the inverse of
+    /// [`Self::label`]. Below 0 there is no error: 0.
+    ///
+    /// * Returns `None` unless it is finite.
+    pub fn error(self, output: f32, tile_height: f64) -> Option<f32> {
+        let output = f64::from(output);
+        let error = match self {
+            Self::Pixels => output,
+            Self::Relative => output * tile_height,
+            Self::LogRelative => output.exp_m1() * LOG_UNIT * tile_height,
+        };
+        let error = error.max(0.0) as f32;
+        (output.is_finite() && error.is_finite()).then_some(error)
+    }
+}
+
+/// What has to be known of a network besides its graph.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Card {
+    /// The tile that it looks at; where it is left out, the size of the input.
+    pub tile: Option<TileShape>,
+    /// How colours are given to it; those of `ImageNet` where they are left out.
+    pub colours: Normalisation,
+    /// Whether it takes [`evidence`](crate::evidence()) of this version; left out: it does not.
+    pub evidence: Option<u32>,
+    /// What its output counts in; pixels where it is left out.
+    pub unit: Unit,
+    /// Which network it is, for people; may be empty.
+    pub identity: String,
+    /// Errors beyond which a part is switched off: pixels of the original image where the unit is
+    /// pixels, else shares of the tile's height (never logarithms). Empty where it is left out.
+    pub tau: Vec<f32>,
+}
+
+impl Default for Card {
+    fn default() -> Self {
+        Self {
+            tile: None,
+            colours: Normalisation::IMAGENET,
+            evidence: None,
+            unit: Unit::Pixels,
+            identity: String::new(),
+            tau: Vec::new(),
+        }
+    }
+}
+
+/// Why an entry was refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CardError {
+    /// An entry cannot be read.
+    #[error("`{key}` is `{got}`, expected {expected}")]
+    Entry {
+        /// Its name.
+        key: &'static str,
+        /// What it says, the first characters.
+        got: String,
+        /// What would do.
+        expected: String,
+    },
+    /// Nothing is known of the name: it is misspelt, or of a later version.
+    #[error("`{key}` is not an entry of version {VERSION}")]
+    Unknown {
+        /// The name, the first characters.
+        key: String,
+    },
+}
+
+impl Card {
+    /// Reads entries; those whose names do not begin with `parallax.` are somebody else's.
+    ///
+    /// * `entries`: names and values of `metadata_props`; of two of a name the last counts.
+    /// * `n_parts`: parts of the model, for the number of thresholds.
+    ///
+    /// # Errors
+    ///
+    /// [`CardError`], naming the entry.
+    pub fn parse<'a>(
+        entries: impl IntoIterator<Item = (&'a str, &'a str)>,
+        n_parts: usize,
+    ) -> Result<Self, CardError> {
+        let mut card = Self::default();
+        for (name, value) in entries {
+            if !name.starts_with("parallax.") {
+                continue;
+            }
+            match name {
+                key::VERSION => version(key::VERSION, value, VERSION).map(drop)?,
+                key::TILE => card.tile = Some(tile(value)?),
+                key::MEAN => card.colours.mean = colour(key::MEAN, value, |_| true)?,
+                key::STD => card.colours.deviation = colour(key::STD, value, |it| it > 0.0)?,
+                key::EVIDENCE => {
+                    card.evidence = Some(version(key::EVIDENCE, value, EVIDENCE_VERSION)?);
+                }
+                key::OUTPUT => {
+                    let expected = "`pixels`, `relative` or `log-relative`";
+                    card.unit = Unit::by_name(value.trim())
+                        .ok_or_else(|| entry(key::OUTPUT, value, expected))?;
+                }
+                key::IDENTITY => value.clone_into(&mut card.identity),
+                key::TAU => card.tau = tau(value, n_parts)?,
+                _ => {
+                    let key = shortened(name);
+                    return Err(CardError::Unknown { key });
+                }
+            }
+        }
+        Ok(card)
+    }
+
+    /// The entries to write into a file; [`Self::parse`] reads the same card from them.
+    pub fn entries(&self) -> BTreeMap<&'static str, String> {
+        let join = |values: &[f32]| {
+            let words: Vec<String> = values.iter().map(f32::to_string).collect();
+            words.join(" ")
+        };
+        let mut entries = BTreeMap::from([
+            (key::VERSION, VERSION.to_string()),
+            (key::MEAN, join(&self.colours.mean)),
+            (key::STD, join(&self.colours.deviation)),
+            (key::OUTPUT, self.unit.name().to_owned()),
+        ]);
+        if let Some(TileShape { height, width }) = self.tile {
+            entries.insert(key::TILE, format!("{height}x{width}"));
+        }
+        if let Some(version) = self.evidence {
+            entries.insert(key::EVIDENCE, version.to_string());
+        }
+        if !self.identity.is_empty() {
+            entries.insert(key::IDENTITY, self.identity.clone());
+        }
+        if !self.tau.is_empty() {
+            entries.insert(key::TAU, join(&self.tau));
+        }
+        entries
+    }
+
+    /// The thresholds in the pixels of `tile_height`; empty where there are none.
+    pub fn tau_px(&self, tile_height: f64) -> impl Iterator<Item = f32> + '_ {
+        let scale = match self.unit {
+            Unit::Pixels => 1.0,
+            Unit::Relative | Unit::LogRelative => tile_height,
+        };
+        self.tau
+            .iter()
+            .map(move |it| (f64::from(*it) * scale) as f32)
+    }
+}
+
+fn entry(key: &'static str, got: &str, expected: impl Into<String>) -> CardError {
+    let (got, expected) = (shortened(got), expected.into());
+    CardError::Entry { key, got, expected }
+}
+
+fn shortened(text: &str) -> String {
+    text.chars().take(40).collect()
+}
+
+fn version(key: &'static str, value: &str, known: u32) -> Result<u32, CardError> {
+    let number = value.trim().parse().ok();
+    let known = number.filter(|it| *it == known).ok_or(known);
+    known.map_err(|known| entry(key, value, known.to_string()))
+}
+
+fn tile(value: &str) -> Result<TileShape, CardError> {
+    let side = |text: &str| {
+        let side = text.trim().parse().ok()?;
+        (1..=MAX_SIDE).contains(&side).then_some(side)
+    };
+    let sides = value.split_once('x');
+    let sides = sides.and_then(|(height, width)| Some((side(height)?, side(width)?)));
+    let expected = || format!("height x width, each 1 to {MAX_SIDE} pixels, as `160x64`");
+    let (height, width) = sides.ok_or_else(|| entry(key::TILE, value, expected()))?;
+    Ok(TileShape { height, width })
+}
+
+fn numbers(value: &str, is_fit: impl Fn(f32) -> bool) -> Option<Vec<f32>> {
+    let words = value.split(|it: char| it == ',' || it.is_whitespace());
+    let words = words.filter(|it| !it.is_empty());
+    let number = |word: &str| word.parse().ok().filter(|it| is_fit(*it));
+    words.map(number).collect()
+}
+
+fn colour(
+    key: &'static str,
+    value: &str,
+    is_fit: impl Fn(f32) -> bool,
+) -> Result<[f32; 3], CardError> {
+    let read = numbers(value, |it| it.is_finite() && is_fit(it));
+    let read = read.and_then(|it| <[f32; 3]>::try_from(it).ok());
+    let above = if key == key::STD { " above 0" } else { "" };
+    read.ok_or_else(|| entry(key, value, format!("three numbers{above}")))
+}
+
+fn tau(value: &str, n_parts: usize) -> Result<Vec<f32>, CardError> {
+    let read = numbers(value, |it| (0.0..=f32::MAX).contains(&it));
+    let read = read.filter(|it| it.len() == n_parts);
+    read.ok_or_else(|| entry(key::TAU, value, format!("{n_parts} finite numbers from 0")))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,215 @@
+//! What the pose search knows of its answer, as the numbers of a network's second input.
+
+use fmp::{Layout, LocalScore, Model, Pose, Springs};
+
+use crate::Tile;
+
+/// Version of the layout of [`evidence`]; a network says which it was trained with.
+pub const EVIDENCE_VERSION: u32 = 1;
+
+/// Types of a part that the layout has room for.
+pub const N_TYPES: usize = 6;
+
+/// Numbers of every part, in this order; the types follow.
+///
+/// * `response`, `contrast`, `margin`: see [`LocalScore`].
+/// * `spring`: what the spring to the parent adds to the score, at most 0 or little above; 0 for the root.
+/// * `pair_bias`: what the pair of types of part and parent adds; 0 for the root.
+/// * `x`, `y`: where the part's centre is, from the tile's centre, heights of the tile.
+/// * `from_mirror`: distance to the part on the other side of the body, box sides; 0 if it is its own.
+/// * `from_second`: distance to the same part of the second candidate, box sides, at most [`FAR`], which
+///   also stands for no second candidate.
+/// * `inside`: distance to the nearest border of the frame, box sides, from minus to plus [`FAR`];
+///   negative outside.
+/// * `type_1` to `type_6`: 1 for the part's type, else 0.
+pub const PART_NUMBERS: [&str; 10] = [
+    "response",
+    "contrast",
+    "margin",
+    "spring",
+    "pair_bias",
+    "x",
+    "y",
+    "from_mirror",
+    "from_second",
+    "inside",
+];
+
+/// Numbers of the pose as a whole; they come after those of the parts.
+///
+/// * `score`: of the pose.
+/// * `lead`: the score less the second candidate's; [`FAR`] at most, and without one.
+/// * `candidates`: how many there are, up to 8, as a share of 8.
+/// * `log_box_side`: natural logarithm of the root's box side, pixels of the frame.
+/// * `tile_height`: the tile's height as a share of the frame's.
+/// * `aspect`: width of the box of all parts per its height.
+/// * `responses`, `springs`: sums over the parts.
+pub const POSE_NUMBERS: [&str; 8] = [
+    "score",
+    "lead",
+    "candidates",
+    "log_box_side",
+    "tile_height",
+    "aspect",
+    "responses",
+    "springs",
+];
+
+/// Beyond this many box sides, or this score, a number says no more.
+pub const FAR: f32 = 10.0;
+
+/// Stands for a pair of types that the model rules out: minus infinity is no number for a network.
+const IMPOSSIBLE: f64 = -100.0;
+
+const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
+const MOST_CANDIDATES: usize = 8;
+
+/// How many numbers there are for a model of so many parts: 424 for 26.
+pub fn n_evidence(n_parts: usize) -> usize {
+    n_parts * PER_PART + POSE_NUMBERS.len()
+}
+
+/// What the number at an index is, for example `part 3 spring`; parts and types count from 1.
+///
+/// * Returns `None` beyond [`n_evidence`].
+pub fn evidence_name(index: usize, n_parts: usize) -> Option<String> {
+    let (part, number) = (index / PER_PART, index % PER_PART);
+    if part < n_parts {
+        let name = match PART_NUMBERS.get(number) {
+            Some(name) => (*name).to_owned(),
+            None => format!("type_{}", number - PART_NUMBERS.len() + 1),
+        };
+        return Some(format!("part {} {name}", part + 1));
+    }
+    let name = POSE_NUMBERS.get(index - n_parts * PER_PART)?;
+    Some((*name).to_owned())
+}
+
+/// Why there are no numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum EvidenceError {
+    /// There is nothing to speak of.
+    #[error("there is no pose")]
+    NoPose,
+    /// A part has more types than the layout.
+    #[error("part {part} has {got} types, a network knows {N_TYPES}")]
+    Types {
+        /// 1-based part.
+        part: usize,
+        /// Its types.
+        got: usize,
+    },
+    /// The local scores are not those of the pose.
+    #[error("there are {got} local scores of {expected} parts")]
+    Scores {
+        /// Scores given.
+        got: usize,
+        /// Parts of the pose.
+        expected: usize,
+    },
+}
+
+/// Writes what the pose search knows of its best candidate: [`n_evidence`] numbers, part by part
+/// [`PART_NUMBERS`] and the types, then [`POSE_NUMBERS`]. Raw numbers: to scale them is the network's.
+///
+/// * `candidates`: of the frame, best first; the first is the pose.
+/// * `scores`: of the pose; see [`fmp::local_scores`].
+/// * `tile`: of the pose.
+/// * `out`: overwritten.
+///
+/// # Errors
+///
+/// [`EvidenceError`]
+pub fn evidence(
+    (model, layout): (&Model, &Layout),
+    candidates: &[Pose],
+    scores: &[LocalScore],
+    tile: &Tile,
+    out: &mut Vec<f32>,
+) -> Result<(), EvidenceError> {
+    let pose = candidates.first().ok_or(EvidenceError::NoPose)?;
+    let n_parts = pose.parts.len();
+    if scores.len() != n_parts {
+        return Err(EvidenceError::Scores {
+            got: scores.len(),
+            expected: n_parts,
+        });
+    }
+    let centres = pose.centres(model, layout);
+    let second = candidates.get(1).map(|it| it.centres(model, layout));
+    let mirror = model.spec().mirror.as_deref();
+    let [width, height] = layout.image_size.map(|it| it as f64 - 1.0);
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let (mut responses, mut springs) = (0.0, 0.0);
+    out.clear();
+    out.reserve(n_evidence(n_parts));
+    for (part, score) in scores.iter().enumerate() {
+        let n_types = model.n_types(part);
+        if n_types > N_TYPES {
+            let part = part + 1;
+            return Err(EvidenceError::Types { part, got: n_types });
+        }
+        let side = box_side(model, layout, pose, part);
+        let sides = |px: f64| (px / side).clamp(-f64::from(FAR), f64::from(FAR)) as f32;
+        let centre = centres[part];
+        let [x, y] = tile.place(centre).map(|it| it as f32);
+        let [spring, pair_bias] = edge(model, pose, part);
+        let from_mirror = mirror.map_or(0.0, |it| sides(distance(centre, centres[it[part]])));
+        let from_second = second
+            .as_ref()
+            .map_or(FAR, |it| sides(distance(centre, it[part])));
+        let to_border = [centre[0], centre[1], width - centre[0], height - centre[1]];
+        let inside = sides(to_border.into_iter().fold(f64::INFINITY, f64::min));
+        out.extend([score.response, score.contrast, score.margin]);
+        out.extend([spring, pair_bias, x, y, from_mirror, from_second, inside]);
+        let own = usize::from(pose.parts[part].mixture);
+        out.extend((0..N_TYPES).map(|it| f32::from(u8::from(it == own))));
+        responses += score.response;
+        springs += spring;
+    }
+    let [x1, y1, x2, y2] = pose.bounding_box(model, layout);
+    out.extend([
+        pose.score,
+        candidates
+            .get(1)
+            .map_or(FAR, |it| (pose.score - it.score).min(FAR)),
+        candidates.len().min(MOST_CANDIDATES) as f32 / MOST_CANDIDATES as f32,
+        box_side(model, layout, pose, 0).ln() as f32,
+        (tile.height_px() / layout.image_size[1] as f64) as f32,
+        ((x2 - x1 + 1.0) / (y2 - y1 + 1.0)) as f32,
+        responses,
+        springs,
+    ]);
+    Ok(())
+}
+
+/// Height of a part's box, pixels.
+fn box_side(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
+    let [_, y1, _, y2] = pose.part_box(model, layout, part);
+    y2 - y1 + 1.0
+}
+
+/// What the spring to the parent and the pair of types add to the score.
+fn edge(model: &Model, pose: &Pose, part: usize) -> [f32; 2] {
+    let Some(edge) = &model.spec().parts[part].edge else {
+        return [0.0, 0.0];
+    };
+    let (child, parent) = (pose.parts[part], pose.parts[edge.parent]);
+    let [k, l] = [child.mixture, parent.mixture].map(usize::from);
+    let spring = match &edge.springs {
+        Springs::PerChildType(springs) => Some(springs[k]),
+        Springs::PerTypePair(springs) => springs[l][k],
+    };
+    let offset = |parent: u16, anchor: i32, child: u16| {
+        f64::from(i32::from(parent) + anchor - i32::from(child))
+    };
+    let cost = spring.map_or(0.0, |it| {
+        let dx = offset(parent.x, it.anchor[0], child.x);
+        let dy = offset(parent.y, it.anchor[1], child.y);
+        -(it.w[0] * dx * dx + it.w[1] * dx + it.w[2] * dy * dy + it.w[3] * dy)
+    });
+    [cost as f32, edge.bias[l][k].max(IMPOSSIBLE) as f32]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,235 @@
+//! The person's tile: the part of a frame that a network looks at.
+
+use kernels::Rgb8View;
+
+/// Height of the part of a frame that a tile shows, per height of the person's box.
+///
+/// The box already reaches half a part beyond the outermost centres; the margin lets the network see
+/// what the limbs end at.
+const MARGIN: f64 = 1.1;
+
+/// How many pixels a tile has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileShape {
+    /// Height, pixels, at least 1.
+    pub height: usize,
+    /// Width, pixels, at least 1.
+    pub width: usize,
+}
+
+impl TileShape {
+    /// Of the small network.
+    pub const SMALL: Self = Self {
+        height: 160,
+        width: 64,
+    };
+    /// Of VGG-16: its five halvings leave 5 x 1.
+    pub const VGG16: Self = Self {
+        height: 160,
+        width: 48,
+    };
+
+    /// Number of values of a tile: three channels.
+    pub fn n_values(self) -> usize {
+        3 * self.height * self.width
+    }
+}
+
+/// Where a tile lies in its frame: upright, never distorted, of the same scale in both directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tile {
+    /// How many pixels it has.
+    pub shape: TileShape,
+    /// Its centre in the frame, `[x, y]`, pixels; the centre of the top-left pixel is (0, 0).
+    pub centre: [f64; 2],
+    /// Pixels of the frame per pixel of the tile, above 0.
+    pub scale: f64,
+}
+
+impl Tile {
+    /// The smallest tile that shows a box and a margin of a tenth.
+    ///
+    /// With the box `b` wide and `h` high it shows `1.1 max(h, b H / W)` pixels of the frame in height,
+    /// about the box's centre; `H x W` is the tile's shape.
+    ///
+    /// * `bounds`: `[x1, y1, x2, y2]`, centres of the outermost pixels, as
+    ///   [`Pose::bounding_box`](fmp::Pose::bounding_box) of the single-view pose gives them.
+    /// * Returns `None` if the box is not finite, or empty.
+    pub fn around(bounds: [f64; 4], shape: TileShape) -> Option<Self> {
+        let [x1, y1, x2, y2] = bounds;
+        let [width, height] = [x2 - x1 + 1.0, y2 - y1 + 1.0];
+        let by_width = width * shape.height as f64 / shape.width as f64;
+        let scale = MARGIN * height.max(by_width) / shape.height as f64;
+        let centre = [f64::midpoint(x1, x2), f64::midpoint(y1, y2)];
+        let is_finite = scale.is_finite() && centre.iter().all(|it| it.is_finite());
+        (is_finite && width > 0.0 && height > 0.0).then_some(Self {
+            shape,
+            centre,
+            scale,
+        })
+    }
+
+    /// Height of what it shows, pixels of the frame: the size of the person by which relative errors
+    /// are relative.
+    pub fn height_px(&self) -> f64 {
+        self.shape.height as f64 * self.scale
+    }
+
+    /// Width of what it shows, pixels of the frame.
+    pub fn width_px(&self) -> f64 {
+        self.shape.width as f64 * self.scale
+    }
+
+    /// What it shows, `[x1, y1, x2, y2]`, centres of the outermost pixels of the frame.
+    pub fn rectangle(&self) -> [f64; 4] {
+        let [x, y] = self.centre;
+        let [dx, dy] = [self.width_px(), self.height_px()].map(|side| (side - 1.0) / 2.0);
+        [x - dx, y - dy, x + dx, y + dy]
+    }
+
+    /// Where a point of the frame lies: 0 at the tile's centre, `[x, y]` in heights of the tile.
+    pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
+        let [x, y] = self.centre;
+        [point[0] - x, point[1] - y].map(|it| it / self.height_px())
+    }
+}
+
+/// How the colours of a tile are given to a network: `(v / 255 - mean) / deviation` per channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Normalisation {
+    /// Mean of red, green and blue, from 0 to 1.
+    pub mean: [f32; 3],
+    /// Deviation of red, green and blue, above 0.
+    pub deviation: [f32; 3],
+}
+
+impl Normalisation {
+    /// What networks that were trained on `ImageNet` expect, among them torchvision's.
+    pub const IMAGENET: Self = Self {
+        mean: [0.485, 0.456, 0.406],
+        deviation: [0.229, 0.224, 0.225],
+    };
+}
+
+/// Resamples tiles; keeps its memory from one to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Sampler {
+    taps: Vec<Taps>,
+    weights: Vec<f32>,
+    band: Vec<f32>,
+}
+
+/// Which pixels of a row or column of the frame a pixel of the tile is a mean of.
+#[derive(Debug, Clone, Copy)]
+struct Taps {
+    /// The first of them; may lie outside, where the border is repeated.
+    first: i64,
+    /// Where its weights begin, and how many there are.
+    begin: usize,
+    count: usize,
+}
+
+impl Sampler {
+    /// Resamples a tile once from its frame, as `3 x height x width` normalised values.
+    ///
+    /// Every pixel is a weighted mean over both directions in turn. The weight of a pixel of the frame
+    /// falls linearly to 0 at `max(1, s)` pixels from where the tile's pixel lies (`s` is the scale):
+    /// bilinear interpolation where the tile is the finer grid, an average without aliasing where it
+    /// is the coarser. Beyond the frame its border is repeated. Sums run in f32 in ascending order,
+    /// columns first, so that the same frame and tile give the same bits everywhere.
+    ///
+    /// * `out`: [`TileShape::n_values`] values, overwritten; red, green, blue planes, row major.
+    ///
+    /// # Panics
+    ///
+    /// If `out` has another length, or the image has no pixels.
+    pub fn sample(
+        &mut self,
+        image: Rgb8View<'_>,
+        tile: &Tile,
+        colours: &Normalisation,
+        out: &mut [f32],
+    ) {
+        let TileShape { height, width } = tile.shape;
+        assert_eq!(out.len(), tile.shape.n_values(), "one value per colour");
+        assert!(image.width() > 0 && image.height() > 0, "an image");
+        self.taps.clear();
+        self.weights.clear();
+        self.lay_taps(tile.centre[1], tile.scale, height);
+        self.lay_taps(tile.centre[0], tile.scale, width);
+        let columns = self.columns(height, image.width());
+        self.band.resize(3 * (columns[1] - columns[0]), 0.0);
+        for row in 0..height {
+            self.mix_rows(image, row, columns);
+            for col in 0..width {
+                let mean = self.mix_columns(height + col, image.width(), columns);
+                for channel in 0..3 {
+                    let value = (mean[channel] / 255.0 - colours.mean[channel])
+                        / colours.deviation[channel];
+                    out[(channel * height + row) * width + col] = value;
+                }
+            }
+        }
+    }
+
+    /// The taps of one direction.
+    fn lay_taps(&mut self, centre: f64, scale: f64, n: usize) {
+        let reach = scale.max(1.0);
+        for i in 0..n {
+            let at = centre + (i as f64 - (n as f64 - 1.0) / 2.0) * scale;
+            let [first, last] = [(at - reach).ceil() as i64, (at + reach).floor() as i64];
+            let begin = self.weights.len();
+            let weight = |it: i64| (1.0 - (it as f64 - at).abs() / reach).max(0.0);
+            let total: f64 = (first..=last).map(weight).sum();
+            self.weights
+                .extend((first..=last).map(|it| (weight(it) / total) as f32));
+            let count = self.weights.len() - begin;
+            self.taps.push(Taps {
+                first,
+                begin,
+                count,
+            });
+        }
+    }
+
+    /// First column of the frame that the tile needs, and the one after the last.
+    fn columns(&self, height: usize, image_width: usize) -> [usize; 2] {
+        let inside = |it: i64| it.clamp(0, image_width as i64 - 1) as usize;
+        let columns = &self.taps[height..];
+        let first = columns.iter().map(|it| inside(it.first)).min();
+        let last = columns
+            .iter()
+            .map(|it| inside(it.first + it.count as i64 - 1))
+            .max();
+        [first.unwrap_or(0), last.map_or(1, |it| it + 1)]
+    }
+
+    /// The weighted mean of the frame's rows that belong to a row of the tile, into `band`.
+    fn mix_rows(&mut self, image: Rgb8View<'_>, row: usize, [left, right]: [usize; 2]) {
+        let taps = self.taps[row];
+        self.band.fill(0.0);
+        for (i, &weight) in self.weights[taps.begin..][..taps.count].iter().enumerate() {
+            let y = (taps.first + i as i64).clamp(0, image.height() as i64 - 1) as usize;
+            let pixels = &image.data()[3 * (y * image.width() + left)..][..3 * (right - left)];
+            for (sum, &value) in self.band.iter_mut().zip(pixels) {
+                *sum += weight * f32::from(value);
+            }
+        }
+    }
+
+    /// The weighted mean of the mixed row's pixels that belong to a column of the tile.
+    fn mix_columns(&self, taps: usize, image_width: usize, [left, _]: [usize; 2]) -> [f32; 3] {
+        let taps = self.taps[taps];
+        let mut mean = [0.0; 3];
+        for (i, &weight) in self.weights[taps.begin..][..taps.count].iter().enumerate() {
+            let x = (taps.first + i as i64).clamp(0, image_width as i64 - 1) as usize - left;
+            for (sum, &value) in mean.iter_mut().zip(&self.band[3 * x..][..3]) {
+                *sum += weight * value;
+            }
+        }
+        mean
+    }
+}
+
+#[cfg(test)]
+mod tests;
