@@ -4,3 +4,4 @@
 pub mod c3d;
 pub mod mat;
 pub mod npy;
+pub mod onnx;

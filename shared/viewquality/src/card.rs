@@ -29,7 +29,7 @@ const VERSION: u32 = 1;
 /// Share of the tile's height that is 1 in the logarithm.
 const LOG_UNIT: f64 = 0.01;
 /// Largest side of a tile, pixels.
-const MAX_SIDE: usize = 1024;
+pub(crate) const MAX_SIDE: usize = 1024;
 
 /// What the numbers of an output are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,0 +1,99 @@
+//! Whether the bytes of a file are nested as those of an ONNX file must be.
+//!
+//! The library that reads the file trusts its lengths: one that points backwards is followed for ever,
+//! and one that is too large is allocated. So they are checked first. Numbers of fields are those of
+//! the published `onnx.proto`.
+
+/// Most messages within messages.
+const MAX_DEPTH: usize = 32;
+
+/// A message of the format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Model,
+    Graph,
+    Node,
+    Attribute,
+    Tensor,
+    ValueInfo,
+    Type,
+    TensorType,
+    Shape,
+    /// One without messages inside: an operator set, an entry, a dimension.
+    Flat,
+}
+
+impl Kind {
+    /// What a field of this message is, if it is a message that the library reads.
+    fn child(self, field: u64) -> Option<Self> {
+        Some(match (self, field) {
+            (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
+            (Self::Model, 8 | 14) | (Self::Tensor, 13) | (Self::Shape, 1) => Self::Flat,
+            (Self::Graph, 1) => Self::Node,
+            (Self::Graph, 5) | (Self::Attribute, 5 | 10) => Self::Tensor,
+            (Self::Graph, 11..=13) => Self::ValueInfo,
+            (Self::Node, 5) => Self::Attribute,
+            (Self::ValueInfo, 2) | (Self::TensorType, 1) => Self::Type,
+            (Self::Type, 1 | 4) => Self::TensorType,
+            (Self::TensorType, 2) => Self::Shape,
+            _ => return None,
+        })
+    }
+}
+
+/// Where the nesting breaks: the byte, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the file is cut off or no ONNX file: byte {at} belongs to nothing")]
+pub(super) struct Broken {
+    at: usize,
+}
+
+/// Checks a whole file.
+pub(super) fn check(file: &[u8]) -> Result<(), Broken> {
+    walk(Kind::Model, file, 0, 0)
+}
+
+/// Checks one message, which begins at byte `base` of the file.
+fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Broken> {
+    let broken = |at: usize| Broken { at: base + at };
+    let mut at = 0;
+    while at < bytes.len() {
+        let begin = at;
+        let tag = varint(bytes, &mut at).ok_or(broken(begin))?;
+        let (field, wire) = (tag >> 3, tag & 7);
+        if field == 0 {
+            return Err(broken(begin));
+        }
+        let length = match wire {
+            0 => varint(bytes, &mut at).map(|_| 0),
+            1 => Some(8),
+            2 => varint(bytes, &mut at).and_then(|it| usize::try_from(it).ok()),
+            5 => Some(4),
+            _ => None,
+        };
+        let end = length.and_then(|it| at.checked_add(it));
+        let end = end.filter(|it| *it <= bytes.len()).ok_or(broken(begin))?;
+        if let (2, Some(child)) = (wire, kind.child(field)) {
+            if depth == MAX_DEPTH {
+                return Err(broken(begin));
+            }
+            walk(child, &bytes[at..end], base + at, depth + 1)?;
+        }
+        at = end;
+    }
+    Ok(())
+}
+
+/// A number of seven bits a byte, lowest first; `None` if it does not end.
+fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
+    let mut value = 0;
+    for shift in (0..64).step_by(7) {
+        let byte = *bytes.get(*at)?;
+        *at += 1;
+        value |= u64::from(byte & 0x7f) << shift;
+        if byte < 0x80 {
+            return Some(value);
+        }
+    }
+    None
+}

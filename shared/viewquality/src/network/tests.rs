@@ -1,0 +1,246 @@
+//! Networks whose answers are known by hand give them, and what is no such network is refused.
+
+use proptest::prelude::*;
+use testkit::onnx::{self, Side};
+
+use super::*;
+use crate::Unit;
+
+const N_PARTS: usize = 2;
+const SHAPE: TileShape = TileShape {
+    height: 4,
+    width: 3,
+};
+
+/// `sigma = means of the three colours x [[1, 2], [10, 20], [100, 200]] + [0.5, 0.25]`.
+fn of_colours() -> onnx::Network {
+    let mut net = onnx::Network::default();
+    let sides = [
+        Side::Named("n"),
+        Side::Fixed(3),
+        Side::Fixed(4),
+        Side::Fixed(3),
+    ];
+    net.inputs.push(("tile".to_owned(), sides.to_vec()));
+    net.outputs
+        .push(("sigma".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
+    net.weigh("w", &[3, 2], vec![1.0, 2.0, 10.0, 20.0, 100.0, 200.0]);
+    net.weigh("b", &[2], vec![0.5, 0.25]);
+    net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
+    net.node("Flatten", &["mean"], "flat", vec![]);
+    net.node("Gemm", &["flat", "w", "b"], "sigma", vec![]);
+    net
+}
+
+/// `sigma = the first two numbers of the evidence`.
+fn of_evidence() -> onnx::Network {
+    let k = n_evidence(N_PARTS);
+    let mut net = onnx::Network::default();
+    net.inputs
+        .push(("evidence".to_owned(), vec![Side::Fixed(1), Side::Fixed(k)]));
+    net.outputs
+        .push(("sigma".to_owned(), vec![Side::Fixed(1), Side::Fixed(2)]));
+    let mut weights = vec![0.0; 2 * k];
+    (weights[0], weights[3]) = (1.0, 1.0);
+    net.weigh("w", &[k, 2], weights);
+    net.node("MatMul", &["evidence", "w"], "sigma", vec![]);
+    net.metadata
+        .push(("parallax.evidence".to_owned(), "1".to_owned()));
+    net
+}
+
+fn read(net: &onnx::Network) -> Result<Network, NetworkError> {
+    Network::parse(net.file(), N_PARTS)
+}
+
+fn said_of(net: &onnx::Network) -> String {
+    read(net).unwrap_err().to_string()
+}
+
+#[test]
+fn a_network_gives_the_numbers_known_by_hand() {
+    let network = read(&of_colours()).unwrap();
+    assert_eq!(network.tile_shape(), SHAPE);
+    assert!(network.takes_tile() && !network.takes_evidence());
+    let mut tile = vec![1.0; 12];
+    tile.extend([0.5; 12]);
+    tile.extend([-1.0; 12]);
+    let sigma = network.run(&tile, &[]).unwrap();
+    assert_eq!(sigma, [1.0 + 5.0 - 100.0 + 0.5, 2.0 + 10.0 - 200.0 + 0.25]);
+}
+
+#[test]
+fn a_network_may_take_the_evidence_alone() {
+    let network = read(&of_evidence()).unwrap();
+    assert!(!network.takes_tile() && network.takes_evidence());
+    assert_eq!(network.tile_shape(), TileShape::SMALL);
+    let mut evidence = vec![7.0; n_evidence(N_PARTS)];
+    (evidence[0], evidence[1]) = (3.0, 4.0);
+    assert_eq!(network.run(&[], &evidence).unwrap(), [3.0, 4.0]);
+}
+
+#[test]
+fn a_network_may_take_both() {
+    let mut net = of_colours();
+    let k = n_evidence(N_PARTS);
+    net.inputs.push((
+        "evidence".to_owned(),
+        vec![Side::Named("n"), Side::Named("k")],
+    ));
+    net.metadata
+        .push(("parallax.evidence".to_owned(), "1".to_owned()));
+    net.nodes.last_mut().unwrap().output = "seen".to_owned();
+    net.weigh("v", &[k, 2], vec![1.0; 2 * k]);
+    net.node("MatMul", &["evidence", "v"], "known", vec![]);
+    net.node("Add", &["seen", "known"], "sigma", vec![]);
+    let sigma = read(&net).unwrap().run(&[0.0; 36], &vec![0.5; k]).unwrap();
+    assert_eq!(sigma, [k as f32 / 2.0 + 0.5, k as f32 / 2.0 + 0.25]);
+}
+
+#[test]
+fn what_the_file_says_of_itself_is_read() {
+    let mut net = of_colours();
+    let card = Card {
+        tile: Some(SHAPE),
+        unit: Unit::LogRelative,
+        identity: "three colours".to_owned(),
+        tau: vec![0.1, 0.2],
+        ..Card::default()
+    };
+    let entries = card.entries().into_iter();
+    net.metadata = entries.map(|(name, it)| (name.to_owned(), it)).collect();
+    assert_eq!(*read(&net).unwrap().card(), card);
+    net.metadata
+        .push(("parallax.tau".to_owned(), "1".to_owned()));
+    assert_eq!(
+        said_of(&net),
+        "`parallax.tau` is `1`, expected 2 finite numbers from 0"
+    );
+}
+
+#[test]
+fn a_tile_of_no_fixed_size_has_the_one_that_the_file_names() {
+    let mut net = of_colours();
+    net.inputs[0].1[2..].copy_from_slice(&[Side::Named("h"), Side::Named("w")]);
+    assert_eq!(
+        said_of(&net),
+        "`tile` of the network is [n, 3, h, w], expected [n, 3, H, W] of known height and width, or \
+         `parallax.tile`"
+    );
+    net.metadata
+        .push(("parallax.tile".to_owned(), "8x6".to_owned()));
+    let expected = TileShape {
+        height: 8,
+        width: 6,
+    };
+    assert_eq!(read(&net).unwrap().tile_shape(), expected);
+}
+
+#[test]
+fn refuses_shapes_with_what_was_found_and_expected() {
+    let mut net = of_colours();
+    net.metadata
+        .push(("parallax.tile".to_owned(), "160x64".to_owned()));
+    assert_eq!(
+        said_of(&net),
+        "`tile` of the network is [n, 3, 4, 3], expected [n, 3, 160, 64]"
+    );
+    let mut net = of_colours();
+    net.inputs[0].1[1] = Side::Fixed(1);
+    assert!(said_of(&net).starts_with("`tile` of the network is [n, 1, 4, 3], expected"));
+    let mut net = of_colours();
+    net.inputs[0].1.pop();
+    assert!(said_of(&net).starts_with("`tile` of the network is [n, 3, 4], expected"));
+    let mut net = of_evidence();
+    net.inputs[0].1[1] = Side::Fixed(5);
+    assert_eq!(
+        said_of(&net),
+        "`evidence` of the network is [1, 5], expected [n, 40]"
+    );
+    let said = Network::parse(of_colours().file(), 26).unwrap_err();
+    assert_eq!(
+        said.to_string(),
+        "`sigma` of the network is f32 [1, 2], expected f32 [1, 26]"
+    );
+}
+
+#[test]
+fn refuses_other_inputs_and_outputs_by_name() {
+    let mut net = of_colours();
+    net.inputs[0].0 = "image".to_owned();
+    net.nodes[0].inputs[0] = "image".to_owned();
+    assert_eq!(
+        said_of(&net),
+        "the network has the inputs `image`, expected `tile` f32 [n, 3, H, W], `evidence` f32 \
+         [n, K], or both"
+    );
+    let mut net = of_colours();
+    net.outputs[0].0 = "error".to_owned();
+    net.nodes[2].output = "error".to_owned();
+    assert_eq!(
+        said_of(&net),
+        "the network has the outputs `error`, expected `sigma` f32 [n, parts]"
+    );
+}
+
+#[test]
+fn evidence_is_taken_only_in_a_version_that_the_file_names() {
+    let mut net = of_evidence();
+    net.metadata.clear();
+    assert_eq!(
+        said_of(&net),
+        "the network takes `evidence`, but its file does not say which version of it"
+    );
+    let mut net = of_colours();
+    net.metadata = of_evidence().metadata;
+    assert_eq!(
+        said_of(&net),
+        "the network does not take `evidence`, but its file says which version of it"
+    );
+}
+
+#[test]
+fn refuses_operations_that_are_not_known() {
+    let mut net = of_colours();
+    net.nodes[1].op = "Guess".to_owned();
+    let error = read(&net).unwrap_err();
+    let cause = std::error::Error::source(&error).unwrap().to_string();
+    assert!(matches!(error, NetworkError::Load(_)), "{error}");
+    assert!(cause.contains("Guess"), "{cause}");
+}
+
+#[test]
+fn refuses_files_that_are_cut_off_or_no_networks() {
+    let file = of_colours().file();
+    for cut in [0, 1, 10, file.len() / 2, file.len() - 40] {
+        assert!(
+            Network::parse(file[..cut].to_vec(), N_PARTS).is_err(),
+            "{cut}"
+        );
+    }
+    for garbage in [&b"sigma,1,2,3"[..], &[0xff; 64], &[0; 64]] {
+        assert!(Network::parse(garbage.to_vec(), N_PARTS).is_err());
+    }
+}
+
+#[test]
+fn refuses_to_run_on_less_than_a_tile() {
+    let network = read(&of_colours()).unwrap();
+    let said = network.run(&[0.0; 35], &[]).unwrap_err().to_string();
+    assert_eq!(
+        said,
+        "`tile` of the network is 35 values, expected 36 values"
+    );
+}
+
+proptest! {
+    #[test]
+    fn a_changed_file_is_a_network_or_an_error(at in any::<prop::sample::Index>(), to in any::<u8>(), cut in any::<prop::sample::Index>()) {
+        let mut file = of_colours().file();
+        let at = at.index(file.len());
+        file[at] = to;
+        let _outcome = Network::parse(file.clone(), N_PARTS);
+        file.truncate(cut.index(file.len()));
+        let _outcome = Network::parse(file, N_PARTS);
+    }
+}
