@@ -15,6 +15,7 @@ mod pcp3d;
 mod bootstrap;
 mod changes;
 mod percentile;
+mod ranks;
 
 mod trc;
 
@@ -25,6 +26,7 @@ pub use pck::{PCK_GROUPS, best_covering, joints_found};
 pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
 pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
 pub use percentile::percentile;
+pub use ranks::{area_under_roc, rank_correlation};
 pub use report::{PCK_SHARES, Report, evaluate};
 pub use trc::{Trc, TrcError};
 
