@@ -6,10 +6,12 @@
 #![forbid(unsafe_code)]
 
 mod cadence;
+mod last;
 
 use std::collections::BTreeMap;
 
 pub use cadence::Cadence;
+pub use last::Last;
 
 /// What was brought together about one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,6 +49,8 @@ struct Input {
     alive_at: Option<u64>,
     ended: bool,
     down: bool,
+    /// How long a frame waits for it at most.
+    deadline: Option<u64>,
 }
 
 impl Input {
@@ -55,7 +59,8 @@ impl Input {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.heard_at.unwrap_or(0)));
         let absence = silence.min(self.alive_at.map_or(u64::MAX, elapsed));
-        absence >= patience[0] || silence >= patience[1]
+        let is_overdue = self.deadline.is_some_and(|it| elapsed(began_at) >= it);
+        is_overdue || absence >= patience[0] || silence >= patience[1]
     }
 }
 
@@ -85,6 +90,14 @@ impl<T> Joiner<T> {
         Self {
             alive_patience_nanos: patience_nanos.saturating_mul(10),
             ..Self::new(n_inputs, patience_nanos)
+        }
+    }
+
+    /// Says that no frame waits for an input longer than this, however alive its sender is: its words
+    /// are welcome and not necessary.
+    pub fn hurry(&mut self, input: usize, deadline_nanos: u64) {
+        if let Some(it) = self.inputs.get_mut(input) {
+            it.deadline = Some(deadline_nanos);
         }
     }
 
@@ -269,6 +282,24 @@ mod tests {
             assert_eq!(frames(&mut joiner, now), []);
         }
         assert_eq!(frames(&mut joiner, 1000), [(0, vec![true, false])]);
+    }
+
+    #[test]
+    fn no_frame_waits_for_a_welcome_word_past_its_deadline() {
+        let mut joiner = Joiner::lossless(2, 1000);
+        joiner.hurry(1, 30);
+        joiner.push(0, 0, 'a', 0);
+        joiner.alive(1, 29);
+        assert_eq!(frames(&mut joiner, 29), []);
+        joiner.alive(1, 30);
+        assert_eq!(frames(&mut joiner, 30), [(0, vec![true, false])]);
+        // It is not waited for again until it speaks, though it speaks too late.
+        joiner.push(0, 1, 'b', 40);
+        assert_eq!(frames(&mut joiner, 40), [(1, vec![true, false])]);
+        assert_eq!(joiner.push(1, 0, 'c', 45), Push::Late);
+        joiner.push(0, 2, 'd', 50);
+        assert_eq!(frames(&mut joiner, 79), []);
+        assert_eq!(frames(&mut joiner, 80), [(2, vec![true, false])]);
     }
 
     #[test]
