@@ -67,6 +67,7 @@ impl Shot {
             plan: &self.plan,
             candidates: &self.candidates,
             sigma_px: None,
+            tau_px: None,
         }
     }
 }

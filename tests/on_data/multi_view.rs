@@ -208,6 +208,7 @@ impl Pair {
                 plan: &self.plans[view],
                 candidates: std::slice::from_ref(&self.solo[view]),
                 sigma_px: sigma_px[view],
+                tau_px: None,
             }),
             epipolar: Epipolar::new(&self.plans[order[0]], &self.plans[order[1]]),
             tables,

@@ -190,6 +190,7 @@ impl<'a> Stage<'a> {
                 Some(Answer {
                     candidates,
                     sigma_px: None,
+                    tau_px: None,
                 })
             })
             .collect()

@@ -180,6 +180,7 @@ impl Bench {
             Some(Answer {
                 candidates: it.candidates.clone(),
                 sigma_px: expected(view, &centres),
+                tau_px: None,
             })
         };
         let evidence = |view: usize| {

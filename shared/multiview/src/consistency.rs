@@ -3,7 +3,7 @@
 use fmp::{Extra, Pose};
 
 use crate::term::Term;
-use crate::{Compatibility, PairInput, Settings, SwitchBy, ViewAnswer};
+use crate::{Compatibility, PairInput, Settings, SwitchBy};
 
 /// Everything about the terms of a pair that does not change from one iteration to the next.
 #[derive(Debug)]
@@ -225,11 +225,9 @@ fn active_parts(
     pair: &PairInput<'_>,
     counterpart: &[usize],
 ) -> [Vec<bool>; 2] {
-    let thresholds = pair.views.map(|it| thresholds(settings, &it));
     let off = |view: usize, part: usize| {
-        let sigma = pair.views[view].sigma_px.and_then(|it| it.get(part));
-        let tau = thresholds[view].get(part);
-        matches!((sigma, tau), (Some(sigma), Some(tau)) if sigma > tau)
+        let expectation = pair.views[view].expectation(settings, part);
+        expectation.is_some_and(|[sigma, tau]| sigma > tau)
     };
     let by_part = |on: &dyn Fn(bool, bool) -> bool| -> Vec<bool> {
         let parts = counterpart.iter().enumerate();
@@ -244,14 +242,4 @@ fn active_parts(
         }
         SwitchBy::Support => [by_part(&|_, second| !second), by_part(&|first, _| !first)],
     }
-}
-
-/// The thresholds `tau` of a view, pixels.
-fn thresholds(settings: &Settings, view: &ViewAnswer<'_>) -> Vec<f32> {
-    let unit = match view.candidates.first() {
-        Some(best) if settings.tau_px.is_empty() => view.plan.size(best) / 10.0,
-        _ => return settings.tau_px.clone(),
-    };
-    let tenths = settings.tau_tenths.iter();
-    tenths.map(|it| it * unit as f32).collect()
 }

@@ -177,9 +177,9 @@ impl Line {
 fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
     let n_parts = counterpart.len();
     let sigma = |view: usize, part: usize| pair.views[view].sigma_px.and_then(|it| it.get(part));
-    let is_on = |view: usize, part: usize| match (sigma(view, part), settings.tau_px.get(part)) {
-        (Some(sigma), Some(tau)) => sigma <= tau,
-        _ => true,
+    let is_on = |view: usize, part: usize| {
+        let expectation = pair.views[view].expectation(settings, part);
+        expectation.is_none_or(|[sigma, tau]| sigma <= tau)
     };
     let mut on = [0, 1].map(|view| {
         (0..n_parts)

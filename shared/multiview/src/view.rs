@@ -6,6 +6,8 @@ use fmp::{Layout, Model, Placement, Pose};
 use geometry::Camera;
 use nalgebra::Point2;
 
+use crate::Settings;
+
 /// A view prepared once: camera, pyramid, and where every cell's centre lies without lens distortion.
 #[derive(Debug)]
 pub struct ViewPlan {
@@ -139,4 +141,23 @@ pub struct ViewAnswer<'a> {
     pub candidates: &'a [Pose],
     /// Expected error of every part, pixels; `None` where there is no prediction.
     pub sigma_px: Option<&'a [f32]>,
+    /// Thresholds that came with the prediction, pixels; they count where
+    /// [`Settings::tau_px`] and [`Settings::tau_tenths`] are empty.
+    pub tau_px: Option<&'a [f32]>,
+}
+
+impl<'a> ViewAnswer<'a> {
+    /// Expected error and threshold of a part, where there are both.
+    pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
+        let sigma = *self.sigma_px?.get(part)?;
+        let tau = if !settings.tau_px.is_empty() {
+            *settings.tau_px.get(part)?
+        } else if !settings.tau_tenths.is_empty() {
+            let tenth = self.plan.size(self.candidates.first()?) / 10.0;
+            *settings.tau_tenths.get(part)? * tenth as f32
+        } else {
+            *self.tau_px?.get(part)?
+        };
+        Some([sigma, tau])
+    }
 }

@@ -136,6 +136,7 @@ impl Estimator {
                 let answer = (!found.candidates.is_empty()).then(|| Answer {
                     candidates: found.candidates.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
+                    tau_px: None,
                 });
                 (answer, Some(found))
             })

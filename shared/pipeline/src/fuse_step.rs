@@ -16,6 +16,8 @@ pub struct Answer {
     pub candidates: Vec<Pose>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
     pub sigma_px: Option<Vec<f32>>,
+    /// Thresholds that came with it, pixels of the frame; they count where the settings have none.
+    pub tau_px: Option<Vec<f32>>,
 }
 
 /// The part-type tables of a rig.
@@ -219,6 +221,7 @@ impl FuseStep {
             plan: &self.plans[view],
             candidates: &answer.candidates,
             sigma_px: answer.sigma_px.as_deref(),
+            tau_px: answer.tau_px.as_deref(),
         }
     }
 

@@ -353,6 +353,20 @@ fn an_expected_error_at_the_threshold_is_not_above_it() {
     assert_eq!(found.active, [true, false, false]);
 }
 
+#[test]
+fn thresholds_that_came_with_a_prediction_count_where_the_settings_have_none() {
+    let mut scene = Scene::new(1, 2, &SIZES);
+    scene.views[0].sigma_px = Some(vec![5.0; N_PARTS]);
+    scene.views[1].sigma_px = Some(vec![5.0; N_PARTS]);
+    scene.views[1].tau_px = Some(vec![4.0, 5.0, 6.0]);
+    let mut settings = settings(1);
+    let found = scene.fuse(&settings, [0, 1], FROM_BEST);
+    assert_eq!(found.active, [false, true, true], "the other view has none");
+    settings.tau_px = vec![9.0, 9.0, 1.0];
+    let found = scene.fuse(&settings, [0, 1], FROM_BEST);
+    assert_eq!(found.active, [true, true, false]);
+}
+
 /// The view that supports the other one first.
 fn first_support(sigma_px: [Option<[f32; N_PARTS]>; 2], seed: u64) -> (usize, usize) {
     let mut scene = Scene::new(seed, 2, &SIZES);

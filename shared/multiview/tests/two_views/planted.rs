@@ -149,6 +149,7 @@ pub(crate) struct View {
     pub(crate) levels: Vec<u16>,
     pub(crate) candidates: Vec<Pose>,
     pub(crate) sigma_px: Option<Vec<f32>>,
+    pub(crate) tau_px: Option<Vec<f32>>,
 }
 
 impl View {
@@ -161,6 +162,7 @@ impl View {
             plan: &self.plan,
             candidates: &self.candidates,
             sigma_px: self.sigma_px.as_deref(),
+            tau_px: self.tau_px.as_deref(),
         }
     }
 
@@ -238,6 +240,7 @@ impl Scene {
                             .map(|_| noise.within(0.0, 12.0) as f32)
                             .collect()
                     }),
+                    tau_px: None,
                 };
                 view.candidates = (0..3).map(|_| pose(noise, &solver, &view)).collect();
                 view.candidates
