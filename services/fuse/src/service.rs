@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::sync::Arc;
 
-use join::{Cadence, Joined, Joiner, Push};
+use join::{Cadence, Joined, Joiner, Last, Push};
 use messages::{PairPose, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
 use multiview::ViewPlan;
 use pipeline::{Answer, FuseStep};
@@ -29,6 +29,10 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
+    /// How long a frame waits for expected errors where the latest wins.
+    pub quality_deadline: Duration,
+    /// How old the last ones of a view may be to be used instead.
+    pub quality_max_age: Duration,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
     /// Processes that take the answers.
@@ -85,6 +89,8 @@ struct Worker<'a> {
     evidence: Vec<Option<Evidence>>,
     publisher: Publisher<PairPose>,
     joiner: Joiner<Word>,
+    /// The last expected errors of every view.
+    expected: Last<Box<ViewQuality>>,
     cadence: Cadence,
 }
 
@@ -105,10 +111,16 @@ impl<'a> Worker<'a> {
                 None
             });
         }
+        let mut joiner = joiner(service.delivery(), n_views + qualities.len(), job.patience);
+        if service.delivery() == Delivery::Realtime {
+            let deadline = job.quality_deadline.as_nanos() as u64;
+            (0..qualities.len()).for_each(|view| joiner.hurry(n_views + view, deadline));
+        }
         Ok(Self {
             service,
             job,
-            joiner: joiner(service.delivery(), n_views + qualities.len(), job.patience),
+            joiner,
+            expected: Last::new(n_views, job.quality_max_age.as_nanos() as u64),
             cadence: Cadence::default(),
             poses,
             qualities,
@@ -154,6 +166,15 @@ impl<'a> Worker<'a> {
             return;
         }
         self.service.health().received(1);
+        if let Word::Quality(quality) = &word
+            && status == Status::OK
+        {
+            // It may come too late for its own frame, and in time for the next.
+            let view = input - self.poses.len();
+            let captured_at = stamp.captured_at_nanos;
+            self.expected
+                .keep(view, stamp.frame, captured_at, quality.clone());
+        }
         if self.joiner.push(input, stamp.frame, word, now_nanos()) == Push::Late {
             self.service.health().dropped(1);
         }
@@ -183,7 +204,7 @@ impl<'a> Worker<'a> {
         let Some(stamp) = stamp_of(joined) else {
             return Ok(());
         };
-        let answers = self.answers(joined);
+        let (answers, sigma_ages) = self.answers(joined);
         let present = (0..answers.len()).filter(|it| answers[*it].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
         let start = self.job.step.start(&answers);
@@ -209,6 +230,7 @@ impl<'a> Worker<'a> {
                 epoch: self.service.epoch(),
                 ..stamp
             };
+            message.sigma_age = views.map(|view| sigma_ages[view]);
             message.timing = Timing {
                 received_at_nanos,
                 sent_at_nanos: now_nanos(),
@@ -234,9 +256,10 @@ impl<'a> Worker<'a> {
             .collect()
     }
 
-    fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {
-        let n_views = self.poses.len();
-        (0..n_views)
+    /// What every view says, and how many frames old its expected errors are, plus 1; 0 for none.
+    fn answers(&self, joined: &Joined<Word>) -> (Vec<Option<Answer>>, Vec<u16>) {
+        let mut ages = vec![0; self.poses.len()];
+        let answers = (0..self.poses.len())
             .map(|view| {
                 let plan = &self.job.plans[view];
                 let Some(Word::Pose(pose)) = &joined.items[view] else {
@@ -247,21 +270,50 @@ impl<'a> Worker<'a> {
                     .inspect_err(|error| tracing::warn!(view, %error, "unreadable candidates"))
                     .ok()
                     .filter(|it| !it.is_empty())?;
-                let sigma_px = match joined.items.get(n_views + view) {
-                    Some(Some(Word::Quality(quality))) => {
-                        wire::sigma_from_message(quality, plan.model().n_parts())
-                            .inspect_err(|error| tracing::warn!(view, %error, "unreadable errors"))
-                            .ok()
-                            .flatten()
-                    }
-                    _ => None,
-                };
-                Some(Answer {
+                let mut answer = Answer {
                     candidates,
-                    sigma_px,
-                })
+                    sigma_px: None,
+                    tau_px: None,
+                };
+                if let Some((age, quality)) = self.quality_of(view, joined, &pose.stamp)
+                    && self.expect(&mut answer, view, quality).is_some()
+                {
+                    ages[view] = u16::try_from(age + 1).unwrap_or(u16::MAX);
+                }
+                Some(answer)
             })
-            .collect()
+            .collect();
+        (answers, ages)
+    }
+
+    /// What was predicted for a view of this frame, else for the last one while that is fresh; and how
+    /// many frames ago.
+    fn quality_of<'b>(
+        &'b self,
+        view: usize,
+        joined: &'b Joined<Word>,
+        stamp: &Stamp,
+    ) -> Option<(u64, &'b ViewQuality)> {
+        match joined.items.get(self.poses.len() + view)? {
+            Some(Word::Quality(quality)) => Some((0, quality)),
+            _ => {
+                let last = self
+                    .expected
+                    .of(view, joined.frame, stamp.captured_at_nanos);
+                last.map(|(age, quality)| (age, &**quality))
+            }
+        }
+    }
+
+    /// Adds expected errors to an answer; `None` if there are none, or they cannot be read.
+    fn expect(&self, answer: &mut Answer, view: usize, quality: &ViewQuality) -> Option<()> {
+        let n_parts = self.job.plans[view].model().n_parts();
+        let read = wire::sigma_from_message(quality, n_parts)
+            .and_then(|sigma| Ok((sigma, wire::tau_from_message(quality, n_parts)?)))
+            .inspect_err(|error| tracing::warn!(view, %error, "unreadable errors"));
+        let (sigma_px, tau_px) = read.ok()?;
+        (answer.sigma_px, answer.tau_px) = (sigma_px, tau_px);
+        answer.sigma_px.as_ref().map(|_| ())
     }
 
     fn end(&self, waiter: &Waiter) -> Result<(), Failure> {

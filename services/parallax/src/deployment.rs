@@ -114,8 +114,12 @@ impl Deployment {
                 base.join(&camera.source).to_string_lossy().into_owned()
             };
         }
-        if let Some(table) = &mut self.quality.table {
-            *table = base.join(&table);
+        let quality = &mut self.quality;
+        for file in [&mut quality.table, &mut quality.network]
+            .into_iter()
+            .flatten()
+        {
+            *file = base.join(&file);
         }
         if let Some(file) = &mut self.fuse.consistency {
             *file = base.join(&file);

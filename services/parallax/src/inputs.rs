@@ -15,7 +15,7 @@ use multiview::{Compatibility, TypeTables};
 use pipeline::PairTables;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
-use viewquality::{Table, Tau};
+use viewquality::{Network, Table, Tau};
 
 use crate::deployment::Deployment;
 
@@ -197,6 +197,16 @@ pub(crate) fn pair_tables(
 /// Reads a table of expected errors.
 pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
+}
+
+/// Reads a network that predicts errors.
+pub(crate) fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
+    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    Network::parse(bytes, n_parts).map_err(|error| {
+        let cause = std::error::Error::source(&error).map(|it| format!(": {it}"));
+        let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
+        Failure::new(ExitKind::Input, message)
+    })
 }
 
 /// Reads thresholds of the expected errors.

@@ -69,9 +69,14 @@ impl Resolved {
         Duration::from_millis(self.deployment.deadline_ms())
     }
 
+    /// Whether expected errors are predicted from the frames.
+    pub(crate) fn has_network(&self) -> bool {
+        self.deployment.quality.network.is_some()
+    }
+
     /// Whether there are processes that send expected errors.
     pub(crate) fn has_quality(&self) -> bool {
-        self.deployment.quality.table.is_some()
+        self.deployment.quality.table.is_some() || self.has_network()
     }
 }
 
@@ -132,6 +137,11 @@ pub(crate) fn topics(
         n_workers: dealing.n_workers,
         n_recorders: 1,
         held: 1,
+        held_frames: if resolved.has_network() && resolved.delivery() == Delivery::Realtime {
+            quality::HELD_REALTIME
+        } else {
+            1
+        },
         processes: names,
     };
     plan.topics()

@@ -176,6 +176,8 @@ impl View<'_> {
         let layout = self.job.step.layout();
         let Found { estimate, evidence } = found;
         let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
+        let mut message = message.or_fail(ExitKind::Run)?;
+        wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
         let n_values = evidence
             .as_ref()
             .map_or(0, |_| layout.n_values(&estimate.scope));
@@ -186,7 +188,7 @@ impl View<'_> {
                 Searched::TRACKED
             },
             evidence_bytes: (n_values * size_of::<f32>()) as u64,
-            ..message.or_fail(ExitKind::Run)?
+            ..message
         })
     }
 

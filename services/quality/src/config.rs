@@ -10,7 +10,14 @@ use viewquality::Selection;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Table of expected errors; without one there are no predictions, and every part counts.
+    /// Network that predicts the errors, an ONNX file; in place of a table.
+    pub network: Option<PathBuf>,
+    /// How long a frame waits for its expected errors where the latest wins, milliseconds.
+    pub deadline_ms: u64,
+    /// How old the last expected errors of a view may be to be used instead, milliseconds.
+    pub max_age_ms: u64,
+    /// Table of expected errors; without one and without a network there are no predictions, and every
+    /// part counts.
     pub table: Option<PathBuf>,
     /// The subject's name in the table; not given where the table names none.
     pub subject: Option<String>,
@@ -28,6 +35,9 @@ impl Default for Config {
     fn default() -> Self {
         let selection = Selection::default();
         Self {
+            network: None,
+            deadline_ms: 50,
+            max_age_ms: 500,
             table: None,
             subject: None,
             action: None,

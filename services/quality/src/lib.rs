@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod config;
+mod frames;
 mod service;
 
 pub use config::Config;
-pub use service::{Job, run};
+pub use frames::HELD_REALTIME;
+pub use service::{Job, Looking, Source, run};

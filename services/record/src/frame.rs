@@ -61,6 +61,16 @@ impl FrameRecord {
         }
     }
 
+    /// How many frames ago the expected errors were predicted that fusion used for a view, at least: the
+    /// workers may differ. `None` if no pair of the view used any.
+    pub(crate) fn sigma_used(&self, view: usize) -> Option<u16> {
+        let ages = self.pairs.iter().flat_map(|pair| {
+            let views = pair.views.iter().zip(pair.sigma_age);
+            views.filter(|it| *it.0 as usize == view).map(|it| it.1)
+        });
+        ages.filter(|it| *it > 0).map(|it| it - 1).max()
+    }
+
     /// The expected errors of a view's parts, pixels of the frame.
     pub(crate) fn sigma_px(&self, scene: &Scene, view: usize) -> Option<Vec<f32>> {
         let message = self.views.get(view)?.quality.as_ref()?;

@@ -9,6 +9,9 @@ use crate::{FrameRecord, Scene};
 ///
 /// `single` names parts as the model does, by the side of the image; `fused` by the side of the body:
 /// the two differ where `facing` is `behind`. Types and levels count from 1, as in the reference.
+///
+/// `sigma_px` is what was predicted for this frame. `sigma_used` is what fusion had of the view in time:
+/// 0 the same, n what was predicted n frames before, `null` nothing, and every part counted as usable.
 pub(crate) fn json_lines(scene: &Scene, record: &FrameRecord) -> String {
     (0..scene.views.len())
         .map(|view| format!("{}\n", line(scene, record, view)))
@@ -49,6 +52,7 @@ fn line(scene: &Scene, record: &FrameRecord, view: usize) -> Value {
             })
         }),
         "sigma_px": sigma,
+        "sigma_used": record.sigma_used(view),
     })
 }
 

@@ -23,6 +23,19 @@ pub struct PoseMessage {
     pub mixture: [u8; MAX_PARTS],
 }
 
+/// How well one part of the best candidate fits where it lies: `fmp::LocalScore`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[type_name("LocalMessage.v1")]
+#[repr(C)]
+pub struct LocalMessage {
+    /// Response of the part's filter.
+    pub response: f32,
+    /// The response less the mean response around.
+    pub contrast: f32,
+    /// The response less the best of the part's other types.
+    pub margin: f32,
+}
+
 /// How much of the image and of its pyramid was searched for poses.
 ///
 /// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
@@ -50,7 +63,7 @@ impl Searched {
 
 /// The single-view answer: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
-#[type_name("ViewPose.v2")]
+#[type_name("ViewPose.v3")]
 #[repr(C)]
 pub struct ViewPose {
     /// Which frame of which view.
@@ -73,6 +86,8 @@ pub struct ViewPose {
     pub reserved: u32,
     /// The candidates.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
+    /// Of the parts of the first.
+    pub local: [LocalMessage; MAX_PARTS],
 }
 
 /// What a pair of views agreed on under one assumption about which way the person faces.
@@ -100,7 +115,7 @@ pub struct PairHypothesis {
 
 /// The answer of one pair of views.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
-#[type_name("PairPose.v1")]
+#[type_name("PairPose.v2")]
 #[repr(C)]
 pub struct PairPose {
     /// Which frame; `view` is the index of the pair.
@@ -117,6 +132,7 @@ pub struct PairPose {
     pub hypotheses: [PairHypothesis; 2],
     /// Bit `v` is set if view `v` delivered a pose for this frame in time.
     pub views_present: u32,
-    /// Keeps the layout free of padding.
-    pub reserved: u32,
+    /// Of either view: how many frames ago its expected errors were predicted, plus 1: 1 of this very
+    /// frame; 0 where there were none, and every part counted as usable.
+    pub sigma_age: [u16; 2],
 }

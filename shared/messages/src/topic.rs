@@ -12,7 +12,7 @@ pub fn frame(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v2/{view}")
+    format!("view-pose/v3/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
@@ -24,13 +24,13 @@ pub fn evidence(view: usize) -> String {
 /// Expected errors of a view: [`ViewQuality`](crate::ViewQuality).
 #[must_use]
 pub fn view_quality(view: usize) -> String {
-    format!("view-quality/v1/{view}")
+    format!("view-quality/v2/{view}")
 }
 
 /// Answers of one fusion worker: [`PairPose`](crate::PairPose).
 #[must_use]
 pub fn pair_pose(worker: usize) -> String {
-    format!("pair-pose/v1/{worker}")
+    format!("pair-pose/v2/{worker}")
 }
 
 /// The result: [`Pose3d`](crate::Pose3d).

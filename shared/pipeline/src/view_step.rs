@@ -3,7 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use fmp::{Bounds, Extractor, Layout, Model, Pose, Responses, Scope, Solver, Track, Tracker};
+use fmp::{
+    Bounds, Extractor, Layout, LocalScore, Model, Pose, Responses, Scope, Solver, Track, Tracker,
+    local_scores,
+};
 use kernels::Rgb8View;
 
 /// Which levels of the pyramid a view offers as evidence.
@@ -61,6 +64,8 @@ pub struct ViewEstimate {
     pub candidates: Vec<Pose>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
+    /// How well each part of the best pose fits where it lies; empty without one.
+    pub local: Vec<LocalScore>,
     /// What every level can offer at most.
     pub bounds: Bounds,
     /// What was searched, and is covered by the responses.
@@ -117,9 +122,12 @@ impl ViewStep {
             self.settings.n_candidates,
             self.settings.min_separation,
         );
+        let best = candidates.first();
+        let local = best.map(|it| local_scores(self.solver.model(), &evidence, it));
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
             candidates,
+            local: local.unwrap_or_default(),
             levels,
             bounds,
             scope,

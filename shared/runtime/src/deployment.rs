@@ -30,8 +30,10 @@ pub struct DeploymentPlan {
     pub n_workers: usize,
     /// Processes that write results.
     pub n_recorders: usize,
-    /// Images or response maps of one view that one process may hold at the same time.
+    /// Response maps of one view that one process may hold at the same time.
     pub held: usize,
+    /// The same of images.
+    pub held_frames: usize,
     /// The names of all processes.
     pub processes: Vec<String>,
 }
@@ -97,7 +99,7 @@ impl DeploymentPlan {
             topics.push(TopicPlan::slices::<u8, FrameHeader>(
                 topic::frame(index),
                 self.delivery,
-                Limits::new(2 + self.n_recorders, LARGE_BUFFER, self.held),
+                Limits::new(2 + self.n_recorders, LARGE_BUFFER, self.held_frames),
                 view.frame_bytes,
             ));
             let evidence = TopicPlan::slices::<f32, EvidenceHeader>(
@@ -205,6 +207,7 @@ mod tests {
             n_workers: 2,
             n_recorders: 1,
             held: 2,
+            held_frames: 2,
             processes: (0..12).map(|index| format!("process-{index}")).collect(),
         }
     }

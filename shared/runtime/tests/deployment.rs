@@ -31,6 +31,7 @@ fn plan(delivery: Delivery) -> DeploymentPlan {
         n_workers: N_WORKERS,
         n_recorders: 1,
         held: 2,
+        held_frames: 2,
         processes: per_view
             .chain((0..N_WORKERS).map(|worker| format!("fuse-{worker}")))
             .chain(["triangulate".to_owned(), "record".to_owned()])

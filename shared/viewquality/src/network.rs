@@ -25,6 +25,7 @@ pub struct Network {
     card: Card,
     shape: TileShape,
     n_parts: usize,
+    fingerprint: u32,
     threads: Arc<ThreadPool>,
 }
 
@@ -82,6 +83,7 @@ impl Network {
     ///
     /// [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
+        let fingerprint = fnv1a(&file);
         frame::check(&file).map_err(|it| NetworkError::Load(Box::new(it)))?;
         let model = Model::load(file).map_err(|it| NetworkError::Load(Box::new(it)))?;
         let card = Card::parse(model.metadata().fields(), n_parts)?;
@@ -122,6 +124,7 @@ impl Network {
             card,
             shape,
             n_parts,
+            fingerprint,
             threads: Arc::new(ThreadPool::with_num_threads(1)),
         };
         let tile = vec![0.0; shape.n_values()];
@@ -132,6 +135,11 @@ impl Network {
     /// What its file says of it.
     pub fn card(&self) -> &Card {
         &self.card
+    }
+
+    /// A number made of the bytes of its file (FNV-1a, 32 bits): another for another file.
+    pub fn fingerprint(&self) -> u32 {
+        self.fingerprint
     }
 
     /// The tile that it looks at; of a network that looks at none, the one its errors are relative to.
@@ -184,6 +192,12 @@ impl Network {
         }
         Ok(sigma.iter().copied().collect())
     }
+}
+
+/// The published hash; its letters are checked in the tests.
+fn fnv1a(bytes: &[u8]) -> u32 {
+    let step = |hash: u32, byte: &u8| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193);
+    bytes.iter().fold(0x811c_9dc5, step)
 }
 
 fn name(model: &Model, id: NodeId) -> &str {

@@ -1,7 +1,7 @@
 //! Poses and the candidates of a view.
 
-use fmp::{Layout, Model, Placement, Pose};
-use messages::{MAX_CANDIDATES, MAX_PARTS, PoseMessage, Status, ViewPose};
+use fmp::{Layout, LocalScore, Model, Placement, Pose};
+use messages::{LocalMessage, MAX_CANDIDATES, MAX_PARTS, PoseMessage, Status, ViewPose};
 
 use crate::WireError;
 use crate::error::{count, equal, finite, index};
@@ -116,6 +116,57 @@ pub fn candidates_from_message(
         .collect()
 }
 
+/// Adds how well the parts of the first candidate fit.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`], or a number is not finite.
+pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result<(), WireError> {
+    count("local", scores.len(), MAX_PARTS)?;
+    for (part, (slot, score)) in message.local.iter_mut().zip(scores).enumerate() {
+        let LocalScore {
+            response,
+            contrast,
+            margin,
+        } = checked(part, *score)?;
+        *slot = LocalMessage {
+            response,
+            contrast,
+            margin,
+        };
+    }
+    Ok(())
+}
+
+/// Reads how well the parts of the first candidate fit.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`] parts, or a number is not finite.
+pub fn local_from_message(
+    message: &ViewPose,
+    n_parts: usize,
+) -> Result<Vec<LocalScore>, WireError> {
+    let n = count("local", n_parts, MAX_PARTS)?;
+    let parts = message.local[..n].iter().enumerate();
+    let score = |(part, it): (usize, &LocalMessage)| {
+        let score = LocalScore {
+            response: it.response,
+            contrast: it.contrast,
+            margin: it.margin,
+        };
+        checked(part, score)
+    };
+    parts.map(score).collect()
+}
+
+fn checked(part: usize, score: LocalScore) -> Result<LocalScore, WireError> {
+    for number in [score.response, score.contrast, score.margin] {
+        finite("local", part, f64::from(number))?;
+    }
+    Ok(score)
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -166,6 +217,23 @@ mod tests {
                 prop_assert!(poses.len() <= MAX_CANDIDATES);
             }
         }
+    }
+
+    #[test]
+    fn local_scores_come_back_unless_they_are_no_numbers() {
+        let score = LocalScore {
+            response: 1.5,
+            contrast: -2.0,
+            margin: 0.25,
+        };
+        let mut message = ViewPose::default();
+        local_to_message(&mut message, &[score, LocalScore::default(), score]).unwrap();
+        let back = local_from_message(&message, 3).unwrap();
+        assert_eq!(back, [score, LocalScore::default(), score]);
+        message.local[1].margin = f32::NAN;
+        let said = local_from_message(&message, 3).unwrap_err().to_string();
+        assert_eq!(said, "local of entry 1 is NaN, expected a finite number");
+        assert!(local_from_message(&message, MAX_PARTS + 1).is_err());
     }
 
     fn sent() -> PoseMessage {

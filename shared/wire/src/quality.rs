@@ -51,6 +51,41 @@ pub fn sigma_from_message(
         .map(Some)
 }
 
+/// Adds the thresholds that came with a prediction.
+///
+/// * `tau_px`: of every part, pixels of the frame; or none.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+pub fn tau_to_message(message: &mut ViewQuality, tau_px: &[f32]) -> Result<(), WireError> {
+    message.n_thresholds = count("n_thresholds", tau_px.len(), MAX_PARTS)? as u32;
+    for (part, &tau) in tau_px.iter().enumerate() {
+        message.tau_px[part] = checked(part, tau)?;
+    }
+    Ok(())
+}
+
+/// Reads the thresholds that came with a prediction; `None` where none came.
+///
+/// # Errors
+///
+/// [`WireError`] if they are not for `n_parts` parts, or a value is negative or not finite.
+pub fn tau_from_message(
+    message: &ViewQuality,
+    n_parts: usize,
+) -> Result<Option<Vec<f32>>, WireError> {
+    if message.status != Status::OK || message.n_thresholds == 0 {
+        return Ok(None);
+    }
+    equal("n_thresholds", message.n_thresholds as usize, n_parts)?;
+    count("n_thresholds", n_parts, MAX_PARTS)?;
+    let tau = message.tau_px[..n_parts].iter().enumerate();
+    tau.map(|(part, &tau)| checked(part, tau))
+        .collect::<Result<_, _>>()
+        .map(Some)
+}
+
 fn checked(part: usize, sigma: f32) -> Result<f32, WireError> {
     finite("sigma_px", part, f64::from(sigma))?;
     if sigma < 0.0 {
@@ -101,6 +136,19 @@ mod tests {
         let message = sigma_to_message(None).unwrap();
         assert_eq!(message.status, Status::NO_PREDICTION);
         assert_eq!(sigma_from_message(&message, 26).unwrap(), None);
+    }
+
+    #[test]
+    fn thresholds_come_back_with_their_prediction_or_not_at_all() {
+        let mut message = sigma_to_message(Some(&[1.0, 2.0])).unwrap();
+        assert_eq!(tau_from_message(&message, 2).unwrap(), None);
+        tau_to_message(&mut message, &[3.0, 4.0]).unwrap();
+        assert_eq!(tau_from_message(&message, 2).unwrap(), Some(vec![3.0, 4.0]));
+        let said = tau_from_message(&message, 3).unwrap_err().to_string();
+        assert_eq!(said, "n_thresholds is 2, expected 3");
+        assert!(tau_to_message(&mut message, &[f32::NAN]).is_err());
+        message.status = Status::NO_PREDICTION;
+        assert_eq!(tau_from_message(&message, 2).unwrap(), None);
     }
 
     #[test]

@@ -4,11 +4,13 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
 use geometry::files::ReadOptions;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
+use viewquality::Forecaster;
 
 use crate::inputs;
 use crate::plan::{Dealing, Resolved};
@@ -99,7 +101,8 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         framing: prepare::framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,
-        n_consumers: 2, // pose and record
+        // Pose and record, and quality if it looks at them.
+        n_consumers: 2 + usize::from(resolved.has_network()),
         patience: resolved.patience(),
     };
     capture::run(service, &job)
@@ -124,20 +127,33 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let predictor = prepared
-        .predictor(resolved, view)?
-        .ok_or("there is no quality.table")
-        .or_fail(ExitKind::Config)?;
+    let source = match &resolved.deployment.quality.network {
+        Some(file) => {
+            let network = inputs::network(file, prepared.model.n_parts())?;
+            quality::Source::Network(Box::new(quality::Looking {
+                forecaster: Forecaster::new(network),
+                model: Arc::clone(&prepared.model),
+                layout: Arc::new(prepared.views[view].plan.layout().clone()),
+            }))
+        }
+        None => quality::Source::Table(
+            prepared
+                .predictor(resolved, view)?
+                .ok_or("there is no quality.table and no quality.network")
+                .or_fail(ExitKind::Config)?,
+        ),
+    };
     let workers = resolved.deployment.fuse.workers;
     let n_workers = Dealing::new(&prepared.pairs, workers).n_workers;
-    let job = quality::Job {
+    let mut job = quality::Job {
         view,
-        predictor,
+        source,
+        frame_step: resolved.deployment.capture.frame_step,
         frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
         n_consumers: n_workers + 1, // and record
         patience: resolved.patience(),
     };
-    quality::run(service, &job)
+    quality::run(service, &mut job)
 }
 
 fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Failure> {
@@ -155,6 +171,8 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         ),
         plans,
         has_quality: resolved.has_quality(),
+        quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
+        quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         n_consumers: 2, // triangulate and record
         patience: resolved.patience(),

@@ -121,6 +121,18 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "tracked: fall of the score since the last full search that asks for another",
     ),
     (
+        "quality.network",
+        "network that predicts the errors of every view, an ONNX file; in place of a table",
+    ),
+    (
+        "quality.deadline_ms",
+        "realtime: how long a frame waits for expected errors",
+    ),
+    (
+        "quality.max_age_ms",
+        "how old the last expected errors of a view may be to be used instead; else its parts count",
+    ),
+    (
         "quality.table",
         "expected errors: subject, action, frame, camera, then one per part, pixels",
     ),

@@ -105,6 +105,12 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
             "the name of a [[camera]] of this file",
         )?;
     }
+    demand(
+        it.table.is_none() || it.network.is_none(),
+        "quality.network",
+        "given besides `quality.table`",
+        "one of the two",
+    )?;
     demand(it.frame_step > 0, "quality.frame_step", "0", "at least 1")
 }
 

@@ -224,6 +224,13 @@ fn refuses_files_that_are_cut_off_or_no_networks() {
 }
 
 #[test]
+fn a_network_is_told_by_the_bytes_of_its_file() {
+    assert_eq!(fnv1a(b"foobar"), 0xbf9c_f968, "as published");
+    let [first, second] = [of_colours(), of_evidence()].map(|it| read(&it).unwrap().fingerprint());
+    assert_ne!(first, second);
+}
+
+#[test]
 fn refuses_to_run_on_less_than_a_tile() {
     let network = read(&of_colours()).unwrap();
     let said = network.run(&[0.0; 35], &[]).unwrap_err().to_string();

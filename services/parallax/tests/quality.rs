@@ -1,0 +1,169 @@
+//! Deployments whose expected errors a network predicts from the frames.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::sync::Arc;
+
+use common::started::signal;
+use common::{Case, PLAIN, planted};
+use fmp::Scope;
+use kernels::Rgb8View;
+use pipeline::{ViewSettings, ViewStep};
+use serde_json::{Value, json};
+use testkit::onnx::{Network, Side};
+use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
+
+const N_PARTS: usize = 26;
+
+/// `sigma` of part `i` = mean red of the tile + `i` / 8 + response of part 1, at least 0; switched off
+/// beyond `tau`.
+fn network(tau: f32) -> Network {
+    let k = n_evidence(N_PARTS);
+    let mut net = Network::default();
+    let tile = [
+        Side::Named("n"),
+        Side::Fixed(3),
+        Side::Fixed(40),
+        Side::Fixed(16),
+    ];
+    net.inputs.push(("tile".to_owned(), tile.to_vec()));
+    let evidence = vec![Side::Named("n"), Side::Fixed(k)];
+    net.inputs.push(("evidence".to_owned(), evidence));
+    let sigma = vec![Side::Named("n"), Side::Fixed(N_PARTS)];
+    net.outputs.push(("sigma".to_owned(), sigma));
+    let red = |it: usize| if it < N_PARTS { 0.05 } else { 0.0 };
+    net.weigh("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
+    let bias = (0..N_PARTS).map(|it| it as f32 / 800.0);
+    net.weigh("b", &[N_PARTS], bias.collect());
+    let first = |it: usize| if it < N_PARTS { 0.01 } else { 0.0 };
+    net.weigh("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
+    net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
+    net.node("Flatten", &["mean"], "flat", vec![]);
+    net.node("Gemm", &["flat", "w", "b"], "seen", vec![]);
+    net.node("MatMul", &["evidence", "v"], "known", vec![]);
+    net.node("Add", &["seen", "known"], "sigma", vec![]);
+    let card = Card {
+        evidence: Some(viewquality::EVIDENCE_VERSION),
+        unit: Unit::Relative,
+        tau: vec![tau; N_PARTS],
+        ..Card::default()
+    };
+    let entries = card.entries().into_iter();
+    net.metadata = entries.map(|(name, it)| (name.to_owned(), it)).collect();
+    net
+}
+
+#[test]
+fn the_service_says_what_the_library_says() {
+    let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
+    let case = Case::new("network", &[8; 2], &more);
+    let file = network(0.02).file();
+    case.write("q.onnx", &file);
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines = case.lines("pose2d.jsonl");
+    assert_eq!(lines.len(), 16);
+    let network = viewquality::Network::parse(file, N_PARTS).unwrap();
+    let mut forecaster = Forecaster::new(network);
+    let (rig, model) = (planted::rig(2), planted::model());
+    let [width, height] = planted::SIZE.map(|it| it as usize);
+    for (view, camera) in rig.cameras().iter().enumerate() {
+        let plan = pipeline::plan(&model, camera).unwrap();
+        let layout = Arc::new(plan.layout().clone());
+        let step = ViewStep::new(
+            Arc::clone(&model),
+            Arc::clone(&layout),
+            ViewSettings::default(),
+        );
+        let mut responses = vec![0.0; layout.n_responses()];
+        for frame in 0..8 {
+            let picture = planted::picture(camera, frame);
+            let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
+            let found = step.run(image, Scope::whole(&layout), &mut responses);
+            let seen = Seen {
+                image,
+                on: (&model, &layout),
+                candidates: &found.candidates,
+                scores: &found.local,
+                frame_scale: 1.0,
+            };
+            let forecast = forecaster.run(&seen).unwrap();
+            assert!(
+                forecast.sigma_px.iter().any(|it| *it > 0.0),
+                "nothing to compare"
+            );
+            let line = &lines[frame * 2 + view];
+            let at = format!("frame {frame}, view {view}");
+            assert_eq!(line["sigma_px"], json!(forecast.sigma_px), "{at}");
+            assert_eq!(line["sigma_used"], json!(0), "{at}");
+        }
+    }
+}
+
+/// Lines about a view.
+fn of_view(case: &Case, name: &str) -> Vec<Value> {
+    let lines = case.lines("pose2d.jsonl");
+    lines.into_iter().filter(|it| it["view"] == name).collect()
+}
+
+#[test]
+fn no_frame_waits_for_a_network_that_stands_still() {
+    let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
+                frame_rate_hz = 15\n[record]\noverlay_every = 0\n[supervise]\nhang_limit_s = 60\n\
+                [quality]\nnetwork = \"q.onnx\"\nmax_age_ms = 400\n";
+    let case = Case::new("stopped", &[120; 2], more);
+    case.write("q.onnx", network(0.02).file());
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    let n_lines = || case.lines("pose3d.jsonl").len();
+    started.until("predictions", |_| {
+        of_view(&case, "b").iter().any(|it| it["sigma_used"] == 0)
+    });
+    let stopped = started.pid_of("quality --index 1");
+    signal("STOP", stopped.into());
+    let before = n_lines();
+    started.until("frames without it", |_| n_lines() >= before + 20);
+    signal("CONT", stopped.into());
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines = of_view(&case, "b");
+    let used = |it: &Value| it["sigma_used"].as_u64();
+    let fused: Vec<Option<u64>> = lines
+        .iter()
+        .filter(|it| !it["fused"].is_null())
+        .map(used)
+        .collect();
+    assert!(fused.contains(&Some(0)), "{fused:?}");
+    assert!(
+        fused.iter().flatten().any(|it| *it > 0),
+        "the last prediction was used while it was fresh: {fused:?}"
+    );
+    assert!(fused.contains(&None), "and no longer: {fused:?}");
+    let n_of_other = of_view(&case, "a")
+        .iter()
+        .filter(|it| used(it).is_some())
+        .count();
+    assert!(n_of_other > 20, "the other view has its own: {n_of_other}");
+}
+
+#[test]
+fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
+    let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
+    let case = Case::new("unfit", &[2; 2], &more);
+    let said = |file: &[u8]| {
+        case.write("q.onnx", file);
+        let ended = case.start(&["check", "deployment.toml"]).wait();
+        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        ended.stderr
+    };
+    let mut net = network(0.02);
+    net.inputs[0].1[1] = Side::Fixed(1);
+    let stderr = said(&net.file());
+    assert!(
+        stderr.contains("q.onnx: `tile` of the network is [n, 1, 40, 16], expected [n, 3"),
+        "{stderr}"
+    );
+    let file = network(0.02).file();
+    let stderr = said(&file[..file.len() / 2]);
+    assert!(stderr.contains("cut off or no ONNX file"), "{stderr}");
+}
