@@ -58,10 +58,32 @@ impl Trial {
     }
 }
 
+/// What a view saw, and found alone.
+#[derive(Debug, Clone, Copy)]
+pub struct Look<'a> {
+    /// The view.
+    pub view: usize,
+    /// Its frame.
+    pub image: Rgb8View<'a>,
+    /// Its pyramid, and the model.
+    pub plan: &'a ViewPlan,
+    /// What was found; there is at least one candidate.
+    pub found: &'a ViewEstimate,
+    /// Centres of the 26 parts of the best pose, pixels of the frame.
+    pub centres: &'a [[f64; 2]],
+}
+
+/// What error is expected of every part of a view.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Expectation {
+    /// In the unit of the thresholds.
+    pub sigma: Vec<f32>,
+    /// Thresholds of this view, where those of the settings are empty.
+    pub tau: Option<Vec<f32>>,
+}
+
 /// Says what error is expected of every part of a view.
-///
-/// * view, and the centres of the 26 parts of its best pose, pixels of the frame.
-pub type Expected<'a> = dyn Fn(usize, &[[f64; 2]]) -> Option<Vec<f32>> + Sync + 'a;
+pub type Expected<'a> = dyn Fn(&Look<'_>) -> Option<Expectation> + Sync + 'a;
 
 /// The versions, ready for the frames of one rig.
 #[derive(Debug)]
@@ -145,7 +167,7 @@ impl Bench {
         let mut responses = std::mem::take(&mut self.responses);
         let seen = self.look(images, &mut responses);
         let found = {
-            let seen = self.seen(&seen, &responses, expected);
+            let seen = self.seen(images, &seen, &responses, expected);
             let trials = self.setup.trials.par_iter().enumerate();
             trials
                 .map(|(nth, it)| self.version(nth, it.version, &seen))
@@ -170,17 +192,27 @@ impl Bench {
 
     fn seen<'a>(
         &'a self,
+        images: &[Option<Rgb8View<'_>>],
         found: &'a [Option<ViewEstimate>],
         responses: &'a [Vec<f32>],
         expected: &Expected<'_>,
     ) -> Seen<'a> {
         let answer = |view: usize| {
             let it = found[view].as_ref()?;
-            let centres = self.plans[view].centres(it.candidates.first()?);
+            let plan = &self.plans[view];
+            let centres = plan.centres(it.candidates.first()?);
+            let look = Look {
+                view,
+                image: images[view]?,
+                plan,
+                found: it,
+                centres: &centres,
+            };
+            let expected = expected(&look);
             Some(Answer {
                 candidates: it.candidates.clone(),
-                sigma_px: expected(view, &centres),
-                tau_px: None,
+                tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
+                sigma_px: expected.map(|it| it.sigma),
             })
         };
         let evidence = |view: usize| {

@@ -14,6 +14,7 @@ mod bench;
 mod film;
 mod truth;
 
+mod predicted;
 mod record;
 mod score;
 mod summary;
@@ -21,12 +22,13 @@ mod summary;
 mod published;
 mod report;
 
-pub use bench::{Bench, Expected, Setup, Trial};
+pub use bench::{Bench, Expectation, Expected, Look, Setup, Trial};
 pub use film::{Film, FilmError, FilmSettings};
+pub use predicted::{Judgement, Predicted, judge};
 pub use published::published;
 pub use record::{Found, Header, Record, RecordError, read_records};
 pub use report::{Page, html, latex};
 pub use score::{FrameScore, Joints, score, seen};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
-pub use truth::{parse14, part_errors, part_errors_and_facing, size};
+pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};
 pub use version::{Combining, Terms, Version, VersionError};

@@ -3,6 +3,8 @@
 use evaluation::Point;
 use serde::{Deserialize, Serialize};
 
+use crate::Predicted;
+
 /// The first line of a file of records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -40,6 +42,9 @@ pub struct Record {
     pub frame: u64,
     /// What each version found.
     pub found: Vec<Found>,
+    /// For each view what a network expected of it, and the truth; empty without a network.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predicted: Vec<Option<Predicted>>,
 }
 
 /// What one version found in one frame.
@@ -135,6 +140,14 @@ mod tests {
                 solutions: 18,
                 on: Some(0.75),
             }],
+            predicted: vec![
+                None,
+                Some(Predicted {
+                    sigma_px: vec![0.1],
+                    tau_px: Vec::new(),
+                    error_px: vec![3.5],
+                }),
+            ],
         }
     }
 

@@ -3,7 +3,7 @@
 use evaluation::{Bootstrap, Changes, PcpRule, Report, Share};
 use serde::Serialize;
 
-use crate::FrameScore;
+use crate::{FrameScore, Judgement};
 
 /// Error in 3D up to which a joint counts as found, metres.
 const PCK_M: f64 = 0.15;
@@ -16,6 +16,8 @@ const REACH_PX: f64 = 50.0;
 const N_BINS: usize = 40;
 /// Changes below it are none, pixels.
 const SAME_PX: f64 = 1.0;
+/// Deteriorations beyond it are counted apart, pixels.
+const FAR_PX: f64 = 5.0;
 
 /// The scores of one sequence.
 #[derive(Debug, Clone)]
@@ -41,6 +43,10 @@ pub struct Summary {
     pub confidence: f64,
     /// The sequences, then the groups of them.
     pub groups: Vec<Group>,
+    /// How well expected errors told the true ones: the mean over parts, then each; empty without a
+    /// network.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub predictions: Vec<Judgement>,
 }
 
 /// Some sequences together, every frame with the same weight.
@@ -106,6 +112,8 @@ pub struct ChangesOf {
     pub improved: f64,
     /// Away from it.
     pub deteriorated: f64,
+    /// Away from it by more than five pixels.
+    pub deteriorated_5px: f64,
     /// Lower edge (pixels; above 0 is better) and percent; the outermost hold what lies beyond.
     pub bins: Vec<[f64; 2]>,
 }
@@ -167,6 +175,7 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
         versions: versions.to_vec(),
         confidence: bootstrap.confidence,
         groups,
+        predictions: Vec::new(),
     }
 }
 
@@ -279,6 +288,7 @@ fn images(frames: &[&FrameScore]) -> Option<Report> {
 
 fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
     let mut changes = Changes::new(REACH_PX, N_BINS, SAME_PX);
+    let mut n_far = 0;
     for (before, after) in before.iter().zip(after) {
         for (before, after) in before.views.iter().zip(&after.views) {
             let (Some((Some(before), truth)), Some((Some(after), _))) = (before, after) else {
@@ -287,6 +297,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
             for ((before, after), truth) in before.iter().zip(after).zip(truth) {
                 let off = |it: &[f64; 2]| (it[0] - truth[0]).hypot(it[1] - truth[1]);
                 changes.add(off(before), off(after));
+                n_far += usize::from(off(after) - off(before) > FAR_PX);
             }
         }
     }
@@ -294,6 +305,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
     ChangesOf {
         improved: share(changes.improved()),
         deteriorated: share(changes.deteriorated()),
+        deteriorated_5px: share(n_far),
         bins: changes.bins().map(|(edge, n)| [edge, share(n)]).collect(),
     }
 }

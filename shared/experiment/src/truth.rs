@@ -43,6 +43,18 @@ fn parts(joints: &[[f64; 2]]) -> [[f64; 2]; N_PARTS] {
     parts
 }
 
+/// A tenth of the longer side of the rectangle around joints, in their unit.
+pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let values = joints.iter().map(|it| it[axis]);
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
+            [low.min(it), high.max(it)]
+        });
+        high - low + 1.0
+    };
+    0.1 * side(0).max(side(1))
+}
+
 /// The true error of every part of a pose, in tenths of the person's size: the longer side of the
 /// rectangle around the true joints.
 ///
@@ -72,7 +84,7 @@ pub fn part_errors_and_facing(
         return None;
     }
     let truth = parts(joints);
-    let tenth = 0.1 * size(joints);
+    let tenth = tenth_of(joints);
     let errors = |exchanged: bool| -> Vec<f32> {
         let of = |part: usize| truth[if exchanged { MIRROR[part] } else { part }];
         let error = |(part, at): (usize, &[f64; 2])| {

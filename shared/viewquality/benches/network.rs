@@ -126,7 +126,10 @@ impl Layers {
 
     /// A number about 0, so large that sums of so many keep their size.
     fn random(&mut self, fan_in: usize) -> f32 {
-        self.seed = self.seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        self.seed = self
+            .seed
+            .wrapping_mul(1_664_525)
+            .wrapping_add(1_013_904_223);
         let unit = (self.seed >> 8) as f32 / (1 << 24) as f32;
         (unit - 0.5) * (24.0 / fan_in as f32).sqrt()
     }

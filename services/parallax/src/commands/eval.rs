@@ -6,13 +6,14 @@ mod report;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 use clap::Args;
 use experiment::{FilmSettings, Version};
 use fuse::Config;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence, SequenceError};
-use viewquality::Table;
+use viewquality::Forecaster;
 
 use crate::cli::Globals;
 use crate::inputs;
@@ -28,7 +29,11 @@ Versions: fmp (every view alone, then triangulation), geometry, appearance (part
 (parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
 geometry+consensus by what all views can mean; geometry+all-views supports each view by all others at \
 once, geometry+all-views-mean by the mean of their terms. Without --versions: all for which there is what \
-they need (tables of part types, or --consistency, for appearance; --sigma or --oracle for adaptive), pairs and all views.
+they need (tables of part types, or --consistency, for appearance; --network, --sigma or --oracle for adaptive), pairs and all views.
+
+--network FILE predicts the errors of the same single views as the service does; the report then says how \
+well: area under the ROC and rank correlation, part by part. Its thresholds count where --fuse sets no tau; \
+without any, a tenth of the person's size.
 
 --fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
@@ -72,6 +77,9 @@ pub(crate) struct Arguments {
     /// Table of expected errors, as the authors released it.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
+    /// Network that predicts the errors, an ONNX file.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
+    network: Option<PathBuf>,
     /// Expect the true errors: a part is off beyond a tenth of the person's size.
     #[arg(long)]
     oracle: bool,
@@ -147,6 +155,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Some(file) => Some(inputs::quality_table(file, model.n_parts())?),
         None => None,
     };
+    let network = match &arguments.network {
+        Some(file) => Some(inputs::network(file, model.n_parts())?),
+        None => None,
+    };
     let poses = arguments.out.join("poses");
     fs::create_dir_all(&poses).map_err(|error| inputs::in_file(&poses, &error))?;
     let pool = rayon::ThreadPoolBuilder::new()
@@ -154,7 +166,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .build()
         .or_fail(ExitKind::Run)?;
     let job = Job {
-        versions: versions(arguments, &config, sigma.as_ref())?,
+        versions: versions(arguments, &config)?,
         settings: settings_text(arguments, &config)?,
         film: FilmSettings {
             size: arguments.size,
@@ -169,6 +181,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         config,
         learned,
         sigma,
+        tau_px: match &config.tau {
+            fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
+            it => it.px(),
+        },
+        forecaster: network.map(|it| Mutex::new(Forecaster::new(it))),
         poses,
         stop,
     };
@@ -257,16 +274,12 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
 }
 
 /// What is compared: what was asked for, or all that can be.
-fn versions(
-    arguments: &Arguments,
-    config: &Config,
-    sigma: Option<&Table>,
-) -> Result<Vec<Version>, Failure> {
-    let expects = sigma.is_some() || arguments.oracle;
+fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
+    let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
         let adaptive = |it: &Version| it.terms == experiment::Terms::Adaptive;
         if !expects && arguments.versions.iter().any(adaptive) {
-            let message = "adaptive selection needs expected errors: --sigma FILE or --oracle";
+            let message = "adaptive selection needs expected errors: --network FILE, --sigma FILE or --oracle";
             return Err(Failure::new(ExitKind::Usage, message));
         }
         return Ok(arguments.versions.clone());
@@ -295,6 +308,8 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
     };
     let model = inputs::fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
+    let network = arguments.network.as_ref().map(digest).transpose()?;
+    let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
     let mut tables = Vec::new();
     let files = config.compatibility.iter().flat_map(|it| &it.files);
     for file in files.chain(&config.consistency) {
@@ -308,7 +323,7 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         arguments.oracle,
     );
     Ok(format!(
-        "model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
+        "{network}model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
          scale {scale}, upright {upright}, candidates {n}\n{fuse}"
     ))
 }

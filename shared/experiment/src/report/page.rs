@@ -66,6 +66,7 @@ pub fn html(page: &Page<'_>) -> String {
         measures(&mut out, group, &titles);
         figures(&mut out, group, &titles);
     }
+    predictions(&mut out, page.summary);
     out.push_str("</html>\n");
     out
 }
@@ -122,7 +123,7 @@ fn interval(ends: Option<[f64; 2]>, digits: usize) -> String {
 /// All other measures of a group, a column for each version.
 fn measures(out: &mut String, group: &Group, titles: &[String]) {
     type Cell = fn(&Numbers) -> String;
-    let rows: [(&str, Cell); 15] = [
+    let rows: [(&str, Cell); 16] = [
         ("PCP3D at 0.5, %", |it| {
             number(it.pcp3d, 2) + &interval(it.pcp3d_interval, 2)
         }),
@@ -154,6 +155,9 @@ fn measures(out: &mut String, group: &Group, titles: &[String]) {
         ("deteriorated, %", |it| {
             number(Some(it.changes.deteriorated), 1)
         }),
+        ("deteriorated by more than 5 px, %", |it| {
+            number(Some(it.changes.deteriorated_5px), 2)
+        }),
     ];
     out.push_str("<div class=\"scroll\"><table>\n<tr><th>");
     for title in titles {
@@ -166,6 +170,35 @@ fn measures(out: &mut String, group: &Group, titles: &[String]) {
             put(out, format_args!("<td>{}", cell(it)));
         }
         out.push_str("</tr>\n");
+    }
+    out.push_str("</table></div>\n");
+}
+
+/// How well the network told the true errors.
+fn predictions(out: &mut String, summary: &Summary) {
+    if summary.predictions.is_empty() {
+        return;
+    }
+    out.push_str(
+        "<h2>Expected errors</h2>\n<p><small>Views: those judged. Above: the true error exceeds the threshold. \
+         Area: under the ROC of that, by the expected error; 0.5 tells nothing. Correlation: of ranks \
+         (Spearman).</small></p>\n<div class=\"scroll\"><table>\n<tr><th>part<th>views<th>above, %<th>of \
+         these switched off, %<th>of the others, %<th>area<th>correlation</tr>\n",
+    );
+    for it in &summary.predictions {
+        put(
+            out,
+            format_args!(
+                "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
+                escape(&it.part),
+                it.n,
+                number(it.above, 1),
+                number(it.caught, 1),
+                number(it.wasted, 1),
+                number(it.auc, 3),
+                number(it.rank_correlation, 3)
+            ),
+        );
     }
     out.push_str("</table></div>\n");
 }

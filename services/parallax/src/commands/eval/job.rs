@@ -3,13 +3,13 @@
 use std::fs::{File, OpenOptions};
 use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use consistency::Learned;
 use experiment::{
-    Bench, Film, FilmError, FilmSettings, Header, Record, Setup, Trial, Version, parse14,
-    part_errors, read_records, seen,
+    Bench, Expectation, Film, FilmError, FilmSettings, Header, Look, Predicted, Record, Setup,
+    Trial, Version, parse14, part_errors, read_records, seen, tenth_of,
 };
 use fmp::Model;
 use fuse::Config;
@@ -18,7 +18,7 @@ use pipeline::{SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 use skeleton::PARSE14;
-use viewquality::Table;
+use viewquality::{Forecaster, Seen, Table};
 
 use crate::{inputs, output};
 
@@ -35,6 +35,9 @@ pub(super) struct Job {
     pub(super) film: FilmSettings,
     pub(super) n_candidates: usize,
     pub(super) sigma: Option<Table>,
+    /// Thresholds of the settings, pixels of the footage; empty without any.
+    pub(super) tau_px: Vec<f32>,
+    pub(super) forecaster: Option<Mutex<Forecaster>>,
     pub(super) oracle: bool,
     pub(super) resume: bool,
     pub(super) quiet: bool,
@@ -96,20 +99,40 @@ impl Job {
                 continue;
             }
             let truth = self.truth(sequence, frame, &bench);
-            let found = bench.solve(&images, &|view, centres| {
-                if let Some(truth) = &truth {
-                    let may_be_exchanged = self.config.facing;
-                    return part_errors(centres, truth[view].as_ref()?, may_be_exchanged);
+            let predicted = Mutex::new(vec![None; sequence.views.len()]);
+            let found = bench.solve(&images, &|look| {
+                let view = look.view;
+                let joints = truth.as_ref().and_then(|it| it[view].as_ref());
+                if self.oracle {
+                    let sigma = part_errors(look.centres, joints?, self.config.facing)?;
+                    return Some(Expectation { sigma, tau: None });
+                }
+                if let Some(forecaster) = &self.forecaster {
+                    let scale = f64::from(scales[view]);
+                    let (expectation, judged) = self.forecast(forecaster, look, joints, scale)?;
+                    predicted.lock().unwrap_or_else(PoisonError::into_inner)[view] = judged;
+                    return Some(expectation);
                 }
                 let table = self.sigma.as_ref()?;
                 let camera = &sequence.views[view].camera;
                 let number = i64::try_from(frame.number).ok()?;
                 let sigma = table.get(&sequence.subject, &sequence.action, number, camera)?;
-                Some(sigma.iter().map(|it| it * scales[view]).collect())
+                Some(Expectation {
+                    sigma: sigma.iter().map(|it| it * scales[view]).collect(),
+                    tau: None,
+                })
             });
+            let predicted = predicted
+                .into_inner()
+                .unwrap_or_else(PoisonError::into_inner);
             let record = Record {
                 frame: frame.number,
                 found,
+                predicted: if self.forecaster.is_some() {
+                    predicted
+                } else {
+                    Vec::new()
+                },
             };
             let line = serde_json::to_string(&record).or_fail(ExitKind::Run)?;
             writeln!(kept, "{line}").or_fail(ExitKind::Run)?;
@@ -117,6 +140,55 @@ impl Job {
             progress.solved(&sequence.name);
         }
         Ok((records, n_missing))
+    }
+
+    /// What the network expects of a view; and that beside the truth, where it is known.
+    ///
+    /// * `joints`: the true ones in the frame.
+    /// * `frame_scale`: pixels of the frame per pixel of the footage.
+    fn forecast(
+        &self,
+        forecaster: &Mutex<Forecaster>,
+        look: &Look<'_>,
+        joints: Option<&Vec<[f64; 2]>>,
+        frame_scale: f64,
+    ) -> Option<(Expectation, Option<Predicted>)> {
+        let seen = Seen {
+            image: look.image,
+            on: (look.plan.model(), look.plan.layout()),
+            candidates: &look.found.candidates,
+            scores: &look.found.local,
+            frame_scale,
+        };
+        let mut forecaster = forecaster.lock().unwrap_or_else(PoisonError::into_inner);
+        let forecast = forecaster.run(&seen).inspect_err(
+            |error| tracing::warn!(view = look.view, %error, "the network says nothing"),
+        );
+        let forecast = forecast.ok()?;
+        let tenth = joints.map(|it| tenth_of(it));
+        let tau_px: Vec<f32> = if !self.tau_px.is_empty() {
+            self.tau_px
+                .iter()
+                .map(|it| it * frame_scale as f32)
+                .collect()
+        } else if forecast.tau_px.is_empty() {
+            tenth.map_or_else(Vec::new, |it| vec![it as f32; forecast.sigma_px.len()])
+        } else {
+            forecast.tau_px
+        };
+        let judged = joints.zip(tenth).and_then(|(joints, tenth)| {
+            let errors = part_errors(look.centres, joints, self.config.facing)?;
+            Some(Predicted {
+                sigma_px: forecast.sigma_px.clone(),
+                tau_px: tau_px.clone(),
+                error_px: errors.iter().map(|it| it * tenth as f32).collect(),
+            })
+        });
+        let expectation = Expectation {
+            sigma: forecast.sigma_px,
+            tau: (!tau_px.is_empty()).then_some(tau_px),
+        };
+        Some((expectation, judged))
     }
 
     /// The file that what is found goes to, and what is in it already.
@@ -193,7 +265,8 @@ impl Job {
         Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
     }
 
-    /// The true joints in the frames of every view, where they stand in for expected errors.
+    /// The true joints in the frames of every view, where expected errors are taken from them or judged
+    /// by them.
     fn truth(
         &self,
         sequence: &Sequence,
@@ -205,7 +278,8 @@ impl Job {
             let joints = seen(camera, [0.0; 2], &joints)?;
             Some(joints.to_vec())
         };
-        self.oracle.then(|| bench.cameras().map(in_frame).collect())
+        let is_needed = self.oracle || self.forecaster.is_some();
+        is_needed.then(|| bench.cameras().map(in_frame).collect())
     }
 }
 

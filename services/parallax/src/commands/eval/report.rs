@@ -3,7 +3,9 @@
 use std::fs;
 
 use evaluation::Bootstrap;
-use experiment::{FrameScore, Group, Measured, Page, Summary, html, latex, score, summarise};
+use experiment::{
+    FrameScore, Group, Measured, Page, Summary, html, judge, latex, score, summarise,
+};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::Arguments;
@@ -17,7 +19,12 @@ pub(super) fn write(arguments: &Arguments, job: &Job, done: &Done) -> Result<(),
         ..Bootstrap::default()
     };
     let versions: Vec<String> = job.versions.iter().map(ToString::to_string).collect();
-    let summary = summarise(&measured(done), &versions, &bootstrap);
+    let records = done.sequences.iter().flat_map(|it| &it.1);
+    let predicted = records.flat_map(|it| it.predicted.iter().flatten());
+    let summary = Summary {
+        predictions: judge(predicted),
+        ..summarise(&measured(done), &versions, &bootstrap)
+    };
     let json = serde_json::to_string_pretty(&summary).or_fail(ExitKind::Run)?;
     let about = about(arguments, job, done);
     let page = html(&Page {
@@ -65,7 +72,8 @@ fn measured(done: &Done) -> Vec<Measured> {
 
 fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)> {
     let n_frames: usize = done.sequences.iter().map(|it| it.1.len()).sum();
-    let expected = match (&arguments.sigma, arguments.oracle) {
+    let file = arguments.sigma.as_ref().or(arguments.network.as_ref());
+    let expected = match (file, arguments.oracle) {
         (Some(file), _) => file.display().to_string(),
         (None, true) => "the true errors, a tenth of the person's size allowed".to_owned(),
         (None, false) => "none".to_owned(),
@@ -120,6 +128,13 @@ fn print(summary: &Summary, job: &Job) -> Result<(), Failure> {
     output::line(head.join(" "))?;
     for group in &summary.groups {
         output::line(row(group))?;
+    }
+    if let Some(it) = summary.predictions.first() {
+        let number = |it: Option<f64>| it.map_or_else(|| "-".to_owned(), |it| format!("{it:.3}"));
+        let [auc, correlation] = [it.auc, it.rank_correlation].map(number);
+        output::line(format_args!(
+            "expected errors, mean over parts: area under the ROC {auc}, rank correlation {correlation}"
+        ))?;
     }
     Ok(())
 }
