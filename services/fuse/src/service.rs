@@ -294,15 +294,13 @@ impl<'a> Worker<'a> {
         joined: &'b Joined<Word>,
         stamp: &Stamp,
     ) -> Option<(u64, &'b ViewQuality)> {
-        match joined.items.get(self.poses.len() + view)? {
-            Some(Word::Quality(quality)) => Some((0, quality)),
-            _ => {
-                let last = self
-                    .expected
-                    .of(view, joined.frame, stamp.captured_at_nanos);
-                last.map(|(age, quality)| (age, &**quality))
-            }
+        if let Some(Word::Quality(quality)) = joined.items.get(self.poses.len() + view)? {
+            return Some((0, quality));
         }
+        let last = self
+            .expected
+            .of(view, joined.frame, stamp.captured_at_nanos);
+        last.map(|(age, quality)| (age, &**quality))
     }
 
     /// Adds expected errors to an answer; `None` if there are none, or they cannot be read.

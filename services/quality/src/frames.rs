@@ -3,8 +3,8 @@
 use messages::FrameHeader;
 use runtime::{Delivery, Failure, Sample, Service, SliceSubscriber};
 
-/// Frames that are held at the same time where the latest wins.
-pub const HELD_REALTIME: usize = 3;
+/// Frames that are held at the same time where the latest wins: three that wait, and one that is taken.
+pub const HELD_REALTIME: usize = 4;
 
 /// Frames that wait for their poses.
 #[derive(Debug)]
@@ -35,20 +35,16 @@ impl Frames {
     /// Takes in what has come: one frame where nothing may be lost, for its sender waits; else all, and
     /// keeps those that are likeliest to be asked for.
     pub(crate) fn listen(&mut self) -> Result<(), Failure> {
-        let most = match self.delivery {
-            Delivery::Lossless => 1,
-            Delivery::Realtime => HELD_REALTIME,
-        };
-        while self.delivery == Delivery::Realtime || self.held.len() < most {
-            if self.held.len() == most {
-                let nth = |it: &Sample<u8, FrameHeader>| it.header().stamp.frame / self.frame_step;
-                let held: Vec<u64> = self.held.iter().map(nth).collect();
-                self.held.remove(least_wanted(&held));
-            }
+        while self.delivery == Delivery::Realtime || self.held.is_empty() {
             match self.subscriber.receive()? {
                 Some(it) if it.header().stamp.session == self.session => self.held.push(it),
                 Some(_) => {}
                 None => break,
+            }
+            if self.held.len() == HELD_REALTIME {
+                let nth = |it: &Sample<u8, FrameHeader>| it.header().stamp.frame / self.frame_step;
+                let held: Vec<u64> = self.held.iter().map(nth).collect();
+                self.held.remove(least_wanted(&held));
             }
         }
         Ok(())

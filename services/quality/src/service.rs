@@ -6,7 +6,9 @@ use std::sync::Arc;
 use fmp::{Layout, Model};
 use kernels::Rgb8View;
 use messages::{FrameHeader, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
-use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, Woken, now_nanos};
+use runtime::{
+    ExitKind, Failure, OrFail as _, Publisher, Sample, Service, Waiter, Woken, now_nanos,
+};
 use viewquality::{Forecaster, Predictor, Seen};
 
 use crate::frames::Frames;
@@ -75,18 +77,9 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
                 continue;
             }
             if pose.status == Status::END {
-                let end = ViewQuality {
-                    stamp: pose.stamp,
-                    status: Status::END,
-                    ..ViewQuality::default()
-                };
-                let say = || -> Result<(), Failure> {
-                    publisher.send(&end)?;
-                    Ok(())
-                };
-                say()?;
-                service.health().finished();
-                return waiter.linger(|| publisher.n_connected(), say);
+                // Their sender is to wait for nobody who reads no more.
+                drop(frames);
+                return end(service, &publisher, &waiter, pose.stamp);
             }
             let received_at_nanos = now_nanos();
             service.health().received(1);
@@ -106,6 +99,26 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+fn end(
+    service: &Service,
+    publisher: &Publisher<ViewQuality>,
+    waiter: &Waiter,
+    stamp: Stamp,
+) -> Result<(), Failure> {
+    let end = ViewQuality {
+        stamp,
+        status: Status::END,
+        ..ViewQuality::default()
+    };
+    let say = || -> Result<(), Failure> {
+        publisher.send(&end)?;
+        Ok(())
+    };
+    say()?;
+    service.health().finished();
+    waiter.linger(|| publisher.n_connected(), say)
 }
 
 fn answer(

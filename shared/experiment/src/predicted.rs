@@ -40,12 +40,12 @@ pub struct Judgement {
 /// Where thresholds grow with the person, errors are compared per threshold.
 ///
 /// * Returns nothing if no view has thresholds.
-pub fn judge<'a>(views: impl Iterator<Item = &'a Predicted> + Clone) -> Vec<Judgement> {
+pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
     let parts: Vec<Judgement> = (0..N_PARTS)
         .map(|part| {
             of_part(
                 PART_NAMES[part],
-                views.clone().filter_map(|it| sample(it, part)),
+                views.iter().filter_map(|it| sample(it, part)),
             )
         })
         .collect();
@@ -118,7 +118,7 @@ mod tests {
             view(11.0, 10.0, 8.0),
             view(18.0, 20.0, 30.0),
         ];
-        let judged = judge(views.iter());
+        let judged = judge(&views.iter().collect::<Vec<_>>());
         assert_eq!(judged.len(), 1 + N_PARTS);
         let all = &judged[0];
         assert_eq!((all.part.as_str(), all.n), ("mean", 4));
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn the_truth_predicts_itself() {
         let views: Vec<Predicted> = (1..9).map(|it| view(it as f32, 4.0, it as f32)).collect();
-        let all = &judge(views.iter())[0];
+        let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(1.0), Some(1.0)));
         assert_eq!((all.caught, all.wasted), (Some(100.0), Some(0.0)));
     }
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn a_constant_tells_nothing() {
         let views: Vec<Predicted> = (1..9).map(|it| view(3.0, 4.0, it as f32)).collect();
-        let all = &judge(views.iter())[0];
+        let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(0.5), None));
     }
 
@@ -151,7 +151,7 @@ mod tests {
     fn without_thresholds_nothing_is_judged() {
         let mut alone = view(1.0, 1.0, 1.0);
         alone.tau_px.clear();
-        assert_eq!(judge([alone].iter()), []);
-        assert_eq!(judge([].iter()), []);
+        assert_eq!(judge(&[&alone]), []);
+        assert_eq!(judge(&[]), []);
     }
 }

@@ -146,7 +146,7 @@ pub struct ViewAnswer<'a> {
     pub tau_px: Option<&'a [f32]>,
 }
 
-impl<'a> ViewAnswer<'a> {
+impl ViewAnswer<'_> {
     /// Expected error and threshold of a part, where there are both.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;

@@ -59,6 +59,10 @@ pub struct Network {
 
 impl Network {
     /// Adds weights.
+    ///
+    /// # Panics
+    ///
+    /// Unless there are as many values as the shape asks for.
     pub fn weigh(&mut self, name: &str, shape: &[usize], values: Vec<f32>) {
         assert_eq!(
             values.len(),

@@ -32,7 +32,7 @@ const BLOCKS: [(usize, i64); 13] = [
 
 fn main() {
     let pixels: Vec<u8> = (0..3 * SIZE[0] * SIZE[1])
-        .map(|it| (it * 2_654_435_761 >> 13) as u8)
+        .map(|it| ((it * 2_654_435_761) >> 13) as u8)
         .collect();
     let image = Rgb8View::new(SIZE[0], SIZE[1], &pixels).unwrap();
     let tile = Tile::around([600.0, 200.0, 740.0, 600.0], TileShape::SMALL).unwrap();

@@ -123,3 +123,111 @@ impl Forecaster {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use fmp::{Filter, ModelSpec, N_CHANNELS, PartSpec, Placement};
+    use testkit::onnx::{self, Side};
+
+    use super::*;
+    use crate::{Card, Unit};
+
+    /// One part of 3 x 3 cells of 4 pixels.
+    fn model() -> Model {
+        Model::new(ModelSpec {
+            name: "one".to_owned(),
+            parts: vec![PartSpec {
+                name: "head".to_owned(),
+                filter_of_type: vec![0],
+                edge: None,
+            }],
+            filters: vec![Filter {
+                rows: 3,
+                cols: 3,
+                weights: vec![0.0; 9 * N_CHANNELS],
+            }],
+            root_bias: 0.0,
+            interval: 5,
+            cell_px: 4,
+            threshold: -1.0,
+            mirror: None,
+        })
+        .unwrap()
+    }
+
+    /// A network that says the same of every tile of 4 x 3 pixels.
+    fn always(sigma: f32, unit: Unit, tau: f32) -> Forecaster {
+        let mut net = onnx::Network::default();
+        let sides = [1, 3, 4, 3].map(Side::Fixed);
+        net.inputs.push(("tile".to_owned(), sides.to_vec()));
+        let one = vec![Side::Fixed(1), Side::Fixed(1)];
+        net.outputs.push(("sigma".to_owned(), one));
+        net.weigh("w", &[3, 1], vec![0.0; 3]);
+        net.weigh("b", &[1], vec![sigma]);
+        net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
+        net.node("Flatten", &["mean"], "flat", vec![]);
+        net.node("Gemm", &["flat", "w", "b"], "sigma", vec![]);
+        let card = Card {
+            unit,
+            tau: vec![tau],
+            ..Card::default()
+        };
+        let entries = card.entries().into_iter();
+        net.metadata = entries.map(|(name, it)| (name.to_owned(), it)).collect();
+        Forecaster::new(Network::parse(net.file(), 1).unwrap())
+    }
+
+    fn run(forecaster: &mut Forecaster, frame_scale: f64) -> Result<Forecast, ForecastError> {
+        let model = model();
+        let layout = Layout::new(&model, 80, 60).unwrap();
+        let pixels = vec![7; 80 * 60 * 3];
+        let pose = Pose {
+            score: 1.0,
+            level: 0,
+            parts: vec![Placement {
+                x: 5,
+                y: 4,
+                mixture: 0,
+            }],
+        };
+        forecaster.run(&Seen {
+            image: Rgb8View::new(80, 60, &pixels).unwrap(),
+            on: (&model, &layout),
+            candidates: &[pose],
+            scores: &[],
+            frame_scale,
+        })
+    }
+
+    fn close(got: &[f32], expected: f32) {
+        assert!((got[0] - expected).abs() < 1e-5, "{got:?}, not {expected}");
+    }
+
+    #[test]
+    fn pixels_are_those_of_the_original_image() {
+        let forecast = run(&mut always(8.0, Unit::Pixels, 6.0), 0.5).unwrap();
+        close(&forecast.sigma_px, 4.0);
+        close(&forecast.tau_px, 3.0);
+    }
+
+    #[test]
+    fn relative_errors_grow_with_the_tile_whatever_the_scale_of_the_frame() {
+        // 12 pixels wide, so 16 high by the shape of the tile, and a tenth.
+        for frame_scale in [0.25, 1.0, 3.0] {
+            let forecast = run(&mut always(0.1, Unit::Relative, 0.2), frame_scale).unwrap();
+            assert!((forecast.tile.height_px() - 17.6).abs() < 1e-9);
+            close(&forecast.sigma_px, 1.76);
+            close(&forecast.tau_px, 3.52);
+        }
+        let mut network = always(2.0_f32.ln(), Unit::LogRelative, 0.2);
+        let forecast = run(&mut network, 0.25).unwrap();
+        close(&forecast.sigma_px, 0.176);
+        close(&forecast.tau_px, 3.52);
+    }
+
+    #[test]
+    fn what_is_no_number_is_no_prediction() {
+        let said = run(&mut always(f32::INFINITY, Unit::Pixels, 1.0), 1.0).unwrap_err();
+        assert_eq!(said.to_string(), "the network says inf of part 1");
+    }
+}

@@ -4,7 +4,7 @@ mod frame;
 
 use std::sync::Arc;
 
-use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, ValueOrView};
+use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView};
 use rten_tensor::prelude::*;
 use rten_tensor::{NdTensorView, TensorView};
 
@@ -183,7 +183,7 @@ impl Network {
         let run = self.model.run(inputs, &[self.sigma], Some(options));
         let outputs = run.map_err(|it| NetworkError::Run(Box::new(it)))?;
         let expected = || format!("f32 [1, {}]", self.n_parts);
-        let sigma: Option<TensorView<'_, f32>> = outputs.first().and_then(|it| it.as_tensor_view());
+        let sigma: Option<TensorView<'_, f32>> = outputs.first().and_then(Value::as_tensor_view);
         let Some(sigma) = sigma else {
             return Err(shape(SIGMA, "of another type".to_owned(), expected()));
         };

@@ -233,7 +233,8 @@ mod tests {
         message.local[1].margin = f32::NAN;
         let said = local_from_message(&message, 3).unwrap_err().to_string();
         assert_eq!(said, "local of entry 1 is NaN, expected a finite number");
-        assert!(local_from_message(&message, MAX_PARTS + 1).is_err());
+        let said = local_from_message(&message, MAX_PARTS + 1).unwrap_err();
+        assert_eq!(said.to_string(), "local is 33, the limit is 32");
     }
 
     fn sent() -> PoseMessage {

@@ -36,6 +36,7 @@ impl Bench {
                 plan: &self.plans[view],
                 candidates: &found.candidates,
                 sigma_px: None,
+                tau_px: None,
             })
         };
         let sight = |view: usize| {

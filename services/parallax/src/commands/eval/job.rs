@@ -113,14 +113,7 @@ impl Job {
                     predicted.lock().unwrap_or_else(PoisonError::into_inner)[view] = judged;
                     return Some(expectation);
                 }
-                let table = self.sigma.as_ref()?;
-                let camera = &sequence.views[view].camera;
-                let number = i64::try_from(frame.number).ok()?;
-                let sigma = table.get(&sequence.subject, &sequence.action, number, camera)?;
-                Some(Expectation {
-                    sigma: sigma.iter().map(|it| it * scales[view]).collect(),
-                    tau: None,
-                })
+                self.looked_up(sequence, frame, view, scales[view])
             });
             let predicted = predicted
                 .into_inner()
@@ -140,6 +133,24 @@ impl Job {
             progress.solved(&sequence.name);
         }
         Ok((records, n_missing))
+    }
+
+    /// What the table expects of a view.
+    fn looked_up(
+        &self,
+        sequence: &Sequence,
+        frame: &Frame,
+        view: usize,
+        frame_scale: f32,
+    ) -> Option<Expectation> {
+        let table = self.sigma.as_ref()?;
+        let camera = &sequence.views[view].camera;
+        let number = i64::try_from(frame.number).ok()?;
+        let sigma = table.get(&sequence.subject, &sequence.action, number, camera)?;
+        Some(Expectation {
+            sigma: sigma.iter().map(|it| it * frame_scale).collect(),
+            tau: None,
+        })
     }
 
     /// What the network expects of a view; and that beside the truth, where it is known.

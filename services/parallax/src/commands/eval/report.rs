@@ -20,9 +20,11 @@ pub(super) fn write(arguments: &Arguments, job: &Job, done: &Done) -> Result<(),
     };
     let versions: Vec<String> = job.versions.iter().map(ToString::to_string).collect();
     let records = done.sequences.iter().flat_map(|it| &it.1);
-    let predicted = records.flat_map(|it| it.predicted.iter().flatten());
+    let predicted: Vec<_> = records
+        .flat_map(|it| it.predicted.iter().flatten())
+        .collect();
     let summary = Summary {
-        predictions: judge(predicted),
+        predictions: judge(&predicted),
         ..summarise(&measured(done), &versions, &bootstrap)
     };
     let json = serde_json::to_string_pretty(&summary).or_fail(ExitKind::Run)?;

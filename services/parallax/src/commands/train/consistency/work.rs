@@ -195,7 +195,7 @@ impl<'a> Work<'a> {
         let trials: Vec<Trial> = tried.iter().map(trial).collect();
         let mut tallies = vec![Tally::default(); trials.len()];
         self.frames(held, what, &trials, |bench, sequence, frame, images| {
-            let found = bench.solve(images, &|_, _| None);
+            let found = bench.solve(images, &|_| None);
             for (tally, found) in tallies.iter_mut().zip(&found) {
                 let score = score(sequence, frame, found);
                 tally.add(&score.segments, &score.iterations);
