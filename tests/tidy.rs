@@ -25,7 +25,7 @@ const LAYERS: &[&[&str]] = &[
         "consistency",
         "runpage",
     ],
-    &["wire", "training", "sequences"],
+    &["wire", "training", "qualitytraining", "sequences"],
     &["experiment"],
     &[
         "capture",

@@ -7,7 +7,9 @@ use fastrand::Rng;
 
 use self::forward::{Forward, Seen};
 use crate::network::{self, Shape};
+use crate::onnx::width_of;
 use crate::parameters::{Inputs, Parameter, Role};
+use crate::settings::Loss;
 
 /// How much of a running statistic every batch replaces.
 const MOMENTUM_OF_STATISTICS: f32 = 0.05;
@@ -21,16 +23,6 @@ pub struct Batch {
     pub tiles: Vec<f32>,
     /// `[n, values]`; empty for networks that see no evidence.
     pub evidence: Vec<f32>,
-}
-
-/// What the difference between what is said and what is true costs.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Loss {
-    /// Half the squared length of the vector of differences, as in the paper.
-    L2,
-    /// The same for small differences, growing linearly for those of more than 1 (Huber).
-    Robust,
 }
 
 /// How one step changes the parameters.
@@ -73,7 +65,12 @@ impl Learner {
         speeds: Option<Vec<Vec<f32>>>,
         frozen: usize,
     ) -> Self {
-        let still = || parameters.iter().map(|it| vec![0.0; it.values.len()]).collect();
+        let still = || {
+            parameters
+                .iter()
+                .map(|it| vec![0.0; it.values.len()])
+                .collect()
+        };
         Self {
             speeds: speeds.unwrap_or_else(still),
             shape,
@@ -112,7 +109,8 @@ impl Learner {
     /// * Returns the loss before it, the mean over the samples.
     pub fn learn(&mut self, batch: &Batch, truth: &[f32], step: Step, dice: &mut Rng) -> f32 {
         let device = self.device.clone().autodiff();
-        let tensors: Vec<Tensor<1>> = (0..).zip(&self.parameters)
+        let tensors: Vec<Tensor<1>> = (0..)
+            .zip(&self.parameters)
             .map(|(at, it)| {
                 let tensor = list(&it.values, &device);
                 if at < self.frozen || it.role == Role::Fixed {
@@ -145,7 +143,10 @@ impl Learner {
             }
         }
         self.remember(seen);
-        numbers(loss.reshape([-1])).first().copied().unwrap_or(f32::NAN)
+        numbers(loss.reshape([-1]))
+            .first()
+            .copied()
+            .unwrap_or(f32::NAN)
     }
 
     fn change(&mut self, at: usize, gradient: &[f32], step: Step) {
@@ -187,7 +188,10 @@ impl Learner {
         let kind = self.shape.kind;
         let tile = kind.tile().map(|_| {
             let [height, width] = self.inputs.tile;
-            Tensor::from_data(TensorData::new(batch.tiles.clone(), [n, 3, height, width]), device)
+            Tensor::from_data(
+                TensorData::new(batch.tiles.clone(), [n, 3, height, width]),
+                device,
+            )
         });
         let evidence = kind.sees_evidence().then(|| {
             let width = self.inputs.evidence_mean.len();
@@ -199,6 +203,7 @@ impl Learner {
             tensors,
             tile,
             evidence,
+            width: width_of(self.inputs.tile),
             dice: None,
             next: 0,
             seen: Vec::new(),

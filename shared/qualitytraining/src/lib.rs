@@ -1,9 +1,19 @@
 //! Training of the network that predicts how far off every part of a single view is (the paper's section 4.3).
 #![forbid(unsafe_code)]
 
+pub mod sample;
+pub mod settings;
+pub mod store;
+pub mod vary;
+
 pub mod network;
 pub mod onnx;
 pub mod parameters;
 
+pub mod judge;
+pub mod score;
+
 #[cfg(feature = "burn")]
 pub mod learn;
+#[cfg(feature = "burn")]
+pub mod trainer;

@@ -1,6 +1,7 @@
 //! The networks, each written once: what plans their parameters, runs them and writes them as ONNX only differs in [`Ops`].
 
 use skeleton::N_PARTS;
+use viewquality::{N_TYPES, PART_NUMBERS};
 
 /// A convolution, followed by batch normalisation (where asked for) and ReLU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,13 +18,35 @@ pub struct Conv {
     pub normalised: bool,
 }
 
-/// Where the evidence says that the parts lie in the tile.
+/// Which columns of the evidence say where the parts are: heights of the tile from its centre.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Places {
-    /// Column of the evidence that holds every part's place across the tile, 0 at its left edge and 1 at the right.
+    /// Across the tile, one column a part.
     pub x: Vec<usize>,
-    /// The same down the tile.
+    /// Down the tile.
     pub y: Vec<usize>,
+}
+
+impl Default for Places {
+    /// Those of [`viewquality::evidence()`].
+    fn default() -> Self {
+        let columns = |name: &str| -> Vec<usize> {
+            (0..N_PARTS).filter_map(|part| column(part, name)).collect()
+        };
+        Self {
+            x: columns("x"),
+            y: columns("y"),
+        }
+    }
+}
+
+/// Numbers of the evidence that there are of every part.
+pub(crate) const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
+
+/// Column of a number of a part.
+pub(crate) fn column(part: usize, name: &str) -> Option<usize> {
+    let at = PART_NUMBERS.iter().position(|it| *it == name)?;
+    Some(part * PER_PART + at)
 }
 
 /// The operations that networks are made of.
@@ -111,8 +134,6 @@ pub struct Shape {
     pub hidden: usize,
     /// Share of the values that are dropped while training.
     pub dropout: f32,
-    /// Where the evidence holds the places of the parts.
-    pub places: Places,
 }
 
 /// Runs a network: one value for every part, as a list.
@@ -154,7 +175,7 @@ fn small<O: Ops>(ops: &mut O, shape: &Shape) -> O::Value {
         map = ops.conv(&map, &format!("point{nth}"), full(channels, 1, 1));
         if nth == 2 {
             let narrow = ops.conv(&map, "narrow", full(2 * width, 1, 1));
-            looked = Some(ops.look(&narrow, &shape.places, LOOK));
+            looked = Some(ops.look(&narrow, &Places::default(), LOOK));
         }
     }
     let whole = ops.mean(&map);

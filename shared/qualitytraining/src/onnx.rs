@@ -67,7 +67,10 @@ struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    #[expect(clippy::expect_used, reason = "documented: the caller's parameters fit the network")]
+    #[expect(
+        clippy::expect_used,
+        reason = "documented: the caller's parameters fit the network"
+    )]
     fn parameter(&mut self, name: &str) -> &'a Parameter {
         let found = self.parameters.next().expect("a parameter for every layer");
         assert_eq!(found.name, name, "parameters in the order of the layers");
@@ -103,15 +106,13 @@ impl<'a> Writer<'a> {
     }
 
     /// Weights about every part along one side of a map, `[n, parts, cells]`.
-    fn weights(&mut self, columns: &[usize], cells: usize, deviation: f32) -> Value {
+    fn weights(&mut self, columns: &[usize], (cells, side): (usize, f32), deviation: f32) -> Value {
         let id = self.n;
-        let [index, centre, scale] =
-            ["index", "centre", "scale"].map(|it| format!("{it}_{id}"));
+        let [index, centre, scale] = ["index", "centre", "scale"].map(|it| format!("{it}_{id}"));
         let columns: Vec<i64> = columns.iter().map(|it| *it as i64).collect();
         self.graph.ints(&index, &columns);
-        let centres: Vec<f32> = (0..cells).map(|it| centre_of(it, cells)).collect();
+        let (centres, factor) = cells_along(cells, side, deviation);
         self.graph.floats(&centre, &[1, 1, cells], &centres);
-        let factor = look_factor(cells, deviation);
         self.graph.floats(&scale, &[1], &[factor]);
         let axis = [("axis", Attribute::Int(1))];
         let n = columns.len();
@@ -125,14 +126,20 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Where a cell of a map lies along the tile, 0 at the first edge and 1 at the other.
-pub(crate) fn centre_of(cell: usize, cells: usize) -> f32 {
-    (cell as f32 + 0.5) / cells as f32
+/// The cells along one side of a map: where their centres lie, and what the squared distance from them is
+/// multiplied with to look at what is within `deviation` cells.
+///
+/// * `side`: its length in heights of the tile, in which the places and the centres count.
+pub(crate) fn cells_along(cells: usize, side: f32, deviation: f32) -> (Vec<f32>, f32) {
+    let cell = side / cells as f32;
+    let centre = |it: usize| (it as f32 + 0.5) * cell - 0.5 * side;
+    let factor = -0.5 / (deviation * cell).powi(2);
+    ((0..cells).map(centre).collect(), factor)
 }
 
-/// What the squared distance, in sides of the tile, is multiplied with.
-pub(crate) fn look_factor(cells: usize, deviation: f32) -> f32 {
-    -0.5 * (cells as f32 / deviation).powi(2)
+/// Width of a tile in its heights.
+pub(crate) fn width_of(tile: [usize; 2]) -> f32 {
+    tile[1] as f32 / tile[0] as f32
 }
 
 impl Ops for Writer<'_> {
@@ -158,14 +165,18 @@ impl Ops for Writer<'_> {
         let bias = if conv.normalised {
             let [scale, shift, mean, variance] = ["scale", "shift", "mean", "variance"]
                 .map(|it| &self.parameter(&format!("{name}.{it}")).values);
-            let factors = scale.iter().zip(variance).map(|(s, v)| s / (v + EPSILON).sqrt());
+            let factors = scale
+                .iter()
+                .zip(variance)
+                .map(|(s, v)| s / (v + EPSILON).sqrt());
             let factors: Vec<f32> = factors.collect();
             let per_channel = weights.len() / conv.channels;
             for (weights, factor) in weights.chunks_exact_mut(per_channel).zip(&factors) {
                 weights.iter_mut().for_each(|it| *it *= factor);
             }
             let bias = shift.iter().zip(mean).zip(&factors);
-            bias.map(|((shift, mean), factor)| shift - mean * factor).collect()
+            bias.map(|((shift, mean), factor)| shift - mean * factor)
+                .collect()
         } else {
             self.parameter(&format!("{name}.bias")).values.clone()
         };
@@ -209,15 +220,20 @@ impl Ops for Writer<'_> {
             return of.clone();
         };
         let n = places.x.len();
-        let x = self.weights(&places.x, cols, deviation);
-        let y = self.weights(&places.y, rows, deviation);
+        let x = self.weights(&places.x, (cols, width_of(self.inputs.tile)), deviation);
+        let y = self.weights(&places.y, (rows, 1.0), deviation);
         let x = self.reshaped(&x, &[n, 1, cols]);
         let y = self.reshaped(&y, &[n, rows, 1]);
         let both = self.node("Mul", &[&y.name, &x.name], &[], vec![n, rows, cols]);
         let both = self.reshaped(&both, &[n, rows * cols]);
         let map = self.reshaped(of, &[channels, rows * cols]);
         let turn = [("perm", Attribute::Ints(&[0, 2, 1]))];
-        let map = self.node("Transpose", &[&map.name], &turn, vec![rows * cols, channels]);
+        let map = self.node(
+            "Transpose",
+            &[&map.name],
+            &turn,
+            vec![rows * cols, channels],
+        );
         let looked = self.node("MatMul", &[&both.name, &map.name], &[], vec![n, channels]);
         self.reshaped(&looked, &[n * channels])
     }
@@ -233,7 +249,12 @@ impl Ops for Writer<'_> {
         self.constant(&weight);
         self.constant(&bias);
         let attributes = [("transB", Attribute::Int(1))];
-        self.node("Gemm", &[&of.name, &weight, &bias], &attributes, vec![values])
+        self.node(
+            "Gemm",
+            &[&of.name, &weight, &bias],
+            &attributes,
+            vec![values],
+        )
     }
 
     fn prelu(&mut self, of: &Value, name: &str) -> Value {

@@ -116,7 +116,12 @@ impl Ops for Plan<'_> {
         let (mean, deviation) = (&self.inputs.evidence_mean, &self.inputs.evidence_deviation);
         let n = mean.len();
         let factor = deviation.iter().map(|it| 1.0 / it).collect();
-        self.add("evidence.mean".to_owned(), vec![n], Role::Fixed, mean.clone());
+        self.add(
+            "evidence.mean".to_owned(),
+            vec![n],
+            Role::Fixed,
+            mean.clone(),
+        );
         self.add("evidence.factor".to_owned(), vec![n], Role::Fixed, factor);
         vec![n]
     }

@@ -7,6 +7,7 @@ mod data;
 mod leave;
 mod per_dataset;
 mod progress;
+mod quality;
 mod report;
 mod store;
 
@@ -71,6 +72,8 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn what several views of a person have in common: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
+    /// Search pictures with known joints, and keep what the quality network is trained on.
+    QualitySamples(Box<quality::samples::Arguments>),
 }
 
 /// What to train on, and how.
@@ -112,6 +115,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     let arguments = match command {
         Command::Fmp(it) => it,
         Command::Consistency(it) => return consistency::run(&it, globals),
+        Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };
     let settings = settings(&arguments)?;
     if arguments.print_settings {

@@ -5,7 +5,7 @@ use burn_tensor::{Device, Tensor, TensorData, activation, module};
 use fastrand::Rng;
 
 use crate::network::{Conv, Ops, Places};
-use crate::onnx::{EPSILON, centre_of, look_factor};
+use crate::onnx::{EPSILON, cells_along};
 use crate::parameters::Parameter;
 
 /// A map or a list of every sample.
@@ -16,7 +16,10 @@ pub(super) enum Value {
 }
 
 impl Value {
-    #[expect(clippy::panic, reason = "a network that mixes maps and lists is a mistake in its source")]
+    #[expect(
+        clippy::panic,
+        reason = "a network that mixes maps and lists is a mistake in its source"
+    )]
     fn map(&self) -> Tensor<4> {
         match self {
             Self::Map(it) => it.clone(),
@@ -24,7 +27,10 @@ impl Value {
         }
     }
 
-    #[expect(clippy::panic, reason = "a network that mixes maps and lists is a mistake in its source")]
+    #[expect(
+        clippy::panic,
+        reason = "a network that mixes maps and lists is a mistake in its source"
+    )]
     pub(super) fn list(&self) -> Tensor<2> {
         match self {
             Self::List(it) => it.clone(),
@@ -51,6 +57,8 @@ pub(super) struct Forward<'a> {
     pub(super) tensors: &'a [Tensor<1>],
     pub(super) tile: Option<Tensor<4>>,
     pub(super) evidence: Option<Tensor<2>>,
+    /// Width of the tile in its heights.
+    pub(super) width: f32,
     /// For what is dropped; `None` while nothing is learnt.
     pub(super) dice: Option<&'a mut Rng>,
     /// Number of the next parameter.
@@ -62,7 +70,10 @@ impl Forward<'_> {
     fn parameter(&mut self, name: &str) -> Tensor<1> {
         let at = self.next;
         self.next += 1;
-        assert_eq!(self.parameters[at].name, name, "parameters in the order of the layers");
+        assert_eq!(
+            self.parameters[at].name, name,
+            "parameters in the order of the layers"
+        );
         self.tensors[at].clone()
     }
 
@@ -74,7 +85,8 @@ impl Forward<'_> {
         let [n, channels, rows, cols] = of.dims();
         let [scale, shift] = ["scale", "shift"].map(|it| self.parameter(&format!("{name}.{it}")));
         let at = self.next;
-        let [mean, variance] = ["mean", "variance"].map(|it| self.parameter(&format!("{name}.{it}")));
+        let [mean, variance] =
+            ["mean", "variance"].map(|it| self.parameter(&format!("{name}.{it}")));
         let (mean, variance) = if self.dice.is_some() {
             let flat = of.clone().reshape([n, channels, rows * cols]);
             let mean = flat.clone().mean_dim(2).mean_dim(0);
@@ -96,20 +108,20 @@ impl Forward<'_> {
     }
 
     /// Weights about every part along one side of a map, `[n, parts, cells]`.
-    fn weights(&self, columns: &[usize], cells: usize, deviation: f32) -> Tensor<3> {
-        let evidence = self.evidence.clone().map(|it| it.into_data_as::<f32>().to_vec::<f32>());
+    fn weights(&self, columns: &[usize], (cells, side): (usize, f32), deviation: f32) -> Tensor<3> {
+        let evidence = self
+            .evidence
+            .clone()
+            .map(|it| it.into_data_as::<f32>().to_vec::<f32>());
         let evidence = evidence.and_then(Result::ok).unwrap_or_default();
         let width = self.evidence.as_ref().map_or(1, |it| it.dims()[1]);
-        let factor = look_factor(cells, deviation);
+        let (centres, factor) = cells_along(cells, side, deviation);
         let n = evidence.len() / width;
-        let weight = |place: f32, cell: usize| {
-            let off = place - centre_of(cell, cells);
-            (off * off * factor).exp()
-        };
+        let weight = |place: f32, centre: f32| ((place - centre).powi(2) * factor).exp();
         let values: Vec<f32> = evidence
             .chunks_exact(width)
             .flat_map(|row| columns.iter().map(|it| row[*it]))
-            .flat_map(|place| (0..cells).map(move |cell| weight(place, cell)))
+            .flat_map(|place| centres.iter().map(move |it| weight(place, *it)))
             .collect();
         let data = TensorData::new(values, [n, columns.len(), cells]);
         Tensor::from_data(data, self.device)
@@ -121,7 +133,11 @@ impl Ops for Forward<'_> {
 
     #[expect(clippy::expect_used, reason = "the caller gives what the network sees")]
     fn tile(&mut self) -> Value {
-        Value::Map(self.tile.take().expect("tiles for a network that sees them"))
+        Value::Map(
+            self.tile
+                .take()
+                .expect("tiles for a network that sees them"),
+        )
     }
 
     #[expect(clippy::expect_used, reason = "the caller gives what the network sees")]
@@ -138,8 +154,7 @@ impl Ops for Forward<'_> {
         let weight = self.parameter(&format!("{name}.weight")).reshape(dims);
         let bias = (!conv.normalised).then(|| self.parameter(&format!("{name}.bias")));
         let groups = if conv.by_channel { conv.channels } else { 1 };
-        let options =
-            ConvOptions::new([conv.stride; 2], [conv.kernel / 2; 2], [1, 1], groups);
+        let options = ConvOptions::new([conv.stride; 2], [conv.kernel / 2; 2], [1, 1], groups);
         let sum = module::conv2d(of.map(), weight, bias, options);
         let sum = if conv.normalised {
             self.normalised(sum, name)
@@ -170,8 +185,12 @@ impl Ops for Forward<'_> {
         let map = of.map();
         let [n, channels, rows, cols] = map.dims();
         let parts = places.x.len();
-        let x = self.weights(&places.x, cols, deviation).reshape([n, parts, 1, cols]);
-        let y = self.weights(&places.y, rows, deviation).reshape([n, parts, rows, 1]);
+        let x = self
+            .weights(&places.x, (cols, self.width), deviation)
+            .reshape([n, parts, 1, cols]);
+        let y = self
+            .weights(&places.y, (rows, 1.0), deviation)
+            .reshape([n, parts, rows, 1]);
         let both = (y * x).reshape([n, parts, rows * cols]);
         let map = map.reshape([n, channels, rows * cols]).swap_dims(1, 2);
         Value::List(both.matmul(map).reshape([n, parts * channels]))
@@ -183,7 +202,9 @@ impl Ops for Forward<'_> {
 
     fn dense(&mut self, of: &Value, name: &str, values: usize) -> Value {
         let inputs = self.sizes(self.next)[1];
-        let weight = self.parameter(&format!("{name}.weight")).reshape([values, inputs]);
+        let weight = self
+            .parameter(&format!("{name}.weight"))
+            .reshape([values, inputs]);
         let bias = self.parameter(&format!("{name}.bias"));
         Value::List(of.list().matmul(weight.transpose()) + bias.unsqueeze::<2>())
     }

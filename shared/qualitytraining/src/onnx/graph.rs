@@ -47,7 +47,8 @@ impl Graph {
     /// Adds a list of constant whole numbers.
     pub(super) fn ints(&mut self, name: &str, values: &[i64]) {
         let raw: Vec<u8> = values.iter().flat_map(|it| it.to_le_bytes()).collect();
-        self.initializers.push(tensor(name, &[values.len()], INT64, &raw));
+        self.initializers
+            .push(tensor(name, &[values.len()], INT64, &raw));
     }
 
     /// Adds a node that gives one value, which is called as the node is.
@@ -63,7 +64,9 @@ impl Graph {
             .text(2, name)
             .text(3, name)
             .text(4, operator)
-            .each(attributes, |it, (name, of)| it.message(5, &attribute(name, *of)));
+            .each(attributes, |it, (name, of)| {
+                it.message(5, &attribute(name, *of))
+            });
         self.nodes.push(node);
     }
 

@@ -75,7 +75,10 @@ mod tests {
 
     #[test]
     fn numbers_and_texts_are_written_as_the_documentation_of_the_format_shows() {
-        assert_eq!(Message::default().number(1, 150).finish(), [0x08, 0x96, 0x01]);
+        assert_eq!(
+            Message::default().number(1, 150).finish(),
+            [0x08, 0x96, 0x01]
+        );
         let testing = [0x12, 0x07, 0x74, 0x65, 0x73, 0x74, 0x69, 0x6e, 0x67];
         assert_eq!(Message::default().text(2, "testing").finish(), testing);
         let inner = Message::default().number(1, 150);
@@ -86,6 +89,9 @@ mod tests {
     #[test]
     fn negative_numbers_take_ten_bytes() {
         let bytes = Message::default().number(1, -1).finish();
-        assert_eq!(bytes[1..], [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1]);
+        assert_eq!(
+            bytes[1..],
+            [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1]
+        );
     }
 }

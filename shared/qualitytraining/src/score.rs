@@ -1,0 +1,114 @@
+//! How good predicted errors are, as they are used: is a part further off than its threshold or not.
+
+/// The middle of some numbers, the mean of the two middle ones of an even number of them.
+///
+/// * Returns `None` of no numbers.
+pub fn median(mut of: Vec<f32>) -> Option<f32> {
+    of.sort_unstable_by(f32::total_cmp);
+    let n = of.len();
+    let high = *of.get(n / 2)?;
+    let low = of[(n - 1) / 2];
+    Some(f32::midpoint(low, high))
+}
+
+/// Area under the ROC: the probability that a sample that is positive scores higher than one that is not; ties
+/// count half.
+///
+/// * Returns `None` if all are positive, or none is.
+pub fn area(scores: &[f32], positive: &[bool]) -> Option<f64> {
+    let ranks = ranks(scores);
+    let of_positive = ranks.iter().zip(positive).filter(|it| *it.1);
+    let n_positive = positive.iter().filter(|it| **it).count() as f64;
+    let n_other = positive.len() as f64 - n_positive;
+    let sum: f64 = of_positive.map(|it| it.0).sum();
+    let above = sum - n_positive * (n_positive + 1.0) / 2.0;
+    (n_positive > 0.0 && n_other > 0.0).then(|| above / (n_positive * n_other))
+}
+
+/// Spearman's rank correlation; tied numbers share the mean of their ranks.
+///
+/// * Returns `None` if all numbers of one side are the same.
+pub fn rank_correlation(a: &[f32], b: &[f32]) -> Option<f64> {
+    let (a, b) = (ranks(a), ranks(b));
+    let middle = (a.len() as f64 + 1.0) / 2.0;
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        let each = a.iter().zip(b);
+        each.map(|(a, b)| (a - middle) * (b - middle)).sum()
+    };
+    let size = (product(&a, &a) * product(&b, &b)).sqrt();
+    (size > 0.0).then(|| product(&a, &b) / size)
+}
+
+/// Ranks from 1, ties share their mean.
+fn ranks(of: &[f32]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..of.len()).collect();
+    order.sort_unstable_by(|a, b| of[*a].total_cmp(&of[*b]));
+    let mut ranks = vec![0.0; of.len()];
+    let same = order.chunk_by(|a, b| of[*a] == of[*b]);
+    let mut before = 0;
+    for group in same {
+        let mean = before as f64 + (group.len() as f64 + 1.0) / 2.0;
+        group.iter().for_each(|it| ranks[*it] = mean);
+        before += group.len();
+    }
+    ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(Vec::new()), None);
+    }
+
+    #[test]
+    fn ranks_of_ties_are_shared() {
+        assert_eq!(ranks(&[5.0, 1.0, 5.0, 0.0]), [3.5, 2.0, 3.5, 1.0]);
+    }
+
+    #[test]
+    fn what_is_right_about_everything_has_an_area_of_1_and_what_says_nothing_a_half() {
+        let positive = [false, true, false, true];
+        assert_eq!(area(&[1.0, 3.0, 2.0, 4.0], &positive), Some(1.0));
+        assert_eq!(area(&[1.0; 4], &positive), Some(0.5));
+        assert_eq!(area(&[4.0, 2.0, 3.0, 1.0], &positive), Some(0.0));
+        assert_eq!(area(&[1.0, 2.0], &[true, true]), None);
+    }
+
+    #[test]
+    fn any_growing_function_has_a_rank_correlation_of_1() {
+        let a = [1.0, 5.0, 2.0, 9.0];
+        let b = a.map(f32::exp);
+        assert!((rank_correlation(&a, &b).unwrap() - 1.0).abs() < 1e-12);
+        let falling = a.map(|it| -it);
+        assert!((rank_correlation(&a, &falling).unwrap() + 1.0).abs() < 1e-12);
+        assert_eq!(rank_correlation(&a, &[1.0; 4]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn the_area_is_the_share_of_pairs_in_the_right_order(
+            cases in proptest::collection::vec((0_u8..12, any::<bool>()), 2..40)
+        ) {
+            let scores: Vec<f32> = cases.iter().map(|it| f32::from(it.0)).collect();
+            let positive: Vec<bool> = cases.iter().map(|it| it.1).collect();
+            let (mut n, mut right) = (0.0, 0.0);
+            for (a, _) in cases.iter().filter(|it| it.1) {
+                for (b, _) in cases.iter().filter(|it| !it.1) {
+                    n += 1.0;
+                    right += if a > b { 1.0 } else if a == b { 0.5 } else { 0.0 };
+                }
+            }
+            match area(&scores, &positive) {
+                Some(area) => prop_assert!((area - right / n).abs() < 1e-12),
+                None => prop_assert_eq!(n, 0.0),
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! What is varied stays true of the picture.
+
+use viewquality::n_evidence;
+
+use super::*;
+
+const TILE: TileShape = TileShape {
+    height: 40,
+    width: 24,
+};
+
+/// A sample in which every part is a bright dot where the evidence says, and its error is its number.
+fn sample() -> Sample {
+    let [rows, cols] = picture_size(TILE);
+    let mut sample = Sample {
+        group: String::new(),
+        source: String::new(),
+        picture: vec![0; 3 * rows * cols],
+        evidence: (0..n_evidence(N_PARTS))
+            .map(|it| it as f32 / 100.0)
+            .collect(),
+        height_px: 200.0,
+        errors_px: (0..N_PARTS).map(|it| it as f32).collect(),
+    };
+    for part in 0..N_PARTS {
+        let [col, row] = [MARGIN + 4 + part * 3 % 16, MARGIN + 5 + part];
+        let middle = [cols, rows].map(|it| (it as f32 - 1.0) / 2.0);
+        let place = [col as f32 - middle[0], row as f32 - middle[1]];
+        for (axis, name) in ["x", "y"].into_iter().enumerate() {
+            sample.evidence[column(part, name).unwrap()] = place[axis] / TILE.height as f32;
+        }
+        for channel in 0..3 {
+            sample.picture[3 * (row * cols + col) + channel] = 255;
+        }
+    }
+    sample
+}
+
+fn unknown() -> Vec<f32> {
+    vec![0.25; n_evidence(N_PARTS)]
+}
+
+/// Brightness of the first plane where the evidence says that a part is.
+fn brightness(planes: &[f32], evidence: &[f32], part: usize) -> f32 {
+    let place = ["x", "y"].map(|it| evidence[column(part, it).unwrap()] * TILE.height as f32);
+    let middle = [TILE.width, TILE.height].map(|it| (it as f32 - 1.0) / 2.0);
+    let [x, y] = [0, 1].map(|axis| (place[axis] + middle[axis]).round() as usize);
+    planes[y * TILE.width + x]
+}
+
+#[test]
+fn a_sample_as_it_is_is_the_middle_of_its_picture() {
+    let sample = sample();
+    let [_, cols] = picture_size(TILE);
+    let planes = pixels(&sample, TILE, AS_IT_IS);
+    for (row, col) in [(0, 0), (7, 13), (39, 23)] {
+        let at = 3 * ((row + MARGIN) * cols + col + MARGIN);
+        let expected = f32::from(sample.picture[at]) / 255.0;
+        assert_eq!(planes[row * TILE.width + col], expected);
+    }
+}
+
+#[test]
+fn every_part_is_where_the_evidence_says_however_the_tile_lies() {
+    let sample = sample();
+    for mirrored in [false, true] {
+        for (scale, shift) in [(1.0, [0.0, 0.0]), (1.0, [2.0, -3.0]), (0.95, [-1.0, 1.5])] {
+            let place = Place {
+                scale,
+                shift,
+                mirrored,
+            };
+            let planes = pixels(&sample, TILE, place);
+            let evidence = moved(&sample.evidence, TILE, place, &unknown());
+            let dark = planes.iter().filter(|it| **it < 0.15).count();
+            assert!(dark > 800, "{dark}: most of the picture is dark");
+            for part in 0..N_PARTS {
+                let it = brightness(&planes, &evidence, part);
+                assert!(it > 0.2, "part {part}, {place:?}: {it}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mirrored_sample_exchanges_errors_and_evidence_and_twice_is_as_it_was() {
+    let sample = sample();
+    let vary = Vary {
+        mirror: 1.0,
+        shift: 0.0,
+        scale: 0.0,
+        blur: 0.0,
+        noise: 0.0,
+        ..Vary::default()
+    };
+    let mut dice = Rng::with_seed(1);
+    let seen = varied(&sample, (TILE, true), (&vary, &unknown()), &mut dice);
+    let plain = plain(&sample, TILE, true);
+    for part in 0..N_PARTS {
+        assert_eq!(seen.errors_px[part], sample.errors_px[MIRROR[part]]);
+        let at = |part: usize, name: &str| column(part, name).unwrap();
+        let (here, there) = (at(part, "response"), at(MIRROR[part], "response"));
+        assert_eq!(seen.evidence[here], sample.evidence[there]);
+        let (here, there) = (at(part, "x"), at(MIRROR[part], "x"));
+        assert_eq!(seen.evidence[here], -sample.evidence[there]);
+        assert_eq!(seen.evidence[part * PER_PART + PART_NUMBERS.len()], 0.25);
+    }
+    for row in 0..TILE.height {
+        let of = |tile: &[f32]| tile[row * TILE.width..][..TILE.width].to_vec();
+        let mut back = of(&seen.tile);
+        back.reverse();
+        assert_eq!(back, of(&plain.tile));
+    }
+}
+
+#[test]
+fn a_blur_keeps_the_mean_and_flattens() {
+    let mut planes = vec![0.0; 3 * TILE.height * TILE.width];
+    planes[20 * TILE.width + 12] = 1.0;
+    blur(&mut planes, TILE, 1.0);
+    let sum: f32 = planes.iter().sum();
+    assert!((sum - 1.0).abs() < 1e-5);
+    assert!((planes[20 * TILE.width + 12] - 0.159).abs() < 0.005);
+}
+
+#[test]
+fn nothing_is_varied_where_nothing_may_be() {
+    let sample = sample();
+    let still = Vary {
+        mirror: 0.0,
+        shift: 0.0,
+        scale: 0.0,
+        blur: 0.0,
+        noise: 0.0,
+        ..Vary::default()
+    };
+    let mut dice = Rng::with_seed(1);
+    let seen = varied(&sample, (TILE, true), (&still, &unknown()), &mut dice);
+    assert_eq!(seen, plain(&sample, TILE, true));
+}
