@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use skeleton::N_PARTS;
 use viewquality::{Card, EVIDENCE_VERSION, Normalisation, TileShape, n_evidence};
 
+use crate::curves::Pass;
 use crate::judge::{self, Judgement};
 use crate::learn::{Batch, Learner, Step};
 use crate::network::{Kind, VGG16};
@@ -16,17 +17,6 @@ use crate::store::{Samples, StoreError, fnv1a, unwrap, wrap};
 use crate::vary::{Seen, plain, varied};
 
 const CHECKPOINT: [u8; 8] = *b"PLXQUALI";
-
-/// What one pass over the samples gave.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pass {
-    /// Mean loss while learning.
-    pub learnt: f32,
-    /// Mean loss of the samples that are validated on, after the pass.
-    pub validated: f32,
-    /// Mean area under the ROC of these.
-    pub area: f64,
-}
 
 /// Everything that a training knows after a pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -144,6 +134,11 @@ impl<'a> Trainer<'a> {
     /// How many samples are learnt from, and validated on.
     pub fn n_samples(&self) -> [usize; 2] {
         [self.learnt.len(), self.validated.len()]
+    }
+
+    /// The parameters after the last pass.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.state.parameters
     }
 
     /// The passes so far.

@@ -72,6 +72,8 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn what several views of a person have in common: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
+    /// Train a network that predicts how far off every part of a single view is.
+    Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and keep what the quality network is trained on.
     QualitySamples(Box<quality::samples::Arguments>),
 }
@@ -115,6 +117,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     let arguments = match command {
         Command::Fmp(it) => it,
         Command::Consistency(it) => return consistency::run(&it, globals),
+        Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };
     let settings = settings(&arguments)?;

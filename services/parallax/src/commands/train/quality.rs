@@ -1,7 +1,14 @@
 //! `parallax train quality` and `quality-samples`: the network that predicts the errors of single views.
 
+pub(crate) mod network;
+mod observer;
 pub(crate) mod samples;
 mod scenes;
+
+#[cfg(feature = "train-quality")]
+mod teach;
+#[cfg(feature = "train-quality")]
+mod weights;
 
 use std::fs;
 use std::path::Path;

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
 use datasets::{Picture, ReadOptions, Selection};
-use qualitytraining::sample::{Observer, Sample};
+use qualitytraining::sample::Sample;
 use qualitytraining::store::Samples;
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use viewquality::TileShape;
 
 use super::super::{data::unread, per_dataset::deal};
+use super::observer::Observer;
 use super::scenes;
 use crate::cli::Globals;
 use crate::{inputs, output};

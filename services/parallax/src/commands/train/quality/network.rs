@@ -1,0 +1,133 @@
+//! `parallax train quality`: the network that predicts how far off every part of a single view is.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use qualitytraining::network::Kind;
+use qualitytraining::settings::Settings;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use crate::cli::Globals;
+use crate::{inputs, output};
+
+const HELP: &str = "\
+The samples are made by `parallax train quality-samples`; a share of their groups (subjects, images) is validated on, \
+never a part of a group. After every pass the state is in OUT.checkpoint: --resume goes on, and on the CPU the \
+network is the same, bit for bit, whatever the interruptions. OUT.svg shows how the training went. The best pass is \
+written as ONNX, with what `[quality]` needs to know of it inside: preprocessing, unit, thresholds.
+
+This command needs a Parallax that was built with it:
+    cargo run --release --features train-quality -- train quality ...
+
+VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.pth or .safetensors, and samples \
+made with --tile vgg16.
+
+Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a \
+setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped by Ctrl-C.
+
+Example:
+    parallax train quality --samples train.samples --judge test.samples --out person.quality.onnx";
+
+/// Which network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Network {
+    /// What the search knows, without the picture: a baseline.
+    Evidence,
+    /// A few separable convolutions, looked at around every part, and what the search knows.
+    Small,
+    /// The paper's.
+    Vgg16,
+}
+
+impl From<Network> for Kind {
+    fn from(network: Network) -> Self {
+        match network {
+            Network::Evidence => Self::Evidence,
+            Network::Small => Self::Small,
+            Network::Vgg16 => Self::Vgg16,
+        }
+    }
+}
+
+/// What to train on, and how.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+#[cfg_attr(
+    not(feature = "train-quality"),
+    expect(dead_code, reason = "a Parallax without the trainer still says what it would take")
+)]
+pub(crate) struct Arguments {
+    /// Samples to learn from and to validate on.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    pub(super) samples: Vec<PathBuf>,
+    /// Samples to judge the network on, which it never saw; every file by itself.
+    #[arg(long, value_name = "FILE")]
+    pub(super) judge: Vec<PathBuf>,
+    /// The ONNX file to write.
+    #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
+    pub(super) out: Option<PathBuf>,
+    /// How to train, as TOML; what it does not say has its default, see --print-settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Print the settings that would be used, as TOML, and end.
+    #[arg(long)]
+    print_settings: bool,
+    /// Which network, instead of the settings' one.
+    #[arg(long, value_enum)]
+    network: Option<Network>,
+    /// Seed of everything random, instead of the settings' one.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Weights of torchvision's VGG-16 to begin with, .pth or .safetensors.
+    #[arg(long, value_name = "FILE")]
+    pub(super) weights: Option<PathBuf>,
+    /// What the file says that it is; its name if not given.
+    #[arg(long, value_name = "TEXT")]
+    pub(super) identity: Option<String>,
+    /// Go on from the checkpoint of an interrupted training; from the beginning if there is none.
+    #[arg(long)]
+    pub(super) resume: bool,
+    /// Print events and the summary as JSON, one object a line.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Trains, in a Parallax that can.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let settings = settings(arguments)?;
+    if arguments.print_settings {
+        let text = toml::to_string(&settings).or_fail(ExitKind::Run)?;
+        output::line(text.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    train(arguments, &settings, globals)
+}
+
+#[cfg(feature = "train-quality")]
+use super::teach::train;
+
+#[cfg(not(feature = "train-quality"))]
+fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
+    let message = "this Parallax was built without the trainer of networks";
+    Err(Failure::new(ExitKind::Usage, message).with_hint(
+        "build it with: cargo run --release --features train-quality -- train quality ...",
+    ))
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
+    let mut settings = match &arguments.settings {
+        None => Settings::default(),
+        Some(file) => toml::from_str(&inputs::text(file)?).map_err(|error| {
+            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
+        })?,
+    };
+    if let Some(network) = arguments.network {
+        settings.network = network.into();
+    }
+    if let Some(seed) = arguments.seed {
+        settings.seed = u64::from(seed);
+    }
+    settings.check().or_fail(ExitKind::Config)?;
+    Ok(settings)
+}
