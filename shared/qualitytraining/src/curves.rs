@@ -67,7 +67,10 @@ fn panel(what: &str, lines: &[(&str, &str, &Vec<f64>)], best: Option<usize>, top
         return out;
     }
     for (value, at) in [(low, y(low)), (high, y(high))] {
-        put(format!("<text x=\"4\" y=\"{:.1}\">{value:.3}</text>", at + 4.0));
+        put(format!(
+            "<text x=\"4\" y=\"{:.1}\">{value:.3}</text>",
+            at + 4.0
+        ));
     }
     put(format!(
         "<text x=\"{MARGIN}\" y=\"{:.1}\">{what} by pass, 1 to {n}</text>",
@@ -114,7 +117,10 @@ mod tests {
         assert_eq!(drawn.matches("stroke-width").count(), 3);
         assert_eq!(drawn.matches("stroke-dasharray").count(), 2);
         // From 3.5 down to 1: the lines fall evenly.
-        assert!(drawn.contains("M48.0 96.0L368.0 192.0L688.0 288.0"), "{drawn}");
+        assert!(
+            drawn.contains("M48.0 96.0L368.0 192.0L688.0 288.0"),
+            "{drawn}"
+        );
         assert!(!drawn.contains("NaN"));
     }
 

@@ -34,6 +34,8 @@ pub struct Step {
     pub momentum: f32,
     /// Share of every weight that is added to its gradient.
     pub decay: f32,
+    /// Gradients longer than this are shortened to it.
+    pub longest: f32,
     /// Cost.
     pub loss: Loss,
 }
@@ -137,9 +139,23 @@ impl Learner {
         };
         let loss = cost.sum() / batch.n as f32;
         let mut gradients = loss.backward();
-        for (at, tensor) in tensors.iter().enumerate() {
-            if let Some(gradient) = tensor.grad_remove(&mut gradients) {
-                self.change(at, &numbers(gradient), step);
+        let gradients = tensors.iter().map(|it| it.grad_remove(&mut gradients));
+        let gradients: Vec<Option<Vec<f32>>> = gradients.map(|it| it.map(numbers)).collect();
+        let squared = gradients
+            .iter()
+            .flatten()
+            .flatten()
+            .map(|it| f64::from(*it).powi(2));
+        let length = squared.sum::<f64>().sqrt() as f32;
+        let factor = if length > step.longest {
+            step.longest / length
+        } else {
+            1.0
+        };
+        for (at, gradient) in gradients.into_iter().enumerate() {
+            if let Some(mut gradient) = gradient {
+                gradient.iter_mut().for_each(|it| *it *= factor);
+                self.change(at, &gradient, step);
             }
         }
         self.remember(seen);

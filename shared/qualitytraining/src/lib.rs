@@ -9,7 +9,6 @@ pub mod vary;
 pub mod network;
 pub mod onnx;
 pub mod parameters;
-pub mod vgg;
 
 pub mod curves;
 pub mod judge;

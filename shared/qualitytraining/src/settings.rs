@@ -71,6 +71,8 @@ pub struct Settings {
     pub momentum: f32,
     /// Weight decay.
     pub decay: f32,
+    /// Gradients longer than this are shortened to it.
+    pub longest: f32,
     /// Share of the groups (subjects, images) that are validated on.
     pub validation: f32,
     /// Channels of the small network's first layer.
@@ -127,13 +129,14 @@ impl Default for Settings {
             network: Kind::Small,
             seed: 1,
             unit: Unit::LogRelative,
-            loss: Loss::L2,
-            epochs: 40,
-            patience: 12,
-            batch: 32,
-            rate: 0.002,
+            loss: Loss::Robust,
+            epochs: 15,
+            patience: 15,
+            batch: 16,
+            rate: 0.007,
             momentum: 0.9,
-            decay: 0.001,
+            decay: 0.002,
+            longest: 20.0,
             validation: 0.15,
             width: 16,
             hidden: 256,
@@ -177,6 +180,7 @@ impl Settings {
         ];
         let limited = [
             ("rate", self.rate, 10.0, "from 0 to 10"),
+            ("longest", self.longest, 1e9, "a positive number"),
             ("vary.shift", vary.shift, 0.05, "from 0 to 0.05"),
             ("vary.scale", vary.scale, 0.1, "from 0 to 0.1"),
             ("vary.blur_px", vary.blur_px, 4.0, "from 0 to 4"),

@@ -297,6 +297,7 @@ impl<'a> Trainer<'a> {
             rate: self.settings.rate * falling * at.clamp(0.02, 1.0),
             momentum: self.settings.momentum,
             decay: self.settings.decay,
+            longest: self.settings.longest,
             loss: self.settings.loss,
         }
     }

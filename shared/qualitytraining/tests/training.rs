@@ -26,7 +26,9 @@ fn samples(kind: Kind, n: usize) -> Samples {
         Sample {
             group: format!("subject {}", nth % 20),
             source: format!("picture {nth}"),
-            picture: (0..3 * rows * cols).map(|_| bright + dice.u8(0..40)).collect(),
+            picture: (0..3 * rows * cols)
+                .map(|_| bright + dice.u8(0..40))
+                .collect(),
             evidence,
             height_px: 200.0,
             errors_px: vec![1.0 + 20.0 * told + 20.0 * shown; N_PARTS],
@@ -77,7 +79,10 @@ fn check_file(network: Kind, n: usize, within: f32) {
     for (seen, said) in trainer.said(&some) {
         let other = file.run(&seen.tile, &seen.evidence).unwrap();
         for (said, other) in said.iter().zip(other) {
-            assert!((said - other).abs() < within * said.abs().max(1.0), "{said}, {other}");
+            assert!(
+                (said - other).abs() < within * said.abs().max(1.0),
+                "{said}, {other}"
+            );
         }
     }
 }
@@ -143,7 +148,10 @@ fn an_interrupted_training_ends_with_the_same_bits() {
 #[test]
 fn a_checkpoint_of_other_settings_or_samples_is_refused() {
     let (settings, samples) = (settings(Kind::Evidence), samples(Kind::Evidence, 40));
-    let kept = Trainer::new(&settings, &samples, &[], None).unwrap().checkpoint().unwrap();
+    let kept = Trainer::new(&settings, &samples, &[], None)
+        .unwrap()
+        .checkpoint()
+        .unwrap();
     let others = Settings {
         unit: Unit::Relative,
         ..settings.clone()
@@ -162,8 +170,15 @@ fn a_checkpoint_of_other_settings_or_samples_is_refused() {
 fn no_group_is_on_both_sides_and_one_group_alone_is_refused() {
     let (settings, mut samples) = (settings(Kind::Evidence), samples(Kind::Evidence, 200));
     let trainer = Trainer::new(&settings, &samples, &[], None).unwrap();
-    let validated: Vec<&str> = trainer.validated().iter().map(|it| it.group.as_str()).collect();
-    let of_these = samples.all.iter().filter(|it| validated.contains(&it.group.as_str()));
+    let validated: Vec<&str> = trainer
+        .validated()
+        .iter()
+        .map(|it| it.group.as_str())
+        .collect();
+    let of_these = samples
+        .all
+        .iter()
+        .filter(|it| validated.contains(&it.group.as_str()));
     assert_eq!(of_these.count(), validated.len());
     assert!(!validated.is_empty() && validated.len() < 120);
     samples.all.iter_mut().for_each(|it| it.group.clear());

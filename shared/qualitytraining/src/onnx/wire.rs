@@ -7,20 +7,12 @@ pub(super) struct Message(Vec<u8>);
 /// Wire types.
 const VARINT: u64 = 0;
 const BYTES: u64 = 2;
-const FIXED32: u64 = 5;
 
 impl Message {
     /// A whole number.
     pub(super) fn number(mut self, field: u64, value: i64) -> Self {
         self.key(field, VARINT);
         self.varint(value as u64);
-        self
-    }
-
-    /// A single-precision number.
-    pub(super) fn float(mut self, field: u64, value: f32) -> Self {
-        self.key(field, FIXED32);
-        self.0.extend(value.to_le_bytes());
         self
     }
 

@@ -20,8 +20,8 @@ written as ONNX, with what `[quality]` needs to know of it inside: preprocessing
 This command needs a Parallax that was built with it:
     cargo run --release --features train-quality -- train quality ...
 
-VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.pth or .safetensors, and samples \
-made with --tile vgg16.
+VGG-16 (--network vgg16) begins with torchvision's weights, --weights vgg16.safetensors (of a .pth make one \
+with safetensors.torch.save_file), and samples made with --tile vgg16.
 
 Exit codes: 0 the network is written; 2 the command line is wrong, or an interrupted training is in the way; 3 a \
 setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped by Ctrl-C.
@@ -55,7 +55,10 @@ impl From<Network> for Kind {
 #[command(after_help = HELP)]
 #[cfg_attr(
     not(feature = "train-quality"),
-    expect(dead_code, reason = "a Parallax without the trainer still says what it would take")
+    expect(
+        dead_code,
+        reason = "a Parallax without the trainer still says what it would take"
+    )
 )]
 pub(crate) struct Arguments {
     /// Samples to learn from and to validate on.
@@ -79,7 +82,7 @@ pub(crate) struct Arguments {
     /// Seed of everything random, instead of the settings' one.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Weights of torchvision's VGG-16 to begin with, .pth or .safetensors.
+    /// Weights of torchvision's VGG-16 to begin with, as .safetensors.
     #[arg(long, value_name = "FILE")]
     pub(super) weights: Option<PathBuf>,
     /// What the file says that it is; its name if not given.

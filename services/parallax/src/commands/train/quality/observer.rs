@@ -66,7 +66,8 @@ impl Observer {
         joints: &[[f64; 2]],
         (group, source): (String, String),
     ) -> Result<Sample, NoSample> {
-        if joints.len() != self.table.n_joints() || joints.iter().flatten().any(|it| !it.is_finite())
+        if joints.len() != self.table.n_joints()
+            || joints.iter().flatten().any(|it| !it.is_finite())
         {
             return Err(NoSample::Unknown);
         }

@@ -61,7 +61,10 @@ pub(super) fn train(
         say.pass(&trainer)?;
     }
     let identity = arguments.identity.clone().unwrap_or_else(|| {
-        out.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+        out.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
     });
     replace(&out, &trainer.onnx(&identity))?;
     say.judged("validation", &trainer.judge(trainer.validated()))?;
@@ -167,7 +170,11 @@ impl Say {
             }));
         }
         if !self.quiet {
-            let best = if trainer.best() == Some(n - 1) { ", the best" } else { "" };
+            let best = if trainer.best() == Some(n - 1) {
+                ", the best"
+            } else {
+                ""
+            };
             output::message(format_args!(
                 "pass {n} of {}: loss {:.4}, validated {:.4}, area {:.3}{best}; {left:.0} s left at most",
                 self.epochs, pass.learnt, pass.validated, pass.area
@@ -185,7 +192,10 @@ impl Say {
             }));
         }
         if !self.quiet {
-            let areas = judgement.area.iter().map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
+            let areas = judgement
+                .area
+                .iter()
+                .map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
             let areas: Vec<String> = areas.collect();
             output::line(format_args!(
                 "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
