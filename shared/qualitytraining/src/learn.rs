@@ -233,5 +233,5 @@ fn list(values: &[f32], device: &Device) -> Tensor<1> {
 
 /// The numbers of a tensor of `f32`, which all of ours are.
 fn numbers(of: Tensor<1>) -> Vec<f32> {
-    of.into_data_as::<f32>().to_vec().unwrap_or_default()
+    of.into_data_as::<f32>().try_into_vec().unwrap_or_default()
 }

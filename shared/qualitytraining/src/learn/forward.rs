@@ -112,7 +112,7 @@ impl Forward<'_> {
         let evidence = self
             .evidence
             .clone()
-            .map(|it| it.into_data_as::<f32>().to_vec::<f32>());
+            .map(|it| it.into_data_as::<f32>().try_into_vec::<f32>());
         let evidence = evidence.and_then(Result::ok).unwrap_or_default();
         let width = self.evidence.as_ref().map_or(1, |it| it.dims()[1]);
         let (centres, factor) = cells_along(cells, side, deviation);
