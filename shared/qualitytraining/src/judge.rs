@@ -21,12 +21,10 @@ pub struct Judgement {
 }
 
 /// The errors of samples, shares of the height that their tiles show: the median of every part is its tau.
-pub fn tau<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> Vec<f32> {
+pub fn tau(samples: &[&Sample]) -> Vec<f32> {
     let of_part = |part: usize| {
-        samples
-            .clone()
-            .map(|it| it.errors_px[part] / it.height_px)
-            .collect()
+        let share = |it: &&Sample| it.errors_px[part] / it.height_px;
+        samples.iter().map(share).collect()
     };
     (0..N_PARTS)
         .map(|part| median(of_part(part)).unwrap_or(0.0))
@@ -106,7 +104,7 @@ mod tests {
     fn the_truth_is_the_best_prediction_and_a_constant_says_nothing() {
         let samples = [sample(1.0), sample(5.0), sample(3.0), sample(9.0)];
         let all: Vec<&Sample> = samples.iter().collect();
-        let tau = tau(samples.iter());
+        let tau = tau(&all);
         assert_eq!(tau, [0.04; N_PARTS]);
         let truth: Vec<Vec<f32>> = samples
             .iter()

@@ -154,7 +154,9 @@ impl Learner {
         };
         for (at, gradient) in gradients.into_iter().enumerate() {
             if let Some(mut gradient) = gradient {
-                gradient.iter_mut().for_each(|it| *it *= factor);
+                for it in &mut gradient {
+                    *it *= factor;
+                }
                 self.change(at, &gradient, step);
             }
         }

@@ -3,7 +3,7 @@
 use skeleton::N_PARTS;
 use viewquality::{N_TYPES, PART_NUMBERS};
 
-/// A convolution, followed by batch normalisation (where asked for) and ReLU.
+/// A convolution, followed by batch normalisation (where asked for) and `ReLU`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conv {
     /// Channels that come out.
@@ -77,7 +77,7 @@ pub trait Ops {
     fn join(&mut self, of: &[&Self::Value]) -> Self::Value;
     /// A dense layer with bias.
     fn dense(&mut self, of: &Self::Value, name: &str, values: usize) -> Self::Value;
-    /// ReLU with a learnt slope for negative values, one a value of the list.
+    /// `ReLU` with a learnt slope for negative values, one a value of the list.
     fn prelu(&mut self, of: &Self::Value, name: &str) -> Self::Value;
     /// While training, sets this share of the values to 0 and enlarges the others.
     fn dropout(&mut self, of: &Self::Value, share: f32) -> Self::Value;
@@ -214,7 +214,7 @@ fn vgg16<O: Ops>(ops: &mut O, shape: &Shape) -> O::Value {
     top(ops, &flat, shape)
 }
 
-/// The paper's top (section 4.3): dense, PReLU, dropout, one value for every part.
+/// The paper's top (section 4.3): dense, `PReLU`, dropout, one value for every part.
 fn top<O: Ops>(ops: &mut O, of: &O::Value, shape: &Shape) -> O::Value {
     let hidden = ops.dense(of, "hidden", shape.hidden);
     let hidden = ops.prelu(&hidden, "slope");

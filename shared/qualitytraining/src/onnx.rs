@@ -172,7 +172,9 @@ impl Ops for Writer<'_> {
             let factors: Vec<f32> = factors.collect();
             let per_channel = weights.len() / conv.channels;
             for (weights, factor) in weights.chunks_exact_mut(per_channel).zip(&factors) {
-                weights.iter_mut().for_each(|it| *it *= factor);
+                for it in weights {
+                    *it *= factor;
+                }
             }
             let bias = shift.iter().zip(mean).zip(&factors);
             bias.map(|((shift, mean), factor)| shift - mean * factor)

@@ -229,10 +229,12 @@ impl Settings {
 mod tests {
     use super::*;
 
+    type Change = fn(&mut Settings);
+
     #[test]
     fn the_defaults_are_fine_and_what_cannot_be_is_refused_by_name() {
         assert_eq!(Settings::default().check(), Ok(()));
-        let change: [(&str, fn(&mut Settings)); 5] = [
+        let change: [(&str, Change); 5] = [
             ("batch", |it| it.batch = 0),
             ("dropout", |it| it.dropout = 1.0),
             ("rate", |it| it.rate = f32::NAN),

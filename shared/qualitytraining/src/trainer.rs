@@ -123,7 +123,7 @@ impl<'a> Trainer<'a> {
         Ok(Self {
             settings,
             tile: TileShape { height, width },
-            tau: judge::tau(learnt.iter().copied()),
+            tau: judge::tau(&learnt),
             learnt,
             validated,
             inputs,

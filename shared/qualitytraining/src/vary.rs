@@ -82,7 +82,9 @@ pub fn varied(
         }
         if dice.f32() < vary.noise {
             let level = vary.noise_level * dice.f32();
-            planes.iter_mut().for_each(|it| *it += level * normal(dice));
+            for it in &mut planes {
+                *it += level * normal(dice);
+            }
         }
         normalised(&planes, tile)
     } else {

@@ -96,12 +96,12 @@ fn a_mirrored_sample_exchanges_errors_and_evidence_and_twice_is_as_it_was() {
     let mut dice = Rng::with_seed(1);
     let seen = varied(&sample, (TILE, true), (&vary, &unknown()), &mut dice);
     let plain = plain(&sample, TILE, true);
-    for part in 0..N_PARTS {
-        assert_eq!(seen.errors_px[part], sample.errors_px[MIRROR[part]]);
+    for (part, &other) in MIRROR.iter().enumerate() {
+        assert_eq!(seen.errors_px[part], sample.errors_px[other]);
         let at = |part: usize, name: &str| column(part, name).unwrap();
-        let (here, there) = (at(part, "response"), at(MIRROR[part], "response"));
+        let (here, there) = (at(part, "response"), at(other, "response"));
         assert_eq!(seen.evidence[here], sample.evidence[there]);
-        let (here, there) = (at(part, "x"), at(MIRROR[part], "x"));
+        let (here, there) = (at(part, "x"), at(other, "x"));
         assert_eq!(seen.evidence[here], -sample.evidence[there]);
         assert_eq!(seen.evidence[part * PER_PART + PART_NUMBERS.len()], 0.25);
     }

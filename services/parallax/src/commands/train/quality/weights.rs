@@ -130,10 +130,11 @@ mod tests {
                 let n: usize = dims.iter().product();
                 let from = data.len();
                 data.extend((0..n).flat_map(|_| (number as f32).to_le_bytes()));
-                header += &format!(
+                let entry = format!(
                     ", \"features.{number}.{what}\": {{\"dtype\": \"F32\", \"shape\": {dims:?}, \"data_offsets\": [{from}, {}]}}",
                     data.len()
                 );
+                header.push_str(&entry);
             }
             inputs = channels;
         }
@@ -163,7 +164,7 @@ mod tests {
         let half = said(&|it| *it = it.replacen("F32", "F16", 1));
         assert!(half.starts_with("`features.0.weight` is F16"), "{half}");
         assert!(matches!(
-            parse(&file(|it| it.clear())),
+            parse(&file(String::clear)),
             Err(VggError::Header(_))
         ));
     }
