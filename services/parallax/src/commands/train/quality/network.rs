@@ -53,13 +53,6 @@ impl From<Network> for Kind {
 /// What to train on, and how.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
-#[cfg_attr(
-    not(feature = "train-quality"),
-    expect(
-        dead_code,
-        reason = "a Parallax without the trainer still says what it would take"
-    )
-)]
 pub(crate) struct Arguments {
     /// Samples to learn from and to validate on.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
