@@ -189,6 +189,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "expected error that switches a part off: none, learned, humaneva, humaneva-median, umpm, umpm-median, one per part or { file = ... }, pixels of the footage",
     ),
     (
+        "fuse.switch",
+        "whose expected error switches a part off: either view's (the paper), or the support's",
+    ),
+    (
         "fuse.facing",
         "decide for every view whether it sees the person from behind",
     ),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use fmp::{Bound, Bounds, Placement, Pose};
-use multiview::{EnergyKind, PairEstimate, PairStart, Settings, ViewPlan};
+use multiview::{EnergyKind, PairEstimate, PairStart, Settings, SwitchBy, ViewPlan};
 use nalgebra::Point2;
 use proptest::prelude::*;
 
@@ -175,6 +175,37 @@ proptest! {
         prop_assert_eq!(found.poses.each_ref().map(|it| &it.parts), alone.each_ref().map(|it| &it.parts));
         let sum: f64 = alone.iter().map(|it| f64::from(it.score)).sum();
         prop_assert!((found.energy - sum).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn where_the_support_alone_counts_the_view_that_cannot_tell_follows_the_one_that_can(
+        seed: u64,
+        blind in 0..2_usize,
+        start in starts(),
+    ) {
+        let mut scene = Scene::new(seed, 2, &SIZES);
+        scene.views[blind].sigma_px = Some(vec![9.0; N_PARTS]);
+        scene.views[1 - blind].sigma_px = Some(vec![1.0; N_PARTS]);
+        let all_on = Settings { tau_px: Vec::new(), ..settings(seed) };
+        let settings = Settings {
+            tau_px: vec![8.0; N_PARTS],
+            switch: SwitchBy::Support,
+            ..all_on.clone()
+        };
+        let found = scene.fuse(&settings, [0, 1], start);
+        prop_assert!(found.converged);
+        let alone = &scene.views[1 - blind].candidates[0];
+        prop_assert_eq!(&found.poses[1 - blind].parts, &alone.parts, "it asks nobody");
+        let worth = |pose: &Pose| {
+            let mut poses = found.poses.clone();
+            poses[blind] = pose.clone();
+            oracle::own(&scene, blind, pose)
+                + oracle::between(&scene, &all_on, [0, 1], poses.each_ref(), start.exchanged)
+        };
+        let followed = worth(&found.poses[blind]);
+        for candidate in &scene.views[blind].candidates {
+            prop_assert!(followed >= worth(candidate) - ROUNDING);
+        }
     }
 
     #[test]
