@@ -4,7 +4,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
 use crate::commands::{
-    calib, config, demo, deployments, detect, eval, fuse_frame, model, run, service, synth, train,
+    calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, run, service, synth,
+    train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -22,6 +23,7 @@ Examples:
     parallax run configs/pose2sim-balancing.toml        four cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
+    parallax chaos                                      processes killed on purpose, and what held
     parallax config show my.toml                        every value, and who said it
     parallax detect photo.jpg --model parse.mat --json  people in single images
     parallax model import parse.mat --out parse.plx     another format's model as our own
@@ -84,6 +86,8 @@ pub(crate) enum Command {
     Demo(demo::Arguments),
     /// Run a deployment: all its processes, from footage to 3D.
     Run(run::Arguments),
+    /// Kill and stop processes of a deployment on purpose, and judge what held.
+    Chaos(chaos::Arguments),
     /// Find people in single images.
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 pub(crate) mod calib;
+pub(crate) mod chaos;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod deployments;
@@ -27,6 +28,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
     }
     match cli.command {
         Command::Demo(it) => demo::run(&it, cli.globals),
+        Command::Chaos(it) => chaos::run(&it, cli.globals),
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),

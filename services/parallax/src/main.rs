@@ -13,6 +13,7 @@ mod prepare;
 mod search;
 mod sheet;
 mod summary;
+mod trial;
 mod views;
 
 use std::process::ExitCode;

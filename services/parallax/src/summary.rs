@@ -169,14 +169,18 @@ impl Report {
         &self.views
     }
 
-    /// The processes that were restarted, and how often.
-    pub(crate) fn restarts(&self) -> &[(String, u32)] {
-        &self.restarts
-    }
-
-    /// The processes that were given up.
-    pub(crate) fn given_up(&self) -> &[String] {
-        &self.given_up
+    /// Processes that ended without being asked to more often than they were struck on purpose, or were given up.
+    ///
+    /// * `struck`: how often a process was.
+    pub(crate) fn failed_by_themselves(&self, struck: impl Fn(&str) -> u32) -> Vec<String> {
+        let restarted = self.restarts.iter();
+        let by_themselves = restarted
+            .filter(|(name, n)| *n > struck(name))
+            .map(|it| &it.0);
+        let mut failed: Vec<String> = by_themselves.chain(&self.given_up).cloned().collect();
+        failed.sort();
+        failed.dedup();
+        failed
     }
 
     /// What the recorder wrote about the run; null if it did not.

@@ -145,9 +145,24 @@ impl Child {
 ///
 /// There is no such process, or it belongs to somebody else.
 pub fn kill(pid: u32) -> io::Result<()> {
+    signal(pid, Signal::KILL)
+}
+
+/// Lets a process stand still (SIGSTOP), as a hang would: for faults that are made on purpose.
+///
+/// Call it where [`kill`] may be called.
+///
+/// # Errors
+///
+/// As those of [`kill`].
+pub fn freeze(pid: u32) -> io::Result<()> {
+    signal(pid, Signal::STOP)
+}
+
+fn signal(pid: u32, signal: Signal) -> io::Result<()> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
     let pid = pid.ok_or(io::ErrorKind::InvalidInput)?;
-    Ok(kill_process(pid, Signal::KILL)?)
+    Ok(kill_process(pid, signal)?)
 }
 
 impl Drop for Child {
@@ -195,7 +210,7 @@ mod tests {
     use std::process::ExitStatus;
     use std::time::Instant;
 
-    use super::{Child, kill, wait_for_any};
+    use super::{Child, freeze, kill, wait_for_any};
 
     /// What takes longer will never happen.
     const WATCHDOG: Duration = Duration::from_mins(1);
@@ -276,5 +291,24 @@ mod tests {
         assert!(Path::new(&proc).exists());
         drop(child);
         assert!(!Path::new(&proc).exists());
+    }
+
+    #[test]
+    fn a_process_that_stands_still_can_still_be_killed() {
+        use std::os::unix::process::ExitStatusExt as _;
+        let mut child = shell("exec sleep 600");
+        freeze(child.pid()).unwrap();
+        let begin = Instant::now();
+        let is_still = || {
+            let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.pid())).unwrap();
+            stat.contains(") T ")
+        };
+        while !is_still() {
+            assert!(begin.elapsed() < WATCHDOG, "it goes on");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        kill(child.pid()).unwrap();
+        let (_, status) = run(&mut child);
+        assert_eq!(status.signal(), Some(9));
     }
 }

@@ -27,7 +27,7 @@ mod remains;
 mod stop;
 
 pub use bus::{Bus, BusError, Topic};
-pub use child::{Child, kill, wait_for_any};
+pub use child::{Child, freeze, kill, wait_for_any};
 pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, health_topic, preflight};

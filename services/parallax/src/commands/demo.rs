@@ -1,30 +1,27 @@
 //! `parallax demo`: four cameras that do not exist, every process, one of them killed on purpose, and a report.
 
-mod cost;
 mod limits;
 mod page;
 mod report;
-mod results;
 mod score;
-mod stage;
-mod strike;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use runtime::{ExitKind, Failure, now_nanos};
+use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 
 use super::run::Planned;
 use crate::cli::Globals;
 use crate::deployment::Loaded;
+use crate::trial::Point;
+use crate::trial::results::{self, Moment};
+use crate::trial::stage::{self, Cast, Stage};
+use crate::trial::strike::{Blow, Strike, Times};
 use crate::{inputs, output};
 use limits::Asked;
 use report::Report;
-use results::Moment;
-use stage::{REPORTS, Stage};
-use strike::{Strike, Times};
 
 const HELP: &str = "\
 Nothing is needed but this program: the pictures are made by the camera processes while they run (a person who does \
@@ -100,10 +97,23 @@ impl Arguments {
         let of_seconds = |it: u32| ((f64::from(it) * self.rate).round() as u64).max(1);
         self.seconds.map_or(self.frames, of_seconds)
     }
+
+    fn cast(&self) -> Cast<'_> {
+        Cast {
+            subject: self.subject,
+            action: self.action,
+            seed: self.seed,
+            rate_hz: self.rate,
+            n_frames: self.n_frames(),
+            deadline_ms: self.deadline_ms,
+            name: &self.name,
+            command: "demo",
+        }
+    }
 }
 
-/// A place in space, metres in the world.
-type Point = [f64; 3];
+/// What is written at the end: for programs, for people.
+const REPORTS: [&str; 2] = ["report.json", "report.html"];
 
 /// The camera that is killed, from 0.
 const VICTIM: usize = 2;
@@ -112,19 +122,23 @@ const KILL_AFTER: f64 = 0.4;
 
 /// Runs the demo, and judges it.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let stage = Stage::new(arguments, stage::absolute(&arguments.out)?)?;
-    let loaded = Loaded::read(&stage.write(arguments)?, &[])?;
+    let cast = arguments.cast();
+    let stage = Stage::new(&cast, stage::absolute(&arguments.out)?)?;
+    remove_reports(&stage)?;
+    let loaded = Loaded::read(&stage.write(&cast)?, &[])?;
     let planned = Planned::new(&loaded.deployment, globals.level())?;
     let processes: Vec<String> = planned.processes().map(str::to_owned).collect();
     announce(arguments, globals, &stage, processes.len());
     let mut strike = (!arguments.no_kill).then(|| {
         let camera = &stage.rig.cameras()[VICTIM].name;
-        Strike::new(VICTIM, camera, KILL_AFTER * arguments.n_frames() as f64)
+        let at_frame = KILL_AFTER * arguments.n_frames() as f64;
+        Strike::new(Blow::Kill, &format!("capture-{VICTIM}"), at_frame).of_camera(camera)
     });
-    let ran = planned.carry_out(globals, &mut |event| {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let ran = planned.carry_out(globals, &stop, &mut |event| {
         strike
             .as_mut()
-            .and_then(|it| it.note(event, now_nanos(), runtime::kill))
+            .and_then(|it| it.note(event, now_nanos(), Blow::deal))
     })?;
     if ran.kind() == Some(ExitKind::Interrupted) {
         output::message("stopped: nothing is judged, and no report written");
@@ -171,6 +185,17 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         ExitKind::Limit.status()
     };
     Ok(ExitCode::from(status))
+}
+
+/// Those of an earlier demo must not be taken for this one's.
+fn remove_reports(stage: &Stage) -> Result<(), Failure> {
+    for name in REPORTS {
+        let file = stage.folder.join(name);
+        if file.exists() {
+            std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
+        }
+    }
+    Ok(())
 }
 
 fn announce(arguments: &Arguments, globals: Globals, stage: &Stage, n_processes: usize) {

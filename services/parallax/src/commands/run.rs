@@ -54,7 +54,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if arguments.dry_run {
         return show(&planned.plan);
     }
-    let report = planned.carry_out(globals, &mut |_| None)?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {
@@ -83,6 +84,16 @@ impl Planned {
         Ok(Self { resolved, plan })
     }
 
+    /// What every process is given.
+    pub(crate) fn resolved(&self) -> &Resolved {
+        &self.resolved
+    }
+
+    /// Its processes and topics.
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
     /// The run, which is the time of its planning too: `runtime::now_nanos`.
     pub(crate) fn session(&self) -> u64 {
         self.plan.session
@@ -95,20 +106,21 @@ impl Planned {
 
     /// Runs it, shows its progress, and says what became of it.
     ///
+    /// * `stop`: ends it before its footage does.
     /// * `onlooker`: is told everything that happens; what it answers is shown.
     pub(crate) fn carry_out(
         &self,
         globals: Globals,
+        stop: &Stop,
         onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
     ) -> Result<Report, Failure> {
         let deployment = &self.resolved.deployment;
         let folder = &deployment.output;
         std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
         self.resolved.write(&file_of(deployment))?;
-        let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
         let begin = Instant::now();
         let mut watcher = Watcher::new(&self.resolved, globals.quiet);
-        let outcome = supervise::run(&self.plan, &stop, &mut |event| {
+        let outcome = supervise::run(&self.plan, stop, &mut |event| {
             watcher.note(&event);
             if let Some(said) = onlooker(&event).filter(|_| !globals.quiet) {
                 watcher.say(&said);

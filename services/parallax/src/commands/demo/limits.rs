@@ -3,8 +3,9 @@
 use clap::Args;
 use runpage::Limit;
 
-use super::cost::Cost;
 use super::score::Score;
+use crate::trial::cost::Cost;
+use crate::trial::limit::{at_least, at_most, none_of};
 use crate::views::ViewReport;
 
 /// What a process that is killed may hold, and what its last report may not have counted: frames.
@@ -93,16 +94,7 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
             may_be_lost as f64,
             Some(unanswered as f64),
         ),
-        Limit {
-            what: "processes that failed by themselves".to_owned(),
-            asked: "none".to_owned(),
-            got: if it.failed.is_empty() {
-                "none".to_owned()
-            } else {
-                it.failed.join(", ")
-            },
-            held: it.failed.is_empty(),
-        },
+        none_of("processes that failed by themselves", it.failed),
         at_most("results not written", 0.0, Some(it.n_unwritten as f64)),
     ]);
     limits
@@ -117,38 +109,6 @@ fn must_be_seen(cost: &Cost, deadline_ms: f64) -> bool {
 
 fn share(n: usize, of: usize) -> Option<f64> {
     (of > 0).then(|| 100.0 * n as f64 / of as f64)
-}
-
-fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
-    limit(
-        what,
-        format!("at least {asked}"),
-        got,
-        got.is_some_and(|it| it >= asked),
-    )
-}
-
-fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
-    limit(
-        what,
-        format!("at most {asked}"),
-        got,
-        got.is_some_and(|it| it <= asked),
-    )
-}
-
-/// What was not measured has not held.
-fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
-    let digits = |it: f64| usize::from(it.fract() != 0.0);
-    Limit {
-        what: what.to_owned(),
-        asked,
-        got: got.map_or_else(
-            || "nothing".to_owned(),
-            |it| format!("{it:.0$}", digits(it)),
-        ),
-        held,
-    }
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@ use runpage::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use serde_json::Value;
 use skeleton::PARSE14;
 
-use super::cost::Cost;
 use super::report::Report;
-use super::results::Moment;
-use super::stage::Stage;
 use super::{Run, VICTIM};
+use crate::trial::Point;
+use crate::trial::cost::Cost;
+use crate::trial::results::Moment;
+use crate::trial::stage::Stage;
 
 const JPEG_QUALITY: u8 = 88;
 
@@ -81,7 +82,7 @@ fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
 }
 
 fn space(run: &Run<'_>, stage: &Stage) -> Space {
-    let moment = |(it, truth): (&Moment, &Vec<super::Point>)| runpage::Moment {
+    let moment = |(it, truth): (&Moment, &Vec<Point>)| runpage::Moment {
         frame: it.frame,
         seconds: it.frame as f64 / run.rate_hz,
         found: it.joints.clone(),
@@ -313,8 +314,8 @@ fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::Seen;
     use super::*;
+    use crate::trial::results::Seen;
 
     /// A frame that was drawn, with all four cameras or without the killed one.
     fn drawn(frame: u64, is_whole: bool) -> Moment {
@@ -322,6 +323,7 @@ mod tests {
         views[VICTIM].missing = (!is_whole).then(|| "process lost".to_owned());
         Moment {
             frame,
+            epoch: 0,
             sent_ms: 0.0,
             joints: Vec::new(),
             views,

@@ -6,11 +6,11 @@ use std::path::Path;
 use runpage::Limit;
 use serde_json::{Value, json};
 
-use super::cost::Cost;
 use super::limits::{self, Asked, Measured};
-use super::results::Moment;
 use super::score::{GAMMA, Score, score};
 use super::{Run, VICTIM};
+use crate::trial::cost::{Cost, Trace};
+use crate::trial::results::Moment;
 
 /// What the demo found out.
 #[derive(Debug)]
@@ -44,10 +44,12 @@ impl Report {
         ];
         let cost = run
             .killed
-            .map(|it| Cost::new(VICTIM, it, run.session, run.moments));
+            .map(|it| Cost::new(Trace::Camera(VICTIM), it, run.session, run.moments));
         let posed = run.moments.iter().filter(|it| it.is_posed()).count();
         let count = |key: &str| run.ran.recorded()["summary"][key].as_u64();
         let unwritten = ["writes_failed", "frames_not_recorded"].map(count);
+        let was_killed = cost.as_ref().is_some_and(|it| it.killed_at_ms.is_some());
+        let killed = format!("capture-{VICTIM}");
         let measured = Measured {
             n_frames: run.n_frames,
             n_results: [run.moments.len(), posed],
@@ -55,7 +57,9 @@ impl Report {
             cost: cost.as_ref(),
             deadline_ms: run.deadline_ms,
             views: run.ran.views(),
-            failed: &failed(run, cost.as_ref()),
+            failed: &run
+                .ran
+                .failed_by_themselves(|it| u32::from(was_killed && it == killed)),
             n_unwritten: unwritten.iter().flatten().sum(),
         };
         let limits = limits::judge(asked, &measured);
@@ -121,19 +125,4 @@ impl Report {
         }
         writeln!(text, "report {}", folder.join("report.html").display())
     }
-}
-
-/// Processes that ended without being asked to, but for the one that was killed, once.
-fn failed(run: &Run<'_>, cost: Option<&Cost>) -> Vec<String> {
-    let killed = format!("capture-{VICTIM}");
-    let was_killed = cost.is_some_and(|it| it.killed_at_ms.is_some());
-    let by_themselves = run.ran.restarts().iter().filter_map(|(name, n)| {
-        let asked_for = u32::from(was_killed && *name == killed);
-        (*n > asked_for).then_some(name)
-    });
-    let given_up = run.ran.given_up().iter();
-    let mut failed: Vec<String> = by_themselves.chain(given_up).cloned().collect();
-    failed.sort();
-    failed.dedup();
-    failed
 }

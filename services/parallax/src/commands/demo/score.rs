@@ -4,7 +4,7 @@ use evaluation::{joint_errors, segment_errors, segments};
 use serde::Serialize;
 use skeleton::PARSE14;
 
-use super::Point;
+use crate::trial::Point;
 
 /// The threshold of PCP3D, by convention.
 pub(super) const GAMMA: f64 = 0.5;

@@ -1,13 +1,13 @@
-//! What a killed camera cost: how long it was away, what the others did meanwhile.
+//! What a killed process cost: how long it was away, what the others did meanwhile.
 
 use serde::Serialize;
 
 use super::results::Moment;
 use super::strike::Times;
 
-/// What a killed camera cost. Times are milliseconds after it was killed.
+/// What a killed process cost. Times are milliseconds after it was killed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(super) struct Cost {
+pub(crate) struct Cost {
     /// When it was killed, milliseconds since the run was planned; none if it never was.
     pub killed_at_ms: Option<f64>,
     /// When the supervisor noticed.
@@ -30,44 +30,74 @@ pub(super) struct Cost {
     pub usual_pause_ms: Option<f64>,
 }
 
+/// Where the results say which life of a process they owe to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Trace {
+    /// It is the camera of a view.
+    Camera(usize),
+    /// It answers for a view.
+    Pose(usize),
+    /// It makes the results.
+    Result,
+    /// Nowhere: only its signs of life tell.
+    Nowhere,
+}
+
+impl Trace {
+    /// The life that a result owes to, and when that life sent what it owes.
+    fn life(self, it: &Moment) -> Option<(u32, f64)> {
+        match self {
+            Self::Camera(view) => it.views[view].shot.map(|it| (it.epoch, it.sent_ms)),
+            Self::Pose(view) => it.views[view].answer.map(|it| (it.epoch, it.sent_ms)),
+            Self::Result => Some((it.epoch, it.sent_ms)),
+            Self::Nowhere => None,
+        }
+    }
+}
+
 impl Cost {
     /// Puts together what the kill and the results say.
     ///
-    /// * `view`: of the camera.
+    /// * `trace`: of the process.
     /// * `times`: of the kill, as it was ordered.
     /// * `session`: when the run was planned, by the same clock.
-    pub(super) fn new(view: usize, times: Times, session: u64, moments: &[Moment]) -> Self {
+    pub(crate) fn new(trace: Trace, times: Times, session: u64, moments: &[Moment]) -> Self {
         let Some(killed) = times.killed else {
             return Self::default();
         };
         let ms = |nanos: u64| nanos as f64 / 1e6;
         let killed_at = ms(killed.saturating_sub(session));
         let after = |it: u64| ms(it.saturating_sub(killed));
-        let shots = moments
-            .iter()
-            .filter_map(|it| Some((it.frame, it.views[view].shot?)));
-        let (old, new): (Vec<_>, Vec<_>) = shots.partition(|it| it.1.epoch == 0);
+        let lives = moments.iter().filter_map(|it| Some((it, trace.life(it)?)));
+        let (old, new): (Vec<_>, Vec<_>) = lives.partition(|it| it.1.0 == 0);
         let (last, first) = (old.last(), new.first());
-        let back_at = first.map(|it| it.1.sent_ms);
-        // What came first with the new life ends the pause, if it was one.
-        let end = moments
-            .iter()
-            .find(|it| it.views[view].shot.is_some_and(|it| it.epoch > 0));
-        let end = end.map_or(f64::INFINITY, |it| it.sent_ms);
-        // By frames, for what was taken meanwhile may have its result a little later.
-        let after_last = |it: &&Moment| last.is_none_or(|last| it.frame > last.0);
-        let before_first = |it: &&Moment| first.is_none_or(|first| it.frame < first.0);
-        let away = moments.iter().filter(after_last).filter(before_first);
+        let heard = times.heard.filter(|_| trace == Trace::Nowhere).map(after);
+        // What came first with the new life, or at least after it, ends the pause, if it was one.
+        let after_heard = |it: &&Moment| heard.is_some_and(|ms| it.sent_ms >= killed_at + ms);
+        let end = first
+            .map(|it| it.0)
+            .or_else(|| moments.iter().find(after_heard))
+            .map(|it| it.sent_ms);
+        let end = end.unwrap_or(f64::INFINITY);
+        let is_between = |it: &&Moment| match trace {
+            Trace::Nowhere => it.sent_ms > killed_at && it.sent_ms < end,
+            // By frames, for what was taken meanwhile may have its result a little later.
+            _ => {
+                last.is_none_or(|last| it.frame > last.0.frame)
+                    && first.is_none_or(|first| it.frame < first.0.frame)
+            }
+        };
+        let away = moments.iter().filter(is_between);
         Self {
             killed_at_ms: Some(killed_at),
             noticed_ms: times.noticed.map(after),
             restarted_ms: times.started.map(after),
-            back_ms: back_at.map(|it| it - killed_at),
-            last_frame: last.map(|it| it.0),
-            first_frame: first.map(|it| it.0),
+            back_ms: first.map(|it| it.1.1 - killed_at).or(heard),
+            last_frame: last.map(|it| it.0.frame),
+            first_frame: first.map(|it| it.0.frame),
             frames_lost: last
                 .zip(first)
-                .map(|(last, first)| (first.0 - last.0).saturating_sub(1)),
+                .map(|(last, first)| first.0.frame.saturating_sub(last.0.frame + 1)),
             results_without_it: away.filter(|it| it.is_posed()).count(),
             longest_pause_ms: longest_pause(moments, killed_at, end),
             usual_pause_ms: longest_pause(moments, f64::NEG_INFINITY, killed_at),
@@ -84,7 +114,7 @@ fn longest_pause(moments: &[Moment], from: f64, to: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::{Seen, Shot};
+    use super::super::results::{Answer, Seen, Shot};
     use super::*;
 
     /// A result sent at a time; the camera's frame by the life that sent it.
@@ -96,11 +126,16 @@ mod tests {
         });
         Moment {
             frame,
+            epoch: epoch.unwrap_or(0),
             sent_ms,
             joints: vec![Some([0.0; 3]); 14],
             views: vec![Seen {
                 missing: shot.is_none().then(|| "process lost".to_owned()),
                 shot,
+                answer: epoch.map(|epoch| Answer {
+                    epoch,
+                    sent_ms: sent_ms - 5.0,
+                }),
             }],
         }
     }
@@ -124,7 +159,7 @@ mod tests {
             moment(6, 900.0, Some(1)),
             moment(7, 1900.0, Some(1)),
         ];
-        let got = Cost::new(0, killed(310), 0, &moments);
+        let got = Cost::new(Trace::Camera(0), killed(310), 0, &moments);
         let expected = Cost {
             killed_at_ms: Some(310.0),
             noticed_ms: Some(3.0),
@@ -147,9 +182,44 @@ mod tests {
             moment(1, 200.0, Some(0)),
             moment(2, 5000.0, Some(1)),
         ];
-        let got = Cost::new(0, killed(210), 0, &moments);
+        let got = Cost::new(Trace::Camera(0), killed(210), 0, &moments);
         assert_eq!(got.results_without_it, 0);
         assert_eq!(got.longest_pause_ms, Some(4800.0));
+    }
+
+    #[test]
+    fn every_stage_is_back_with_what_it_sent_itself() {
+        let moments = [
+            moment(0, 100.0, Some(0)),
+            moment(1, 300.0, Some(0)),
+            moment(2, 900.0, Some(1)),
+        ];
+        let back = |trace| Cost::new(trace, killed(310), 0, &moments).back_ms;
+        assert_eq!(back(Trace::Camera(0)), Some(580.0));
+        assert_eq!(back(Trace::Pose(0)), Some(585.0));
+        assert_eq!(back(Trace::Result), Some(590.0));
+        assert_eq!(back(Trace::Nowhere), None, "it was not heard of");
+    }
+
+    #[test]
+    fn of_whom_the_results_say_nothing_the_signs_of_life_tell() {
+        let moments = [
+            moment(0, 100.0, None),
+            moment(1, 300.0, None),
+            moment(2, 500.0, None),
+            moment(3, 1900.0, None),
+        ];
+        let times = Times {
+            heard: Some(1_000_000 * 810),
+            ..killed(310)
+        };
+        let got = Cost::new(Trace::Nowhere, times, 0, &moments);
+        assert_eq!(got.back_ms, Some(500.0));
+        assert_eq!(
+            (got.results_without_it, got.longest_pause_ms),
+            (1, Some(1400.0))
+        );
+        assert_eq!((got.last_frame, got.frames_lost), (None, None));
     }
 
     #[test]
@@ -159,12 +229,15 @@ mod tests {
             moment(1, 400.0, None),
             moment(2, 500.0, None),
         ];
-        let got = Cost::new(0, killed(110), 0, &moments);
+        let got = Cost::new(Trace::Camera(0), killed(110), 0, &moments);
         assert_eq!((got.back_ms, got.frames_lost), (None, None));
         assert_eq!(
             (got.results_without_it, got.longest_pause_ms),
             (2, Some(300.0))
         );
-        assert_eq!(Cost::new(0, Times::default(), 0, &moments), Cost::default());
+        assert_eq!(
+            Cost::new(Trace::Camera(0), Times::default(), 0, &moments),
+            Cost::default()
+        );
     }
 }

@@ -12,8 +12,10 @@ use crate::inputs;
 
 /// One result.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Moment {
+pub(crate) struct Moment {
     pub frame: u64,
+    /// How often the process that made it had been restarted.
+    pub epoch: u32,
     /// When it was sent, milliseconds since the run was planned.
     pub sent_ms: f64,
     /// The joints of `skeleton::PARSE14` that were found, metres in the world.
@@ -24,16 +26,27 @@ pub(super) struct Moment {
 
 /// What is known of one view of a result.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Seen {
+pub(crate) struct Seen {
     /// Why it has no part in the result, if it has none.
     pub missing: Option<String>,
     /// The frame that its camera sent.
     pub shot: Option<Shot>,
+    /// The answer of its pose process.
+    pub answer: Option<Answer>,
+}
+
+/// An answer of a pose process.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub(crate) struct Answer {
+    /// How often the process had been restarted.
+    pub epoch: u32,
+    /// Milliseconds since the run was planned.
+    pub sent_ms: f64,
 }
 
 /// A frame that a camera sent; milliseconds since the run was planned.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub(super) struct Shot {
+pub(crate) struct Shot {
     /// How often the camera's process had been restarted.
     pub epoch: u32,
     pub captured_ms: f64,
@@ -42,12 +55,12 @@ pub(super) struct Shot {
 
 impl Moment {
     /// Whether anything was found.
-    pub(super) fn is_posed(&self) -> bool {
+    pub(crate) fn is_posed(&self) -> bool {
         self.joints.iter().any(Option::is_some)
     }
 
     /// When the first of its pictures was taken.
-    pub(super) fn captured_ms(&self) -> Option<f64> {
+    pub(crate) fn captured_ms(&self) -> Option<f64> {
         let shots = self.views.iter().filter_map(|it| it.shot);
         shots.map(|it| it.captured_ms).reduce(f64::min)
     }
@@ -56,7 +69,7 @@ impl Moment {
 /// Reads the results of a run, in the order in which they came.
 ///
 /// * `cameras`: names, in the order of the rig.
-pub(super) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
+pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
     let text = |name: &str| inputs::text(&folder.join(name));
     let [poses, times] = [text("pose3d.jsonl")?, text("times.jsonl")?];
     parse(&poses, &times, cameras).map_err(|error| inputs::in_file(folder, &error))
@@ -79,6 +92,7 @@ struct Joint {
 #[derive(Debug, Deserialize)]
 struct TimeLine {
     frame: u64,
+    epoch: u32,
     sent_ms: f64,
     views: BTreeMap<String, TimesOfView>,
 }
@@ -86,6 +100,7 @@ struct TimeLine {
 #[derive(Debug, Deserialize)]
 struct TimesOfView {
     camera: Option<Shot>,
+    pose: Option<Answer>,
 }
 
 /// Results that stand in one of the two texts only are left out: they were not written.
@@ -103,9 +118,11 @@ fn parse(poses: &str, times: &str, cameras: &[String]) -> Result<Vec<Moment>, se
         let view = |name: &String| Seen {
             missing: line.views_missing.get(name).cloned(),
             shot: time.views.get(name).and_then(|it| it.camera),
+            answer: time.views.get(name).and_then(|it| it.pose),
         };
         moments.push(Moment {
             frame: line.frame,
+            epoch: time.epoch,
             sent_ms: time.sent_ms,
             joints: PARSE14.joints.iter().map(|it| joint(it.name)).collect(),
             views: cameras.iter().map(view).collect(),
@@ -121,7 +138,7 @@ mod tests {
     const POSES: &str = r#"{"frame":4,"joints":{"head":{"position_m":[1.0,2.0,3.0]},"neck":{"status":"too few views"}},"views_missing":{"c2":"late"},"pairs":1}
 {"frame":5,"joints":{},"views_missing":{}}
 "#;
-    const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":0,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":null},"c2":{"camera":null,"pose":null}}}
+    const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":3,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":{"epoch":2,"sent_ms":20.0}},"c2":{"camera":null,"pose":null}}}
 "#;
 
     #[test]
@@ -135,6 +152,8 @@ mod tests {
         assert_eq!(moment.joints[13], Some([1.0, 2.0, 3.0]));
         assert_eq!(moment.joints.iter().flatten().count(), 1);
         assert_eq!(moment.views[0].shot.unwrap().epoch, 1);
+        assert_eq!(moment.views[0].answer.unwrap().epoch, 2);
+        assert_eq!(moment.epoch, 3);
         assert_eq!(moment.captured_ms(), Some(10.0));
         assert_eq!(moment.views[1].missing.as_deref(), Some("late"));
     }

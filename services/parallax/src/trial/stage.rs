@@ -1,4 +1,4 @@
-//! The person, the cameras and the deployment of the demo.
+//! Four cameras that do not exist around a person who does not either, and their deployment.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use geometry::{Camera, Intrinsics, Rig};
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Action, Address, RigChoice, Scene, Settings};
 
-use super::{Arguments, Point};
+use super::Point;
 use crate::inputs;
 
 /// Cameras, evenly around the stage.
@@ -20,14 +20,35 @@ const SCALE: f64 = 0.5;
 /// Every so manieth frame is drawn.
 const OVERLAY_EVERY: u64 = 4;
 
-/// What is written at the end: for programs, for people.
-pub(super) const REPORTS: [&str; 2] = ["report.json", "report.html"];
+/// What is played, and under which name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cast<'a> {
+    /// Number of the person.
+    pub subject: u64,
+    /// What the person does.
+    pub action: Action,
+    /// Seed of the performance, the room and the lamps.
+    pub seed: u64,
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// Frames of every camera.
+    pub n_frames: u64,
+    /// How long a stage waits for a view that is late, milliseconds.
+    pub deadline_ms: u64,
+    /// Name of the deployment.
+    pub name: &'a str,
+    /// The command that writes it.
+    pub command: &'a str,
+}
 
 /// Who is seen by whom.
 #[derive(Debug)]
-pub(super) struct Stage {
+pub(crate) struct Stage {
+    /// Of everything that is written, absolute.
     pub folder: PathBuf,
+    /// The cameras.
     pub rig: Rig,
+    /// Of their pictures.
     pub settings: Settings,
 }
 
@@ -35,15 +56,8 @@ impl Stage {
     /// Makes the cameras, and the folder.
     ///
     /// * `folder`: absolute.
-    pub(super) fn new(arguments: &Arguments, folder: PathBuf) -> Result<Self, Failure> {
+    pub(crate) fn new(cast: &Cast<'_>, folder: PathBuf) -> Result<Self, Failure> {
         std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
-        // An earlier demo's must not be taken for this one's.
-        for name in REPORTS {
-            let file = folder.join(name);
-            if file.exists() {
-                std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
-            }
-        }
         let ring = RigChoice::Ring {
             n: N_CAMERAS,
             radius: RADIUS,
@@ -55,10 +69,10 @@ impl Stage {
             rig: Rig::new(cameras, ring.up_in_world(), ring.source()).or_fail(ExitKind::Run)?,
             settings: Settings {
                 rig: RigChoice::File(folder.join("rig.toml")),
-                subject: arguments.subject,
-                action: arguments.action,
-                seed: arguments.seed,
-                rate_hz: arguments.rate,
+                subject: cast.subject,
+                action: cast.action,
+                seed: cast.seed,
+                rate_hz: cast.rate_hz,
                 ..Settings::default()
             },
             folder,
@@ -66,16 +80,16 @@ impl Stage {
     }
 
     /// Writes the rig and the deployment; its file.
-    pub(super) fn write(&self, arguments: &Arguments) -> Result<PathBuf, Failure> {
+    pub(crate) fn write(&self, cast: &Cast<'_>) -> Result<PathBuf, Failure> {
         let rig = self.folder.join("rig.toml");
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
         let file = self.folder.join("deployment.toml");
-        let text = self.deployment(arguments);
+        let text = self.deployment(cast);
         std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
         Ok(file)
     }
 
-    fn deployment(&self, arguments: &Arguments) -> String {
+    fn deployment(&self, cast: &Cast<'_>) -> String {
         let quoted = |it: &str| toml::Value::from(it).to_string();
         let settings = Settings {
             rig: RigChoice::File(PathBuf::from("rig.toml")),
@@ -85,14 +99,14 @@ impl Stage {
             let address = Address {
                 settings: settings.clone(),
                 camera: it.name.clone(),
-                n_frames: arguments.n_frames(),
+                n_frames: cast.n_frames,
             };
             let (name, source) = (quoted(&it.name), quoted(&address.to_string()));
             format!("\n[[camera]]\nname = {name}\nsource = {source}\n")
         };
         let cameras: Vec<String> = self.rig.cameras().iter().map(camera).collect();
         format!(
-            "# Written by `parallax demo`: subject {}, {}, before cameras that make their pictures while they run.\n\
+            "# Written by `parallax {}`: subject {}, {}, before cameras that make their pictures while they run.\n\
              # The same without a killed camera and without the truth: parallax run deployment.toml\n\n\
              name = {}\nrig = \"rig.toml\"\noutput = \"run\"\n{}\n\
              [capture]\nmode = \"realtime\"       # keep up with the clock; what there is no time for is dropped and counted\n\
@@ -101,17 +115,18 @@ impl Stage {
              [record]\noverlay_every = {OVERLAY_EVERY}\n\n\
              [supervise]\ndeadline_ms = {}        # how long a stage waits for a view that is late\n\
              hang_limit_s = 60        # a machine that is busy is slow, not hung\n",
+            cast.command,
             self.settings.subject,
             self.settings.action.name(),
-            quoted(&arguments.name),
+            quoted(cast.name),
             cameras.concat(),
             self.settings.rate_hz,
-            arguments.deadline_ms,
+            cast.deadline_ms,
         )
     }
 
     /// Where the joints of `skeleton::PARSE14` are in some frames, metres in the world.
-    pub(super) fn truth(
+    pub(crate) fn truth(
         &self,
         frames: impl Iterator<Item = u64>,
     ) -> Result<Vec<Vec<Point>>, Failure> {
@@ -140,13 +155,13 @@ fn smaller(camera: &Camera) -> Camera {
 }
 
 /// The action of a name, for the command line.
-pub(super) fn action(name: &str) -> Result<Action, String> {
+pub(crate) fn action(name: &str) -> Result<Action, String> {
     let known = || Action::ALL.map(Action::name).join(", ");
     Action::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
 }
 
 /// An absolute path, for processes that work in any folder.
-pub(super) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
     std::path::absolute(folder).or_fail(ExitKind::Usage)
 }
 

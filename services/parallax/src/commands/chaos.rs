@@ -1,0 +1,294 @@
+//! `parallax chaos`: a deployment with a fault made on purpose, once for every fault, and what held.
+
+mod barrage;
+mod census;
+mod ground;
+mod judge;
+mod orphans;
+mod scenario;
+mod verdict;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use fastrand::Rng;
+use runtime::{ExitKind, Failure, now_nanos};
+use serde_json::{Value, json};
+
+use super::run::Planned;
+use crate::cli::Globals;
+use crate::trial::cost::{Cost, Trace};
+use crate::trial::strike::{Blow, Strike};
+use crate::{inputs, output};
+use barrage::Barrage;
+use census::Census;
+use ground::Ground;
+use judge::{Asked, Barraged};
+use scenario::{Scenario, service_of};
+use verdict::Verdict;
+
+const HELP: &str = "\
+Every scenario is a run of its own, with real processes and a real fault; --list names them. Without a DEPLOYMENT the \
+cameras are those of `parallax demo`: four that do not exist, so nothing is needed. With one, what it says about mode, \
+pace, deadline and hang limit holds; its results stay where they are, for those of every scenario go to \
+OUT/<scenario>; it may run at the same time, for its name becomes <name>-chaos.
+
+What must hold when a process is killed: its death is noticed within a second; it is back within --max-return-ms; \
+where others can go on without it, no pause between two results is longer than --max-pause-ms; what became of every \
+frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
+itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
+within the hang limit (3 s, or the deployment's, but 10 s at most) and two seconds, and may be away longer by that limit. With \
+kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
+a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
+a tenth, 32 MB and 8 files. With kill-supervisor its processes end by themselves within a second, and the next start \
+of the same deployment removes what was left, and works.
+
+`back` is when the process sent what the first result of its new life is made of; of fuse, quality and record, which no \
+result names, when it gave a sign of having worked. Restarts are not limited here (supervise.max_restarts), and no \
+pictures are drawn.
+
+It leaves OUT/chaos.json, which --json prints too.
+
+Exit codes: 0 all held; 6 something did not (the table names it); 1 it could not be tried; 2 the command line is \
+wrong; 130 stopped by Ctrl-C.
+
+Examples:
+    parallax chaos
+    parallax chaos --scenario kill-pose,kill-supervisor
+    parallax chaos my.toml --scenario kill-random --seconds 600 --seed 7 --json";
+
+/// What to try.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(crate) struct Arguments {
+    /// The deployment file; four cameras that do not exist if not given.
+    deployment: Option<PathBuf>,
+    /// What is to happen, separated by commas; everything that the deployment has processes for if not given.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
+    scenario: Vec<Scenario>,
+    /// Name the scenarios, and do nothing.
+    #[arg(long)]
+    list: bool,
+    /// Chooses the victims, and the performance of the person who does not exist.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Footage of every run, seconds.
+    #[arg(long, value_name = "S", default_value_t = 15, value_parser = clap::value_parser!(u32).range(4..=36_000))]
+    seconds: u32,
+    /// Folder for the report and the results.
+    #[arg(long, value_name = "DIR", default_value = "out/chaos")]
+    out: PathBuf,
+    /// Name of the deployment while it is tried: two that run at once need two.
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Limits that can be asked for.
+    #[command(flatten)]
+    limits: Asked,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The fault comes after this share of the frames; at random, from the first result up to the other share.
+const STRIKE_AFTER: f64 = 0.4;
+const BARRAGE_UNTIL: f64 = 0.8;
+/// Nanoseconds between two kills.
+const BARRAGE_PERIOD: u64 = 2_000_000_000;
+/// How long a process of the cameras that do not exist may stand still, where that is tried.
+const SHORT_HANG: &str = "supervise.hang_limit_s=3";
+
+/// Tries everything that is asked for, and judges it.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    if arguments.list {
+        for it in Scenario::all() {
+            output::line(format_args!("{:<17} {}", it.name(), it.says()))?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let ground = Ground::new(arguments, globals)?;
+    let processes = ground.plan("", &[])?;
+    let processes: Vec<String> = processes.processes().map(str::to_owned).collect();
+    let mut verdicts = Vec::new();
+    for scenario in chosen(&arguments.scenario, &processes)? {
+        if !globals.quiet {
+            let (name, says) = (scenario.name(), scenario.says());
+            output::message(format_args!("{name}: {says}"));
+        }
+        verdicts.push(attempt(&ground, arguments, scenario)?);
+        if ground.stop.is_requested() {
+            output::message("stopped: nothing is judged, and no report written");
+            return Ok(ExitCode::from(ExitKind::Interrupted.status()));
+        }
+    }
+    let held = verdicts.iter().all(Verdict::is_held);
+    let scenarios: Vec<Value> = verdicts.iter().map(Verdict::json).collect();
+    let json = json!({ "schema_version": 1, "held": held, "scenarios": scenarios });
+    let file = ground.folder.join("chaos.json");
+    std::fs::write(&file, format!("{json:#}\n")).map_err(|error| inputs::in_file(&file, &error))?;
+    if arguments.json {
+        output::json(&json)?;
+    } else if !globals.quiet {
+        output::line(verdict::table(&verdicts))?;
+    }
+    let status = if held { 0 } else { ExitKind::Limit.status() };
+    Ok(ExitCode::from(status))
+}
+
+/// What was asked for, or all that the deployment has processes for.
+fn chosen(asked: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
+    if asked.is_empty() {
+        let mut all = Scenario::all();
+        all.retain(|it| it.is_possible(processes));
+        return Ok(all);
+    }
+    match asked.iter().find(|it| !it.is_possible(processes)) {
+        None => Ok(asked.to_vec()),
+        Some(it) => {
+            let message = format!("{}: the deployment has no such process", it.name());
+            Err(Failure::new(ExitKind::Usage, message))
+        }
+    }
+}
+
+fn attempt(ground: &Ground, arguments: &Arguments, it: Scenario) -> Result<Verdict, Failure> {
+    match it {
+        Scenario::Once(blow, service) => once(ground, arguments, blow, service),
+        Scenario::Random => random(ground, arguments),
+        Scenario::Supervisor => supervisor(ground, arguments),
+    }
+}
+
+fn once(
+    ground: &Ground,
+    arguments: &Arguments,
+    blow: Blow,
+    service: &'static str,
+) -> Result<Verdict, Failure> {
+    let scenario = Scenario::Once(blow, service).name();
+    let is_short = blow == Blow::Stop && ground.is_synthetic;
+    let more: &[&str] = if is_short { &[SHORT_HANG] } else { &[] };
+    let planned = ground.plan(&scenario, more)?;
+    let victims: Vec<&str> = planned.processes().collect();
+    let victims = victims.into_iter().filter(|it| service_of(it) == service);
+    let process = Rng::with_seed(arguments.seed).choice(victims.collect::<Vec<_>>());
+    let process = process.unwrap_or(service).to_owned();
+    let mut strike = Strike::new(blow, &process, frame_at(&planned, STRIKE_AFTER));
+    let ran = ground.watch(&planned, &mut |event| {
+        strike.note(event, now_nanos(), Blow::deal)
+    });
+    let times = strike.times();
+    let cost = Cost::new(trace_of(&process), times, planned.session(), &ran.moments);
+    let struck = |it: &str| u32::from(it == process && times.killed.is_some());
+    let after = ran.aftermath(struck);
+    let policy = planned.plan().policy;
+    let hang_ms = policy.hang_limit.min(policy.silence_limit).as_millis() as f64;
+    Ok(Verdict {
+        scenario,
+        measured: verdict::of_cost(&process, &cost, after.n_results),
+        numbers: json!({ "process": process, "cost": cost }),
+        limits: judge::once(&arguments.limits, blow, &process, hang_ms, (&cost, &after)),
+        run: ran.json(),
+    })
+}
+
+fn random(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
+    let scenario = Scenario::Random.name();
+    let planned = ground.plan(&scenario, &[])?;
+    let until = frame_at(&planned, BARRAGE_UNTIL) as u64;
+    let mut barrage = Barrage::new(arguments.seed, BARRAGE_PERIOD, until);
+    let mut census = Census::default();
+    let namespace = &planned.plan().namespace;
+    let ran = ground.watch(&planned, &mut |event| {
+        let now = now_nanos();
+        census.note(event, now, |pids| census::look(namespace, pids));
+        barrage.note(event, now, runtime::kill)
+    });
+    let kills = barrage.kills();
+    let struck = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
+    let after = ran.aftermath(struck);
+    let mut away_ms: Vec<f64> = kills.iter().filter_map(barrage::Kill::away_ms).collect();
+    away_ms.sort_by(f64::total_cmp);
+    let it = Barraged {
+        n_kills: kills.len(),
+        away_ms,
+        held: census.ends(),
+    };
+    let [p50, p99] = [0.5, 0.99].map(|share| it.away(share));
+    let each = kills
+        .iter()
+        .map(|it| json!({ "process": it.process, "back_ms": it.away_ms() }));
+    Ok(Verdict {
+        scenario,
+        measured: verdict::of_barrage(&it, after.n_results),
+        numbers: json!({
+            "kills": each.collect::<Vec<_>>(),
+            "back_ms": { "p50": p50, "p99": p99 },
+            "first_and_last": it.held,
+        }),
+        limits: judge::random(&arguments.limits, &it, &after),
+        run: ran.json(),
+    })
+}
+
+fn supervisor(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
+    let scenario = Scenario::Supervisor.name();
+    let mut it = orphans::kill(ground, &scenario, &ground.plan(&scenario, &[])?)?;
+    let planned = ground.plan(&scenario, &[])?;
+    let ran = ground.watch(&planned, &mut |_| None);
+    let sent = ran.moments.iter().map(|it| it.sent_ms);
+    it.result_ms = sent.reduce(f64::min);
+    let after = ran.aftermath(|_| 0);
+    Ok(Verdict {
+        scenario,
+        measured: verdict::of_orphans(&it, after.n_results),
+        numbers: json!({ "children_ended_ms": it.ended_ms, "files_left": it.files, "next_result_ms": it.result_ms }),
+        limits: judge::supervisor(&arguments.limits, &it, &after),
+        run: ran.json(),
+    })
+}
+
+/// The frame after a share of all of them.
+fn frame_at(planned: &Planned, share: f64) -> f64 {
+    let capture = &planned.resolved().deployment.capture;
+    let nth = share * planned.resolved().n_frames() as f64;
+    capture.start_frame as f64 + nth.floor() * capture.frame_step as f64
+}
+
+/// Where the results name the lives of a process.
+fn trace_of(process: &str) -> Trace {
+    let view = |it: &str| process.strip_prefix(it)?.parse().ok();
+    match (view("capture-"), view("pose-"), process) {
+        (Some(view), _, _) => Trace::Camera(view),
+        (_, Some(view), _) => Trace::Pose(view),
+        (_, _, "triangulate") => Trace::Result,
+        _ => Trace::Nowhere,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_name_the_lives_of_those_they_are_made_of() {
+        assert_eq!(trace_of("capture-2"), Trace::Camera(2));
+        assert_eq!(trace_of("pose-11"), Trace::Pose(11));
+        assert_eq!(trace_of("triangulate"), Trace::Result);
+        for process in ["fuse-0", "quality-1", "record"] {
+            assert_eq!(trace_of(process), Trace::Nowhere, "{process}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
+        let processes = ["capture-0", "pose-0", "triangulate", "record"].map(str::to_owned);
+        let all = chosen(&[], &processes).unwrap();
+        assert_eq!(all.len(), 10);
+        let quality = Scenario::Once(Blow::Kill, "quality");
+        assert!(!all.contains(&quality));
+        let refused = chosen(&[all[0], quality], &processes).unwrap_err();
+        assert!(refused.to_string().contains("kill-quality"), "{refused}");
+        assert_eq!(chosen(&[all[1]], &processes).unwrap(), [all[1]]);
+    }
+}

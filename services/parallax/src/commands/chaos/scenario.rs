@@ -1,0 +1,113 @@
+//! The faults that can be asked for, by name.
+
+use crate::trial::strike::Blow;
+
+/// The services, in the order in which a frame passes them.
+const SERVICES: [&str; 6] = [
+    "capture",
+    "pose",
+    "quality",
+    "fuse",
+    "triangulate",
+    "record",
+];
+
+/// A fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scenario {
+    /// One process of a service is struck once.
+    Once(Blow, &'static str),
+    /// Processes chosen at random are killed, one after the other.
+    Random,
+    /// `parallax run` itself is killed.
+    Supervisor,
+}
+
+impl Scenario {
+    /// All of them.
+    pub(super) fn all() -> Vec<Self> {
+        let once = |blow| SERVICES.map(|it| Self::Once(blow, it));
+        let mut all = Vec::from(once(Blow::Kill));
+        all.push(Self::Random);
+        all.extend(once(Blow::Stop));
+        all.push(Self::Supervisor);
+        all
+    }
+
+    /// The one of a name, for the command line.
+    pub(super) fn by_name(name: &str) -> Result<Self, String> {
+        let found = Self::all().into_iter().find(|it| it.name() == name);
+        found.ok_or_else(|| "there is none of this name; --list names them all".to_owned())
+    }
+
+    /// Its name.
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::Once(Blow::Kill, service) => format!("kill-{service}"),
+            Self::Once(Blow::Stop, service) => format!("hang-{service}"),
+            Self::Random => "kill-random".to_owned(),
+            Self::Supervisor => "kill-supervisor".to_owned(),
+        }
+    }
+
+    /// What happens, for people.
+    pub(super) fn says(self) -> String {
+        match self {
+            Self::Once(Blow::Kill, service) => format!("a {service} process is killed (SIGKILL)"),
+            Self::Once(Blow::Stop, service) => {
+                format!("a {service} process is stopped (SIGSTOP), as if it hung")
+            }
+            Self::Random => "a process chosen at random is killed every two seconds".to_owned(),
+            Self::Supervisor => {
+                "`parallax run` itself is killed, and the same deployment started again".to_owned()
+            }
+        }
+    }
+
+    /// Whether a deployment has the processes for it.
+    pub(super) fn is_possible(self, processes: &[String]) -> bool {
+        match self {
+            Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
+            Self::Random | Self::Supervisor => true,
+        }
+    }
+}
+
+/// The service of a process.
+pub(super) fn service_of(process: &str) -> &str {
+    process.split_once('-').map_or(process, |it| it.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scenario_is_found_by_its_name_and_no_two_share_one() {
+        let all = Scenario::all();
+        assert_eq!(all.len(), 14);
+        for it in all {
+            assert_eq!(Scenario::by_name(&it.name()), Ok(it));
+        }
+        Scenario::by_name("kill-nobody").unwrap_err();
+    }
+
+    #[test]
+    fn who_is_not_there_cannot_be_struck() {
+        let processes = ["pose-0", "pose-1", "record"].map(str::to_owned);
+        let names: Vec<String> = Scenario::all()
+            .into_iter()
+            .filter(|it| it.is_possible(&processes))
+            .map(Scenario::name)
+            .collect();
+        let expected = [
+            "kill-pose",
+            "kill-record",
+            "kill-random",
+            "hang-pose",
+            "hang-record",
+            "kill-supervisor",
+        ];
+        assert_eq!(names, expected);
+    }
+}
