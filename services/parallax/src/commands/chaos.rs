@@ -24,7 +24,7 @@ use crate::{inputs, output};
 use barrage::Barrage;
 use census::Census;
 use ground::Ground;
-use judge::{Asked, Barraged};
+use judge::{Asked, Barraged, Orphaned};
 use scenario::{Scenario, service_of};
 use verdict::Verdict;
 
@@ -73,8 +73,8 @@ pub(crate) struct Arguments {
     /// Chooses the victims, and the performance of the person who does not exist.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Footage of every run, seconds.
-    #[arg(long, value_name = "S", default_value_t = 15, value_parser = clap::value_parser!(u32).range(4..=36_000))]
+    /// Footage of every run, seconds; a busy machine needs some of them to start.
+    #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
     /// Folder for the report and the results.
     #[arg(long, value_name = "DIR", default_value = "out/chaos")]
@@ -233,12 +233,17 @@ fn random(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
 
 fn supervisor(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
     let scenario = Scenario::Supervisor.name();
-    let mut it = orphans::kill(ground, &scenario, &ground.plan(&scenario, &[])?)?;
+    let killed = orphans::kill(ground, &scenario, &ground.plan(&scenario, &[])?);
+    let (mut it, failure) = match killed {
+        Ok(it) => (it, None),
+        Err(failure) => (Orphaned::default(), Some(failure.to_string())),
+    };
     let planned = ground.plan(&scenario, &[])?;
     let ran = ground.watch(&planned, &mut |_| None);
     let sent = ran.moments.iter().map(|it| it.sent_ms);
     it.result_ms = sent.reduce(f64::min);
-    let after = ran.aftermath(|_| 0);
+    let mut after = ran.aftermath(|_| 0);
+    after.failure = failure.or(after.failure);
     Ok(Verdict {
         scenario,
         measured: verdict::of_orphans(&it, after.n_results),
