@@ -166,13 +166,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let report = Report::new(&run, &arguments.limits);
     let json = report.json(&run);
     let page = page::page(&run, &report, &stage, &loaded.deployment.output);
-    for (name, text) in REPORTS
-        .into_iter()
-        .zip([format!("{json:#}\n"), runpage::html(&page)])
-    {
-        let file = stage.folder.join(name);
-        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
-    }
+    write_reports(&stage, [format!("{json:#}\n"), runpage::html(&page)])?;
     if arguments.json {
         output::json(&json)?;
     } else if !globals.quiet {
@@ -194,6 +188,14 @@ fn remove_reports(stage: &Stage) -> Result<(), Failure> {
         if file.exists() {
             std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
         }
+    }
+    Ok(())
+}
+
+fn write_reports(stage: &Stage, texts: [String; 2]) -> Result<(), Failure> {
+    for (name, text) in REPORTS.into_iter().zip(texts) {
+        let file = stage.folder.join(name);
+        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
     }
     Ok(())
 }
