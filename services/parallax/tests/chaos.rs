@@ -1,5 +1,4 @@
 //! Chaos on a short deployment: real processes, real kills, the verdicts and the exit codes.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
 
