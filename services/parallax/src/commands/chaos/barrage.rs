@@ -32,7 +32,7 @@ pub(super) struct Kill {
     /// What was heard of it.
     pub times: Times,
     /// How often it had been restarted when it began its next life.
-    life: u32,
+    pub life: u32,
 }
 
 impl Kill {

@@ -32,7 +32,7 @@ pub(super) struct Ground {
     /// Whether its cameras are those that do not exist.
     pub is_synthetic: bool,
     /// What is replaced in the file.
-    set: Vec<String>,
+    pub set: Vec<String>,
     /// How much is said.
     pub globals: Globals,
     /// Ends everything.
@@ -42,10 +42,12 @@ pub(super) struct Ground {
 /// A run that is over.
 #[derive(Debug)]
 pub(super) struct Ran {
-    report: Result<Report, Failure>,
+    /// What its summary said.
+    pub report: Result<Report, Failure>,
     /// Its results.
     pub moments: Vec<Moment>,
-    left: Vec<String>,
+    /// What it left in shared memory.
+    pub left: Vec<String>,
 }
 
 impl Ground {
