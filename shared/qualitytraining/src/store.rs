@@ -58,6 +58,12 @@ pub enum StoreError {
     /// Too large for the format.
     #[error("it cannot be written")]
     Encode(#[source] Box<bincode::error::EncodeError>),
+    /// Something follows the content in the payload.
+    #[error("its content ends {left} bytes before its payload")]
+    Left {
+        /// Bytes that follow.
+        left: usize,
+    },
     /// A sample does not have the sizes that the file says.
     #[error("sample {sample} ({file_says}) has other sizes, or numbers that are none")]
     Sample {
@@ -196,8 +202,11 @@ pub(crate) fn unwrap<T: DeserializeOwned>(magic: [u8; 8], bytes: &[u8]) -> Resul
         return Err(StoreError::Checksum { got, expected });
     }
     let decoded = bincode::serde::decode_from_slice(payload, configuration());
-    let (payload, _): (T, usize) = decoded.map_err(|it| StoreError::Payload(Box::new(it)))?;
-    Ok(payload)
+    let (decoded, n_read): (T, usize) = decoded.map_err(|it| StoreError::Payload(Box::new(it)))?;
+    match payload.len() - n_read {
+        0 => Ok(decoded),
+        left => Err(StoreError::Left { left }),
+    }
 }
 
 #[cfg(test)]
@@ -242,6 +251,26 @@ mod tests {
         for n in [0, 7, 8, 27, 28, bytes.len() - 1] {
             assert!(Samples::from_bytes(&bytes[..n]).is_err(), "{n} bytes");
         }
+    }
+
+    #[test]
+    fn what_follows_the_samples_in_a_sound_payload_is_refused() {
+        let longer = wrap(
+            SAMPLES,
+            &(
+                Payload {
+                    tile: samples().tile,
+                    evidence: EVIDENCE_VERSION,
+                    all: samples().all,
+                },
+                7_u8,
+            ),
+        );
+        let refused = Samples::from_bytes(&longer.unwrap());
+        assert!(
+            matches!(refused, Err(StoreError::Left { left: 1 })),
+            "{refused:?}"
+        );
     }
 
     #[test]
