@@ -51,7 +51,7 @@ pub struct AllViewsEstimate {
 /// which its conclusion leaves for later work. One view is solved exactly while all others are fixed: its terms
 /// are the sums of those that each other view alone would add, so the graph stays a tree. Views
 /// take turns, those that are trusted least first, and a solution is taken only if the energy rises: it
-/// never falls, and a cycle is impossible. It ends when no view can raise the energy alone
+/// never falls, and a cycle is impossible (but see [`SwitchBy::Support`](crate::SwitchBy::Support)). It ends when no view can raise the energy alone
 /// (but for what `epsilon_px` lets pass), or after `max_iterations / 2` solutions of every view.
 ///
 /// What it is worth, by PCP3D of `parallax eval`, distances capped at 6 cells (`max_distance_cells`),

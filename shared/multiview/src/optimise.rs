@@ -63,7 +63,8 @@ pub struct PairEstimate {
 /// fixed, then exchanging roles (section 6). The first support is the view of lower expected error,
 /// summed over its parts, or the one of higher score if either view has no expectation.
 ///
-/// Under [`EnergyKind::Paper`] a solution is taken only if the energy rises, so the energy never falls
+/// Under [`EnergyKind::Paper`] a solution is taken only if the energy rises, as the view that is solved
+/// sees it; with [`SwitchBy::Either`](crate::SwitchBy::Either) both see the same, so the energy never falls
 /// and a cycle is impossible. It ends when a view answers the other one's answer by staying as it is:
 /// then neither view alone can raise the energy (but for what `epsilon_px` lets pass).
 ///

@@ -8,7 +8,7 @@ use crate::Compatibility;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EnergyKind {
     /// The paper's: squared point-to-line distances in both directions, joint type table, a part
-    /// switched off if either view is expected to be off.
+    /// switched off if either view is expected to be off (but see [`SwitchBy`]).
     #[default]
     Paper,
     /// What the authors' program computes: normalised heat maps, conditional type tables, a part
