@@ -35,6 +35,7 @@ mod select;
 
 mod picture;
 mod sample;
+mod sides;
 
 mod table;
 
@@ -45,4 +46,5 @@ pub use picture::Picture;
 pub use read::{DatasetError, ReadOptions, read};
 pub use sample::Sample;
 pub use select::{SelectError, Selection};
+pub use sides::Sides;
 pub use table::{SkeletonFileError, SkeletonSpec, SkeletonTable, TableError};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use datasets::{Person, Picture, ReadOptions, Selection};
+use datasets::{Person, Picture, ReadOptions, Selection, Sides, SkeletonTable};
 use evaluation::{
     PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering, evaluate,
 };
@@ -48,9 +48,17 @@ pub(crate) struct Arguments {
     /// Who is left out.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     without: Option<Selection>,
+    /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
+    /// exchanged.
+    #[arg(long, value_name = "SIDES", default_value = "marked", value_parser = sides)]
+    sides: Sides,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+fn sides(name: &str) -> Result<Sides, String> {
+    Sides::by_name(name).ok_or_else(|| "expected marked or seen".to_owned())
 }
 
 fn selection(text: &str) -> Result<Selection, String> {
@@ -74,7 +82,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         ..ReadOptions::default()
     };
     let read = datasets::read(&arguments.dataset, &options);
-    let people = read.map_err(super::train::unread)?;
+    let mut people = read.map_err(super::train::unread)?;
+    let mirror = SkeletonTable::published().joint_mirror().to_vec();
+    let sided = people.people.into_iter();
+    people.people = sided.map(|it| arguments.sides.of(it, &mirror)).collect();
     for problem in &people.problems {
         let (message, fault) = (problem, &problem.fault);
         output::message(format_args!("left out: {message}: {fault}"));

@@ -39,8 +39,12 @@ JSON lines, one person each, image paths relative to the file:
 says otherwise the joints are the 14 of PARSE and LSP: right ankle, knee, hip, left hip, knee, \
 ankle, right wrist, elbow, shoulder, left shoulder, elbow, wrist, neck, top of the head.
 
-Rows of a data set count from 1. With several data sets, --only, --without and --rotate name the \
-one they mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
+The model knows left and right by the side of the picture. PARSE is marked so; in LSP and \
+LSP-extended people who are seen from behind are marked by their own sides, which --sides LSP=seen \
+undoes.
+
+Rows of a data set count from 1. With several data sets, --only, --without, --rotate and --sides name \
+the one they mean, as it was written: --only PARSE=1-100. A selection is a list of rows (1-100,150), or \
 a file with a row, a range of rows or the file name of an image a line; what it names must be there.
 
 The training is a list of steps. After each one everything it knows is in OUT.checkpoint, so that \
@@ -60,7 +64,7 @@ Examples:
     parallax train fmp PARSE --only 1-100 --rotate -15,-7.5,7.5,15 \\
         --negatives INRIA/neg --out person.fmp
     parallax train fmp PARSE lsp/joints.mat --only PARSE=1-100 --rotate PARSE=-15,15 \\
-        --without lsp/joints.mat=held-out.txt \\
+        --sides lsp/joints.mat=seen --without lsp/joints.mat=held-out.txt \\
         --negatives INRIA/neg --judge holiday-photos --out person.fmp
     parallax train fmp --print-settings > settings.toml
     parallax model judge person.fmp PARSE --only 101-200";

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use datasets::{
-    DatasetError, FaultKind, People, Person, Picture, ReadOptions, Selection, SkeletonTable,
+    DatasetError, FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable,
 };
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -29,6 +29,10 @@ pub(super) struct Chosen {
     /// Who of a data set is left out: a test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
+    /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
+    /// exchanged; marked if not given.
+    #[arg(long, value_name = "[DATASET=]SIDES")]
+    sides: Vec<String>,
     /// Train on turned copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
     #[arg(long, value_name = "[DATASET=]DEGREES,...", allow_hyphen_values = true)]
     rotate: Vec<String>,
@@ -112,9 +116,13 @@ impl Data {
         let options = options(arguments, table)?;
         let all = &arguments.datasets;
         let angles = deal(all, "--rotate", &arguments.rotate, true)?;
-        for ((path, options), angles) in all.iter().zip(&options).zip(angles) {
+        let sides = deal(all, "--sides", &arguments.sides, true)?;
+        for (((path, options), angles), sides) in all.iter().zip(&options).zip(angles).zip(sides) {
             let angles = degrees(&angles)?;
+            let sides = self::sides(&sides)?;
             let People { people, problems } = datasets::read(path, options).map_err(unread)?;
+            let people = people.into_iter();
+            let people = people.map(|it| sides.of(it, table.joint_mirror()));
             for problem in problems {
                 *data
                     .left_out
@@ -122,8 +130,7 @@ impl Data {
                     .or_default() += 1;
                 progress.left_out(&problem)?;
             }
-            data.people
-                .extend(people.into_iter().map(|it| (it, angles.clone())));
+            data.people.extend(people.map(|it| (it, angles.clone())));
         }
         if data.people.is_empty() {
             let n: usize = data.left_out.values().sum();
@@ -231,6 +238,17 @@ fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     Ok(angles)
 }
 
+/// Whose left and right the joints of a data set are called by: the last word counts.
+fn sides(values: &[&str]) -> Result<Sides, Failure> {
+    let Some(name) = values.last() else {
+        return Ok(Sides::default());
+    };
+    Sides::by_name(name).ok_or_else(|| {
+        let message = format!("--sides {name}: expected marked or seen");
+        Failure::new(ExitKind::Usage, message)
+    })
+}
+
 /// A selection that means nobody is a slip on the command line, all else is the data set's fault.
 pub(crate) fn unread(error: DatasetError) -> Failure {
     let kind = match error {
@@ -243,6 +261,13 @@ pub(crate) fn unread(error: DatasetError) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sides_are_as_marked_unless_said() {
+        assert_eq!(sides(&[]).unwrap(), Sides::Marked);
+        assert_eq!(sides(&["marked", "seen"]).unwrap(), Sides::Seen);
+        assert_eq!(sides(&["left"]).unwrap_err().kind(), ExitKind::Usage);
+    }
 
     #[test]
     fn angles_are_what_was_written_after_no_turn() {
