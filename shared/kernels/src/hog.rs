@@ -28,6 +28,32 @@ const FLAT: f64 = 0.0001;
 /// Weight of the texture channels, about `1 / sqrt(18)`.
 const TEXTURE: f64 = 0.2357;
 
+/// Where a channel's value goes when the picture is seen in a mirror (left and right exchanged).
+///
+/// An orientation of 20 k degrees becomes one of 180 - 20 k, and the blocks of 2 x 2 cells to the left of
+/// the cell, of which the texture channels speak, become those to its right. Its own inverse.
+pub const MIRRORED_CHANNEL: [usize; N_CHANNELS] = {
+    let mut to = [0; N_CHANNELS];
+    let mut o = 0;
+    while o < N_ORIENTATIONS {
+        to[o] = (N_ORIENTATIONS + N_UNSIGNED - o) % N_ORIENTATIONS;
+        o += 1;
+    }
+    o = 0;
+    while o < N_UNSIGNED {
+        to[N_ORIENTATIONS + o] = N_ORIENTATIONS + (N_UNSIGNED - o) % N_UNSIGNED;
+        o += 1;
+    }
+    let texture = N_ORIENTATIONS + N_UNSIGNED;
+    o = 0;
+    while o < 4 {
+        to[texture + o] = texture + (o + 2) % 4;
+        o += 1;
+    }
+    to[N_CHANNELS - 1] = N_CHANNELS - 1;
+    to
+};
+
 /// How the feature map of an image is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HogShape {
@@ -202,6 +228,30 @@ mod tests {
                     let mut got = vec![f32::NAN; misaligned + want.len()];
                     hog(isa, image, shape, &mut workspace, &mut got[misaligned..]);
                     prop_assert!(got[misaligned..] == want, "{:?}", isa);
+                }
+            }
+        }
+
+        #[test]
+        fn a_mirrored_image_has_mirrored_features(cells in [3..9_usize, 3..9_usize], seed in any::<u64>()) {
+            // Samples of which no two gradients are alike, so that no orientation is a draw.
+            let [width, height] = cells.map(|it| 4 * it);
+            let mut state = seed | 1;
+            let samples = std::iter::repeat_with(|| {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            });
+            let samples: Vec<f64> = samples.take(3 * width * height).collect();
+            let rows = samples.chunks_exact(width);
+            let mirrored = rows.flat_map(|row| row.iter().rev()).copied().collect();
+            let plain = hog_f64(&Planes::from_samples(width, height, samples.clone()), SHAPE);
+            let mirrored = hog_f64(&Planes::from_samples(width, height, mirrored), SHAPE);
+            let cols = SHAPE.map_size(width, height)[1];
+            for (at, cell) in plain.chunks_exact(N_CHANNELS).enumerate() {
+                let there = at / cols * cols + cols - 1 - at % cols;
+                for (channel, to) in MIRRORED_CHANNEL.into_iter().enumerate() {
+                    let got = mirrored[there * N_CHANNELS + to];
+                    prop_assert!((cell[channel] - got).abs() < 1e-9, "channel {}", channel);
                 }
             }
         }

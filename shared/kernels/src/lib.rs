@@ -29,7 +29,7 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
 
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use envelope::{Transformed, transform_f64};
-pub use hog::{HogShape, HogWorkspace, N_CHANNELS, hog, hog_f64};
+pub use hog::{HogShape, HogWorkspace, MIRRORED_CHANNEL, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
 pub use peak::Peak;

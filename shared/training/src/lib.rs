@@ -19,6 +19,7 @@ mod scale;
 mod settings;
 mod shape;
 mod sparse;
+mod symmetry;
 #[cfg(test)]
 mod testing;
 mod trainer;

@@ -123,7 +123,8 @@ impl Plan {
                 .collect()
         };
         let in_cells: Vec<Vec<[f64; 2]>> = large.iter().map(in_cells).collect();
-        let Types { of_person, anchors } = cluster(&in_cells, &tree.parents, settings);
+        let mirror = tree.mirror.as_deref().filter(|_| settings.symmetric);
+        let Types { of_person, anchors } = cluster(&in_cells, (&tree.parents, mirror), settings);
         let planned = large.iter().zip(of_person).map(|(&person, types)| Planned {
             person,
             parts: people[person].clone(),

@@ -8,7 +8,7 @@ use crate::types::TypesBy;
 /// Everything about a training that is not its data.
 ///
 /// The defaults are those of Yang & Ramanan 2013, as far as they are known, but for what keeps memory
-/// and time in bounds (`per_image`, `room`, `cache_mib`, `batch`, `passes`).
+/// and time in bounds (`per_image`, `room`, `cache_mib`, `batch`, `passes`), and `symmetric`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Settings {
@@ -16,6 +16,9 @@ pub struct Settings {
     pub n_types: usize,
     /// What the types of a part are told apart by.
     pub types_by: TypesBy,
+    /// Whether the left side of the body is the mirror image of the right one: types, filters, springs and
+    /// biases. Only true of people who are trained on with their mirror images.
+    pub symmetric: bool,
     /// Random starts of every clustering, of which the tightest is taken.
     pub cluster_starts: usize,
     /// Side of a feature cell, pixels of its level.
@@ -64,6 +67,7 @@ impl Default for Settings {
         Self {
             n_types: 6,
             types_by: TypesBy::Parent,
+            symmetric: true,
             cluster_starts: 100,
             cell_px: 4,
             max_filter_cells: 5,

@@ -19,6 +19,7 @@ use crate::plan::Plan;
 use crate::scale::quantile;
 use crate::settings::Settings;
 use crate::shape::Coordinates;
+use crate::symmetry::Symmetry;
 use crate::watch::{Event, Step, Watch};
 
 pub use checkpoint::{Checkpoint, CheckpointBytesError, CheckpointError};
@@ -79,6 +80,8 @@ pub struct Trainer<'a> {
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
     /// Where every person was placed last.
     right: Vec<Option<Placed>>,
+    /// What makes either side of the body the mirror image of the other.
+    symmetry: Option<Symmetry>,
     v: Vec<f64>,
     threshold: f64,
 }
@@ -113,6 +116,10 @@ impl<'a> Trainer<'a> {
             next: 0,
             cells: Mutex::default(),
             right: vec![None; plan.n_people()],
+            symmetry: settings
+                .symmetric
+                .then(|| Symmetry::of(plan.shape()))
+                .flatten(),
             v: vec![0.0; at.len()],
             threshold: 0.0,
             plan,
@@ -176,6 +183,13 @@ impl<'a> Trainer<'a> {
         }
     }
 
+    fn balanced(&self, v: Vec<f64>) -> Vec<f64> {
+        match &self.symmetry {
+            Some(symmetry) => symmetry.balance(&v),
+            None => v,
+        }
+    }
+
     fn go_on(&self) -> Result<(), TrainError> {
         if self.watch.go_on() {
             Ok(())
@@ -193,7 +207,8 @@ impl<'a> Trainer<'a> {
             effort: self.effort(),
             seed: self.settings.seed,
         };
-        self.v = first_model(self.plan.shape(), &people, &background, &settings);
+        let v = first_model(self.plan.shape(), &people, &background, &settings);
+        self.v = self.balanced(v);
         Ok(())
     }
 
@@ -230,7 +245,7 @@ impl<'a> Trainer<'a> {
         self.machine.solve(effort, random, &mut told);
         self.go_on()?;
         self.forget();
-        self.v = self.machine.solution();
+        self.v = self.balanced(self.machine.solution());
         Ok(())
     }
 

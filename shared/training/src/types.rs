@@ -25,61 +25,194 @@ pub(crate) struct Types {
 
 /// Clusters every part of all people into types by k-means.
 ///
+/// With a mirror the types of a part are the mirrored ones of the part on the other side, number by
+/// number. Those of a part in the middle come in mirrored pairs, 0 and 1, 2 and 3...; if their number is
+/// odd, it has one less.
+///
 /// Fewer types are found where fewer people differ.
 ///
 /// * `people`: centres of the parts of every person, in cells of the level at which the person has
 ///   the size of the model.
+/// * `mirror`: the part on the other side of the body, its own inverse and true to the tree.
 pub(crate) fn cluster(
     people: &[Vec<[f64; 2]>],
-    parents: &[Option<usize>],
+    (parents, mirror): (&[Option<usize>], Option<&[usize]>),
     settings: &Settings,
 ) -> Types {
-    let labels: Vec<Vec<usize>> = (0..parents.len())
-        .into_par_iter()
-        .map(|part| {
-            let neighbours = neighbours(parents, part, settings.types_by);
-            let features = people.iter().map(|it| {
-                let offsets = neighbours.iter().flat_map(|&of| offset(it, part, of));
-                offsets.collect()
-            });
-            let features: Vec<Vec<f64>> = features.collect();
-            let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
-            k_means(&features, settings, &mut random)
-        })
-        .collect();
-    let anchor_of = |(part, labels): (usize, &Vec<usize>)| {
-        let mut sums = vec![[0.0; 3]; labels.iter().max().map_or(0, |it| it + 1)];
-        for (person, &label) in people.iter().zip(labels) {
-            let [x, y] = parents[part].map_or([0.0; 2], |of| offset(person, part, of));
-            let sum = &mut sums[label];
-            *sum = [sum[0] + x, sum[1] + y, sum[2] + 1.0];
+    let other = |part: usize| mirror.map_or(part, |it| it[part]);
+    let clustered = |part: usize| -> Vec<(usize, OfPart)> {
+        let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
+        let sight = Sight::of(part, parents, settings.types_by);
+        match mirror {
+            Some(mirror) if other(part) == part && settings.n_types > 1 => {
+                let both = [
+                    sight.offsets(people),
+                    sight.mirrored(mirror).offsets(people),
+                ];
+                vec![(part, in_the_middle(both, settings, &mut random))]
+            }
+            Some(mirror) if other(part) != part => {
+                let own = OfPart::clustered(&sight.offsets(people), settings, &mut random);
+                let theirs = sight.mirrored(mirror).offsets(people);
+                let theirs = own.mirrored(&theirs);
+                vec![(part, own), (other(part), theirs)]
+            }
+            _ => {
+                let own = OfPart::clustered(&sight.offsets(people), settings, &mut random);
+                vec![(part, own)]
+            }
         }
-        let mean = |[x, y, n]: &[f64; 3]| [x / n, y / n].map(|it| it.round() as i32);
-        sums.iter().map(mean).collect()
     };
+    let mut parts: Vec<(usize, OfPart)> = (0..parents.len())
+        .into_par_iter()
+        .filter(|&it| it <= other(it))
+        .flat_map_iter(clustered)
+        .collect();
+    parts.sort_unstable_by_key(|it| it.0);
+    let of_person = |person: usize| parts.iter().map(|it| it.1.labels[person]).collect();
     Types {
-        anchors: labels.iter().enumerate().map(anchor_of).collect(),
-        of_person: (0..people.len())
-            .map(|person| labels.iter().map(|it| it[person]).collect())
-            .collect(),
+        of_person: (0..people.len()).map(of_person).collect(),
+        anchors: parts.iter().map(|it| it.1.anchors()).collect(),
     }
 }
 
-/// The parts whose offsets tell the types of `part` apart.
-fn neighbours(parents: &[Option<usize>], part: usize, by: TypesBy) -> Vec<usize> {
-    let children = (0..parents.len()).filter(|&it| parents[it] == Some(part));
-    let mut found: Vec<_> = parents[part].into_iter().collect();
-    match by {
-        TypesBy::Parent if found.is_empty() => found.extend(children.take(1)),
-        TypesBy::Parent => {}
-        TypesBy::Neighbours => found.extend(children),
-    }
-    found
+/// What of a person the types of a part are told apart by.
+struct Sight {
+    part: usize,
+    neighbours: Vec<usize>,
+    /// Seen in a mirror: offsets to the left count as to the right.
+    in_mirror: bool,
 }
 
-/// Where `part` lies as seen from `of`.
-fn offset(person: &[[f64; 2]], part: usize, of: usize) -> [f64; 2] {
-    [0, 1].map(|axis| person[part][axis] - person[of][axis])
+impl Sight {
+    /// The parts whose offsets tell the types of `part` apart, its parent first.
+    fn of(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
+        let children = (0..parents.len()).filter(|&it| parents[it] == Some(part));
+        let mut neighbours: Vec<_> = parents[part].into_iter().collect();
+        match by {
+            TypesBy::Parent if neighbours.is_empty() => neighbours.extend(children.take(1)),
+            TypesBy::Parent => {}
+            TypesBy::Neighbours => neighbours.extend(children),
+        }
+        Self {
+            part,
+            neighbours,
+            in_mirror: false,
+        }
+    }
+
+    /// The same of the other side of the body.
+    fn mirrored(&self, mirror: &[usize]) -> Self {
+        Self {
+            part: mirror[self.part],
+            neighbours: self.neighbours.iter().map(|&it| mirror[it]).collect(),
+            in_mirror: !self.in_mirror,
+        }
+    }
+
+    /// Offsets from the neighbours, cells, one point a person: `x, y, x, y...`.
+    fn offsets(&self, people: &[Vec<[f64; 2]>]) -> Vec<Vec<f64>> {
+        let of_person = |person: &Vec<[f64; 2]>| {
+            let from = |&of: &usize| {
+                let [x, y] = [0, 1].map(|axis| person[self.part][axis] - person[of][axis]);
+                [if self.in_mirror { -x } else { x }, y]
+            };
+            self.neighbours.iter().flat_map(from).collect()
+        };
+        people.iter().map(of_person).collect()
+    }
+}
+
+/// The types of one part.
+struct OfPart {
+    /// Type of every person's part.
+    labels: Vec<usize>,
+    /// The middle of every type.
+    centres: Vec<Vec<f64>>,
+}
+
+impl OfPart {
+    fn clustered(points: &[Vec<f64>], settings: &Settings, random: &mut fastrand::Rng) -> Self {
+        let labels = k_means(points, settings, random);
+        let mut centres = vec![Vec::new(); labels.iter().max().map_or(0, |it| it + 1)];
+        for (label, centre) in centres.iter_mut().enumerate() {
+            let members = labels.iter().zip(points).filter(|it| *it.0 == label);
+            *centre = middle(members.map(|it| it.1));
+        }
+        Self { labels, centres }
+    }
+
+    /// The types of the other side of the body: everybody has the one whose mirror image is nearest.
+    ///
+    /// * `points`: the other side as it is seen in a mirror.
+    fn mirrored(&self, points: &[Vec<f64>]) -> Self {
+        let nearest = |point: &Vec<f64>| nearest(point, &self.centres).map_or(0, |it| it.0);
+        Self {
+            labels: points.iter().map(nearest).collect(),
+            centres: self.centres.iter().map(|it| in_mirror(it)).collect(),
+        }
+    }
+
+    /// Where the types rest, `[x, y]` from the first neighbour, cells.
+    fn anchors(&self) -> Vec<[i32; 2]> {
+        let anchor = |it: &Vec<f64>| match it[..] {
+            [x, y, ..] => [x, y].map(|it| it.round() as i32),
+            _ => [0; 2],
+        };
+        self.centres.iter().map(anchor).collect()
+    }
+}
+
+/// Types of a part in the middle, in pairs: what lies to the left is clustered as its mirror image.
+///
+/// * `both`: everybody's part as it is, and in a mirror.
+fn in_the_middle(
+    [plain, mirrored]: [Vec<Vec<f64>>; 2],
+    settings: &Settings,
+    random: &mut fastrand::Rng,
+) -> OfPart {
+    let is_left: Vec<bool> = plain.iter().zip(&mirrored).map(|(a, b)| a < b).collect();
+    let right = plain
+        .into_iter()
+        .zip(mirrored)
+        .map(|(a, b)| if a < b { b } else { a });
+    let half = Settings {
+        n_types: settings.n_types / 2,
+        ..settings.clone()
+    };
+    let found = OfPart::clustered(&right.collect::<Vec<_>>(), &half, random);
+    let label = |(label, is_left): (&usize, bool)| 2 * label + usize::from(is_left);
+    let labels = found.labels.iter().zip(is_left).map(label).collect();
+    let centres = found.centres.into_iter();
+    let centres = centres
+        .flat_map(|it| [it.clone(), in_mirror(&it)])
+        .collect();
+    OfPart { labels, centres }
+}
+
+/// A point as it is seen in a mirror.
+fn in_mirror(point: &[f64]) -> Vec<f64> {
+    let axes = point.iter().enumerate();
+    axes.map(|(axis, it)| if axis % 2 == 0 { -it } else { *it })
+        .collect()
+}
+
+fn middle<'a>(points: impl Iterator<Item = &'a Vec<f64>>) -> Vec<f64> {
+    let (mut sum, mut n) = (Vec::new(), 0.0);
+    for point in points {
+        sum.resize(point.len(), 0.0);
+        for (sum, value) in sum.iter_mut().zip(point) {
+            *sum += value;
+        }
+        n += 1.0;
+    }
+    sum.into_iter().map(|it| it / n).collect()
+}
+
+/// The nearest of some points, and its squared distance; the first of several.
+fn nearest(point: &[f64], to: &[Vec<f64>]) -> Option<(usize, f64)> {
+    let distances = to.iter().map(|it| squared_distance(point, it));
+    distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Lloyd's algorithm from several random starts; the labels of the tightest clusters.
@@ -105,9 +238,7 @@ fn lloyd(points: &[Vec<f64>], mut centres: Vec<Vec<f64>>) -> (f64, Vec<usize>) {
         spread = 0.0;
         let mut moved = false;
         for (point, label) in points.iter().zip(&mut labels) {
-            let distances = centres.iter().map(|it| squared_distance(point, it));
-            let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((it, distance)) = nearest {
+            if let Some((it, distance)) = nearest(point, &centres) {
                 spread += distance;
                 moved |= *label != it;
                 *label = it;
@@ -153,73 +284,4 @@ fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
 const MAX_ROUNDS: usize = 1000;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PARENTS: [Option<usize>; 3] = [None, Some(0), Some(1)];
-
-    /// People whose second part hangs to the left, below, or to the right, and whose third one always
-    /// lies below that.
-    fn people() -> Vec<Vec<[f64; 2]>> {
-        let person = |it: usize| {
-            let jitter = 0.1 * (it % 7) as f64;
-            let arm = [[-5.0, 1.0], [0.2, 5.0], [6.0, 0.0], [6.0, 0.0]][it % 4];
-            let second = [10.0 + arm[0] + jitter, 10.0 + arm[1] - jitter];
-            vec![[10.0, 10.0], second, [second[0], second[1] + 4.0]]
-        };
-        (0..40).map(person).collect()
-    }
-
-    fn settings(n_types: usize, types_by: TypesBy) -> Settings {
-        Settings {
-            n_types,
-            types_by,
-            cluster_starts: 20,
-            ..Settings::default()
-        }
-    }
-
-    #[test]
-    fn clusters_are_found_the_largest_first() {
-        let types = cluster(&people(), &PARENTS, &settings(3, TypesBy::Parent));
-        let of_second: Vec<_> = types.of_person.iter().map(|it| it[1]).collect();
-        assert_eq!(types.anchors[1][0], [6, 0], "half of the people");
-        for (person, label) in of_second.iter().enumerate() {
-            assert_eq!(of_second[person % 4], *label, "person {person}");
-        }
-        assert_eq!(of_second[2], of_second[3]);
-        assert_ne!(of_second[0], of_second[1]);
-    }
-
-    #[test]
-    fn neighbours_tell_apart_what_the_parent_does_not() {
-        let by_parent = cluster(&people(), &PARENTS, &settings(3, TypesBy::Parent));
-        assert_eq!(
-            by_parent.anchors[2].len(),
-            by_parent.anchors[2].iter().len()
-        );
-        assert!(by_parent.anchors[2].iter().all(|it| *it == [0, 4]));
-        let by_all = cluster(&people(), &PARENTS, &settings(3, TypesBy::Neighbours));
-        let spread = |types: &Types| {
-            let labels = types.of_person.iter().map(|it| it[1]);
-            labels.collect::<std::collections::BTreeSet<_>>().len()
-        };
-        assert_eq!(spread(&by_all), 3);
-    }
-
-    #[test]
-    fn few_people_have_few_types() {
-        let types = cluster(&people()[..2], &PARENTS, &settings(6, TypesBy::Parent));
-        assert!(types.anchors.iter().all(|it| (1..=2).contains(&it.len())));
-        let fits =
-            |person: &Vec<usize>| person.iter().zip(&types.anchors).all(|(a, b)| *a < b.len());
-        assert!(types.of_person.iter().all(fits));
-    }
-
-    #[test]
-    fn the_seed_decides() {
-        let people = people();
-        let twice = [0, 1].map(|_| cluster(&people, &PARENTS, &settings(2, TypesBy::Parent)));
-        assert_eq!(twice[0], twice[1]);
-    }
-}
+mod tests;

@@ -175,6 +175,8 @@ fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
     if let Some(seed) = arguments.seed {
         settings.seed = u64::from(seed);
     }
+    // Without mirror images left is not the mirror image of right.
+    settings.symmetric &= arguments.data.with_mirror();
     settings.check().or_fail(ExitKind::Config)?;
     Ok(settings)
 }

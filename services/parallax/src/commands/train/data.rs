@@ -66,6 +66,11 @@ fn fatal(name: &str) -> Result<Fatal, String> {
 }
 
 impl Chosen {
+    /// Whether mirror images are trained on.
+    pub(super) fn with_mirror(&self) -> bool {
+        !self.no_mirror
+    }
+
     /// The skeleton that is trained.
     pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
         match &self.skeleton {
@@ -109,7 +114,7 @@ impl Data {
         let mut data = Self {
             people: Vec::new(),
             left_out: BTreeMap::new(),
-            with_mirror: !arguments.no_mirror,
+            with_mirror: arguments.with_mirror(),
             negatives: Vec::new(),
             n_unreadable: 0,
         };

@@ -1,0 +1,226 @@
+//! The model and its mirror image: what is learned of one side of the body holds for the other.
+
+use fmp::N_CHANNELS;
+use kernels::MIRRORED_CHANNEL;
+
+use crate::shape::Shape;
+
+/// Where every number of a model's vector goes in its mirror image, and with which sign.
+///
+/// People are trained on with their mirror images, so the best model is its own mirror image; an
+/// approximate one is not, and its mean with its mirror image costs no more (the objective is convex).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Symmetry {
+    mirrored: Vec<(u32, f64)>,
+}
+
+impl Symmetry {
+    /// Of a shape whose types are mirrored as [`cluster`](crate::types::cluster) makes them; `None` if
+    /// they are not, or if it has no mirror.
+    pub(crate) fn of(shape: &Shape) -> Option<Self> {
+        let mirror = shape.mirror.as_deref()?;
+        let fits = |part: usize| {
+            let (own, other) = (&shape.anchors[part], &shape.anchors[mirror[part]]);
+            let flipped = |(k, it): (usize, &[i32; 2])| {
+                let of = if mirror[part] == part {
+                    pair_of(k, own.len())
+                } else {
+                    k
+                };
+                other.get(of) == Some(&[-it[0], it[1]])
+            };
+            own.len() == other.len() && own.iter().enumerate().all(flipped)
+        };
+        if !(0..shape.n_parts()).all(fits) {
+            return None;
+        }
+        let at = shape.coordinates();
+        let mut mirrored: Vec<(u32, f64)> = (0..at.len()).map(|it| (it as u32, 1.0)).collect();
+        let of = |part: usize, k: usize| {
+            if mirror[part] == part {
+                pair_of(k, shape.n_types(part))
+            } else {
+                k
+            }
+        };
+        for part in 0..shape.n_parts() {
+            let other = mirror[part];
+            for k in 0..shape.n_types(part) {
+                let their = of(part, k);
+                let (from, to) = (at.filter(part, k), at.filter(other, their));
+                for cell in 0..shape.side * shape.side {
+                    let (row, col) = (cell / shape.side, cell % shape.side);
+                    let flipped = row * shape.side + shape.side - 1 - col;
+                    for (channel, its) in MIRRORED_CHANNEL.iter().enumerate() {
+                        let to = to + flipped * N_CHANNELS + its;
+                        mirrored[from + cell * N_CHANNELS + channel].0 = to as u32;
+                    }
+                }
+                for axis in 0..2 {
+                    let [from, to] =
+                        [(part, k), (other, their)].map(|(part, k)| at.quadratic(part, k));
+                    mirrored[from + axis].0 = (to + axis) as u32;
+                    let [from, to] =
+                        [(part, k), (other, their)].map(|(part, k)| at.linear(part, k));
+                    let sign = if axis == 0 { -1.0 } else { 1.0 };
+                    mirrored[from + axis] = ((to + axis) as u32, sign);
+                }
+                let Some(parent) = shape.parents[part] else {
+                    continue;
+                };
+                for of_parent in 0..shape.n_types(parent) {
+                    let to = at.bias(other, of(parent, of_parent), their);
+                    mirrored[at.bias(part, of_parent, k)].0 = to as u32;
+                }
+            }
+        }
+        Some(Self { mirrored })
+    }
+
+    /// The mean of a vector and its mirror image.
+    pub(crate) fn balance(&self, v: &[f64]) -> Vec<f64> {
+        let theirs = self
+            .mirrored
+            .iter()
+            .map(|&(at, sign)| sign * v[at as usize]);
+        v.iter()
+            .zip(theirs)
+            .map(|(own, theirs)| 0.5 * (own + theirs))
+            .collect()
+    }
+}
+
+/// The mirror image of a type of a part in the middle: they come in pairs, unless there is only one.
+fn pair_of(k: usize, n_types: usize) -> usize {
+    if n_types == 1 { k } else { k ^ 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmp::{Placement, Pose};
+    use kernels::FeatureMap;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::example::Example;
+
+    const SIDES: [usize; 4] = [0, 1, 3, 2];
+    const COLS: usize = 9;
+    const ROWS: usize = 8;
+
+    /// Head, trunk, and an arm on either side.
+    fn shape() -> Shape {
+        Shape {
+            name: "small".to_owned(),
+            part_names: ["head", "trunk", "right", "left"]
+                .map(str::to_owned)
+                .to_vec(),
+            parents: vec![None, Some(0), Some(1), Some(1)],
+            mirror: Some(SIDES.to_vec()),
+            anchors: vec![
+                vec![[0, 0]],
+                vec![[1, 3], [-1, 3]],
+                vec![[-2, 1], [-1, 2], [0, -2]],
+                vec![[2, 1], [1, 2], [0, -2]],
+            ],
+            side: 3,
+            cell_px: 4,
+            interval: 4,
+        }
+    }
+
+    fn numbers(n: usize, seed: u64) -> Vec<f64> {
+        let mut random = fastrand::Rng::with_seed(seed);
+        (0..n).map(|_| random.f64() - 0.5).collect()
+    }
+
+    fn score(v: &[f64], cells: &[f32], pose: &Pose) -> f64 {
+        let map = FeatureMap {
+            rows: ROWS,
+            cols: COLS,
+            cells,
+        };
+        let (shape, v) = (shape(), v.iter().map(|it| *it as f32).collect::<Vec<_>>());
+        let example = Example::of(&shape, &shape.coordinates(), &map, pose);
+        example.features.dot(&v) + example.fixed
+    }
+
+    fn pose(parts: Vec<(u16, u16, u8)>) -> Pose {
+        let part = |(x, y, mixture)| Placement { x, y, mixture };
+        Pose {
+            score: 0.0,
+            level: 0,
+            parts: parts.into_iter().map(part).collect(),
+        }
+    }
+
+    fn mirrored_pose(it: &Pose) -> Pose {
+        let shape = shape();
+        let part = |part: usize| {
+            let Placement { x, y, mixture } = it.parts[SIDES[part]];
+            let k = usize::from(mixture);
+            let in_pairs = SIDES[part] == part;
+            let k = if in_pairs {
+                pair_of(k, shape.n_types(part))
+            } else {
+                k
+            };
+            (COLS as u16 - 3 - x, y, k as u8)
+        };
+        pose((0..4).map(part).collect())
+    }
+
+    fn mirrored_cells(cells: &[f32]) -> Vec<f32> {
+        let mut to = vec![0.0; cells.len()];
+        for (at, cell) in cells.chunks_exact(N_CHANNELS).enumerate() {
+            let there = at / COLS * COLS + COLS - 1 - at % COLS;
+            for (value, channel) in cell.iter().zip(MIRRORED_CHANNEL) {
+                to[there * N_CHANNELS + channel] = *value;
+            }
+        }
+        to
+    }
+
+    proptest! {
+        #[test]
+        fn a_balanced_model_scores_a_mirrored_pose_as_the_pose(
+            places in prop::collection::vec((0..7_u16, 0..6_u16, 0..6_u8), 4),
+            seed in any::<u64>(),
+        ) {
+            let shape = shape();
+            let symmetry = Symmetry::of(&shape).unwrap();
+            let v = symmetry.balance(&numbers(shape.coordinates().len(), seed));
+            let cells: Vec<f32> = numbers(ROWS * COLS * N_CHANNELS, !seed)
+                .into_iter()
+                .map(|it| it as f32)
+                .collect();
+            let typed = |(part, (x, y, k)): (usize, (u16, u16, u8))| {
+                (x, y, k % shape.n_types(part) as u8)
+            };
+            let plain = pose(places.into_iter().enumerate().map(typed).collect());
+            let [here, there] = [
+                score(&v, &cells, &plain),
+                score(&v, &mirrored_cells(&cells), &mirrored_pose(&plain)),
+            ];
+            prop_assert!((here - there).abs() < 1e-4 * (1.0 + here.abs()), "{} {}", here, there);
+        }
+
+        #[test]
+        fn what_is_balanced_stays(seed in any::<u64>()) {
+            let shape = shape();
+            let symmetry = Symmetry::of(&shape).unwrap();
+            let once = symmetry.balance(&numbers(shape.coordinates().len(), seed));
+            prop_assert_eq!(symmetry.balance(&once), once);
+        }
+    }
+
+    #[test]
+    fn a_shape_whose_sides_differ_has_no_symmetry() {
+        let mut other = shape();
+        other.anchors[3][0] = [3, 1];
+        assert_eq!(Symmetry::of(&other), None);
+        let mut without = shape();
+        without.mirror = None;
+        assert_eq!(Symmetry::of(&without), None);
+    }
+}
