@@ -15,7 +15,8 @@ const LAYERS: &[&[&str]] = &[
     &[
         "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d",
     ],
-    &["runtime", "fmp", "scene"],
+    &["metrics", "fmp", "scene"],
+    &["runtime"],
     &["multiview", "viewquality"],
     &[
         "pipeline",

@@ -8,6 +8,7 @@
 mod evidence;
 mod frame;
 mod health;
+mod metrics;
 mod pose;
 mod pose3d;
 mod quality;
@@ -17,6 +18,9 @@ pub mod topic;
 pub use evidence::EvidenceHeader;
 pub use frame::FrameHeader;
 pub use health::Health;
+pub use metrics::{
+    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
+};
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Pose3d};
 pub use quality::ViewQuality;
@@ -47,4 +51,6 @@ const _: () = {
     assert!(size_of::<FusedView>() == 544);
     assert!(size_of::<Pose3d>() == 11600);
     assert!(size_of::<Health>() == 104);
+    assert!(size_of::<MetricsRow>() == 56);
+    assert!(size_of::<Metrics>() == 176 + MAX_ROWS * 56);
 };

@@ -46,3 +46,19 @@ pub fn pose3d() -> String {
 pub fn health(process: &str) -> String {
     format!("health/v2/{process}")
 }
+
+/// Times and counts of a process: [`Metrics`](crate::Metrics).
+///
+/// * `process`: its unique name in the deployment.
+#[must_use]
+pub fn metrics(process: &str) -> String {
+    format!("{METRICS}{process}")
+}
+
+/// The process whose [`metrics`] travel on a topic, if they do.
+#[must_use]
+pub fn process_of_metrics(topic: &str) -> Option<&str> {
+    topic.strip_prefix(METRICS)
+}
+
+const METRICS: &str = "metrics/v1/";

@@ -1,0 +1,133 @@
+//! How often things happened lately.
+
+use std::collections::VecDeque;
+
+use messages::{MAX_ROWS, Metrics};
+
+/// How far back "lately" reaches, nanoseconds.
+const REACH_NANOS: u64 = 5_000_000_000;
+/// Less time than this says nothing about a rate, nanoseconds.
+const LEAST_NANOS: u64 = 200_000_000;
+
+/// How often things happened lately: over the last five seconds, or since the beginning.
+#[derive(Debug)]
+pub struct Rates {
+    past: VecDeque<Past>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Past {
+    at_nanos: u64,
+    n_sent: u64,
+    counts: [u64; MAX_ROWS],
+}
+
+impl Rates {
+    /// Begins, with nothing done yet.
+    ///
+    /// * `at_nanos`: now.
+    pub fn new(at_nanos: u64) -> Self {
+        let start = Past {
+            at_nanos,
+            n_sent: 0,
+            counts: [0; MAX_ROWS],
+        };
+        Self {
+            past: VecDeque::from([start]),
+        }
+    }
+
+    /// Fills the rates of a message in, whose counts and time are there, and remembers those. Rows must
+    /// keep their places from message to message.
+    pub fn fill(&mut self, message: &mut Metrics) {
+        let now = Past {
+            at_nanos: message.at_nanos,
+            n_sent: message.n_sent,
+            counts: message.rows.map(|it| it.count),
+        };
+        while self.past.len() > 1
+            && now.at_nanos.saturating_sub(self.past[1].at_nanos) > REACH_NANOS
+        {
+            self.past.pop_front();
+        }
+        let Some(then) = self.past.front() else {
+            return;
+        };
+        let nanos = now.at_nanos.saturating_sub(then.at_nanos);
+        if nanos >= LEAST_NANOS {
+            message.sent_millihertz = per_second(now.n_sent, then.n_sent, nanos);
+            for (row, then) in message.rows.iter_mut().zip(&then.counts) {
+                row.millihertz = per_second(row.count, *then, nanos);
+            }
+        }
+        self.past.push_back(now);
+    }
+}
+
+/// In thousandths.
+fn per_second(now: u64, then: u64, nanos: u64) -> u64 {
+    let thousandths = u128::from(now.saturating_sub(then)) * 1_000_000_000_000 / u128::from(nanos);
+    u64::try_from(thousandths).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    fn message(at_nanos: u64, n_sent: u64, count: u64) -> Metrics {
+        let mut it = Metrics {
+            at_nanos,
+            n_sent,
+            ..Metrics::default()
+        };
+        it.rows[1].count = count;
+        it
+    }
+
+    fn rates(it: &Metrics) -> [u64; 2] {
+        [it.sent_millihertz, it.rows[1].millihertz]
+    }
+
+    #[test]
+    fn what_goes_on_evenly_has_one_rate() {
+        let mut rates_of = Rates::new(7 * SECOND);
+        for second in 1..20 {
+            let mut it = message((7 + second) * SECOND, 20 * second, 5 * second);
+            rates_of.fill(&mut it);
+            assert_eq!(rates(&it), [20_000, 5_000], "{second}");
+        }
+    }
+
+    #[test]
+    fn what_has_stopped_has_no_rate_after_five_seconds() {
+        let mut rates_of = Rates::new(0);
+        let mut last = [1; 2];
+        for second in 1..=12 {
+            let mut it = message(second * SECOND, 100 * second.min(3), second.min(3));
+            rates_of.fill(&mut it);
+            let now = rates(&it);
+            assert!(second <= 3 || now[0] <= last[0], "{second}: {now:?}");
+            last = now;
+        }
+        assert_eq!(last, [0, 0]);
+    }
+
+    #[test]
+    fn a_moment_says_nothing_about_a_rate() {
+        let mut rates_of = Rates::new(0);
+        let mut it = message(LEAST_NANOS - 1, 1000, 1000);
+        rates_of.fill(&mut it);
+        assert_eq!(rates(&it), [0, 0]);
+    }
+
+    #[test]
+    fn memory_is_bounded_however_often_somebody_looks() {
+        let mut rates_of = Rates::new(0);
+        for nth in 0..10_000 {
+            rates_of.fill(&mut message(nth * SECOND / 10, nth, nth));
+        }
+        assert!(rates_of.past.len() <= 52, "{}", rates_of.past.len());
+    }
+}

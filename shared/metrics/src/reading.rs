@@ -1,0 +1,463 @@
+//! What another process says about itself, checked.
+
+use messages::{
+    Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
+};
+
+/// A message that no process of ours would send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReadingError {
+    /// More rows than there is room for.
+    #[error("{rows} rows, a message has room for {MAX_ROWS}")]
+    TooManyRows {
+        /// As many as it says.
+        rows: u32,
+    },
+    /// A stage that does not exist.
+    #[error("row {row} is of unknown stage {span}")]
+    UnknownSpan {
+        /// Which row.
+        row: usize,
+        /// Its stage.
+        span: u32,
+    },
+    /// A view that cannot be.
+    #[error("view {view} of at most {MAX_VIEWS}")]
+    UnknownView {
+        /// The view.
+        view: u32,
+    },
+    /// Percentiles that fall.
+    #[error("row {row} has percentiles that fall, or none of {count} durations")]
+    Disordered {
+        /// Which row.
+        row: usize,
+        /// How many durations it says it has seen.
+        count: u64,
+    },
+    /// Two rows of the same stage and view.
+    #[error("rows {first} and {second} are of the same stage and view")]
+    Twice {
+        /// The first of them.
+        first: usize,
+        /// The second.
+        second: usize,
+    },
+    /// A name that is no text.
+    #[error("the name of the view is not UTF-8, or goes on after its end")]
+    Name,
+    /// A flag that is neither 0 nor 1.
+    #[error("finished is {finished}, neither 0 nor 1")]
+    Flag {
+        /// Its value.
+        finished: u32,
+    },
+    /// A queue that is longer than it ever was, or a time before the beginning.
+    #[error("counts that contradict each other: {what}")]
+    Contradiction {
+        /// Which.
+        what: &'static str,
+    },
+}
+
+/// What another process says about itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reading {
+    /// Run of the deployment.
+    pub session: u64,
+    /// Process id.
+    pub pid: u32,
+    /// How often the process has been restarted.
+    pub restarts: u32,
+    /// When it began, `CLOCK_MONOTONIC`, nanoseconds.
+    pub began_at_nanos: u64,
+    /// When it said this, `CLOCK_MONOTONIC`, nanoseconds.
+    pub at_nanos: u64,
+    /// Messages taken in.
+    pub n_received: u64,
+    /// Messages sent out.
+    pub n_sent: u64,
+    /// The same per second lately, in thousandths.
+    pub sent_millihertz: u64,
+    /// Messages or frames lost, in the order of [`Cause::ALL`].
+    pub n_dropped: [u64; N_CAUSES],
+    /// Evidence sent out, bytes.
+    pub evidence_bytes: u64,
+    /// Physical memory, bytes; 0 where the system does not say.
+    pub memory_bytes: u64,
+    /// The most it has ever held, bytes.
+    pub peak_memory_bytes: u64,
+    /// Frames or results that wait, and the most that ever did, where there is a queue.
+    pub queue: Option<[u32; 2]>,
+    /// Its view, if it works for one.
+    pub view: Option<ViewName>,
+    /// Whether it has seen the end of the footage and passed it on.
+    pub is_finished: bool,
+    /// Durations by stage and view.
+    pub times: Vec<Timed>,
+}
+
+/// A view, as the process that works for it calls it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ViewName {
+    /// Its number.
+    pub index: usize,
+    /// Its camera's name; empty if the process has not said.
+    pub name: String,
+}
+
+/// Durations of one stage, nanoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Timed {
+    /// Which stage.
+    pub span: Span,
+    /// Of which view, if of one.
+    pub view: Option<usize>,
+    /// How many were measured.
+    pub count: u64,
+    /// How many per second lately, in thousandths.
+    pub millihertz: u64,
+    /// Half are no longer.
+    pub p50_nanos: u64,
+    /// 99 of 100 are no longer.
+    pub p99_nanos: u64,
+    /// 999 of 1000 are no longer.
+    pub p99_9_nanos: u64,
+    /// The longest.
+    pub max_nanos: u64,
+}
+
+impl Reading {
+    /// Reads a message; rows beyond their number are ignored.
+    ///
+    /// # Errors
+    ///
+    /// [`ReadingError`].
+    pub fn from_message(it: &Metrics) -> Result<Self, ReadingError> {
+        let rows = it.rows.get(..it.n_rows as usize);
+        let rows = rows.ok_or(ReadingError::TooManyRows { rows: it.n_rows })?;
+        let mut times: Vec<Timed> = Vec::with_capacity(rows.len());
+        for (second, row) in rows.iter().enumerate() {
+            let timed = timed(second, row)?;
+            let same = |it: &Timed| it.span == timed.span && it.view == timed.view;
+            if let Some(first) = times.iter().position(same) {
+                return Err(ReadingError::Twice { first, second });
+            }
+            times.push(timed);
+        }
+        if it.finished > 1 {
+            return Err(ReadingError::Flag {
+                finished: it.finished,
+            });
+        }
+        if it.at_nanos < it.began_at_nanos {
+            let what = "it was sent before the process began";
+            return Err(ReadingError::Contradiction { what });
+        }
+        let view = view_of(it.view)?;
+        let name = name_of(&it.name)?;
+        Ok(Self {
+            session: it.session,
+            pid: it.pid,
+            restarts: it.epoch,
+            began_at_nanos: it.began_at_nanos,
+            at_nanos: it.at_nanos,
+            n_received: it.n_received,
+            n_sent: it.n_sent,
+            sent_millihertz: it.sent_millihertz,
+            n_dropped: it.n_dropped,
+            evidence_bytes: it.evidence_bytes,
+            memory_bytes: it.memory_bytes,
+            peak_memory_bytes: it.peak_memory_bytes,
+            queue: queue_of(it)?,
+            view: view.map(|index| ViewName { index, name }),
+            is_finished: it.finished == 1,
+            times,
+        })
+    }
+
+    /// As a message. What does not fit is left out: rows beyond [`MAX_ROWS`], bytes of a name beyond
+    /// [`MAX_NAME`].
+    pub fn to_message(&self) -> Metrics {
+        let mut rows = [MetricsRow::default(); MAX_ROWS];
+        for (row, it) in rows.iter_mut().zip(&self.times) {
+            *row = MetricsRow {
+                span: it.span,
+                view: it.view.map_or(NO_VIEW, |it| it as u32),
+                count: it.count,
+                millihertz: it.millihertz,
+                p50_nanos: it.p50_nanos,
+                p99_nanos: it.p99_nanos,
+                p99_9_nanos: it.p99_9_nanos,
+                max_nanos: it.max_nanos,
+            };
+        }
+        let mut name = [0; MAX_NAME];
+        let said = self.view.as_ref().map_or("", |it| &it.name);
+        for (byte, said) in name.iter_mut().zip(said.bytes()) {
+            *byte = said;
+        }
+        let [queue, longest_queue] = self.queue.unwrap_or([NO_QUEUE; 2]);
+        Metrics {
+            session: self.session,
+            pid: self.pid,
+            epoch: self.restarts,
+            began_at_nanos: self.began_at_nanos,
+            at_nanos: self.at_nanos,
+            n_received: self.n_received,
+            n_sent: self.n_sent,
+            sent_millihertz: self.sent_millihertz,
+            n_dropped: self.n_dropped,
+            evidence_bytes: self.evidence_bytes,
+            memory_bytes: self.memory_bytes,
+            peak_memory_bytes: self.peak_memory_bytes,
+            queue,
+            longest_queue,
+            view: self.view.as_ref().map_or(NO_VIEW, |it| it.index as u32),
+            finished: u32::from(self.is_finished),
+            name,
+            n_rows: self.times.len().min(MAX_ROWS) as u32,
+            reserved: 0,
+            rows,
+        }
+    }
+
+    /// What was lost for one cause.
+    pub fn n_dropped_by(&self, cause: Cause) -> u64 {
+        self.n_dropped[cause as usize]
+    }
+}
+
+fn timed(row: usize, it: &MetricsRow) -> Result<Timed, ReadingError> {
+    if !Span::ALL.contains(&it.span) {
+        let span = it.span.0;
+        return Err(ReadingError::UnknownSpan { row, span });
+    }
+    let rising = [it.p50_nanos, it.p99_nanos, it.p99_9_nanos, it.max_nanos];
+    if !rising.is_sorted() || (it.count == 0) != (it.max_nanos == 0) {
+        let count = it.count;
+        return Err(ReadingError::Disordered { row, count });
+    }
+    Ok(Timed {
+        span: it.span,
+        view: view_of(it.view)?,
+        count: it.count,
+        millihertz: it.millihertz,
+        p50_nanos: it.p50_nanos,
+        p99_nanos: it.p99_nanos,
+        p99_9_nanos: it.p99_9_nanos,
+        max_nanos: it.max_nanos,
+    })
+}
+
+fn view_of(view: u32) -> Result<Option<usize>, ReadingError> {
+    match view {
+        NO_VIEW => Ok(None),
+        view if (view as usize) < MAX_VIEWS => Ok(Some(view as usize)),
+        view => Err(ReadingError::UnknownView { view }),
+    }
+}
+
+fn queue_of(it: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
+    match [it.queue, it.longest_queue] {
+        [NO_QUEUE, NO_QUEUE] => Ok(None),
+        both @ [now, longest] if now <= longest && longest != NO_QUEUE => Ok(Some(both)),
+        _ => Err(ReadingError::Contradiction {
+            what: "the queue is longer than it ever was",
+        }),
+    }
+}
+
+fn name_of(bytes: &[u8; MAX_NAME]) -> Result<String, ReadingError> {
+    let len = bytes.iter().position(|it| *it == 0).unwrap_or(MAX_NAME);
+    let (name, rest) = bytes.split_at(len);
+    let name = core::str::from_utf8(name)
+        .ok()
+        .filter(|_| rest.iter().all(|it| *it == 0));
+    name.map(str::to_owned).ok_or(ReadingError::Name)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn any_times() -> impl Strategy<Value = Vec<Timed>> {
+        let view = proptest::option::of(0..MAX_VIEWS);
+        let keys = proptest::collection::btree_set((0..Span::ALL.len(), view), 0..=MAX_ROWS);
+        keys.prop_flat_map(|keys| {
+            let n = keys.len();
+            let nanos = proptest::collection::vec(any::<[u64; 4]>(), n);
+            (Just(keys), nanos, proptest::collection::vec(1_u64.., n))
+        })
+        .prop_map(|(keys, nanos, counts)| {
+            let rows = keys.into_iter().zip(nanos).zip(counts);
+            let row = |(((span, view), mut nanos), count): (((usize, _), [u64; 4]), u64)| {
+                nanos.sort_unstable();
+                Timed {
+                    span: Span::ALL[span],
+                    view,
+                    count,
+                    millihertz: count / 3,
+                    p50_nanos: nanos[0],
+                    p99_nanos: nanos[1],
+                    p99_9_nanos: nanos[2],
+                    max_nanos: nanos[3].max(1),
+                }
+            };
+            rows.map(row).collect()
+        })
+    }
+
+    fn any_view() -> impl Strategy<Value = Option<ViewName>> {
+        let view = (0..MAX_VIEWS, "[a-z\u{e4}]{0,16}");
+        proptest::option::of(view.prop_map(|(index, name)| ViewName { index, name }))
+    }
+
+    prop_compose! {
+        fn any_reading()(
+            counts in any::<[u64; 12]>(),
+            ids in any::<[u32; 2]>(),
+            queue in proptest::option::of((0_u32..1000, 0_u32..1000)),
+            view in any_view(),
+            is_finished in any::<bool>(),
+            times in any_times(),
+        ) -> Reading {
+            Reading {
+                session: counts[0],
+                pid: ids[0],
+                restarts: ids[1],
+                began_at_nanos: counts[1].min(counts[2]),
+                at_nanos: counts[1].max(counts[2]),
+                n_received: counts[3],
+                n_sent: counts[4],
+                sent_millihertz: counts[5],
+                n_dropped: core::array::from_fn(|it| counts[6].rotate_left(it as u32)),
+                evidence_bytes: counts[7],
+                memory_bytes: counts[8],
+                peak_memory_bytes: counts[9],
+                queue: queue.map(|(now, more)| [now, now + more]),
+                view,
+                is_finished,
+                times,
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_sent_is_what_is_read(it in any_reading()) {
+            prop_assert_eq!(Reading::from_message(&it.to_message()), Ok(it));
+        }
+
+        /// Whatever it is, it is read or refused; and what is read can be sent again.
+        #[test]
+        fn no_message_is_read_as_something_else(
+            it in any_reading(), n_rows in any::<u32>(), name in any::<[u8; MAX_NAME]>(),
+            words in any::<[u32; 6]>(), row in 0..MAX_ROWS,
+        ) {
+            let mut message = it.to_message();
+            let changed = words[5];
+            if changed & 1 != 0 { message.n_rows = n_rows; }
+            if changed & 2 != 0 { message.name = name; }
+            if changed & 4 != 0 { message.view = words[0]; }
+            if changed & 8 != 0 { message.rows[row].span = Span(words[1]); }
+            if changed & 16 != 0 { message.rows[row].view = words[2]; }
+            if changed & 32 != 0 { message.rows[row].p99_nanos = u64::from(words[3]); }
+            if changed & 64 != 0 { message.queue = words[4]; }
+            if let Ok(read) = Reading::from_message(&message) {
+                prop_assert_eq!(Reading::from_message(&read.to_message()), Ok(read));
+            }
+        }
+    }
+
+    fn message() -> Metrics {
+        let row = |view| MetricsRow {
+            span: Span::WAITING,
+            view,
+            count: 3,
+            millihertz: 1,
+            p50_nanos: 1,
+            p99_nanos: 2,
+            p99_9_nanos: 2,
+            max_nanos: 3,
+        };
+        let mut it = Metrics {
+            n_rows: 2,
+            ..Metrics::default()
+        };
+        (it.rows[0], it.rows[1]) = (row(0), row(NO_VIEW));
+        it
+    }
+
+    /// What is said about a message that was changed.
+    fn refused(change: impl FnOnce(&mut Metrics)) -> ReadingError {
+        let mut it = message();
+        change(&mut it);
+        Reading::from_message(&it).unwrap_err()
+    }
+
+    #[test]
+    fn what_was_not_changed_is_read() {
+        assert_eq!(Reading::from_message(&message()).unwrap().times.len(), 2);
+    }
+
+    #[test]
+    fn refuses_more_rows_than_there_are() {
+        let rows = MAX_ROWS as u32 + 1;
+        let error = refused(|it| it.n_rows = rows);
+        assert_eq!(error, ReadingError::TooManyRows { rows });
+        assert_eq!(error.to_string(), "25 rows, a message has room for 24");
+    }
+
+    #[test]
+    fn refuses_a_stage_that_does_not_exist() {
+        let error = refused(|it| it.rows[1].span = Span(5));
+        assert_eq!(error, ReadingError::UnknownSpan { row: 1, span: 5 });
+    }
+
+    #[test]
+    fn refuses_a_view_that_cannot_be() {
+        let expected = ReadingError::UnknownView { view: 16 };
+        assert_eq!(refused(|it| it.rows[0].view = 16), expected);
+        assert_eq!(refused(|it| it.view = 16), expected);
+    }
+
+    #[test]
+    fn refuses_percentiles_that_fall_or_come_from_nothing() {
+        let expected = |count| ReadingError::Disordered { row: 0, count };
+        assert_eq!(refused(|it| it.rows[0].p50_nanos = 3), expected(3));
+        assert_eq!(refused(|it| it.rows[0].max_nanos = 1), expected(3));
+        assert_eq!(refused(|it| it.rows[0].count = 0), expected(0));
+    }
+
+    #[test]
+    fn refuses_two_rows_of_the_same_stage_and_view() {
+        let error = refused(|it| it.rows[1].view = 0);
+        let expected = ReadingError::Twice {
+            first: 0,
+            second: 1,
+        };
+        assert_eq!(error, expected);
+    }
+
+    #[test]
+    fn refuses_a_name_that_is_no_text_or_goes_on_after_its_end() {
+        assert_eq!(refused(|it| it.name[0] = 0xff), ReadingError::Name);
+        assert_eq!(refused(|it| it.name[5] = b'x'), ReadingError::Name);
+    }
+
+    #[test]
+    fn refuses_counts_that_contradict_each_other() {
+        let is_contradiction = |it| matches!(it, ReadingError::Contradiction { .. });
+        assert!(is_contradiction(refused(|it| it.queue = 3)));
+        assert!(is_contradiction(refused(|it| (
+            it.queue,
+            it.longest_queue
+        ) = (3, 2))));
+        assert!(is_contradiction(refused(|it| it.began_at_nanos = 1)));
+        let error = refused(|it| it.finished = 2);
+        assert_eq!(error, ReadingError::Flag { finished: 2 });
+    }
+}
