@@ -4,7 +4,8 @@ use core::time::Duration;
 
 use footage::{Fill, FrameView, Pacer, Size, SourceSpec, Warp};
 use geometry::Framing;
-use messages::{FrameHeader, Stamp, Status, Timing, topic};
+use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
+use metrics::Passage;
 use runtime::{ExitKind, Failure, OrFail as _, Service, SlicePublisher, Waiter, Woken, now_nanos};
 
 use crate::feed::Feed;
@@ -149,16 +150,19 @@ impl<'a> Camera<'a> {
         }
         let n = source.skip(latest - at).or_fail(ExitKind::Input)?;
         self.n_dropped += n;
-        self.service.health().dropped(n);
+        self.service.health().dropped(Cause::BehindClock, n);
         Ok(n)
     }
 
     /// Sends a frame; where nothing may be lost, once more to a receiver that had to be restarted.
     fn send_frame(&mut self, frame: &FrameView<'_>, asked_at: u64) -> Result<(), Failure> {
+        let mut computing = now_nanos() - asked_at;
         loop {
             let [width, height] = self.job.framing.out_size();
             let mut loan = self.publisher.loan((width * height * 3) as usize)?;
+            let begin = now_nanos();
             self.warp.apply(frame.rgb, loan.payload_mut());
+            computing += now_nanos() - begin;
             *loan.header_mut() = FrameHeader {
                 width,
                 height,
@@ -187,10 +191,14 @@ impl<'a> Camera<'a> {
         self.n_expected = self
             .n_expected
             .max(self.publisher.n_connected().min(self.job.n_consumers));
-        self.service.health().sent(frame.index);
-        self.service
-            .health()
-            .computed(Duration::from_nanos(now_nanos() - asked_at));
+        let health = self.service.health();
+        health.sent(frame.index);
+        health.passed(&Passage {
+            waiting: None,
+            computing,
+            publishing: (now_nanos() - asked_at).saturating_sub(computing),
+            since_capture: None,
+        });
         Ok(())
     }
 

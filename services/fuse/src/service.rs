@@ -4,7 +4,8 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use join::{Cadence, Joined, Joiner, Last, Push};
-use messages::{PairPose, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
+use messages::{Cause, PairPose, Span, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
+use metrics::Passage;
 use multiview::ViewPlan;
 use pipeline::{Answer, FuseStep};
 use runtime::{
@@ -67,6 +68,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         worker.listen()?;
         while let Some(joined) = worker.next_frame() {
             let begin = now_nanos();
+            worker.note_waits(&joined, begin);
             worker.answer(&joined)?;
             worker.answered(&joined, now_nanos() - begin);
             if service.stop().is_requested() {
@@ -176,7 +178,7 @@ impl<'a> Worker<'a> {
                 .keep(view, stamp.frame, captured_at, quality.clone());
         }
         if self.joiner.push(input, stamp.frame, word, now_nanos()) == Push::Late {
-            self.service.health().dropped(1);
+            self.service.health().dropped(Cause::Late, 1);
         }
     }
 
@@ -186,10 +188,22 @@ impl<'a> Worker<'a> {
             Delivery::Realtime => {
                 let wants = |it: &Joined<Word>| self.cadence.takes(it.frame / self.job.frame_step);
                 let (joined, n_passed) = self.joiner.latest(now_nanos(), wants);
-                self.service.health().dropped(n_passed);
+                self.service.health().dropped(Cause::Busy, n_passed);
                 joined
             }
         }
+    }
+
+    /// How long every view's answer to a frame has been waiting, for others or for this worker.
+    fn note_waits(&self, joined: &Joined<Word>, now: u64) {
+        let health = self.service.health();
+        for (view, item) in joined.items.iter().take(self.poses.len()).enumerate() {
+            if let Some(Word::Pose(pose)) = item {
+                let waited = now.saturating_sub(pose.timing.sent_at_nanos);
+                health.spent(Span::WAITING, Some(view), waited);
+            }
+        }
+        health.queued(self.joiner.n_pending());
     }
 
     fn answered(&mut self, joined: &Joined<Word>, busy_nanos: u64) {
@@ -238,7 +252,13 @@ impl<'a> Worker<'a> {
             self.publisher.send(&message)?;
             let health = self.service.health();
             health.sent(joined.frame);
-            health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
+            let sent_at = message.timing.sent_at_nanos;
+            health.passed(&Passage {
+                waiting: None,
+                computing: sent_at - received_at_nanos,
+                publishing: now_nanos() - sent_at,
+                since_capture: Some(sent_at.saturating_sub(stamp.captured_at_nanos)),
+            });
         }
         drop(evidence);
         // Room for the next, whatever its sender has left undone: it may have died half-way.

@@ -4,7 +4,10 @@ use core::time::Duration;
 
 use fmp::{Scope, Tracker};
 use kernels::Rgb8View;
-use messages::{EvidenceHeader, FrameHeader, Searched, Stamp, Status, Timing, ViewPose, topic};
+use messages::{
+    Cause, EvidenceHeader, FrameHeader, Searched, Stamp, Status, Timing, ViewPose, topic,
+};
+use metrics::Passage;
 use pipeline::{ViewEstimate, ViewStep};
 use runtime::{
     Delivery, ExitKind, Failure, Loan, OrFail as _, Publisher, Sample, Service, SlicePublisher,
@@ -79,14 +82,16 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
                 continue;
             }
             if header.status == Status::END {
-                service.health().dropped(intake.n_lost_before(&header));
+                let n = intake.n_lost_before(&header);
+                service.health().dropped(Cause::Busy, n);
                 return view.end(&header.stamp, &waiter);
             }
             if !intake.takes(&header) {
                 continue;
             }
             service.health().received(1);
-            service.health().dropped(intake.n_lost_before(&header));
+            let n = intake.n_lost_before(&header);
+            service.health().dropped(Cause::Busy, n);
             let begin = now_nanos();
             let nth = intake.nth(header.stamp.frame);
             view.answer(sample, nth, &mut memory)?;
@@ -108,6 +113,8 @@ struct Memory {
 /// What was found in a frame, and its evidence if anybody wants it.
 struct Found<'a> {
     estimate: ViewEstimate,
+    /// How long memory for the evidence was waited for.
+    loan_nanos: u64,
     /// The responses of the scope that was searched.
     evidence: Option<Loan<'a, f32, EvidenceHeader>>,
 }
@@ -128,7 +135,11 @@ impl View<'_> {
         memory: &mut Memory,
     ) -> Result<(), Failure> {
         let received_at_nanos = now_nanos();
-        let stamp = sample.header().stamp;
+        let FrameHeader {
+            stamp,
+            timing: before,
+            ..
+        } = *sample.header();
         let outcome = self.solve(&sample, nth, memory)?;
         // The frame goes back to the camera before anybody is waited for.
         drop(sample);
@@ -147,6 +158,9 @@ impl View<'_> {
             epoch: self.service.epoch(),
             ..stamp
         };
+        let health = self.service.health();
+        let solved = now_nanos();
+        let loan_nanos = outcome.as_ref().map_or(0, |it| it.loan_nanos);
         // The evidence goes first: whoever has the candidates may count on it.
         if let Ok(found) = outcome
             && let Some(mut loan) = found.evidence
@@ -161,20 +175,32 @@ impl View<'_> {
                 ..header
             };
             loan.send()?;
+            health.sent_evidence(message.evidence_bytes);
         }
         message.stamp = stamp;
         message.timing = timing();
         self.poses.send(&message)?;
-        let health = self.service.health();
         health.sent(stamp.frame);
-        health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
+        health.passed(&Passage {
+            waiting: Some(received_at_nanos.saturating_sub(before.sent_at_nanos)),
+            computing: (solved - received_at_nanos).saturating_sub(loan_nanos),
+            publishing: now_nanos() - solved + loan_nanos,
+            since_capture: Some(
+                message
+                    .timing
+                    .sent_at_nanos
+                    .saturating_sub(stamp.captured_at_nanos),
+            ),
+        });
         Ok(())
     }
 
     /// The candidates, how they were looked for, and how much goes with them.
     fn message(&self, found: &Found<'_>) -> Result<ViewPose, Failure> {
         let layout = self.job.step.layout();
-        let Found { estimate, evidence } = found;
+        let Found {
+            estimate, evidence, ..
+        } = found;
         let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
         let mut message = message.or_fail(ExitKind::Run)?;
         wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
@@ -233,15 +259,19 @@ impl View<'_> {
             responses.resize(responses.len().max(n_values), 0.0);
             return Ok(Found {
                 estimate: step.run(image, scope, responses),
+                loan_nanos: 0,
                 evidence: None,
             });
         }
+        let begin = now_nanos();
         let mut loan = self.evidence.loan(n_values)?;
+        let loan_nanos = now_nanos() - begin;
         let estimate = step.run(image, scope, loan.payload_mut());
         let is_there = !estimate.candidates.is_empty();
         Ok(Found {
             evidence: is_there.then_some(loan),
             estimate,
+            loan_nanos,
         })
     }
 

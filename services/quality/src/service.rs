@@ -6,6 +6,7 @@ use std::sync::Arc;
 use fmp::{Layout, Model};
 use kernels::Rgb8View;
 use messages::{FrameHeader, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
+use metrics::Passage;
 use runtime::{
     ExitKind, Failure, OrFail as _, Publisher, Sample, Service, Waiter, Woken, now_nanos,
 };
@@ -90,12 +91,20 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
                 ..pose.stamp
             };
             message.took_nanos = now_nanos() - received_at_nanos;
+            let computing = message.took_nanos;
             message.timing = Timing {
                 received_at_nanos,
                 sent_at_nanos: now_nanos(),
             };
             publisher.send(&message)?;
             service.health().sent(pose.stamp.frame);
+            let sent_at = message.timing.sent_at_nanos;
+            service.health().passed(&Passage {
+                waiting: Some(received_at_nanos.saturating_sub(pose.timing.sent_at_nanos)),
+                computing,
+                publishing: now_nanos() - sent_at,
+                since_capture: Some(sent_at.saturating_sub(pose.stamp.captured_at_nanos)),
+            });
         }
     }
     Ok(())

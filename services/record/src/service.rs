@@ -4,15 +4,16 @@
 //! comes and hands it on. If the disk cannot keep up, the newest results are missed and counted.
 
 use core::time::Duration;
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
-use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality, topic};
+use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, ViewQuality, topic};
 use runtime::{
-    ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Subscriber, Waiter, Woken,
+    ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Subscriber, Waiter, Woken, now_nanos,
 };
 
 use crate::gather::Gather;
@@ -69,18 +70,43 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             service.health().received(1);
             if let Err(error) = wire::check_pose3d(&pose3d, n_views, n_joints) {
                 tracing::warn!(%error, "unreadable result");
+                service.health().dropped(Cause::Malformed, 1);
                 continue;
             }
             ports.listen(service, &mut gather, &writer)?;
-            if writer.write(gather.result(&pose3d)) {
+            let record = gather.result(&pose3d);
+            note_times(service, &record);
+            if writer.write(record) {
                 service.health().sent(pose3d.stamp.frame);
             } else {
-                service.health().dropped(1);
+                service.health().dropped(Cause::QueueFull, 1);
             }
+            service.health().queued(writer.n_waiting());
         }
     }
     writer.finish(service)?;
     rest(service, &waiter)
+}
+
+/// How old a result was when it was sent, over all and of every view that has a part in it; and how
+/// long ago that was.
+fn note_times(service: &Service, record: &FrameRecord) {
+    let (health, pose3d) = (service.health(), &record.pose3d);
+    if pose3d.status != Status::OK {
+        return;
+    }
+    let sent_at = pose3d.timing.sent_at_nanos;
+    let since = |captured_at: u64| sent_at.saturating_sub(captured_at);
+    let captured_at = pose3d.stamp.captured_at_nanos;
+    health.spent(Span::END_TO_END, None, since(captured_at));
+    for (view, it) in record.views.iter().enumerate() {
+        if let Some(frame) = it.frame.filter(|_| it.missing.is_none()) {
+            let captured_at = frame.stamp.captured_at_nanos;
+            health.spent(Span::END_TO_END, Some(view), since(captured_at));
+        }
+    }
+    let waited = now_nanos().saturating_sub(sent_at);
+    health.spent(Span::WAITING, None, waited);
 }
 
 /// Says that all is done, and waits to be told so.
@@ -175,6 +201,8 @@ struct Writer {
     queue: SyncSender<FrameRecord>,
     thread: JoinHandle<()>,
     n_missed: Arc<AtomicU64>,
+    n_written: Arc<AtomicU64>,
+    n_handed_on: Cell<u64>,
     overlay_every: u64,
     start_frame: u64,
     frame_step: u64,
@@ -196,14 +224,18 @@ impl Writer {
         let (queue, records) = sync_channel(QUEUE);
         let n_missed = Arc::new(AtomicU64::new(0));
         let missed = Arc::clone(&n_missed);
+        let n_written = Arc::new(AtomicU64::new(0));
+        let written = Arc::clone(&n_written);
         let thread = Builder::new()
             .name("writer".to_owned())
-            .spawn(move || write_all(output, &records, &missed, session))
+            .spawn(move || write_all(output, &records, [&missed, &written], session))
             .or_fail(ExitKind::Run)?;
         Ok(Self {
             queue,
             thread,
             n_missed,
+            n_written,
+            n_handed_on: Cell::new(0),
             overlay_every,
             start_frame: job.start_frame,
             frame_step: frame_step.max(1),
@@ -219,12 +251,21 @@ impl Writer {
     /// Hands a record on; `false` if it was missed, because too many wait already.
     fn write(&self, record: FrameRecord) -> bool {
         match self.queue.try_send(record) {
-            Ok(()) => true,
+            Ok(()) => {
+                self.n_handed_on.set(self.n_handed_on.get() + 1);
+                true
+            }
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
                 self.n_missed.fetch_add(1, Ordering::Relaxed);
                 false
             }
         }
+    }
+
+    /// Results that wait to be written.
+    fn n_waiting(&self) -> usize {
+        let written = self.n_written.load(Ordering::Relaxed);
+        self.n_handed_on.get().saturating_sub(written) as usize
     }
 
     /// Waits until everything is written.
@@ -242,11 +283,12 @@ impl Writer {
 fn write_all(
     mut output: Output,
     records: &Receiver<FrameRecord>,
-    n_missed: &AtomicU64,
+    [n_missed, n_written]: [&AtomicU64; 2],
     session: u64,
 ) {
     while let Ok(record) = records.recv() {
         output.frame(&record);
+        n_written.fetch_add(1, Ordering::Relaxed);
     }
     output.missed(n_missed.load(Ordering::Relaxed));
     output.finish(session);

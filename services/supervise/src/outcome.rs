@@ -1,6 +1,6 @@
 //! What became of a run.
 
-use messages::Health;
+use messages::{Health, Metrics};
 
 /// What became of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct ProcessOutcome {
     pub counts: Counts,
     /// Its last sign of life.
     pub last: Option<Health>,
+    /// What its last life has said last of its times and counts; not checked.
+    pub measured: Option<Metrics>,
 }
 
 /// How a process stands.

@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::io;
 use std::time::Instant;
 
-use messages::{Health, topic};
+use messages::{Health, Metrics, topic};
 use runtime::{
     Bus, BusError, Child, Cleaner, ExitKind, Fault, Launch, LockError, PortError, PreflightError,
     Stop, preflight, wait_for_any,
@@ -115,7 +115,8 @@ pub fn run(
     let mut watches = Vec::new();
     for spec in &plan.processes {
         let signs = bus.subscriber::<Health>(&topic::health(&spec.name), &mut waiter)?;
-        watches.push(Watch::new(spec.clone(), signs, now));
+        let metrics = bus.subscriber::<Metrics>(&topic::metrics(&spec.name), &mut waiter)?;
+        watches.push(Watch::new(spec.clone(), signs, metrics, now));
     }
     let mut supervisor = Supervisor {
         plan,
@@ -258,6 +259,12 @@ impl Supervisor<'_> {
             Ok(None) => {}
             Err(error) => {
                 tracing::warn!(process = watch.spec.name, %error, "cannot hear its signs of life");
+            }
+        }
+        match watch.metrics.latest() {
+            Ok(said) => said.iter().for_each(|it| watch.note_metrics(it)),
+            Err(error) => {
+                tracing::warn!(process = watch.spec.name, %error, "cannot hear its times");
             }
         }
     }

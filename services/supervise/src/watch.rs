@@ -6,7 +6,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::process::ExitStatus;
 use std::time::Instant;
 
-use messages::Health;
+use messages::{Health, Metrics};
 use runtime::{Child, ExitKind, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
@@ -21,6 +21,7 @@ const KEPT_LINES: usize = 40;
 pub(crate) struct Watch {
     pub(crate) spec: ProcessSpec,
     pub(crate) signs: Subscriber<Health>,
+    pub(crate) metrics: Subscriber<Metrics>,
     pub(crate) life: Life,
     pub(crate) epoch: u32,
     /// When it was restarted, within the window.
@@ -32,6 +33,8 @@ pub(crate) struct Watch {
     current: Option<Health>,
     /// The last sign of any life.
     last: Option<Health>,
+    /// What any life has said last of its times and counts.
+    measured: Option<Metrics>,
     /// When it last gave a sign of life, by its own clock.
     signed: Change,
     /// When the main loop last turned.
@@ -85,10 +88,16 @@ pub(crate) enum Sequel {
 
 impl Watch {
     /// A process that is to be started at once.
-    pub(crate) fn new(spec: ProcessSpec, signs: Subscriber<Health>, now: Instant) -> Self {
+    pub(crate) fn new(
+        spec: ProcessSpec,
+        signs: Subscriber<Health>,
+        metrics: Subscriber<Metrics>,
+        now: Instant,
+    ) -> Self {
         Self {
             spec,
             signs,
+            metrics,
             life: Life::Due(now),
             epoch: 0,
             restarts: VecDeque::new(),
@@ -96,6 +105,7 @@ impl Watch {
             past: Counts::default(),
             current: None,
             last: None,
+            measured: None,
             signed: Change::new(now),
             turned: Change::new(now),
             received: Change::new(now),
@@ -137,6 +147,11 @@ impl Watch {
         self.current = Some(*health);
         self.last = self.current;
         true
+    }
+
+    /// Takes note of times and counts, which a killed process has sent too.
+    pub(crate) fn note_metrics(&mut self, metrics: &Metrics) {
+        self.measured = Some(*metrics);
     }
 
     /// Counts the time from now on: the supervisor itself has been asleep.
@@ -251,6 +266,7 @@ impl Watch {
             restarts: self.epoch,
             counts: self.past.and(self.current.as_ref()),
             last: self.last,
+            measured: self.measured,
         }
     }
 }

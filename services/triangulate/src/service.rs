@@ -4,7 +4,8 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use join::{Joined, Joiner, Push};
-use messages::{PairPose, Pose3d, Stamp, Status, Timing, ViewPose, topic};
+use messages::{Cause, PairPose, Pose3d, Stamp, Status, Timing, ViewPose, topic};
+use metrics::Passage;
 use multiview::ViewPlan;
 use pipeline::{Answer, PairAnswer, SkeletonStep};
 use runtime::{
@@ -132,7 +133,7 @@ impl<'a> Stage<'a> {
     fn take(&mut self, input: usize, frame: u64, word: Word) {
         self.service.health().received(1);
         if self.joiner.push(input, frame, word, now_nanos()) == Push::Late {
-            self.service.health().dropped(1);
+            self.service.health().dropped(Cause::Late, 1);
         }
     }
 
@@ -172,7 +173,15 @@ impl<'a> Stage<'a> {
         self.publisher.send(&message)?;
         let health = self.service.health();
         health.sent(joined.frame);
-        health.computed(Duration::from_nanos(now_nanos() - received_at_nanos));
+        health.queued(self.joiner.n_pending());
+        let sent_at = message.timing.sent_at_nanos;
+        let waited = |last: u64| received_at_nanos.saturating_sub(last);
+        health.passed(&Passage {
+            waiting: last_sent_at(joined).map(waited),
+            computing: sent_at - received_at_nanos,
+            publishing: now_nanos() - sent_at,
+            since_capture: Some(sent_at.saturating_sub(message.stamp.captured_at_nanos)),
+        });
         Ok(())
     }
 
@@ -214,6 +223,15 @@ fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Wor
         Delivery::Lossless => Joiner::lossless(n_inputs, nanos),
         Delivery::Realtime => Joiner::new(n_inputs, nanos),
     }
+}
+
+/// When the last of what a frame's result is made of was sent.
+fn last_sent_at(joined: &Joined<Word>) -> Option<u64> {
+    let timings = joined.items.iter().flatten().map(|it| match it {
+        Word::Pose(it) => it.timing,
+        Word::Pair(it) => it.timing,
+    });
+    timings.map(|it| it.sent_at_nanos).max()
 }
 
 /// When the first view of the frame was captured.

@@ -3,7 +3,7 @@
 use std::io;
 
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, Metrics, PairPose, Pose3d, ViewPose, ViewQuality, topic,
 };
 
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
@@ -16,6 +16,8 @@ const SMALL_BUFFER_LOSSLESS: usize = 16;
 const LARGE_BUFFER: usize = 1;
 /// Subscribers of small topics beyond those of the deployment: the command line tools.
 const SPARE: usize = 2;
+/// Those who look at times and counts at the same time, besides the supervisor.
+const ONLOOKERS: usize = 4;
 /// Queues and management of one process, bytes: ten times what is measured.
 const OVERHEAD_BYTES: u64 = 1 << 20;
 
@@ -136,7 +138,7 @@ impl DeploymentPlan {
             self.delivery,
             self.small(self.n_recorders),
         ));
-        topics.extend(self.processes.iter().map(|name| health_topic(name)));
+        topics.extend(self.processes.iter().flat_map(|name| process_topics(name)));
         topics
     }
 
@@ -149,14 +151,19 @@ impl DeploymentPlan {
     }
 }
 
-/// The topic of a process's signs of life: never waits, wakes nobody.
-pub fn health_topic(process: &str) -> TopicPlan {
-    TopicPlan::messages::<Health>(
+/// The topics of a process's signs of life and of its times and counts: they never wait and wake nobody.
+pub fn process_topics(process: &str) -> [TopicPlan; 2] {
+    let health = TopicPlan::messages::<Health>(
         topic::health(process),
         Delivery::Realtime,
         Limits::new(1 + SPARE, 2, 1),
-    )
-    .without_wake_up()
+    );
+    let metrics = TopicPlan::messages::<Metrics>(
+        topic::metrics(process),
+        Delivery::Realtime,
+        Limits::new(1 + ONLOOKERS, 1, 1),
+    );
+    [health.without_wake_up(), metrics.without_wake_up()]
 }
 
 /// Checks that the pools of all topics fit into what is free of `/dev/shm`.
@@ -173,7 +180,8 @@ pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
 
 fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightError> {
     let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
-    let n_processes = topics.iter().filter(|plan| !plan.wakes()).count() as u64;
+    let of_process = |plan: &&TopicPlan| topic::process_of_metrics(plan.topic()).is_some();
+    let n_processes = topics.iter().filter(of_process).count() as u64;
     let needed_bytes = pools + OVERHEAD_BYTES * n_processes;
     if needed_bytes <= free_bytes {
         return Ok(());
@@ -245,7 +253,7 @@ mod tests {
             .map(|it| it.topic().to_owned())
             .collect();
         let n = names.len();
-        assert_eq!(n, 4 * 4 + 2 + 1 + 12);
+        assert_eq!(n, 4 * 4 + 2 + 1 + 2 * 12);
         names.sort();
         names.dedup();
         assert_eq!(names.len(), n);

@@ -5,15 +5,15 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
-use hdrhistogram::Histogram;
-use messages::Health as HealthMessage;
+use messages::{Cause, Health as HealthMessage, Metrics, Span, topic};
+use metrics::{Meter, Passage, Rates};
 
-use crate::{Bus, Launch, PortError, Progress, memory, now_nanos};
+use crate::{Bus, Launch, PortError, Progress, Publisher, memory, now_nanos};
 
 /// Pause between two signs of life.
 const PERIOD: Duration = Duration::from_millis(150);
-/// Longest computation that is told apart, microseconds.
-const LONGEST_MICROS: u64 = 3_600_000_000;
+/// Signs of life from one message of times and counts to the next: about a second.
+const SIGNS_PER_METRICS: u32 = 7;
 
 /// Signs of life cannot be sent.
 #[derive(Debug, thiserror::Error)]
@@ -45,12 +45,12 @@ struct Counts {
     progress: Progress,
     n_received: AtomicU64,
     n_sent: AtomicU64,
-    n_dropped: AtomicU64,
     n_total: AtomicU64,
     last_frame: AtomicU64,
     finished: AtomicU32,
     ended: AtomicBool,
-    micros: Mutex<Histogram<u64>>,
+    began_at_nanos: u64,
+    meter: Mutex<Meter>,
 }
 
 impl Health {
@@ -66,26 +66,26 @@ impl Health {
             progress: bus.progress().clone(),
             n_received: AtomicU64::new(0),
             n_sent: AtomicU64::new(0),
-            n_dropped: AtomicU64::new(0),
             n_total: AtomicU64::new(0),
             last_frame: AtomicU64::new(0),
             finished: AtomicU32::new(0),
             ended: AtomicBool::new(false),
-            micros: Mutex::new(histogram()),
+            began_at_nanos: now_nanos(),
+            meter: Mutex::default(),
         });
         // Ports stay in the thread that makes them, so it has to make its own.
         let (answer, answered) = mpsc::sync_channel(1);
         let seed = bus.seed();
-        let topic = messages::topic::health(&launch.process);
+        let process = launch.process.clone();
         let shared = Arc::clone(&counts);
         let thread = thread::Builder::new()
             .name("health".to_owned())
             .spawn(move || {
                 let bus = seed.grow();
-                match bus.publisher::<HealthMessage>(&topic) {
-                    Ok(publisher) => {
+                match Sender::open(&bus, &process, &shared) {
+                    Ok(sender) => {
                         if answer.send(Ok(())).is_ok() {
-                            shared.send_until_ended(&publisher);
+                            sender.send_until_ended();
                         }
                     }
                     Err(error) => {
@@ -120,16 +120,40 @@ impl Health {
         self.counts.last_frame.store(frame, Ordering::Relaxed);
     }
 
-    /// Counts messages that were lost or came too late.
-    pub fn dropped(&self, n: u64) {
-        self.counts.n_dropped.fetch_add(n, Ordering::Relaxed);
+    /// Counts messages or frames that were lost.
+    pub fn dropped(&self, cause: Cause, n: u64) {
+        if n > 0 {
+            self.counts.meter(|it| it.dropped(cause, n));
+        }
     }
 
-    /// Notes how long the computation of a frame took.
-    pub fn computed(&self, time: Duration) {
-        let micros = (time.as_micros() as u64).clamp(1, LONGEST_MICROS);
-        self.counts
-            .histogram(|histogram| histogram.saturating_record(micros));
+    /// Notes how a frame went through the process.
+    pub fn passed(&self, passage: &Passage) {
+        self.counts.meter(|it| it.passed(passage));
+    }
+
+    /// Notes a duration, nanoseconds.
+    ///
+    /// * `view`: of which view, if of one.
+    pub fn spent(&self, span: Span, view: Option<usize>, nanos: u64) {
+        self.counts.meter(|it| it.spent(span, view, nanos));
+    }
+
+    /// Notes how many frames or results wait in the process.
+    pub fn queued(&self, n: usize) {
+        self.counts.meter(|it| it.queued(n));
+    }
+
+    /// Counts evidence that was sent out.
+    pub fn sent_evidence(&self, bytes: u64) {
+        self.counts.meter(|it| it.sent_evidence(bytes));
+    }
+
+    /// Says whose view the process works for.
+    ///
+    /// * `name`: the camera's.
+    pub fn belongs_to(&self, view: usize, name: &str) {
+        self.counts.meter(|it| it.belongs_to(view, name));
     }
 
     /// Says how much work there is, if that is known.
@@ -155,28 +179,57 @@ impl Drop for Health {
     }
 }
 
-impl Counts {
-    /// The last message goes out after the end, so that the final counts are seen.
-    fn send_until_ended(&self, publisher: &crate::Publisher<HealthMessage>) {
+/// The thread that sends.
+struct Sender<'a> {
+    counts: &'a Counts,
+    signs: Publisher<HealthMessage>,
+    metrics: Publisher<Metrics>,
+}
+
+impl<'a> Sender<'a> {
+    fn open(bus: &Bus, process: &str, counts: &'a Counts) -> Result<Self, PortError> {
+        Ok(Self {
+            counts,
+            signs: bus.publisher(&topic::health(process))?,
+            metrics: bus.publisher(&topic::metrics(process))?,
+        })
+    }
+
+    /// The last messages go out after the end, so that the final counts are seen. Who begins to look is
+    /// told at once.
+    fn send_until_ended(&self) {
+        let mut rates = Rates::new(self.counts.began_at_nanos);
+        let (mut n_signs, mut n_looking) = (0_u32, 0);
         loop {
-            let ended = self.ended.load(Ordering::Acquire);
-            if let Err(error) = publisher.send(&self.message()) {
+            let ended = self.counts.ended.load(Ordering::Acquire);
+            if let Err(error) = self.signs.send(&self.counts.message()) {
                 tracing::debug!(%error, "cannot send a sign of life");
             }
+            let n_now = self.metrics.n_connected();
+            if ended || n_signs.is_multiple_of(SIGNS_PER_METRICS) || n_now > n_looking {
+                let mut message = self.counts.metrics();
+                rates.fill(&mut message);
+                if let Err(error) = self.metrics.send(&message) {
+                    tracing::debug!(%error, "cannot send times and counts");
+                }
+            }
+            (n_signs, n_looking) = (n_signs.wrapping_add(1), n_now);
             if ended {
                 return;
             }
             thread::park_timeout(PERIOD);
         }
     }
+}
 
+impl Counts {
     fn message(&self) -> HealthMessage {
-        let (p50_micros, p99_micros) = self.histogram(|histogram| {
-            (
-                histogram.value_at_quantile(0.5),
-                histogram.value_at_quantile(0.99),
-            )
+        let computing = self.meter(|it| {
+            (0..it.n_rows())
+                .filter_map(|row| it.row(row))
+                .find(|it| it.span == Span::COMPUTING)
         });
+        let micros = |nanos: Option<u64>| nanos.map_or(0, |it| it / 1000);
         HealthMessage {
             session: self.session,
             pid: std::process::id(),
@@ -185,10 +238,10 @@ impl Counts {
             at_nanos: now_nanos(),
             n_received: self.n_received.load(Ordering::Relaxed),
             n_sent: self.n_sent.load(Ordering::Relaxed),
-            n_dropped: self.n_dropped.load(Ordering::Relaxed),
+            n_dropped: self.meter(|it| it.n_dropped()),
             last_frame: self.last_frame.load(Ordering::Relaxed),
-            p50_micros,
-            p99_micros,
+            p50_micros: micros(computing.map(|it| it.p50_nanos)),
+            p99_micros: micros(computing.map(|it| it.p99_nanos)),
             peak_memory_bytes: memory::peak_memory().unwrap_or(0),
             finished: self.finished.load(Ordering::Relaxed),
             reserved: 0,
@@ -196,13 +249,33 @@ impl Counts {
         }
     }
 
-    fn histogram<T>(&self, use_it: impl FnOnce(&mut Histogram<u64>) -> T) -> T {
-        let mut histogram = self.micros.lock().unwrap_or_else(PoisonError::into_inner);
-        use_it(&mut histogram)
+    /// All but the rates. The main loop waits for one row at most, not for all of them.
+    fn metrics(&self) -> Metrics {
+        let [memory_bytes, peak_memory_bytes] = memory::memory_now().unwrap_or_default();
+        let mut message = Metrics {
+            session: self.session,
+            pid: std::process::id(),
+            epoch: self.epoch,
+            began_at_nanos: self.began_at_nanos,
+            at_nanos: now_nanos(),
+            n_received: self.n_received.load(Ordering::Relaxed),
+            n_sent: self.n_sent.load(Ordering::Relaxed),
+            memory_bytes,
+            peak_memory_bytes,
+            finished: self.finished.load(Ordering::Relaxed),
+            ..self.meter(|it| it.head())
+        };
+        for (row, index) in message.rows.iter_mut().zip(0_u32..) {
+            let Some(now) = self.meter(|it| it.row(index as usize)) else {
+                break;
+            };
+            *row = now;
+            message.n_rows = index + 1;
+        }
+        message
     }
-}
 
-#[expect(clippy::expect_used, reason = "the arguments are constants")]
-fn histogram() -> Histogram<u64> {
-    Histogram::new_with_bounds(1, LONGEST_MICROS, 2).expect("1 <= 2 * low <= high, 2 digits")
+    fn meter<T>(&self, use_it: impl FnOnce(&mut Meter) -> T) -> T {
+        use_it(&mut self.meter.lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }

@@ -19,6 +19,10 @@ use crate::{BusError, ExitKind, Fault, Namespace};
 
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub(crate) const LOCK_FILE: &str = "lock";
+/// Tells those who only look at a deployment that it ends.
+pub(crate) const ENDING_FILE: &str = "ending";
+/// How long they are given to leave.
+const LEAVING_LIMIT: Duration = Duration::from_secs(1);
 /// How long the processes of a killed supervisor are given to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
 const DYING_PAUSE: Duration = Duration::from_millis(20);
@@ -119,10 +123,25 @@ impl DeploymentLock {
     pub fn namespace(&self) -> &Namespace {
         &self.namespace
     }
+
+    /// Where nobody looks, nobody is waited for.
+    fn ask_onlookers_to_leave(&self) {
+        if alive(&self.config).is_empty() {
+            return;
+        }
+        if let Err(error) = fs::write(self.namespace.root().join(ENDING_FILE), "") {
+            tracing::debug!(%error, "cannot ask those who look to leave");
+        }
+        let begin = Instant::now();
+        while !alive(&self.config).is_empty() && begin.elapsed() < LEAVING_LIMIT {
+            sleep(DYING_PAUSE);
+        }
+    }
 }
 
 impl Drop for DeploymentLock {
     fn drop(&mut self) {
+        self.ask_onlookers_to_leave();
         let alive = alive(&self.config);
         if !alive.is_empty() {
             tracing::warn!(?alive, "processes are left: so are their files");
@@ -192,22 +211,30 @@ fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
 
 /// Names and process ids of the processes that are registered and alive.
 pub(crate) fn alive(config: &Config) -> Vec<String> {
-    let mut alive = Vec::new();
+    let text = |it: Option<(String, u32)>| match it {
+        Some((name, pid)) => format!("{name} ({pid})"),
+        None => "a process that begins".to_owned(),
+    };
+    living(config).into_iter().map(text).collect()
+}
+
+/// The same, apart; none for a process that has not written its name yet.
+pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
+    let mut living = Vec::new();
     let listed = Node::<ipc::Service>::list(config, |state| {
         if let NodeState::Alive(node) = state {
-            alive.push(match node.details() {
-                Some(details) => {
-                    format!("{} ({})", details.name(), details.process_id().value())
-                }
-                None => "a process that begins".to_owned(),
-            });
+            living.push(
+                node.details()
+                    .as_ref()
+                    .map(|it| (it.name().to_string(), it.process_id().value() as u32)),
+            );
         }
         CallbackProgression::Continue
     });
     if let Err(error) = listed {
         tracing::debug!(?error, "cannot list the processes of the deployment");
     }
-    alive
+    living
 }
 
 /// Removes everything but the lock. Nothing may be alive.

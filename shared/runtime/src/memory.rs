@@ -62,10 +62,19 @@ pub fn free_shared_memory() -> io::Result<u64> {
 /// Most bytes of physical memory that this process has ever held (`VmHWM`); `None` where the system does
 /// not say.
 pub fn peak_memory() -> Option<u64> {
+    memory_now().map(|it| it[1])
+}
+
+/// Bytes of physical memory that this process holds now (`VmRSS`) and has ever held (`VmHWM`); `None`
+/// where the system does not say.
+pub(crate) fn memory_now() -> Option<[u64; 2]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|it| it.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(kib * 1024)
+    let bytes = |key: &str| -> Option<u64> {
+        let line = status.lines().find_map(|it| it.strip_prefix(key))?;
+        let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
+        Some(kib * 1024)
+    };
+    Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
 }
 
 /// Allocates every page of the pool of one publisher, and maps those of its first chunks, which are

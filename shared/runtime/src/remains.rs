@@ -84,7 +84,7 @@ fn look_at(namespace: Namespace, locks: &str) -> Result<Remains, LockError> {
 
 /// Who holds a lock file, from the kernel's list of locks: trying to lock it could be in the way of
 /// a deployment that is about to begin.
-fn supervisor(file: &Path, locks: &str) -> Option<u32> {
+pub(crate) fn supervisor(file: &Path, locks: &str) -> Option<u32> {
     let metadata = fs::metadata(file).ok()?;
     locks.lines().find_map(|line| holder(line, &metadata))
 }

@@ -7,7 +7,7 @@ use std::fs;
 
 use common::{Deployment, namespace, shared_memory};
 use messages::Health;
-use runtime::{Bus, LockError, Namespace, NamespaceError, Stop, health_topic};
+use runtime::{Bus, LockError, Namespace, NamespaceError, Stop, process_topics};
 
 #[test]
 fn a_deployment_that_runs_is_not_started_again() {
@@ -24,7 +24,7 @@ fn a_deployment_that_runs_is_not_started_again() {
 
 #[test]
 fn nothing_is_left_after_the_end() {
-    let deployment = Deployment::new(&[health_topic("a")]);
+    let deployment = Deployment::new(&process_topics("a"));
     let namespace = deployment.namespace().clone();
     let bus = deployment.bus("a");
     let publisher = bus.publisher::<Health>("health/v2/a").unwrap();

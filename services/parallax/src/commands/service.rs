@@ -73,6 +73,10 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
         let message = format!("there is no view {}, only {n_views}", own.index);
         return Err(Failure::new(ExitKind::Usage, message));
     }
+    if per_view {
+        let camera = &resolved.deployment.cameras[own.index].name;
+        service.health().belongs_to(own.index, camera);
+    }
     let n_threads = if name == Name::Pose {
         resolved.deployment.pose.threads
     } else {

@@ -8,7 +8,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use messages::FrameHeader;
-use runtime::{Delivery, Limits, Namespace, Stop, TopicPlan, health_topic};
+use runtime::{Delivery, Limits, Namespace, Stop, TopicPlan, process_topics};
 use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
 use tracing::Level;
 
@@ -60,7 +60,9 @@ impl Case {
                 args: behaviour.split(' ').map(Into::into).collect(),
                 role,
             });
-        let health = processes.iter().map(|&(name, _, _)| health_topic(name));
+        let health = processes
+            .iter()
+            .flat_map(|&(name, _, _)| process_topics(name));
         let plan = Plan {
             executable: env!("CARGO_BIN_EXE_supervise-dummy").into(),
             namespace: Namespace::below("t", base.path()).unwrap(),

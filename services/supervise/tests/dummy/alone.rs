@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use messages::FrameHeader;
 use runtime::{
-    Bus, Delivery, Failure, Limits, Namespace, Stop, TopicPlan, health_topic, preflight,
+    Bus, Delivery, Failure, Limits, Namespace, Stop, TopicPlan, preflight, process_topics,
 };
 use supervise::{Event, Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
@@ -33,7 +33,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         namespace: Namespace::below("t", base)?,
         session: 1,
         delivery: Delivery::Realtime,
-        topics: names.map(health_topic).to_vec(),
+        topics: names.into_iter().flat_map(process_topics).collect(),
         processes: processes.to_vec(),
         policy: Policy::default(),
         log: Level::WARN,

@@ -41,6 +41,14 @@ impl Deployment {
         &self.stop
     }
 
+    /// Names and process ids of those who are registered.
+    pub(crate) fn alive(&self) -> Vec<String> {
+        let base = self.namespace().base();
+        let all = runtime::deployments(base).unwrap();
+        let own = |it: &runtime::Remains| it.namespace == *self.namespace();
+        all.into_iter().find(own).unwrap().processes
+    }
+
     pub(crate) fn namespace(&self) -> &Namespace {
         self.lock.namespace()
     }
