@@ -5,7 +5,7 @@ use tracing::Level;
 
 use crate::commands::{
     calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, run, service, synth,
-    train,
+    top, train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -23,6 +23,8 @@ Examples:
     parallax run configs/pose2sim-balancing.toml        four cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
+    parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
+    parallax top                                        where the time of a running deployment goes
     parallax chaos                                      processes killed on purpose, and what held
     parallax config show my.toml                        every value, and who said it
     parallax detect photo.jpg --model parse.mat --json  people in single images
@@ -108,8 +110,10 @@ pub(crate) enum Command {
     Config(config::Command),
     /// Make sequences of people who do not exist, with the truth.
     Synth(Box<synth::Arguments>),
-    /// Show which deployments run, and what dead ones have left in shared memory.
+    /// Show which deployments run, and what dead ones have left in shared memory; or one of them in full.
     Status(deployments::StatusArguments),
+    /// Watch the processes of a deployment that runs: rates, times, losses, memory.
+    Top(top::Arguments),
     /// Remove what dead deployments have left in shared memory.
     Clean(deployments::CleanArguments),
     /// Become one process of a deployment; `run` does this.

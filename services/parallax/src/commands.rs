@@ -13,6 +13,7 @@ pub(crate) mod model;
 pub(crate) mod run;
 pub(crate) mod service;
 pub(crate) mod synth;
+pub(crate) mod top;
 pub(crate) mod train;
 
 use std::process::ExitCode;
@@ -38,6 +39,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Calib(it) => calib::run(&it),
         Command::Config(it) => config::run(&it),
         Command::Status(it) => deployments::status(&it),
+        Command::Top(it) => top::run(&it),
         Command::Clean(it) => deployments::clean(&it),
         Command::Synth(it) => synth::run(&it, cli.globals),
         Command::Service(it) => service::run(&it),

@@ -65,6 +65,9 @@ pub(crate) struct Supervision {
     pub max_restarts: u32,
     /// The window in which restarts are counted, seconds.
     pub restart_window_s: u64,
+    /// Longest 99th percentile from capture to result with which a run succeeds, milliseconds; any if
+    /// not given.
+    pub latency_budget_ms: Option<f64>,
 }
 
 impl Default for Supervision {
@@ -74,6 +77,7 @@ impl Default for Supervision {
             hang_limit_s: None,
             max_restarts: 5,
             restart_window_s: 60,
+            latency_budget_ms: None,
         }
     }
 }

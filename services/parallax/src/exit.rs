@@ -13,7 +13,7 @@ Exit codes:
     3  a deployment or settings file is wrong
     4  an input is missing or unreadable (footage, model, calibration file, table, data set)
     5  the calibration cannot be used
-    6  a limit was missed
+    6  a limit was missed (`demo`, `chaos`, a latency budget)
     7  done, but degraded: views, frames or processes were lost on the way
   130  stopped by Ctrl-C
 

@@ -1,12 +1,14 @@
 //! Entry point: parse the command line, then become what it names.
 #![forbid(unsafe_code)]
 
+mod budget;
 mod cli;
 mod commands;
 mod deployment;
 mod describe;
 mod exit;
 mod inputs;
+mod live;
 mod output;
 mod plan;
 mod prepare;

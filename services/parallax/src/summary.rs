@@ -6,10 +6,13 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use metrics::Reading;
 use runtime::ExitKind;
 use serde_json::{Value, json};
 use supervise::{Event, Outcome};
 
+use crate::budget::{self, Budget};
+use crate::live;
 use crate::output;
 use crate::plan::Resolved;
 use crate::views::ViewReport;
@@ -121,6 +124,9 @@ pub(crate) struct Report {
     n_dropped: u64,
     is_lossless: bool,
     views: Vec<ViewReport>,
+    budget: Option<Budget>,
+    /// What every process has said last of its times and counts.
+    measured: BTreeMap<String, Value>,
     /// `summary.json`, as the recorder wrote it; null if it did not.
     recorded: Value,
 }
@@ -160,6 +166,12 @@ impl Report {
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
             is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
             views: ViewReport::all(resolved, outcome, &recorded["summary"]),
+            budget: resolved
+                .deployment
+                .supervise
+                .latency_budget_ms
+                .map(|it| Budget::new(it, &recorded["latency"])),
+            measured: measured(outcome),
             recorded,
         }
     }
@@ -183,6 +195,11 @@ impl Report {
         failed
     }
 
+    /// Whether the run was fast enough, if it was asked to be.
+    pub(crate) fn budget(&self) -> Option<&Budget> {
+        self.budget.as_ref()
+    }
+
     /// What the recorder wrote about the run; null if it did not.
     pub(crate) fn recorded(&self) -> &Value {
         &self.recorded
@@ -190,25 +207,34 @@ impl Report {
 
     /// How the run ended, if not well.
     pub(crate) fn kind(&self) -> Option<ExitKind> {
+        let budget = self.budget.as_ref();
+        if budget.is_some_and(Budget::is_exceeded) {
+            // Live cameras run until they are stopped: that is no excuse.
+            Some(ExitKind::Limit)
+        } else if self.interrupted {
+            Some(ExitKind::Interrupted)
+        } else if budget.is_some_and(|it| !it.is_held()) {
+            Some(ExitKind::Limit)
+        } else {
+            self.is_degraded().then_some(ExitKind::Degraded)
+        }
+    }
+
+    /// Whether views, frames or processes were lost on the way. Of an interrupted run nothing is said.
+    fn is_degraded(&self) -> bool {
         let count = |key: &str| self.recorded["summary"][key].as_u64().unwrap_or(0);
         let lost: &[&str] = if self.is_lossless {
             &["frames_missed", "frames_not_recorded", "writes_failed"]
         } else {
             &["frames_not_recorded", "writes_failed"]
         };
-        if self.interrupted {
-            Some(ExitKind::Interrupted)
-        } else if !self.given_up.is_empty()
-            || !self.restarts.is_empty()
-            || self.recorded.is_null()
-            || (self.is_lossless && count("frames") < self.n_frames)
-            || lost.iter().any(|it| count(it) > 0)
-            || self.views.iter().any(|it| it.is_lost(self.is_lossless))
-        {
-            Some(ExitKind::Degraded)
-        } else {
-            None
-        }
+        !self.interrupted
+            && (!self.given_up.is_empty()
+                || !self.restarts.is_empty()
+                || self.recorded.is_null()
+                || (self.is_lossless && count("frames") < self.n_frames)
+                || lost.iter().any(|it| count(it) > 0)
+                || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
     }
 
     /// For programs.
@@ -220,12 +246,14 @@ impl Report {
             "frames_in_footage": self.n_frames,
             "seconds": self.seconds,
             "interrupted": self.interrupted,
-            "degraded": self.kind() == Some(ExitKind::Degraded),
+            "degraded": self.is_degraded(),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
             "dropped": self.n_dropped,
             "views": self.views,
+            "latency_budget": self.budget.as_ref().map(Budget::json),
+            "processes": self.measured,
             "recorded": self.recorded,
         })
     }
@@ -241,6 +269,7 @@ impl Report {
     fn write(&self, text: &mut String) -> core::fmt::Result {
         let how = match self.kind() {
             Some(ExitKind::Interrupted) => ", stopped",
+            Some(ExitKind::Limit) => ", over its latency budget",
             Some(_) => ", degraded",
             None => "",
         };
@@ -276,6 +305,9 @@ impl Report {
             it["frames_with_views_missing"].as_u64().unwrap_or(0),
             it["writes_failed"].as_u64().unwrap_or(0),
         )?;
+        if let Some(budget) = &self.budget {
+            writeln!(text, "  budget        {}", budget.verdict())?;
+        }
         self.write_memory(text)?;
         let restarts: Vec<String> = self
             .restarts
@@ -331,17 +363,7 @@ impl Report {
 
     fn write_latency(&self, text: &mut String) -> core::fmt::Result {
         let latency = &self.recorded["latency"];
-        writeln!(text, "  latency       {:>9} {:>9}  ms", "p50", "p99")?;
-        let rows = ["capture", "pose", "quality", "fuse", "triangulate"];
-        let stages = rows.map(|it| (it, &latency["stages"][it]));
-        for (name, it) in stages
-            .into_iter()
-            .chain([("end to end", &latency["end_to_end"])])
-        {
-            if let (Some(p50), Some(p99)) = (it["p50_ms"].as_f64(), it["p99_ms"].as_f64()) {
-                writeln!(text, "    {name:<11} {p50:>9.1} {p99:>9.1}")?;
-            }
-        }
+        text.push_str(&budget::table(latency));
         let share = |key: &str| {
             latency[key]
                 .as_f64()
@@ -356,4 +378,17 @@ impl Report {
         }
         Ok(())
     }
+}
+
+/// What every process has said last of its times and counts; null where that cannot be read.
+fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
+    let said = outcome.processes.iter().filter_map(|it| {
+        let reading = Reading::from_message(it.measured.as_ref()?);
+        let reading = reading.inspect_err(|error| {
+            tracing::warn!(process = it.name, %error, "unreadable times and counts");
+        });
+        let told = reading.map_or(Value::Null, |it| live::measured(&it));
+        Some((it.name.clone(), told))
+    });
+    said.collect()
 }

@@ -6,11 +6,18 @@ use clap::Args;
 use runtime::{ExitKind, Failure, Namespace, Remains, deployments};
 use serde_json::{Value, json};
 
+use crate::commands::top;
+use crate::live::{self, Live};
 use crate::output;
 
 /// How to show what is there.
 #[derive(Debug, Args)]
+#[command(after_help = "\
+With a DEPLOYMENT, it is that of `parallax top --once`: every process, its state, and the percentiles of its stages
+(`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
 pub(crate) struct StatusArguments {
+    /// Name of a deployment that runs, or its file: show its processes and where their time goes.
+    deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -28,6 +35,9 @@ pub(crate) struct CleanArguments {
 
 /// Shows the deployments of this user.
 pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
+    if let Some(named) = &arguments.deployment {
+        return status_of(named, arguments.json);
+    }
     let found = deployments(&Namespace::usual_base())?;
     if arguments.json {
         let all: Vec<Value> = found.iter().map(describe).collect();
@@ -45,6 +55,18 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
             None => format!("dead, but for {}", it.processes.join(", ")),
         };
         output::line(format_args!("{name:<32} {:>10}  {how}", size(it)))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Shows the processes of one deployment that runs.
+fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
+    let namespace = top::namespace(Some(named))?;
+    let board = Live::open(&namespace)?.first_look()?;
+    if json {
+        output::json(&json!({ "schema_version": 1, "deployment": live::describe(&board) }))?;
+    } else {
+        output::line(live::table(&board).trim_end())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -26,7 +26,12 @@ replaced when the new ones are whole, until then they are called *.part.
 Examples:
     parallax run configs/pose2sim-balancing.toml
     parallax run my.toml --out /tmp/try --set capture.n_frames=20 --set fuse.workers=2
-    parallax run my.toml --dry-run")]
+    parallax run my.toml --latency-budget-ms 150
+    parallax run my.toml --dry-run
+
+While it runs, `parallax top` and `parallax status NAME --json` show every process and where its time goes. With a
+latency budget the run ends with exit code 6 if the 99th percentile from capture to result exceeds it, or if no frame
+was measured (unless it was stopped by Ctrl-C before any was).")]
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
@@ -36,6 +41,10 @@ pub(crate) struct Arguments {
     /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Fail with exit code 6 if 1 frame in 100 takes longer than this from capture to result, milliseconds; the same
+    /// as `--set supervise.latency_budget_ms=N`.
+    #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
+    latency_budget_ms: Option<f64>,
     /// Show what would be started and how much shared memory it needs, and start nothing.
     #[arg(long)]
     dry_run: bool,
@@ -46,7 +55,10 @@ pub(crate) struct Arguments {
 
 /// Runs the deployment until its footage ends, or it is told to stop.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let mut loaded = Loaded::read(&arguments.config, &arguments.set)?;
+    let budget = arguments.latency_budget_ms;
+    let budget = budget.map(|it| format!("supervise.latency_budget_ms={it:?}"));
+    let set: Vec<String> = arguments.set.iter().cloned().chain(budget).collect();
+    let mut loaded = Loaded::read(&arguments.config, &set)?;
     if let Some(out) = &arguments.out {
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     }
@@ -61,7 +73,19 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     } else if !globals.quiet {
         output::line(report.text())?;
     }
-    Ok(ExitCode::from(report.kind().map_or(0, ExitKind::status)))
+    match (report.kind(), report.budget()) {
+        (Some(ExitKind::Limit), Some(budget)) => {
+            Err(Failure::new(ExitKind::Limit, budget.complaint()))
+        }
+        (kind, _) => Ok(ExitCode::from(kind.map_or(0, ExitKind::status))),
+    }
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().ok().ok_or("not a number")?;
+    let fits = number.is_finite() && number > 0.0;
+    fits.then_some(number)
+        .ok_or_else(|| "not above 0".to_owned())
 }
 
 /// A deployment that can be started.

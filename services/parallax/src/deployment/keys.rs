@@ -243,6 +243,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "restarts of one process within the window before it is given up",
     ),
     ("supervise.restart_window_s", "that window, seconds"),
+    (
+        "supervise.latency_budget_ms",
+        "a run fails if 1 frame in 100 takes longer from capture to result; none without it",
+    ),
 ];
 
 impl Loaded {

@@ -23,6 +23,9 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     pose(&it.pose)?;
     quality(it)?;
     fuse(it)?;
+    if let Some(budget) = it.supervise.latency_budget_ms {
+        positive("supervise.latency_budget_ms", budget)?;
+    }
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
     demand(
