@@ -58,7 +58,7 @@ fn assert_plausible(it: &Value) {
 fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
     let case = Case::new("shown", &[600; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml"]);
-    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
 
     let shown = processes(&case);
     let names: Vec<&str> = shown
@@ -113,7 +113,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
 fn a_process_that_was_killed_is_shown_with_its_restart() {
     let case = Case::new("restarted", &[600; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml"]);
-    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
     let pid = started.pid_of("pose --index 1");
     signal("KILL", pid.into());
     let mut states = Vec::new();
