@@ -41,7 +41,7 @@ const PROCESSES: [&str; 11] = [
     "SENT",
     "SENT/s",
     "RESTARTS",
-    "QUEUE",
+    "QUEUE of MOST",
     "MEMORY MB",
     "EVIDENCE MB",
     "<DROPPED",
@@ -135,8 +135,14 @@ fn view(board: &Board, index: usize) -> String {
     name.unwrap_or_else(|| format!("view {index}"))
 }
 
+/// Two digits after the point of what is rare, one of what is not.
 fn rate(millihertz: u64) -> String {
-    format!("{:.1}", millihertz as f64 / 1e3)
+    let hertz = millihertz as f64 / 1e3;
+    if hertz < 10.0 {
+        format!("{hertz:.2}")
+    } else {
+        format!("{hertz:.1}")
+    }
 }
 
 /// Three digits after the point of what is short, one of what is long.
@@ -185,11 +191,11 @@ mod tests {
         let expected = "\
 walk: run by process 3, 3 of 4 processes live
 
-PROCESS     VIEW  STATE   UP s  SENT  SENT/s  RESTARTS   QUEUE  MEMORY MB  EVIDENCE MB  DROPPED
-capture-9   -     begins     -     -       -         -       -          -            -  -
-capture-10  -     dead       -     -       -         -       -          -            -  -
-pose-0      left  runs       6   100    20.0         1  2 of 2       48.2          7.3  3 late
-record      -     runs       6   100    20.0         1  2 of 2       48.2          7.3  3 late
+PROCESS     VIEW  STATE   UP s  SENT  SENT/s  RESTARTS  QUEUE of MOST  MEMORY MB  EVIDENCE MB  DROPPED
+capture-9   -     begins     -     -       -         -              -          -            -  -
+capture-10  -     dead       -     -       -         -              -          -            -  -
+pose-0      left  runs       6   100    20.0         1         2 of 2       48.2          7.3  3 late
+record      -     runs       6   100    20.0         1         2 of 2       48.2          7.3  3 late
 
 PROCESS  STAGE       VIEW    COUNT  PER s  p50 ms  p99 ms  p99.9 ms  max ms
 pose-0   waiting     left      100   20.0   0.060   0.060     0.060   0.060
@@ -233,6 +239,11 @@ record   waiting     all       100   20.0  ";
         assert_eq!(milliseconds(1_234), "0.001");
         assert_eq!(milliseconds(9_999_400), "9.999");
         assert_eq!(milliseconds(12_345_678), "12.3");
+    }
+
+    #[test]
+    fn rare_things_have_a_rate_too() {
+        assert_eq!([50, 9_990, 19_960].map(rate), ["0.05", "9.99", "20.0"]);
     }
 
     #[test]
