@@ -43,7 +43,7 @@ pub struct SourceInfo {
 /// One frame of footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameView<'a> {
-    /// Index in the footage, from 0: `start + k * step`.
+    /// Index in the footage, from 0: `start + k * step`; some `k` may be left out.
     pub index: u64,
     /// Presentation time, seconds after frame 0 of the footage; `None` where no rate is known.
     pub time_s: Option<f64>,
@@ -52,6 +52,9 @@ pub struct FrameView<'a> {
 }
 
 /// Open footage, which hands out its frames in order.
+///
+/// A frame of a video that cannot be decoded is left out: the index of the next one says so, where
+/// frames are equally spaced.
 ///
 /// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
 /// channel dropped, 16 bits are rounded to 8. Orientation tags (EXIF, or the display matrix of a
@@ -141,6 +144,12 @@ impl Source {
         }))
     }
 
+    /// The pixels of the frame that [`next_frame`](Self::next_frame) gave last; before the first, and
+    /// after frames of a video were passed over, they mean nothing.
+    pub fn pixels(&self) -> &[u8] {
+        &self.buffer
+    }
+
     /// The next frame, decoded into `rgb`; `None` at the end, and ever after.
     ///
     /// * `rgb`: `width * height * 3` bytes, all of them written; what they are after `None` or an error
@@ -194,7 +203,11 @@ impl Source {
         self.is_over = true;
         let is_there = match &mut self.reader {
             Reader::Images(images) => images.read_into(rgb)?,
-            Reader::Video(video) => video.read_into(rgb)?,
+            Reader::Video(video) => {
+                let index = video.read_into(rgb)?;
+                self.clock.index = index.unwrap_or(self.clock.index);
+                index.is_some()
+            }
             Reader::Still(still) => still.read_into(rgb),
         };
         self.is_over = !is_there;

@@ -292,6 +292,57 @@ fn a_video_that_is_cut_off() {
     }
 }
 
+/// The frames that come of a video of 60 with damage in the middle, by index, each with what it shows.
+fn of_damaged(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
+    let folder = images(60);
+    let options = [
+        "-c:v", "libx264", "-qp", "0", "-pix_fmt", "yuv444p", "-g", "10", "-bf", "2",
+    ];
+    let path = clip::encode(folder.path(), "damaged.mp4", &options);
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    let noise = (0..400_u32).map(|it| (it * it * 31 >> 3) as u8);
+    bytes[middle..middle + 400].copy_from_slice(&noise.collect::<Vec<_>>());
+    fs::write(&path, bytes).unwrap();
+    let spec = SourceSpec {
+        start,
+        step,
+        ..spec(&path)
+    };
+    let mut source = Source::open(&spec).unwrap();
+    let mut all = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        let corner = frame.rgb.last_chunk().copied().unwrap();
+        assert_eq!(frame.time_s, Some(frame.index as f64 / 25.0));
+        all.push((frame.index, corner));
+    }
+    all
+}
+
+#[test]
+fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
+    if !clip::has_ffmpeg() {
+        return;
+    }
+    let whole = of_damaged(0, 1);
+    assert!((30..60).contains(&whole.len()), "{} frames", whole.len());
+    assert_eq!(whole.last().map(|it| it.0), Some(59));
+    assert!(whole.is_sorted_by(|a, b| a.0 < b.0));
+    // The last group of pictures is sound, and every frame shows its own number.
+    for (index, corner) in whole.iter().filter(|it| it.0 >= 50) {
+        let picture = clip::frame(*index as usize).into_raw();
+        let expected = &picture[picture.len() - 3..];
+        let off = corner.iter().zip(expected).map(|(a, b)| a.abs_diff(*b));
+        assert!(
+            off.max() <= Some(6),
+            "frame {index}: {corner:?}, expected {expected:?}"
+        );
+    }
+    let third = of_damaged(1, 3);
+    let expected = whole.iter().filter(|it| it.0 % 3 == 1);
+    assert_eq!(third, expected.copied().collect::<Vec<_>>());
+}
+
 proptest! {
     #[test]
     fn any_bytes_of_an_image_file_are_read_or_refused(

@@ -1,25 +1,39 @@
-//! What a decoder says on its standard error.
+//! What a decoder says on its standard error: complaints, and the time of every frame.
 
 use std::io::Read;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Bytes kept of a log; a damaged video can fill a disk with it.
 const MAX_BYTES: usize = 16 << 10;
+/// Times that may wait; a decoder is a few frames ahead at most.
+const MAX_TIMES: usize = 1024;
+/// How long the time of a frame that is there may take.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Reads a log to its end in a thread of its own, so that a decoder with much to say does not block.
 #[derive(Debug)]
 pub(super) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
+    times_s: Receiver<f64>,
 }
 
 impl Log {
     pub(super) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
+        let (sender, times_s) = sync_channel(MAX_TIMES);
         let reader = std::thread::Builder::new()
             .name("decoder log".to_owned())
-            .spawn(move || keep_end(stream))?;
+            .spawn(move || Lines::new(sender).read(stream))?;
         Ok(Self {
             reader: Some(reader),
+            times_s,
         })
+    }
+
+    /// The time of the next frame that was told, seconds; waits for it a little.
+    pub(super) fn next_time_s(&self) -> Option<f64> {
+        self.times_s.recv_timeout(PATIENCE).ok()
     }
 
     /// Waits for the end of the log, and gives the last of it; empty if nothing was said.
@@ -29,16 +43,78 @@ impl Log {
     }
 }
 
-fn keep_end(mut stream: impl Read) -> Vec<u8> {
-    let mut kept = Vec::new();
-    let mut chunk = [0; 1024];
-    while let Ok(n @ 1..) = stream.read(&mut chunk) {
-        kept.extend_from_slice(&chunk[..n]);
-        if kept.len() > MAX_BYTES {
-            kept.drain(..kept.len() - MAX_BYTES / 2);
+/// Tells the lines of ffmpeg's `framecrc` output from everything else.
+struct Lines {
+    times_s: SyncSender<f64>,
+    /// Seconds of one unit of time, as its head says.
+    unit_s: f64,
+    /// What is no line of that output.
+    kept: Vec<u8>,
+    /// A line whose end has not come.
+    partial: Vec<u8>,
+}
+
+impl Lines {
+    fn new(times_s: SyncSender<f64>) -> Self {
+        Self {
+            times_s,
+            unit_s: f64::NAN,
+            kept: Vec::new(),
+            partial: Vec::new(),
         }
     }
-    kept
+
+    fn read(mut self, mut stream: impl Read) -> Vec<u8> {
+        let mut chunk = [0; 1024];
+        while let Ok(n @ 1..) = stream.read(&mut chunk) {
+            for piece in chunk[..n].split_inclusive(|it| *it == b'\n') {
+                self.partial.extend_from_slice(piece);
+                if piece.ends_with(b"\n") || self.partial.len() > MAX_BYTES / 2 {
+                    self.line();
+                }
+            }
+        }
+        self.line();
+        self.kept
+    }
+
+    fn line(&mut self) {
+        let line = std::mem::take(&mut self.partial);
+        let text = String::from_utf8_lossy(&line);
+        if let Some(unit_s) = text.strip_prefix("#tb 0: ") {
+            self.unit_s = fraction(unit_s).unwrap_or(f64::NAN);
+        } else if let Some(units) = frame_units(&text) {
+            // Who does not listen to times, or only late, misses some.
+            self.times_s.try_send(units * self.unit_s).ok();
+        } else if !text.starts_with('#') {
+            self.kept.extend_from_slice(&line);
+            if self.kept.len() > MAX_BYTES {
+                self.kept.drain(..self.kept.len() - MAX_BYTES / 2);
+            }
+        }
+    }
+}
+
+/// The time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
+/// presentation time, duration, bytes, checksum.
+fn frame_units(line: &str) -> Option<f64> {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let [stream, _, presented, _, bytes, checksum] = fields[..] else {
+        return None;
+    };
+    let is_ours = stream == "0" && checksum.starts_with("0x") && bytes.parse::<u64>().is_ok();
+    presented
+        .parse::<i64>()
+        .ok()
+        .filter(|_| is_ours)
+        .map(|it| it as f64)
+}
+
+/// `1/25`.
+fn fraction(text: &str) -> Option<f64> {
+    let (above, below) = text.trim().split_once('/')?;
+    let [above, below] = [above, below].map(|it| it.parse::<f64>().ok());
+    Some(above? / below?)
 }
 
 /// The last three lines, as one.
@@ -56,12 +132,34 @@ pub(super) fn summary(log: &[u8]) -> String {
 mod tests {
     use super::*;
 
+    /// What is kept of a text, and the times that it told.
+    fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
+        let (sender, times_s) = sync_channel(MAX_TIMES);
+        let kept = Lines::new(sender).read(text.as_bytes());
+        (kept, times_s.try_iter().collect())
+    }
+
     #[test]
     fn the_last_three_lines_are_kept_of_a_log_of_any_length() {
         let text = (0..100_000).fold(String::new(), |text, it| text + &format!("line {it}\n"));
-        let kept = keep_end(text.as_bytes());
-        assert!(kept.len() <= MAX_BYTES);
+        let (kept, times_s) = read(&text);
+        assert!(kept.len() <= MAX_BYTES && times_s.is_empty());
         assert_eq!(summary(&kept), "line 99997; line 99998; line 99999");
+        assert!(
+            read(&"x".repeat(1 << 20)).0.len() <= MAX_BYTES,
+            "without a line's end"
+        );
+    }
+
+    #[test]
+    fn times_of_frames_are_told_from_complaints() {
+        let text = "#software: Lavf59\n#tb 0: 1/50\n#dimensions 0: 2x2\n0,   0,   0,   1,  12, 0x14a00440\n\
+                    [h264 @ 0x5] error while decoding MB 3 14, bytestream -16\n\
+                    0,   7,   7,   1,  12, 0x14a00440\n1, 2, 3, 4, 5, 6\n0, 9, x, 1, 12, 0x0";
+        let (kept, times_s) = read(text);
+        assert_eq!(times_s, [0.0, 0.14]);
+        let said = "[h264 @ 0x5] error while decoding MB 3 14, bytestream -16; 1, 2, 3, 4, 5, 6; 0, 9, x, 1, 12, 0x0";
+        assert_eq!(summary(&kept), said);
     }
 
     #[test]

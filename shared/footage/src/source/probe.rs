@@ -94,6 +94,11 @@ impl Probe {
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 
+    /// The rate, where frames are equally spaced.
+    pub(super) fn regular_hz(&self) -> Option<f64> {
+        self.rate_hz.filter(|_| self.times_s.is_none())
+    }
+
     /// Whether every frame comes where the rate says: to a quarter of a frame, as some containers round
     /// times to milliseconds.
     fn is_regular(&self, times_s: &[f64]) -> bool {

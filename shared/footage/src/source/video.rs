@@ -19,6 +19,11 @@ pub(super) struct Video {
     /// Frames that should come, from the duration in the header.
     n_promised: u64,
     n_read: u64,
+    /// Index in the footage of the frame that was read last.
+    last_index: u64,
+    /// Distance between the frames that are handed out, and the first of them.
+    step: u64,
+    start: u64,
     child: Child,
     stdout: ChildStdout,
     log: Log,
@@ -33,14 +38,7 @@ impl Video {
         let mut child = Command::new(&spec.ffmpeg)
             .args(["-nostdin", "-v", "error", "-noautorotate", "-i"])
             .arg(input_name(path))
-            .args(["-map", "0:v:0"])
-            .args(frame_choice(spec))
-            .arg(if probe.has_fps_mode {
-                "-fps_mode"
-            } else {
-                "-vsync"
-            })
-            .args(["passthrough", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"])
+            .args(outputs(&probe, spec))
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -55,14 +53,20 @@ impl Video {
             n_frames,
             n_promised,
             n_read: 0,
+            last_index: spec.start,
+            step: spec.step,
+            start: spec.start,
             child,
             stdout,
             log: Log::follow(stderr).map_err(not_started)?,
         })
     }
 
-    /// Reads the next frame; `false` at the end of a video that came whole.
-    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
+    /// Reads the next frame, and gives its index in the footage; `None` at the end of a video that came
+    /// whole.
+    ///
+    /// An index that was expected is left out where the decoder could make nothing of a frame.
+    pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
             match self.stdout.read(&mut rgb[filled..]) {
@@ -78,11 +82,26 @@ impl Video {
             }
         }
         if filled == rgb.len() {
+            self.last_index = self.index();
             self.n_read += 1;
-            return Ok(true);
+            return Ok(Some(self.last_index));
         }
         self.check_end(filled > 0)?;
-        Ok(false)
+        Ok(None)
+    }
+
+    /// The index of the frame that has just been read: by its time where frames are equally spaced, else
+    /// by counting.
+    fn index(&self) -> u64 {
+        let counted = match self.n_read {
+            0 => self.start,
+            _ => self.last_index.saturating_add(self.step),
+        };
+        let Some(rate_hz) = self.probe.regular_hz() else {
+            return counted;
+        };
+        let told = self.log.next_time_s().map(|it| (it * rate_hz).round());
+        told.map_or(counted, |it| counted.max(it as u64))
     }
 
     /// Tells a video that is over from one that is cut off.
@@ -109,8 +128,10 @@ impl Video {
             });
         }
         let n_expected = self.n_promised;
-        let complains = !message.is_empty() && self.n_read < n_expected;
-        let is_short = self.n_read < self.n_frames - self.n_frames / 10;
+        // Frames that were left out on the way are no reason to doubt the end.
+        let n_reached = (self.last_index - self.start) / self.step + 1;
+        let complains = !message.is_empty() && n_reached < n_expected;
+        let is_short = n_reached < self.n_frames - self.n_frames / 10;
         if complains || is_partial || is_short || !status.success() {
             return Err(FootageError::VideoTruncated {
                 path: self.path.clone(),
@@ -135,25 +156,75 @@ impl Drop for Video {
     }
 }
 
-/// Lets the decoder drop the frames that are not wanted, so that they never cross the pipe.
-///
-/// Every frame before them is decoded all the same: a seek lands on the wrong frame in many files.
-fn frame_choice(spec: &SourceSpec) -> Vec<String> {
-    let (start, step) = (spec.start, spec.step);
-    let mut arguments = Vec::new();
-    if start > 0 || step > 1 {
-        let chosen = format!("select=gte(n\\,{start})*not(mod(n-{start}\\,{step}))");
-        arguments.extend(["-vf".to_owned(), chosen]);
+/// What the decoder is to write: the pixels of the frames that are wanted and, where frames are equally
+/// spaced, beside its complaints the time of each; a frame that it could make nothing of is missing in
+/// both.
+fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
+    let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
+    let mut arguments = output(probe, spec, None, &pixels);
+    if probe.regular_hz().is_some() {
+        let times = ["-flush_packets", "1", "-f", "framecrc", "pipe:2"];
+        arguments.extend(output(probe, spec, Some("crop=2:2:0:0:exact=1"), &times));
+    }
+    arguments
+}
+
+fn output(probe: &Probe, spec: &SourceSpec, more: Option<&str>, format: &[&str]) -> Vec<String> {
+    let mut filters = frame_choice(probe, spec);
+    filters.extend(more.map(str::to_owned));
+    let mut arguments = vec!["-map".to_owned(), "0:v:0".to_owned()];
+    if !filters.is_empty() {
+        arguments.extend(["-vf".to_owned(), filters.join(",")]);
     }
     if let Some(count) = spec.count {
         arguments.extend(["-frames:v".to_owned(), count.to_string()]);
     }
+    let mode = if probe.has_fps_mode {
+        "-fps_mode"
+    } else {
+        "-vsync"
+    };
+    arguments.extend([mode, "passthrough"].map(str::to_owned));
+    arguments.extend(format.iter().copied().map(str::to_owned));
     arguments
+}
+
+/// Lets the decoder drop the frames that are not wanted, so that they never cross the pipe.
+///
+/// Every frame before them is decoded all the same: a seek lands on the wrong frame in many files. Where
+/// frames are equally spaced they are chosen by their time, so that one which cannot be decoded does not
+/// shift the others.
+fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
+    let (start, step) = (spec.start, spec.step);
+    let is_part = start > 0 || step > 1;
+    match probe.regular_hz() {
+        None if is_part => vec![format!(
+            "select=gte(n\\,{start})*not(mod(n-{start}\\,{step}))"
+        )],
+        None => Vec::new(),
+        Some(rate_hz) => {
+            let nth = format!("round(t*{rate_hz:?})");
+            let chosen = format!("select=gte({nth}\\,{start})*not(mod({nth}-{start}\\,{step}))");
+            let all = ["setpts=PTS-STARTPTS".to_owned(), chosen].into_iter();
+            all.take(if is_part { 2 } else { 1 }).collect()
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn probe(times_s: Option<Vec<f64>>) -> Probe {
+        Probe {
+            size: crate::Size::new(4, 4),
+            rate_hz: Some(12.5),
+            n_frames: 100,
+            n_promised: 100,
+            times_s,
+            has_fps_mode: true,
+        }
+    }
 
     #[test]
     fn the_decoder_drops_what_is_not_wanted() {
@@ -163,17 +234,21 @@ mod tests {
             count: Some(4),
             ..SourceSpec::new("x")
         };
+        let by_number = "select=gte(n\\,5)*not(mod(n-5\\,10))";
+        assert_eq!(frame_choice(&probe(Some(vec![])), &spec), [by_number]);
+        let by_time = "select=gte(round(t*12.5)\\,5)*not(mod(round(t*12.5)-5\\,10))";
         assert_eq!(
-            frame_choice(&spec),
-            [
-                "-vf",
-                "select=gte(n\\,5)*not(mod(n-5\\,10))",
-                "-frames:v",
-                "4"
-            ]
+            frame_choice(&probe(None), &spec),
+            ["setpts=PTS-STARTPTS", by_time]
         );
-        assert!(frame_choice(&SourceSpec::new("x")).is_empty());
+        assert!(frame_choice(&probe(Some(vec![])), &SourceSpec::new("x")).is_empty());
+        let arguments = outputs(&probe(None), &spec);
+        let counts = arguments.windows(2).filter(|it| *it == ["-frames:v", "4"]);
+        assert_eq!(counts.count(), 2, "pixels and times of the same frames");
+        let counted = outputs(&probe(Some(vec![])), &spec);
+        assert!(!counted.contains(&"framecrc".to_owned()), "{counted:?}");
     }
+
     /// A second of video, too large for the pipe; `None` without ffmpeg.
     #[cfg(target_os = "linux")]
     fn long_video(folder: &Path) -> Option<PathBuf> {
@@ -196,7 +271,7 @@ mod tests {
         let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
         let decoder = PathBuf::from(format!("/proc/{}", video.child.id()));
         let mut rgb = vec![0; 640 * 480 * 3];
-        assert!(video.read_into(&mut rgb).unwrap());
+        assert_eq!(video.read_into(&mut rgb).unwrap(), Some(0));
         assert!(decoder.exists());
         drop(video);
         assert!(!decoder.exists());

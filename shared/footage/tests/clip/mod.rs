@@ -16,7 +16,7 @@ pub(crate) fn frame(index: usize) -> RgbImage {
         if (left..left + 9).contains(&x) && (10..19).contains(&y) {
             image::Rgb([255, n, 0])
         } else {
-            image::Rgb([3 * x as u8, 5 * y as u8, 17 * n])
+            image::Rgb([3 * x as u8, 5 * y as u8, n.wrapping_mul(17)])
         }
     })
 }
