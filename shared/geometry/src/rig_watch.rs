@@ -1,0 +1,223 @@
+//! Whether every camera stands where the calibration says, from what the cameras see of a person.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+
+use nalgebra::{Point2, Point3};
+
+use crate::{Camera, Ray};
+
+/// Frames that the running median looks back on.
+const WINDOW: usize = 60;
+/// Frames without which nothing is said.
+const LEAST_FRAMES: usize = 20;
+/// Points of a frame without which it says nothing.
+const LEAST_POINTS: usize = 5;
+/// Sine of the angle between two rays below which their meeting point is too uncertain.
+const LEAST_SINE: f64 = 0.2;
+/// A camera is suspected if cameras disagree so many times more with it than without it, and by at least
+/// so many degrees.
+const FACTOR: f64 = 2.5;
+const LEAST_DEGREES: f64 = 0.5;
+/// Nothing is said where the others disagree by more among themselves.
+const MOST_DEGREES: f64 = 1.5;
+
+/// Follows how far apart the cameras see the same points, with each camera and without it.
+///
+/// From four cameras on, every two others meet in a point of space, which is projected into the camera:
+/// the distance to what it sees itself counts. With three, the distance is that to the ray of one other
+/// camera (the epipolar distance), which a camera that is turned along its epipolar lines hardly shows.
+/// Of a frame the median over all points counts, of such a group of cameras the median over the last
+/// frames, and of a camera the median over all groups that it is in: one wrong camera spoils those, and
+/// none of the others. With two cameras nobody can tell which of them is wrong.
+///
+/// Not a calibration: it names a camera that was moved, and does not say where it stands.
+#[derive(Debug, Clone)]
+pub struct RigWatch {
+    cameras: Vec<Camera>,
+    groups: Vec<Group>,
+}
+
+/// Some cameras, and how far apart they saw the same points.
+#[derive(Debug, Clone)]
+struct Group {
+    /// The camera into which is projected, and the two others, or twice the one other.
+    views: [usize; 3],
+    /// Of the last frames, pixels.
+    px: VecDeque<f64>,
+}
+
+/// A camera that does not stand where the calibration says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Suspect {
+    /// The camera.
+    pub view: usize,
+    /// How far apart cameras see the same points if it is one of them, pixels.
+    pub residual_px: f64,
+    /// The same without it, pixels.
+    pub without_px: f64,
+}
+
+impl RigWatch {
+    /// Begins to watch cameras.
+    pub fn new(cameras: Vec<Camera>) -> Self {
+        let n = cameras.len();
+        let counts = |[view, a, b]: &[usize; 3]| {
+            let is_new = if n > 3 { a < b } else { n == 3 && a == b };
+            is_new && view != a && view != b
+        };
+        let all = (0..n).flat_map(|view| (0..n * n).map(move |it| [view, it / n, it % n]));
+        let groups = all.filter(counts).map(|views| Group {
+            views,
+            px: VecDeque::new(),
+        });
+        Self {
+            groups: groups.collect(),
+            cameras,
+        }
+    }
+
+    /// Takes in what the cameras see of one frame.
+    ///
+    /// * `points_px`: one entry a camera, `None` where it saw nothing; the same points of the world in the
+    ///   same order, pixels of the recorded image.
+    pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
+        let views = self.cameras.iter().zip(points_px);
+        let see = |(camera, points): (&Camera, &Option<Vec<[f64; 2]>>)| -> Vec<Option<Seen>> {
+            let points = points.iter().flatten();
+            points.map(|at| Seen::new(camera, *at)).collect()
+        };
+        let seen: Vec<Vec<Option<Seen>>> = views.map(see).collect();
+        for group in &mut self.groups {
+            let [Some(own), Some(a), Some(b)] = group.views.map(|it| seen.get(it)) else {
+                continue;
+            };
+            let camera = &self.cameras[group.views[0]];
+            let is_one = group.views[1] == group.views[2];
+            let points = own.iter().zip(a).zip(b);
+            let px = points.filter_map(|((own, a), b)| {
+                let (own, a, b) = (own.as_ref()?, a.as_ref()?, b.as_ref()?);
+                if is_one {
+                    own.from_ray(camera, &a.ray)
+                } else {
+                    own.from_meeting(camera, &a.ray, &b.ray)
+                }
+            });
+            group.note(px.collect());
+        }
+    }
+
+    /// How far apart cameras see the same points if a camera is one of them, pixels; `None` while too
+    /// little was seen.
+    pub fn residual_px(&self, view: usize) -> Option<f64> {
+        self.apart(|it| it.views.contains(&view))
+    }
+
+    /// The same of the others without it, pixels.
+    pub fn without_px(&self, view: usize) -> Option<f64> {
+        self.apart(|it| !it.views.contains(&view))
+    }
+
+    /// The median over some groups.
+    fn apart(&self, counts: impl Fn(&Group) -> bool) -> Option<f64> {
+        let groups = self.groups.iter().filter(|it| counts(it));
+        median(groups.filter_map(Group::apart).collect())
+    }
+
+    /// The cameras that do not stand where the calibration says.
+    pub fn suspects(&self) -> Vec<Suspect> {
+        let suspect = |(view, camera): (usize, &Camera)| {
+            let residual_px = self.residual_px(view)?;
+            let without_px = self.without_px(view)?;
+            let it = &camera.intrinsics;
+            let px = |degrees: f64| it.fx.min(it.fy).abs() * degrees.to_radians().tan();
+            let is_wrong = residual_px > px(LEAST_DEGREES).max(FACTOR * without_px)
+                && without_px < px(MOST_DEGREES);
+            is_wrong.then_some(Suspect {
+                view,
+                residual_px,
+                without_px,
+            })
+        };
+        let cameras = self.cameras.iter().enumerate();
+        cameras.filter_map(suspect).collect()
+    }
+}
+
+impl Group {
+    /// Notes how far apart the points of a frame were seen.
+    fn note(&mut self, px: Vec<f64>) {
+        if px.len() < LEAST_POINTS {
+            return;
+        }
+        self.px.extend(median(px));
+        if self.px.len() > WINDOW {
+            self.px.pop_front();
+        }
+    }
+
+    fn apart(&self) -> Option<f64> {
+        let is_enough = self.px.len() >= LEAST_FRAMES;
+        is_enough.then(|| median(self.px.iter().copied().collect()))?
+    }
+}
+
+/// A point that a camera sees.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    at_px: Point2<f64>,
+    ray: Ray,
+}
+
+impl Seen {
+    fn new(camera: &Camera, at: [f64; 2]) -> Option<Self> {
+        let at_px = Point2::from(at);
+        let ray = camera.ray(&at_px)?;
+        Some(Self { at_px, ray })
+    }
+
+    /// How far it is from the point in which two rays meet, pixels of its camera.
+    fn from_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<f64> {
+        let [on_a, on_b] = closest(a, b)?;
+        self.from_point(camera, &nalgebra::center(&on_a, &on_b))
+    }
+
+    /// How far it is from a ray, pixels of its camera: from where the ray comes closest to its own.
+    fn from_ray(&self, camera: &Camera, ray: &Ray) -> Option<f64> {
+        let [on_ray, _] = closest(ray, &self.ray)?;
+        self.from_point(camera, &on_ray)
+    }
+
+    fn from_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<f64> {
+        let px = nalgebra::distance(&camera.project(in_world)?, &self.at_px);
+        px.is_finite().then_some(px)
+    }
+}
+
+/// Where two rays come closest, a point on either; `None` if they are almost parallel, or come closest
+/// behind a camera.
+fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
+    let across = a.direction.cross(&b.direction);
+    let squared_sine = across.norm_squared();
+    if squared_sine.is_nan() || squared_sine < LEAST_SINE.powi(2) {
+        return None;
+    }
+    let between = b.origin - a.origin;
+    let along = |other: &Ray| between.cross(&other.direction).dot(&across) / squared_sine;
+    let (along_a, along_b) = (along(b), along(a));
+    let is_ahead = along_a > 0.0 && along_b > 0.0;
+    is_ahead.then(|| {
+        [
+            a.origin + along_a * *a.direction,
+            b.origin + along_b * *b.direction,
+        ]
+    })
+}
+
+/// The lower of the two in the middle; none of nothing.
+fn median(mut all: Vec<f64>) -> Option<f64> {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len().saturating_sub(1) / 2).copied()
+}
