@@ -1,12 +1,13 @@
 //! The response maps of one image.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_LEVELS, Stamp, Status, Timing};
 
 /// Travels as the user header of the responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
 /// alignment makes them begin on a cache line.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("EvidenceHeader.v3")]
 #[repr(C)]
 #[repr(align(64))]
@@ -35,6 +36,8 @@ pub struct EvidenceHeader {
     pub best: [f32; MAX_LEVELS],
     /// More than any sum on the way to a score on each of `levels`, by this view alone.
     pub size: [f32; MAX_LEVELS],
+    /// Keeps the layout free of padding.
+    pub reserved: [u32; 11],
 }
 
 impl Default for EvidenceHeader {
@@ -52,6 +55,7 @@ impl Default for EvidenceHeader {
             levels: [0; MAX_LEVELS],
             best: [0.0; MAX_LEVELS],
             size: [0.0; MAX_LEVELS],
+            reserved: [0; 11],
         }
     }
 }

@@ -1,5 +1,6 @@
 //! One image of one view.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{Stamp, Status, Timing};
@@ -8,7 +9,7 @@ use crate::{Stamp, Status, Timing};
 ///
 /// The image is what the rest of the pipeline sees: already turned upright, resized and cropped.
 /// The header's alignment makes the pixels begin on a cache line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("FrameHeader.v1")]
 #[repr(C)]
 #[repr(align(64))]

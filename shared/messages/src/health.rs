@@ -1,9 +1,10 @@
 //! Signs of life.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Sent by every process a few times a second; a counter that stands still means a hang.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Health.v2")]
 #[repr(C)]
 pub struct Health {

@@ -3,6 +3,8 @@
 //! Every message begins with a [`Stamp`], says with a [`Status`] whether it carries a result or why
 //! not, and with [`Timing`] what it cost. Counts come before fixed-size arrays; entries past the
 //! count are zero. Receivers treat every count and index as untrusted (`wire` checks them).
+//! All are `Pod`: without padding, and any bytes of the right number are one, so that they can be
+//! written to a file and read again.
 #![forbid(unsafe_code)]
 
 mod evidence;

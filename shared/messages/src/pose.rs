@@ -1,11 +1,12 @@
 //! Poses in one view and in pairs of views.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_CANDIDATES, MAX_PARTS, Stamp, Status, Timing};
 
 /// One pose: `fmp::Pose`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PoseMessage.v1")]
 #[repr(C)]
 pub struct PoseMessage {
@@ -24,7 +25,7 @@ pub struct PoseMessage {
 }
 
 /// How well one part of the best candidate fits where it lies: `fmp::LocalScore`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("LocalMessage.v1")]
 #[repr(C)]
 pub struct LocalMessage {
@@ -39,7 +40,7 @@ pub struct LocalMessage {
 /// How much of the image and of its pyramid was searched for poses.
 ///
 /// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Searched.v1")]
 #[repr(C)]
 pub struct Searched(pub u32);
@@ -62,7 +63,7 @@ impl Searched {
 }
 
 /// The single-view answer: distinct candidates, best first.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("ViewPose.v3")]
 #[repr(C)]
 pub struct ViewPose {
@@ -91,7 +92,7 @@ pub struct ViewPose {
 }
 
 /// What a pair of views agreed on under one assumption about which way the person faces.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PairHypothesis.v1")]
 #[repr(C)]
 pub struct PairHypothesis {
@@ -114,7 +115,7 @@ pub struct PairHypothesis {
 }
 
 /// The answer of one pair of views.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PairPose.v2")]
 #[repr(C)]
 pub struct PairPose {

@@ -1,11 +1,12 @@
 //! The result: joints in the world, and what every view made of it.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
 
 /// One joint in the world.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Joint3d.v1")]
 #[repr(C)]
 pub struct Joint3d {
@@ -22,7 +23,7 @@ pub struct Joint3d {
 }
 
 /// The pose of one view after fusion: the mean over its pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("FusedView.v1")]
 #[repr(C)]
 pub struct FusedView {
@@ -43,7 +44,7 @@ pub struct FusedView {
 }
 
 /// The skeleton of one frame.
-#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Pose3d.v1")]
 #[repr(C)]
 pub struct Pose3d {

@@ -1,11 +1,12 @@
 //! How far off a view is expected to be.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_PARTS, Stamp, Status, Timing};
 
 /// The expected single-view error of every part: the paper's sigma (section 4.3).
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("ViewQuality.v2")]
 #[repr(C)]
 pub struct ViewQuality {

@@ -1,9 +1,10 @@
 //! Which frame of which view, how it went, and when.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What a message belongs to. Stages join on (session, frame), never on arrival.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Stamp.v1")]
 #[repr(C)]
 pub struct Stamp {
@@ -23,7 +24,7 @@ pub struct Stamp {
 /// Whether a message carries a result, or why not.
 ///
 /// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Status.v1")]
 #[repr(C)]
 pub struct Status(pub u32);
@@ -63,7 +64,7 @@ impl Status {
 /// When a stage had all it needed, and when it sent its answer; `CLOCK_MONOTONIC`, nanoseconds.
 ///
 /// The difference is computation; from one stage's `sent` to the next one's `received` is transport.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Timing.v1")]
 #[repr(C)]
 pub struct Timing {
