@@ -15,7 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &[
         "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d",
     ],
-    &["metrics", "fmp", "scene"],
+    &["metrics", "recording", "fmp", "scene"],
     &["runtime"],
     &["multiview", "viewquality"],
     &[

@@ -1,0 +1,147 @@
+//! What a recording says about itself: of which run it is, and what was left out on purpose.
+
+use std::collections::BTreeMap;
+
+/// Name of the metadata record.
+pub(crate) const NAME: &str = "parallax";
+/// Version of what this crate writes; another is refused.
+const FORMAT: &str = "1";
+
+/// What was left out on purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Without {
+    /// Frames come without their pixels.
+    pub pixels: bool,
+    /// Evidence is not there at all.
+    pub evidence: bool,
+}
+
+/// Of which run a recording is.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct About {
+    /// Version of the program that wrote it.
+    pub version: String,
+    /// The run; stands in the stamp of every message.
+    pub session: u64,
+    /// When it began, nanoseconds since 1970.
+    pub began_unix_nanos: u64,
+    /// The settings of the run, as JSON.
+    pub settings: String,
+    /// What was left out on purpose.
+    pub without: Without,
+}
+
+/// A recording does not say of which run it is.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum AboutError {
+    /// Something is not said.
+    #[error("the recording does not say its {0}")]
+    Missing(&'static str),
+    /// A number is none.
+    #[error("the recording's {key} is {got:?}")]
+    Value {
+        /// Which.
+        key: &'static str,
+        /// What stands there.
+        got: String,
+    },
+    /// It was written by another version.
+    #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
+    Format {
+        /// What stands there.
+        got: String,
+    },
+}
+
+impl About {
+    pub(crate) fn to_map(&self) -> BTreeMap<String, String> {
+        let yes_or_no = |it: bool| if it { "yes" } else { "no" }.to_owned();
+        let entries = [
+            ("format", FORMAT.to_owned()),
+            ("version", self.version.clone()),
+            ("session", self.session.to_string()),
+            ("began_unix_nanos", self.began_unix_nanos.to_string()),
+            ("settings", self.settings.clone()),
+            ("without_pixels", yes_or_no(self.without.pixels)),
+            ("without_evidence", yes_or_no(self.without.evidence)),
+        ];
+        entries.map(|(key, value)| (key.to_owned(), value)).into()
+    }
+
+    pub(crate) fn from_map(map: &BTreeMap<String, String>) -> Result<Self, AboutError> {
+        let text = |key: &'static str| map.get(key).ok_or(AboutError::Missing(key));
+        let refused = |key, got: &str| AboutError::Value {
+            key,
+            got: got.chars().take(40).collect(),
+        };
+        let number = |key| {
+            let it = text(key)?;
+            it.parse().ok().ok_or_else(|| refused(key, it))
+        };
+        let flag = |key| match text(key)?.as_str() {
+            "yes" => Ok(true),
+            "no" => Ok(false),
+            other => Err(refused(key, other)),
+        };
+        let format = text("format")?;
+        if format != FORMAT {
+            let got = format.chars().take(40).collect();
+            return Err(AboutError::Format { got });
+        }
+        Ok(Self {
+            version: text("version")?.clone(),
+            session: number("session")?,
+            began_unix_nanos: number("began_unix_nanos")?,
+            settings: text("settings")?.clone(),
+            without: Without {
+                pixels: flag("without_pixels")?,
+                evidence: flag("without_evidence")?,
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn about() -> About {
+        About {
+            version: "0.1.0".to_owned(),
+            session: u64::MAX,
+            began_unix_nanos: 5,
+            settings: "{\"name\": \"walk\"}".to_owned(),
+            without: Without {
+                pixels: true,
+                evidence: false,
+            },
+        }
+    }
+
+    #[test]
+    fn what_is_said_is_read_again() {
+        assert_eq!(About::from_map(&about().to_map()), Ok(about()));
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        for key in about().to_map().keys() {
+            let mut map = about().to_map();
+            map.remove(key);
+            let error = About::from_map(&map).unwrap_err().to_string();
+            assert!(error.ends_with(key), "{error}");
+        }
+    }
+
+    #[test]
+    fn another_format_or_a_number_that_is_none_is_refused_with_what_stands_there() {
+        let refused = |key: &str, value: &str| {
+            let mut map = about().to_map();
+            map.insert(key.to_owned(), value.to_owned());
+            About::from_map(&map).unwrap_err().to_string()
+        };
+        assert!(refused("format", "2").contains("format \"2\""));
+        assert!(refused("session", "-1").contains("session is \"-1\""));
+        assert!(refused("without_pixels", "maybe").contains("\"maybe\""));
+    }
+}

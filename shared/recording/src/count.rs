@@ -1,0 +1,59 @@
+//! How many messages of a topic were kept and how many were not.
+
+use core::fmt;
+use core::str::FromStr;
+
+/// Name of the metadata record; the last of a file counts.
+pub(crate) const NAME: &str = "parallax.counts";
+
+/// Messages of one topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Count {
+    /// Written to the file.
+    pub recorded: u64,
+    /// Sent, but not kept: they came faster than they could be taken in or written.
+    pub lost: u64,
+}
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "recorded {}, lost {}", self.recorded, self.lost)
+    }
+}
+
+impl FromStr for Count {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        let rest = text.strip_prefix("recorded ").ok_or(())?;
+        let (recorded, lost) = rest.split_once(", lost ").ok_or(())?;
+        let number = |it: &str| it.parse().map_err(drop);
+        Ok(Self {
+            recorded: number(recorded)?,
+            lost: number(lost)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_is_read_as_it_is_written() {
+        let count = Count {
+            recorded: 12,
+            lost: u64::MAX,
+        };
+        assert_eq!(count.to_string().parse(), Ok(count));
+        for other in [
+            "",
+            "recorded 1",
+            "recorded 1, lost",
+            "recorded -1, lost 2",
+            "lost 2",
+        ] {
+            assert_eq!(other.parse::<Count>(), Err(()), "{other}");
+        }
+    }
+}

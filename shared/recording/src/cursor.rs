@@ -1,0 +1,93 @@
+//! Reading forward in a file whose length is known, so that no length found in it is believed.
+
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+
+/// Why no more can be read.
+#[derive(Debug)]
+pub(crate) enum Stop {
+    /// The file is over in the middle of something.
+    Cut,
+    /// What stands there cannot be.
+    Damaged(&'static str),
+    /// The file cannot be read.
+    Io(io::Error),
+}
+
+/// A place in a file.
+pub(crate) struct Cursor<'a, R: Read + Seek> {
+    input: BufReader<&'a mut R>,
+    at: u64,
+    end: u64,
+}
+
+impl<'a, R: Read + Seek> Cursor<'a, R> {
+    /// At the beginning of a file.
+    pub(crate) fn new(input: &'a mut R) -> io::Result<Self> {
+        let end = input.seek(SeekFrom::End(0))?;
+        input.seek(SeekFrom::Start(0))?;
+        Ok(Self {
+            input: BufReader::new(input),
+            at: 0,
+            end,
+        })
+    }
+
+    /// Bytes from the beginning.
+    pub(crate) fn at(&self) -> u64 {
+        self.at
+    }
+
+    /// Length of the file, bytes.
+    pub(crate) fn end(&self) -> u64 {
+        self.end
+    }
+
+    fn advance(&mut self, n: u64) -> Result<(), Stop> {
+        match self.at.checked_add(n) {
+            Some(at) if at <= self.end => {
+                self.at = at;
+                Ok(())
+            }
+            _ => Err(Stop::Cut),
+        }
+    }
+
+    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], Stop> {
+        self.advance(N as u64)?;
+        let mut bytes = [0; N];
+        self.input.read_exact(&mut bytes).map_err(short)?;
+        Ok(bytes)
+    }
+
+    pub(crate) fn bytes(&mut self, n: u64) -> Result<Vec<u8>, Stop> {
+        self.advance(n)?;
+        let mut bytes = vec![0; n as usize];
+        self.input.read_exact(&mut bytes).map_err(short)?;
+        Ok(bytes)
+    }
+
+    pub(crate) fn skip(&mut self, n: u64) -> Result<(), Stop> {
+        self.advance(n)?;
+        let n = i64::try_from(n).ok().ok_or(Stop::Cut)?;
+        self.input.seek_relative(n).map_err(Stop::Io)
+    }
+
+    /// Passes over all that follows; whether the file ends with these bytes.
+    pub(crate) fn ends_with(&mut self, bytes: &[u8]) -> Result<bool, Stop> {
+        if self.end - self.at < bytes.len() as u64 {
+            return Ok(false);
+        }
+        self.skip(self.end - self.at - bytes.len() as u64)?;
+        let got = self.bytes(bytes.len() as u64)?;
+        Ok(got == bytes)
+    }
+}
+
+/// A file that became shorter while it was read is cut, too.
+fn short(error: io::Error) -> Stop {
+    if error.kind() == io::ErrorKind::UnexpectedEof {
+        Stop::Cut
+    } else {
+        Stop::Io(error)
+    }
+}

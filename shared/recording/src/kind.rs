@@ -1,0 +1,233 @@
+//! What may travel on a topic, how long it is, and how others may read it.
+
+use messages::{
+    EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
+};
+
+/// A type of message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Pixels of a view.
+    Frame,
+    /// Response maps of a view.
+    Evidence,
+    /// Single-view candidates.
+    ViewPose,
+    /// Expected errors of a view.
+    ViewQuality,
+    /// Answers of a fusion worker.
+    PairPose,
+    /// The result.
+    Pose3d,
+    /// Signs of life of a process.
+    Health,
+}
+
+/// What a schema may refer to.
+const PARTS: [(&str, &str); 7] = [
+    ("Stamp", include_str!("../msg/Stamp.msg")),
+    ("Timing", include_str!("../msg/Timing.msg")),
+    ("Pose", include_str!("../msg/Pose.msg")),
+    ("Local", include_str!("../msg/Local.msg")),
+    ("PairHypothesis", include_str!("../msg/PairHypothesis.msg")),
+    ("Joint3d", include_str!("../msg/Joint3d.msg")),
+    ("FusedView", include_str!("../msg/FusedView.msg")),
+];
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Frame,
+        Self::Evidence,
+        Self::ViewPose,
+        Self::ViewQuality,
+        Self::PairPose,
+        Self::Pose3d,
+        Self::Health,
+    ];
+
+    /// What travels on a topic; none for one that this version does not know.
+    pub fn of_topic(name: &str) -> Option<Self> {
+        let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
+        Self::ALL.into_iter().find(|kind| match kind {
+            Self::Pose3d => name == kind.example(),
+            _ => family(name).is_some_and(|it| Some(it) == family(&kind.example())),
+        })
+    }
+
+    /// A topic of this kind.
+    fn example(self) -> String {
+        match self {
+            Self::Frame => topic::frame(0),
+            Self::Evidence => topic::evidence(0),
+            Self::ViewPose => topic::view_pose(0),
+            Self::ViewQuality => topic::view_quality(0),
+            Self::PairPose => topic::pair_pose(0),
+            Self::Pose3d => topic::pose3d(),
+            Self::Health => topic::health("any"),
+        }
+    }
+
+    /// Size of the message without its array, bytes.
+    pub fn head_bytes(self) -> usize {
+        match self {
+            Self::Frame => size_of::<FrameHeader>(),
+            Self::Evidence => size_of::<EvidenceHeader>(),
+            Self::ViewPose => size_of::<ViewPose>(),
+            Self::ViewQuality => size_of::<ViewQuality>(),
+            Self::PairPose => size_of::<PairPose>(),
+            Self::Pose3d => size_of::<Pose3d>(),
+            Self::Health => size_of::<Health>(),
+        }
+    }
+
+    /// Size of an element of its array, bytes; none if it has no array.
+    pub fn element_bytes(self) -> Option<usize> {
+        match self {
+            Self::Frame => Some(size_of::<u8>()),
+            Self::Evidence => Some(size_of::<f32>()),
+            _ => None,
+        }
+    }
+
+    /// Where its status stands, bytes from the beginning; none if it has no stamp either.
+    pub(crate) fn status_at(self) -> Option<usize> {
+        match self {
+            Self::Frame => Some(core::mem::offset_of!(FrameHeader, status)),
+            Self::Evidence => Some(core::mem::offset_of!(EvidenceHeader, status)),
+            Self::ViewPose => Some(core::mem::offset_of!(ViewPose, status)),
+            Self::ViewQuality => Some(core::mem::offset_of!(ViewQuality, status)),
+            Self::PairPose => Some(core::mem::offset_of!(PairPose, status)),
+            Self::Pose3d => Some(core::mem::offset_of!(Pose3d, status)),
+            Self::Health => None,
+        }
+    }
+
+    /// The name of its schema.
+    pub fn schema_name(self) -> &'static str {
+        match self {
+            Self::Frame => "parallax/msg/Frame",
+            Self::Evidence => "parallax/msg/Evidence",
+            Self::ViewPose => "parallax/msg/ViewPose",
+            Self::ViewQuality => "parallax/msg/ViewQuality",
+            Self::PairPose => "parallax/msg/PairPose",
+            Self::Pose3d => "parallax/msg/Pose3d",
+            Self::Health => "parallax/msg/Health",
+        }
+    }
+
+    fn own_schema(self) -> &'static str {
+        match self {
+            Self::Frame => include_str!("../msg/Frame.msg"),
+            Self::Evidence => include_str!("../msg/Evidence.msg"),
+            Self::ViewPose => include_str!("../msg/ViewPose.msg"),
+            Self::ViewQuality => include_str!("../msg/ViewQuality.msg"),
+            Self::PairPose => include_str!("../msg/PairPose.msg"),
+            Self::Pose3d => include_str!("../msg/Pose3d.msg"),
+            Self::Health => include_str!("../msg/Health.msg"),
+        }
+    }
+
+    /// Its schema, `ros2msg`: its own definition and all that it refers to.
+    pub fn schema(self) -> String {
+        let mut text = self.own_schema().to_owned();
+        let rule = "=".repeat(80);
+        let mut next = 0;
+        let mut used = Vec::new();
+        loop {
+            let found = PARTS
+                .iter()
+                .filter(|(name, _)| text[next..].contains(&format!("parallax/{name}")))
+                .filter(|part| !used.contains(&part.0));
+            let found: Vec<_> = found.collect();
+            next = text.len();
+            if found.is_empty() {
+                return text;
+            }
+            for (name, definition) in found {
+                used.push(*name);
+                for piece in [&rule, "\nMSG: parallax/", name, "\n", definition] {
+                    text.push_str(piece);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Size and alignment of a type in CDR, bytes; an array of any length counts as nothing.
+    fn size(kind: &str) -> [usize; 2] {
+        if let Some((one, n)) = kind.strip_suffix(']').and_then(|it| it.rsplit_once('[')) {
+            let [size, alignment] = size(one);
+            return [size * n.parse::<usize>().unwrap_or(0), alignment];
+        }
+        if let Some(name) = kind.strip_prefix("parallax/") {
+            let part = PARTS.iter().find(|it| it.0 == name).unwrap();
+            return size_of_text(part.1);
+        }
+        let digits = kind.trim_start_matches(|it: char| it.is_ascii_alphabetic());
+        let bytes = digits.parse::<usize>().unwrap() / 8;
+        [bytes, bytes]
+    }
+
+    fn size_of_text(text: &str) -> [usize; 2] {
+        let mut at = 0;
+        let mut most = 1;
+        for line in text.lines() {
+            let [bytes, alignment] = size(line.split_whitespace().next().unwrap());
+            assert_eq!(at % alignment, 0, "CDR would leave a gap before {line:?}");
+            at += bytes;
+            most = most.max(alignment);
+        }
+        [at, most]
+    }
+
+    #[test]
+    fn a_schema_describes_every_byte_of_its_message() {
+        for kind in Kind::ALL {
+            assert_eq!(
+                size_of_text(kind.own_schema())[0],
+                kind.head_bytes(),
+                "{kind:?}"
+            );
+            let has_array = kind.own_schema().contains("[] ");
+            assert_eq!(has_array, kind.element_bytes().is_some(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_schema_brings_all_that_it_refers_to_once() {
+        for kind in Kind::ALL {
+            let schema = kind.schema();
+            for (name, _) in PARTS {
+                let is_used = schema.contains(&format!("parallax/{name} "))
+                    || schema.contains(&format!("parallax/{name}["));
+                let n_defined = schema.matches(&format!("MSG: parallax/{name}\n")).count();
+                assert_eq!(n_defined, usize::from(is_used), "{name} in {kind:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_topic_tells_its_kind_and_an_unknown_one_none() {
+        for kind in Kind::ALL {
+            assert_eq!(Kind::of_topic(&kind.example()), Some(kind));
+        }
+        assert_eq!(Kind::of_topic("frame/v1/12"), Some(Kind::Frame));
+        assert_eq!(Kind::of_topic("health/v2/pose-3"), Some(Kind::Health));
+        for other in [
+            "frame/v2/0",
+            "frame/v1",
+            "pose3d/v1/0",
+            "pose3d",
+            "",
+            "/",
+            "x/frame/v1/0",
+        ] {
+            assert_eq!(Kind::of_topic(other), None, "{other}");
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! One message as bytes: CDR, little endian.
+
+use bytemuck::{bytes_of, pod_read_unaligned};
+use messages::{Stamp, Status, Timing};
+
+use crate::Kind;
+
+/// What CDR begins with: little endian, no options.
+const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
+
+const _: () = assert!(
+    cfg!(target_endian = "little"),
+    "messages are written as they lie in memory"
+);
+
+/// The bytes of a message are not those of its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Malformed {
+    /// It is shorter or longer than its kind and its count say.
+    #[error("a message of {len} bytes, where {expected} are due")]
+    Length {
+        /// Bytes that are there.
+        len: u64,
+        /// Bytes that it should have; the least if even the count is missing.
+        expected: u64,
+    },
+    /// It is not little-endian CDR.
+    #[error("a message that begins with {0:02x?}, which is not little-endian CDR")]
+    Encoding([u8; 4]),
+}
+
+/// Appends a message to `out`.
+///
+/// * `head`: the struct, [`Kind::head_bytes`] long; what is longer is cut, what is shorter filled up.
+/// * `elements`: its array as bytes, if it has one.
+pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
+    out.extend_from_slice(&PREAMBLE);
+    let begin = out.len();
+    out.extend_from_slice(&head[..head.len().min(kind.head_bytes())]);
+    out.resize(begin + kind.head_bytes(), 0);
+    if let Some(size) = kind.element_bytes() {
+        let n = u32::try_from(elements.len() / size).unwrap_or(u32::MAX);
+        out.extend_from_slice(&n.to_le_bytes());
+        out.extend_from_slice(&elements[..n as usize * size]);
+    }
+}
+
+/// A message, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Message<'a> {
+    /// The struct.
+    pub head: &'a [u8],
+    /// The array; empty if it has none.
+    pub elements: &'a [u8],
+}
+
+impl<'a> Message<'a> {
+    /// Takes a message apart.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`].
+    pub fn parse(kind: Kind, data: &'a [u8]) -> Result<Self, Malformed> {
+        let fixed = PREAMBLE.len() + kind.head_bytes();
+        check_length(kind, data.len() as u64)?;
+        if !data.starts_with(&PREAMBLE) {
+            return Err(Malformed::Encoding(pod_read_unaligned(&data[..4])));
+        }
+        let head = &data[PREAMBLE.len()..fixed];
+        let Some(size) = kind.element_bytes() else {
+            return Ok(Self {
+                head,
+                elements: &[],
+            });
+        };
+        let n: u32 = pod_read_unaligned(&data[fixed..fixed + 4]);
+        let elements = &data[fixed + 4..];
+        let expected = u64::from(n) * size as u64;
+        if elements.len() as u64 != expected {
+            return Err(Malformed::Length {
+                len: data.len() as u64,
+                expected: expected + (fixed + 4) as u64,
+            });
+        }
+        Ok(Self { head, elements })
+    }
+}
+
+/// Whether a message of a kind may have this length, as far as can be told without reading it.
+pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
+    let count = kind.element_bytes().map_or(0, |_| size_of::<u32>());
+    let expected = (PREAMBLE.len() + kind.head_bytes() + count) as u64;
+    let fits = match kind.element_bytes() {
+        None => len == expected,
+        Some(size) => {
+            len >= expected
+                && (len - expected).is_multiple_of(size as u64)
+                && u32::try_from((len - expected) / size as u64).is_ok()
+        }
+    };
+    if fits {
+        Ok(())
+    } else {
+        Err(Malformed::Length { len, expected })
+    }
+}
+
+/// What every message begins with, and its status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Envelope {
+    /// Which frame.
+    pub stamp: Stamp,
+    /// When.
+    pub timing: Timing,
+    /// Whether it carries a result.
+    pub status: Status,
+}
+
+impl Envelope {
+    /// Of a struct; none for signs of life, which have no stamp, and for what is too short.
+    pub fn of(kind: Kind, head: &[u8]) -> Option<Self> {
+        let at = kind.status_at()?;
+        let stamp = head.get(..size_of::<Stamp>())?;
+        let timing = head.get(size_of::<Stamp>()..)?.get(..size_of::<Timing>())?;
+        let status = head.get(at..)?.get(..size_of::<Status>())?;
+        Some(Self {
+            stamp: pod_read_unaligned(stamp),
+            timing: pod_read_unaligned(timing),
+            status: pod_read_unaligned(status),
+        })
+    }
+
+    /// Writes it into a struct of the kind; signs of life, and what is too short, are left alone.
+    pub fn put(&self, kind: Kind, head: &mut [u8]) {
+        let Some(at) = kind.status_at().filter(|_| head.len() >= kind.head_bytes()) else {
+            return;
+        };
+        let pieces = [
+            (0, bytes_of(&self.stamp)),
+            (size_of::<Stamp>(), bytes_of(&self.timing)),
+            (at, bytes_of(&self.status)),
+        ];
+        for (at, bytes) in pieces {
+            head[at..at + bytes.len()].copy_from_slice(bytes);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::{Zeroable as _, cast_slice};
+    use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn envelope(n: u64) -> Envelope {
+        Envelope {
+            stamp: Stamp {
+                session: n,
+                frame: n + 1,
+                captured_at_nanos: n + 2,
+                view: 3,
+                epoch: 4,
+            },
+            timing: Timing {
+                received_at_nanos: n + 5,
+                sent_at_nanos: n + 6,
+            },
+            status: Status::NO_DETECTION,
+        }
+    }
+
+    /// The bytes of messages with this envelope, one of every kind that has any.
+    fn heads(it: Envelope) -> Vec<(Kind, Vec<u8>)> {
+        let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
+        let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
+        let (mut pair, mut pose3d) = (PairPose::default(), Pose3d::zeroed());
+        (frame.stamp, frame.timing, frame.status) = (it.stamp, it.timing, it.status);
+        (evidence.stamp, evidence.timing, evidence.status) = (it.stamp, it.timing, it.status);
+        (pose.stamp, pose.timing, pose.status) = (it.stamp, it.timing, it.status);
+        (quality.stamp, quality.timing, quality.status) = (it.stamp, it.timing, it.status);
+        (pair.stamp, pair.timing, pair.status) = (it.stamp, it.timing, it.status);
+        (pose3d.stamp, pose3d.timing, pose3d.status) = (it.stamp, it.timing, it.status);
+        let heads = [
+            (Kind::Frame, bytes_of(&frame)),
+            (Kind::Evidence, bytes_of(&evidence)),
+            (Kind::ViewPose, bytes_of(&pose)),
+            (Kind::ViewQuality, bytes_of(&quality)),
+            (Kind::PairPose, bytes_of(&pair)),
+            (Kind::Pose3d, bytes_of(&pose3d)),
+        ];
+        heads.map(|(kind, bytes)| (kind, bytes.to_vec())).into()
+    }
+
+    #[test]
+    fn an_envelope_is_read_where_every_message_has_it_and_written_there() {
+        for ((kind, head), (_, other)) in heads(envelope(9)).into_iter().zip(heads(envelope(70))) {
+            assert_eq!(Envelope::of(kind, &head), Some(envelope(9)), "{kind:?}");
+            let mut changed = head;
+            envelope(70).put(kind, &mut changed);
+            assert_eq!(changed, other, "{kind:?}");
+            assert_eq!(Envelope::of(kind, &changed[..20]), None);
+        }
+        assert_eq!(Envelope::of(Kind::Health, &[0; 104]), None);
+    }
+
+    #[test]
+    fn evidence_comes_back_bit_for_bit() {
+        let values = [1.5_f32, f32::NAN, -0.0];
+        let (kind, head) = heads(envelope(1)).swap_remove(1);
+        let mut data = Vec::new();
+        encode(kind, &head, cast_slice(&values), &mut data);
+        let got = Message::parse(kind, &data).unwrap();
+        assert_eq!(got.head, head);
+        assert_eq!(got.elements, cast_slice::<f32, u8>(&values));
+    }
+
+    #[test]
+    fn another_byte_order_is_refused() {
+        let mut data = Vec::new();
+        encode(Kind::Health, &[7; 104], &[], &mut data);
+        data[1] = 0;
+        let refused = Message::parse(Kind::Health, &data);
+        assert_eq!(refused, Err(Malformed::Encoding([0; 4])));
+    }
+
+    #[test]
+    fn a_count_that_does_not_match_is_refused() {
+        let mut data = Vec::new();
+        encode(Kind::Frame, &[0; 128], &[1, 2, 3], &mut data);
+        data[132] = 4;
+        let refused = Message::parse(Kind::Frame, &data);
+        let [len, expected] = [139, 140];
+        assert_eq!(refused, Err(Malformed::Length { len, expected }));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_message_or_refused(kind in prop::sample::select(Kind::ALL.to_vec()), n in 0_usize..400, fill: u8) {
+            let mut data = vec![fill; n];
+            if n >= 4 { data[..4].copy_from_slice(&PREAMBLE); }
+            if let Ok(it) = Message::parse(kind, &data) {
+                prop_assert_eq!(it.head.len(), kind.head_bytes());
+            }
+        }
+    }
+}

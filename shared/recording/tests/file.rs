@@ -1,0 +1,262 @@
+//! Recordings as files: written, cut off anywhere, damaged anywhere, and read again.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::cell::RefCell;
+use std::io::{self, Cursor, Write};
+use std::rc::Rc;
+
+use messages::topic;
+use proptest::prelude::*;
+use recording::{
+    About, Count, Entry, Kind, ReadError, Recording, WriteError, Writer, encode, read, scan,
+};
+
+/// One message of the tests: its topic, when it was sent, and its array.
+type Said = (usize, u64, Vec<u8>);
+
+fn topics() -> Vec<String> {
+    vec![
+        topic::frame(0),
+        topic::view_pose(0),
+        topic::health("pose-0"),
+    ]
+}
+
+fn about() -> About {
+    About {
+        version: "1.2.3".to_owned(),
+        session: 77,
+        settings: "{}".to_owned(),
+        ..About::default()
+    }
+}
+
+fn kind(topic: usize) -> Kind {
+    [Kind::Frame, Kind::ViewPose, Kind::Health][topic]
+}
+
+fn data((topic, time, elements): &Said) -> Vec<u8> {
+    let mut data = Vec::new();
+    encode(kind(*topic), &time.to_le_bytes(), elements, &mut data);
+    data
+}
+
+/// A file, and the lengths at which every message was whole in it.
+fn written(said: &[Said], flush_every: usize) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut writer = Writer::begin(&mut file, &about(), &topics()).unwrap();
+    for (nth, it) in said.iter().enumerate() {
+        let entry = Entry {
+            log_time: it.1 + 1,
+            publish_time: it.1,
+            ..Entry::default()
+        };
+        writer.write(it.0, &entry, &data(it)).unwrap();
+        if nth % flush_every == 0 {
+            writer.flush(&[nth as u64 / 3, 0, 0]).unwrap();
+        }
+    }
+    writer.finish(&[9, 0, 1]).unwrap();
+    file
+}
+
+/// What a file holds, in its order, each message checked against what was said.
+fn held(recording: &Recording, file: &[u8], said: &[Said]) -> usize {
+    let mut found = Vec::new();
+    for (nth, name) in topics().iter().enumerate() {
+        let entries = recording.tracks.get(name).map(|it| &it.entries[..]);
+        found.extend(entries.unwrap_or_default().iter().map(|it| (nth, *it)));
+    }
+    found.sort_by_key(|it| it.1.offset);
+    let mut buffer = Vec::new();
+    for ((topic, entry), it) in found.iter().zip(said) {
+        let message = read(&mut Cursor::new(file), kind(*topic), entry, &mut buffer).unwrap();
+        assert_eq!(message.head[..8], it.1.to_le_bytes());
+        let expected: &[u8] = if *topic == 0 { &it.2 } else { &[] };
+        assert_eq!((*topic, message.elements), (it.0, expected));
+        assert_eq!((entry.publish_time, entry.log_time), (it.1, it.1 + 1));
+    }
+    found.len()
+}
+
+fn some() -> Vec<Said> {
+    (0..12)
+        .map(|nth| (nth % 3, 10 * nth as u64, vec![nth as u8; 5 + nth]))
+        .collect()
+}
+
+#[test]
+fn what_was_written_is_read_with_its_counts() {
+    let (said, file) = (some(), written(&some(), 4));
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    assert_eq!(recording.about, Ok(about()));
+    assert!(recording.extent.is_complete);
+    assert_eq!(recording.extent.whole_bytes, file.len() as u64);
+    assert_eq!(held(&recording, &file, &said), said.len());
+    let count = |topic: usize| recording.counts[&topics()[topic]];
+    let expected = [(4, 9), (4, 0), (4, 1)];
+    let expected = expected.map(|(recorded, lost)| Count { recorded, lost });
+    assert_eq!([0, 1, 2].map(count), expected);
+    assert_eq!(recording.n_lost(), 10);
+    assert_eq!(recording.begin(), Some(0));
+}
+
+#[test]
+fn others_can_read_it_with_its_index_and_its_checksums() {
+    let file = written(&some(), 4);
+    let summary = mcap::Summary::read(&file).unwrap().unwrap();
+    assert_eq!(summary.stats.unwrap().message_count, 12);
+    assert!(!summary.chunk_indexes.is_empty());
+    let options = mcap::read::Options::ValidateChunkCrcs;
+    let messages = mcap::MessageStream::new_with_options(&file, options.into()).unwrap();
+    let messages: Vec<_> = messages.map(Result::unwrap).collect();
+    assert_eq!(messages.len(), 12);
+    let first = &messages[0].channel;
+    assert_eq!(
+        (first.topic.as_str(), first.message_encoding.as_str()),
+        ("frame/v1/0", "cdr")
+    );
+    let schema = first.schema.as_ref().unwrap();
+    assert_eq!(
+        (schema.name.as_str(), schema.encoding.as_str()),
+        ("parallax/msg/Frame", "ros2msg")
+    );
+}
+
+#[test]
+fn a_file_cut_off_at_any_byte_holds_what_was_whole_in_it() {
+    let (said, file) = (some(), written(&some(), 4));
+    let mut most = 0;
+    for n in 0..=file.len() {
+        let part = &file[..n];
+        let recording = match scan(&mut Cursor::new(part)) {
+            Ok(recording) => recording,
+            Err(error) => {
+                assert!(n < 8, "{n} bytes: {error}");
+                continue;
+            }
+        };
+        let extent = &recording.extent;
+        assert_eq!(extent.is_complete, n == file.len());
+        assert_eq!((extent.damage, extent.n_malformed), (None, 0), "{n} bytes");
+        assert_eq!(extent.file_bytes, n as u64);
+        assert!(extent.whole_bytes <= n as u64);
+        let n_held = held(&recording, part, &said);
+        assert!(
+            n_held == most || n_held == most + 1,
+            "{n} bytes: {most}, then {n_held}"
+        );
+        most = n_held;
+        assert!(most == 0 || recording.about == Ok(about()));
+    }
+    assert_eq!(most, said.len());
+}
+
+#[test]
+fn what_is_no_recording_is_refused() {
+    for other in [&b""[..], b"\x89MCAP", b"\x89PNG\r\n\x1a\n and more"] {
+        let refused = scan(&mut Cursor::new(other));
+        assert!(matches!(refused, Err(ReadError::NotMcap)));
+    }
+}
+
+#[test]
+fn a_topic_that_this_program_does_not_know_cannot_be_written() {
+    let refused = Writer::begin(Vec::new(), &about(), &["frame/v9/0".to_owned()]);
+    assert!(matches!(refused, Err(WriteError::Topic(it)) if it == "frame/v9/0"));
+}
+
+/// A disk with little room.
+#[derive(Clone)]
+struct Disk {
+    file: Rc<RefCell<Vec<u8>>>,
+    room: usize,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut file = self.file.borrow_mut();
+        let n = bytes.len().min(self.room - file.len());
+        file.extend_from_slice(&bytes[..n]);
+        if n == 0 && !bytes.is_empty() {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_disk_is_told_with_the_number_and_what_is_there_stays_readable() {
+    let disk = Disk {
+        file: Rc::default(),
+        room: 40_000,
+    };
+    let mut writer = Writer::begin(disk.clone(), &about(), &topics()).unwrap();
+    let said: Vec<Said> = (0..90).map(|nth| (0, nth, vec![nth as u8; 1000])).collect();
+    let failed = said.iter().try_for_each(|it| {
+        let entry = Entry {
+            log_time: it.1 + 1,
+            publish_time: it.1,
+            ..Entry::default()
+        };
+        writer.write(0, &entry, &data(it))?;
+        writer.flush(&[0; 3])
+    });
+    let error = failed.unwrap_err();
+    assert!(error.to_string().contains("40000 bytes"), "{error}");
+    assert!(
+        matches!(&error, WriteError::Write { source, .. } if source.kind() == io::ErrorKind::StorageFull)
+    );
+    let again = writer.write(0, &Entry::default(), &data(&said[0]));
+    assert!(again.is_err(), "no more can be written");
+    drop(writer);
+    let file = disk.file.borrow().clone();
+    assert_eq!(file.len(), 40_000);
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    assert!(!recording.extent.is_complete);
+    assert!(held(&recording, &file, &said) > 20);
+}
+
+fn any_said() -> impl Strategy<Value = Vec<Said>> {
+    let elements = prop::collection::vec(any::<u8>(), 0..40);
+    prop::collection::vec((0_usize..3, 0_u64..1000, elements), 0..20)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn a_prefix_holds_a_prefix(said in any_said(), flush_every in 1_usize..8, share in 0.0..1.0) {
+        let file = written(&said, flush_every);
+        let part = &file[..(file.len() as f64 * share) as usize];
+        if let Ok(recording) = scan(&mut Cursor::new(part)) {
+            prop_assert!(held(&recording, part, &said) <= said.len());
+            prop_assert_eq!(recording.extent.n_malformed, 0);
+        }
+    }
+
+    #[test]
+    fn damage_anywhere_is_never_more_than_damage(
+        at in 0.0..1.0, to: [u8; 8], n in 1_usize..9,
+    ) {
+        let mut file = written(&some(), 4);
+        let at = (file.len() as f64 * at) as usize;
+        let end = (at + n).min(file.len());
+        file[at..end].copy_from_slice(&to[..end - at]);
+        if let Ok(recording) = scan(&mut Cursor::new(&file)) {
+            let mut buffer = Vec::new();
+            for track in recording.tracks.values() {
+                for entry in &track.entries {
+                    prop_assert!(entry.offset + entry.len <= file.len() as u64);
+                    if let Ok(it) = read(&mut Cursor::new(&file), track.kind, entry, &mut buffer) {
+                        prop_assert_eq!(it.head.len(), track.kind.head_bytes());
+                    }
+                }
+            }
+        }
+    }
+}
