@@ -137,7 +137,7 @@ impl OfPart {
         let mut centres = vec![Vec::new(); labels.iter().max().map_or(0, |it| it + 1)];
         for (label, centre) in centres.iter_mut().enumerate() {
             let members = labels.iter().zip(points).filter(|it| *it.0 == label);
-            *centre = middle(members.map(|it| it.1));
+            *centre = middle(&mut members.map(|it| it.1));
         }
         Self { labels, centres }
     }
@@ -197,7 +197,7 @@ fn in_mirror(point: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn middle<'a>(points: impl Iterator<Item = &'a Vec<f64>>) -> Vec<f64> {
+fn middle(points: &mut dyn Iterator<Item = &Vec<f64>>) -> Vec<f64> {
     let (mut sum, mut n) = (Vec::new(), 0.0);
     for point in points {
         sum.resize(point.len(), 0.0);
