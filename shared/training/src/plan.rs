@@ -17,6 +17,14 @@ pub struct Tree {
     pub mirror: Option<Vec<usize>>,
 }
 
+impl Tree {
+    /// The parents, and the mirror if either side is to be the mirror image of the other.
+    fn sides(&self, settings: &Settings) -> (&[Option<usize>], Option<&[usize]>) {
+        let mirror = self.mirror.as_deref().filter(|_| settings.symmetric);
+        (&self.parents, mirror)
+    }
+}
+
 /// Who is trained on, and with which shape of model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
@@ -123,8 +131,7 @@ impl Plan {
                 .collect()
         };
         let in_cells: Vec<Vec<[f64; 2]>> = large.iter().map(in_cells).collect();
-        let mirror = tree.mirror.as_deref().filter(|_| settings.symmetric);
-        let Types { of_person, anchors } = cluster(&in_cells, (&tree.parents, mirror), settings);
+        let Types { of_person, anchors } = cluster(&in_cells, tree.sides(settings), settings);
         let planned = large.iter().zip(of_person).map(|(&person, types)| Planned {
             person,
             parts: people[person].clone(),

@@ -19,23 +19,6 @@ impl Symmetry {
     /// they are not, or if it has no mirror.
     pub(crate) fn of(shape: &Shape) -> Option<Self> {
         let mirror = shape.mirror.as_deref()?;
-        let fits = |part: usize| {
-            let (own, other) = (&shape.anchors[part], &shape.anchors[mirror[part]]);
-            let flipped = |(k, it): (usize, &[i32; 2])| {
-                let of = if mirror[part] == part {
-                    pair_of(k, own.len())
-                } else {
-                    k
-                };
-                other.get(of) == Some(&[-it[0], it[1]])
-            };
-            own.len() == other.len() && own.iter().enumerate().all(flipped)
-        };
-        if !(0..shape.n_parts()).all(fits) {
-            return None;
-        }
-        let at = shape.coordinates();
-        let mut mirrored: Vec<(u32, f64)> = (0..at.len()).map(|it| (it as u32, 1.0)).collect();
         let of = |part: usize, k: usize| {
             if mirror[part] == part {
                 pair_of(k, shape.n_types(part))
@@ -43,33 +26,27 @@ impl Symmetry {
                 k
             }
         };
+        let fits = |part: usize| {
+            let (own, other) = (&shape.anchors[part], &shape.anchors[mirror[part]]);
+            let flipped =
+                |(k, it): (usize, &[i32; 2])| other.get(of(part, k)) == Some(&[-it[0], it[1]]);
+            own.len() == other.len() && own.iter().enumerate().all(flipped)
+        };
+        if !(0..shape.n_parts()).all(fits) {
+            return None;
+        }
+        let at = shape.coordinates();
+        let plain = (0..at.len()).map(|it| (it as u32, 1.0));
+        let mut mirrored: Vec<(u32, f64)> = plain.collect();
         for part in 0..shape.n_parts() {
-            let other = mirror[part];
             for k in 0..shape.n_types(part) {
-                let their = of(part, k);
-                let (from, to) = (at.filter(part, k), at.filter(other, their));
-                for cell in 0..shape.side * shape.side {
-                    let (row, col) = (cell / shape.side, cell % shape.side);
-                    let flipped = row * shape.side + shape.side - 1 - col;
-                    for (channel, its) in MIRRORED_CHANNEL.iter().enumerate() {
-                        let to = to + flipped * N_CHANNELS + its;
-                        mirrored[from + cell * N_CHANNELS + channel].0 = to as u32;
-                    }
-                }
-                for axis in 0..2 {
-                    let [from, to] =
-                        [(part, k), (other, their)].map(|(part, k)| at.quadratic(part, k));
-                    mirrored[from + axis].0 = (to + axis) as u32;
-                    let [from, to] =
-                        [(part, k), (other, their)].map(|(part, k)| at.linear(part, k));
-                    let sign = if axis == 0 { -1.0 } else { 1.0 };
-                    mirrored[from + axis] = ((to + axis) as u32, sign);
-                }
-                let Some(parent) = shape.parents[part] else {
-                    continue;
-                };
-                for of_parent in 0..shape.n_types(parent) {
-                    let to = at.bias(other, of(parent, of_parent), their);
+                let (own, their) = ((part, k), (mirror[part], of(part, k)));
+                filters(shape, &mut mirrored, own, their);
+                springs(shape, &mut mirrored, own, their);
+                let parent = shape.parents[part];
+                for of_parent in 0..parent.map_or(0, |it| shape.n_types(it)) {
+                    let parent = parent.unwrap_or_default();
+                    let to = at.bias(their.0, of(parent, of_parent), their.1);
                     mirrored[at.bias(part, of_parent, k)].0 = to as u32;
                 }
             }
@@ -87,6 +64,32 @@ impl Symmetry {
             .zip(theirs)
             .map(|(own, theirs)| 0.5 * (own + theirs))
             .collect()
+    }
+}
+
+/// A part and one of its types.
+type Typed = (usize, usize);
+
+fn filters(shape: &Shape, mirrored: &mut [(u32, f64)], own: Typed, their: Typed) {
+    let at = shape.coordinates();
+    let [from, to] = [own, their].map(|(part, k)| at.filter(part, k));
+    for cell in 0..shape.side * shape.side {
+        let (row, col) = (cell / shape.side, cell % shape.side);
+        let flipped = row * shape.side + shape.side - 1 - col;
+        for (channel, its) in MIRRORED_CHANNEL.iter().enumerate() {
+            let to = to + flipped * N_CHANNELS + its;
+            mirrored[from + cell * N_CHANNELS + channel].0 = to as u32;
+        }
+    }
+}
+
+fn springs(shape: &Shape, mirrored: &mut [(u32, f64)], own: Typed, their: Typed) {
+    let at = shape.coordinates();
+    for (axis, sign) in [-1.0, 1.0].into_iter().enumerate() {
+        let [from, to] = [own, their].map(|(part, k)| at.quadratic(part, k) + axis);
+        mirrored[from].0 = to as u32;
+        let [from, to] = [own, their].map(|(part, k)| at.linear(part, k) + axis);
+        mirrored[from] = (to as u32, sign);
     }
 }
 

@@ -1,3 +1,5 @@
+//! Clusters that are found, and their mirror images.
+
 use super::*;
 
 const PARENTS: [Option<usize>; 3] = [None, Some(0), Some(1)];
