@@ -1,5 +1,6 @@
 //! Where the time of one process goes, and what it has lost.
 
+use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Most rows of a [`Metrics`]: a wait for every view, and what is not of one view.
@@ -16,7 +17,7 @@ pub const NO_QUEUE: u32 = u32::MAX;
 /// What a process has done in this life, sent by every process about once a second, when somebody
 /// begins to look, and at its end. Percentiles are those of the whole life, of a histogram with two
 /// significant digits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Metrics.v1")]
 #[repr(C)]
 pub struct Metrics {
@@ -91,7 +92,7 @@ impl Default for Metrics {
 }
 
 /// Durations of one stage of the work, nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("MetricsRow.v1")]
 #[repr(C)]
 pub struct MetricsRow {
@@ -114,7 +115,9 @@ pub struct MetricsRow {
 }
 
 /// What a duration is the duration of. A transparent number, as [`Status`](crate::Status) is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, ZeroCopySend)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, ZeroCopySend, Pod, Zeroable,
+)]
 #[type_name("Span.v1")]
 #[repr(C)]
 pub struct Span(pub u32);
