@@ -121,6 +121,13 @@ impl Child {
         Ok(status)
     }
 
+    /// Whether it stands still because a signal stopped it (SIGSTOP, SIGTSTP), and not for want of a
+    /// processor; `false` where the system does not say (`/proc` is Linux's).
+    pub fn is_stopped(&self) -> bool {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.pid()));
+        stat.is_ok_and(|it| state_in(&it) == Some('T'))
+    }
+
     /// Asks it to end.
     pub fn terminate(&self) {
         if let Err(error) = kill_process(Pid::from_child(&self.process), Signal::TERM) {
@@ -134,6 +141,12 @@ impl Child {
             tracing::debug!(%error, pid = self.pid(), "cannot kill");
         }
     }
+}
+
+/// The state of a process in `/proc/<pid>/stat`, which follows its name in parentheses (proc(5)).
+fn state_in(stat: &str) -> Option<char> {
+    let (_, rest) = stat.rsplit_once(')')?;
+    rest.trim_start().chars().next()
 }
 
 /// Ends a process at once, as a crash would (SIGKILL): for faults that are made on purpose.
@@ -157,6 +170,17 @@ pub fn kill(pid: u32) -> io::Result<()> {
 /// As those of [`kill`].
 pub fn freeze(pid: u32) -> io::Result<()> {
     signal(pid, Signal::STOP)
+}
+
+/// Lets a process that [`freeze`] stopped go on (SIGCONT).
+///
+/// Call it where [`kill`] may be called.
+///
+/// # Errors
+///
+/// As those of [`kill`].
+pub fn thaw(pid: u32) -> io::Result<()> {
+    signal(pid, Signal::CONT)
 }
 
 fn signal(pid: u32, signal: Signal) -> io::Result<()> {
@@ -210,7 +234,7 @@ mod tests {
     use std::process::ExitStatus;
     use std::time::Instant;
 
-    use super::{Child, freeze, kill, wait_for_any};
+    use super::{Child, freeze, kill, state_in, thaw, wait_for_any};
 
     /// What takes longer will never happen.
     const WATCHDOG: Duration = Duration::from_mins(1);
@@ -293,20 +317,38 @@ mod tests {
         assert!(!Path::new(&proc).exists());
     }
 
+    fn until(or: &str, holds: impl Fn() -> bool) {
+        let begin = Instant::now();
+        while !holds() {
+            assert!(begin.elapsed() < WATCHDOG, "{or}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_process_that_was_stopped_goes_on_when_it_is_told_to() {
+        let child = shell("exec sleep 600");
+        freeze(child.pid()).unwrap();
+        until("it goes on", || child.is_stopped());
+        thaw(child.pid()).unwrap();
+        until("it stands still", || !child.is_stopped());
+    }
+
+    #[test]
+    fn the_state_of_a_process_follows_its_name_whatever_that_is() {
+        assert_eq!(state_in("7 (a b) T 1 7"), Some('T'));
+        assert_eq!(state_in("7 (x) T y) S 1 7"), Some('S'));
+        assert_eq!(state_in("7 (x"), None);
+        assert_eq!(state_in("7 (x)"), None);
+    }
+
     #[test]
     fn a_process_that_stands_still_can_still_be_killed() {
         use std::os::unix::process::ExitStatusExt as _;
         let mut child = shell("exec sleep 600");
+        assert!(!child.is_stopped());
         freeze(child.pid()).unwrap();
-        let begin = Instant::now();
-        let is_still = || {
-            let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.pid())).unwrap();
-            stat.contains(") T ")
-        };
-        while !is_still() {
-            assert!(begin.elapsed() < WATCHDOG, "it goes on");
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        until("it goes on", || child.is_stopped());
         kill(child.pid()).unwrap();
         let (_, status) = run(&mut child);
         assert_eq!(status.signal(), Some(9));

@@ -11,7 +11,7 @@ use metrics::{Meter, Passage, Rates};
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory, now_nanos};
 
 /// Pause between two signs of life.
-const PERIOD: Duration = Duration::from_millis(150);
+pub const HEARTBEAT: Duration = Duration::from_millis(150);
 /// Signs of life from one message of times and counts to the next: about a second.
 const SIGNS_PER_METRICS: u32 = 7;
 
@@ -217,7 +217,7 @@ impl<'a> Sender<'a> {
             if ended {
                 return;
             }
-            thread::park_timeout(PERIOD);
+            thread::park_timeout(HEARTBEAT);
         }
     }
 }

@@ -1,0 +1,84 @@
+//! How far a process has come, kept in a file beside the deployment's sockets: it outlives the process.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::os::unix::fs::FileExt as _;
+use std::path::PathBuf;
+
+/// Digits of the largest number.
+const WIDTH: usize = 20;
+
+/// A few numbers that a process notes, and that its next life reads.
+#[derive(Debug)]
+pub struct Place {
+    path: PathBuf,
+    file: Option<File>,
+}
+
+impl Place {
+    /// A place in a file, which is made when something is noted.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, file: None }
+    }
+
+    /// What was noted last, by this life or an earlier one; `None` if nothing was.
+    pub fn noted<const N: usize>(&self) -> Option<[u64; N]> {
+        let text = fs::read_to_string(&self.path).ok()?;
+        let numbers: Result<Vec<u64>, _> = text.split_whitespace().map(str::parse).collect();
+        numbers.ok()?.try_into().ok()
+    }
+
+    /// Notes numbers, always as many.
+    ///
+    /// One write in place of the old ones, so that who is killed leaves the old ones or the new ones.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written; then the next life finds what was noted before.
+    pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
+        let mut line = Vec::with_capacity(N * (WIDTH + 1));
+        for number in numbers {
+            writeln!(line, "{number:WIDTH$}")?;
+        }
+        let file = match self.file.take() {
+            Some(file) => file,
+            None => File::options()
+                .create(true)
+                .truncate(false)
+                .write(true)
+                .open(&self.path)?,
+        };
+        self.file.insert(file).write_all_at(&line, 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_noted_last_is_read_by_the_next_life() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.place");
+        let mut place = Place::new(path.clone());
+        assert_eq!(place.noted::<2>(), None);
+        for numbers in [[0, 7], [u64::MAX, 12], [3, 4]] {
+            place.note(numbers).unwrap();
+            assert_eq!(Place::new(path.clone()).noted(), Some(numbers));
+        }
+        let mut next = Place::new(path.clone());
+        next.note([5, 6]).unwrap();
+        assert_eq!(place.noted(), Some([5, 6]));
+        assert_eq!(place.noted::<3>(), None, "another number of numbers");
+        fs::write(&path, "5 six").unwrap();
+        assert_eq!(place.noted::<2>(), None);
+    }
+
+    #[test]
+    fn where_nothing_can_be_written_nothing_is_noted() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut place = Place::new(folder.path().join("nowhere").join("a"));
+        place.note([1]).unwrap_err();
+        assert_eq!(place.noted::<1>(), None);
+    }
+}
