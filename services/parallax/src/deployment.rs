@@ -61,6 +61,9 @@ pub(crate) struct Supervision {
     /// How long the main loop of a process may stand still before it is killed, seconds; by mode if
     /// not given.
     pub hang_limit_s: Option<u64>,
+    /// How many signs of life, one every 150 ms, a process may miss that stands still because a signal
+    /// stopped it.
+    pub missed_beats: u32,
     /// Most restarts of one process within the window before it is given up.
     pub max_restarts: u32,
     /// The window in which restarts are counted, seconds.
@@ -75,6 +78,7 @@ impl Default for Supervision {
         Self {
             deadline_ms: None,
             hang_limit_s: None,
+            missed_beats: 3,
             max_restarts: 5,
             restart_window_s: 60,
             latency_budget_ms: None,

@@ -5,7 +5,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use runtime::{
-    Delivery, DeploymentPlan, ExitKind, Failure, Namespace, OrFail as _, TopicPlan, now_nanos,
+    Delivery, DeploymentPlan, ExitKind, Failure, HEARTBEAT, Namespace, OrFail as _, TopicPlan,
+    now_nanos,
 };
 use serde::{Deserialize, Serialize};
 use supervise::{Plan, Policy, ProcessSpec, Role};
@@ -203,6 +204,7 @@ pub(crate) fn plan(
             max_restarts: settings.max_restarts as usize,
             restart_window: Duration::from_secs(settings.restart_window_s),
             hang_limit: Duration::from_secs(resolved.deployment.hang_limit_s()),
+            stopped_limit: HEARTBEAT * settings.missed_beats,
             ..Policy::default()
         },
         log,

@@ -65,8 +65,10 @@ pub struct Policy {
     pub restart_window: Duration,
     /// How long a process may take until its main loop turns for the first time.
     pub startup_limit: Duration,
-    /// How long a process may give no sign of life: they come from a thread of its own, whatever it
-    /// computes, so one that is silent is stopped.
+    /// How long a process that the system calls stopped may give no sign of life.
+    pub stopped_limit: Duration,
+    /// How long any process may give no sign of life: they come from a thread of its own, whatever it
+    /// computes, so one that is silent is stopped, or gets no processor.
     pub silence_limit: Duration,
     /// How long the main loop of a process may stand still: longer than any frame takes.
     pub hang_limit: Duration,
@@ -87,6 +89,7 @@ impl Default for Policy {
             max_restarts: 5,
             restart_window: Duration::from_mins(1),
             startup_limit: Duration::from_mins(1),
+            stopped_limit: 3 * runtime::HEARTBEAT,
             silence_limit: Duration::from_secs(10),
             hang_limit: Duration::from_mins(2),
             idle_limit: Duration::from_secs(10),

@@ -163,12 +163,14 @@ impl Watch {
 
     /// Whether the process should be killed, and as what.
     pub(crate) fn overdue(&self, policy: &Policy, now: Instant) -> Option<Death> {
-        self.child()?;
+        let child = self.child()?;
         let since = |change: Change| now.saturating_duration_since(change.at);
         let (silent, still) = (since(self.signed), since(self.turned));
         if self.turned.count == 0 {
             (still > policy.startup_limit).then_some(Death::NeverBegan { waited: still })
-        } else if silent > policy.silence_limit {
+        } else if silent > policy.silence_limit
+            || (silent > policy.stopped_limit && child.is_stopped())
+        {
             Some(Death::Silent { still: silent })
         } else if still <= policy.hang_limit {
             None

@@ -137,13 +137,16 @@ fn a_receiver_that_is_killed_at_the_very_end_comes_back_and_hears_the_end() {
 
 #[test]
 fn a_stopped_process_looks_alive_but_is_found_out() {
-    let case = Case::new(
+    let mut case = Case::new(
         Delivery::Realtime,
         &[
             ("sink", "receive 0", Role::Essential),
             ("source", "send 1000000 1 1", Role::Essential),
         ],
     );
+    // Nothing but the state of the process can tell.
+    case.plan.policy.silence_limit = Duration::from_mins(10);
+    case.plan.policy.hang_limit = Duration::from_mins(10);
     // Late enough for it to have given a sign of life.
     let mut freeze = kill_once("source", "-STOP", |event| {
         is_line(event, "source", "sent 512")

@@ -26,6 +26,8 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     if let Some(budget) = it.supervise.latency_budget_ms {
         positive("supervise.latency_budget_ms", budget)?;
     }
+    let beats = it.supervise.missed_beats as usize;
+    within("supervise.missed_beats", beats, 1, 1_000_000)?;
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
     demand(
