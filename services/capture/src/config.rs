@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::Faults;
+
 /// Where the pictures of one camera come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -14,6 +16,9 @@ pub struct Camera {
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,
+    /// What is to go wrong with the camera, for a test: `freeze@30+20` (see [`Faults`]).
+    #[serde(default, skip_serializing_if = "Faults::is_empty")]
+    pub fault: Faults,
 }
 
 /// What happens when a stage is slower than its input.
@@ -60,6 +65,9 @@ pub struct Config {
     pub frame_step: u64,
     /// Most frames to use; all without it.
     pub n_frames: Option<u64>,
+    /// A camera whose picture stays the same, bit for bit, is called frozen from this repetition on; 0:
+    /// never. A single image as source may repeat for ever.
+    pub frozen_after: u32,
 }
 
 impl Default for Config {
@@ -74,6 +82,7 @@ impl Default for Config {
             start_frame: 0,
             frame_step: 1,
             n_frames: None,
+            frozen_after: 10,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use footage::{FootageError, FrameView, Size, Source, SourceSpec};
+use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
 /// Why there are no pictures.
@@ -131,6 +131,30 @@ impl Feed {
         match self {
             Self::Footage(source) => source.next_frame(),
             Self::Scene(stage) => Ok(stage.next_frame()),
+        }
+    }
+
+    /// The pixels of the frame that was handed out last; see [`Source::pixels`].
+    pub fn pixels(&self) -> &[u8] {
+        match self {
+            Self::Footage(source) => source.pixels(),
+            Self::Scene(stage) => &stage.rgb,
+        }
+    }
+
+    /// Whether it is one picture again and again, which nobody would call frozen.
+    pub fn is_still(&self) -> bool {
+        match self {
+            Self::Footage(source) => source.info().kind == SourceKind::Still,
+            Self::Scene(_) => false,
+        }
+    }
+
+    /// Whether it is decoded from a video, which leaves out what cannot be decoded.
+    pub fn is_video(&self) -> bool {
+        match self {
+            Self::Footage(source) => source.info().kind == SourceKind::Video,
+            Self::Scene(_) => false,
         }
     }
 

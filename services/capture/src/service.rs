@@ -2,15 +2,16 @@
 
 use core::time::Duration;
 
-use footage::{Fill, FrameView, Pacer, Size, SourceSpec, Warp};
+use footage::{Fill, Pacer, Size, SourceSpec, Warp};
 use geometry::Framing;
 use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
 use metrics::Passage;
-use runtime::{ExitKind, Failure, OrFail as _, Service, SlicePublisher, Waiter, Woken, now_nanos};
+use runtime::{
+    ExitKind, Failure, OrFail as _, Place, Service, SlicePublisher, Waiter, Woken, now_nanos,
+};
 
-use crate::feed::Feed;
-use crate::place::Place;
-use crate::{Mode, Pace};
+use crate::supply::{Step, Supply};
+use crate::{Faults, Mode, Pace};
 
 /// What one camera's process has to do.
 #[derive(Debug)]
@@ -19,6 +20,10 @@ pub struct Job {
     pub view: usize,
     /// The footage.
     pub source: SourceSpec,
+    /// What goes wrong with it on purpose.
+    pub faults: Faults,
+    /// Repetitions from which on a picture is called frozen; 0 for never.
+    pub frozen_after: u32,
     /// From the footage to the frames of the pipeline.
     pub framing: Framing,
     /// Whether frames may be dropped.
@@ -36,32 +41,34 @@ const LEAD_NANOS: u64 = 2_000_000_000;
 
 /// Sends the footage of one view, then its end.
 ///
-/// A frame that cannot be read, and all after it, are sent as [`Status::NO_FRAME`].
+/// A frame that has no picture, or one that something is wrong with, is sent without pixels and says why
+/// ([`Status::CAMERA_FAULTS`]).
 ///
 /// # Errors
 ///
 /// [`ExitKind::Input`] if the footage cannot be opened, and what the transport says.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
-    let mut source = Feed::open(&job.source).or_fail(ExitKind::Input)?;
-    let n_frames = source.info().n_frames;
-    service.health().set_total(n_frames);
-    let mut camera = Camera::open(service, job, &source)?;
-    let mut at = camera.go_on(&mut source)?;
+    let is_live = job.pace == Pace::Realtime;
+    let supply = Supply::open(&job.source, &job.faults, is_live, job.frozen_after);
+    let mut supply = supply.or_fail(ExitKind::Input)?;
+    service.health().set_total(supply.info().n_frames);
+    let mut camera = Camera::open(service, job, &supply)?;
+    let mut at = camera.go_on(&mut supply);
     while !service.stop().is_requested() {
-        at += camera.wait_until_due(&mut source, at)?;
+        at += camera.wait_until_due(&mut supply, at)?;
         if service.stop().is_requested() {
             break;
         }
-        let asked_at = now_nanos();
-        match source.next_frame() {
-            Ok(Some(frame)) => camera.send_frame(&frame, asked_at)?,
-            Ok(None) => return camera.end(at),
-            Err(error) => {
-                tracing::error!(view = job.view, %error, "no more frames of this view");
-                let from = job.source.start + at * job.source.step;
-                camera.send_missing(from, n_frames.saturating_sub(at))?;
-                return camera.end(n_frames);
+        let (asked_at, index) = (now_nanos(), supply.index());
+        let step = supply.step(asked_at);
+        camera.tell(index, step);
+        match step {
+            Step::Picture => camera.send_frame(index, supply.pixels(), asked_at)?,
+            Step::Nothing(status) => {
+                camera.send_empty(index, status)?;
+                service.health().sent(index);
             }
+            Step::End => return camera.end(at),
         }
         at += 1;
         camera.note(at);
@@ -80,10 +87,12 @@ struct Camera<'a> {
     n_dropped: u64,
     /// Fewer than the job's consumers once some have been waited for in vain.
     n_expected: usize,
+    /// Why there is no picture at the moment, if there is none.
+    trouble: Option<Status>,
 }
 
 impl<'a> Camera<'a> {
-    fn open(service: &'a Service, job: &'a Job, source: &Feed) -> Result<Self, Failure> {
+    fn open(service: &'a Service, job: &'a Job, supply: &Supply) -> Result<Self, Failure> {
         let publisher = service.bus().slice_publisher(&topic::frame(job.view))?;
         let [width, height] = job.framing.out_size().map(|it| it as usize);
         // What lies beside a picture that was turned is nothing; beside one that was not, its border
@@ -95,8 +104,8 @@ impl<'a> Camera<'a> {
         };
         let map = job.framing.source_from_output();
         let output = Size::new(width, height);
-        let warp = Warp::new(source.info().size, output, &map, fill).or_fail(ExitKind::Input)?;
-        let pacer = match (job.pace, source.info().frame_rate_hz) {
+        let warp = Warp::new(supply.info().size, output, &map, fill).or_fail(ExitKind::Input)?;
+        let pacer = match (job.pace, supply.info().frame_rate_hz) {
             (Pace::Realtime, Some(rate)) => Pacer::realtime(service.session() + LEAD_NANOS, rate),
             _ => Pacer::as_fast_as_possible(),
         };
@@ -111,11 +120,12 @@ impl<'a> Camera<'a> {
             place: Place::new(service.bus().namespace().root().join(place)),
             n_dropped: 0,
             n_expected: job.n_consumers,
+            trouble: None,
         })
     }
 
     /// Waits for the consumers, then passes over what an earlier life of this process has sent.
-    fn go_on(&mut self, source: &mut Feed) -> Result<u64, Failure> {
+    fn go_on(&mut self, supply: &mut Supply) -> u64 {
         let patience = self.service.patience_at_start(self.job.patience);
         let n = self
             .publisher
@@ -129,15 +139,33 @@ impl<'a> Camera<'a> {
             self.n_expected = n;
         }
         if self.service.epoch() == 0 {
-            return Ok(0);
+            return 0;
         }
-        source.skip(self.place.sent()).or_fail(ExitKind::Input)
+        let [sent] = self.place.noted().unwrap_or([0]);
+        supply.skip(sent)
+    }
+
+    /// Says once that the camera's pictures have gone, and once that they are back.
+    fn tell(&mut self, frame: u64, step: Step) {
+        let trouble = match step {
+            Step::Nothing(status) => Some(status),
+            Step::Picture | Step::End => None,
+        };
+        if trouble == self.trouble {
+            return;
+        }
+        let view = self.job.view;
+        match trouble {
+            Some(it) => tracing::warn!(view, frame, cause = it.reason(), "without a picture"),
+            None => tracing::info!(view, frame, "pictures again"),
+        }
+        self.trouble = trouble;
     }
 
     /// Waits until frame `at` is due; with a clock that drops frames, passes over those that are past.
     ///
     /// Returns how many were passed over.
-    fn wait_until_due(&mut self, source: &mut Feed, at: u64) -> Result<u64, Failure> {
+    fn wait_until_due(&mut self, supply: &mut Supply, at: u64) -> Result<u64, Failure> {
         while self.pacer.wait_nanos(at, now_nanos()) > 0 {
             let nanos = self.pacer.wait_nanos(at, now_nanos());
             if self.waiter.wait(Duration::from_nanos(nanos))? == Woken::Stop {
@@ -148,25 +176,25 @@ impl<'a> Camera<'a> {
         if self.job.mode == Mode::Lossless || latest <= at {
             return Ok(0);
         }
-        let n = source.skip(latest - at).or_fail(ExitKind::Input)?;
+        let n = supply.skip(latest - at);
         self.n_dropped += n;
         self.service.health().dropped(Cause::BehindClock, n);
         Ok(n)
     }
 
     /// Sends a frame; where nothing may be lost, once more to a receiver that had to be restarted.
-    fn send_frame(&mut self, frame: &FrameView<'_>, asked_at: u64) -> Result<(), Failure> {
+    fn send_frame(&mut self, index: u64, rgb: &[u8], asked_at: u64) -> Result<(), Failure> {
         let mut computing = now_nanos() - asked_at;
         loop {
             let [width, height] = self.job.framing.out_size();
             let mut loan = self.publisher.loan((width * height * 3) as usize)?;
             let begin = now_nanos();
-            self.warp.apply(frame.rgb, loan.payload_mut());
+            self.warp.apply(rgb, loan.payload_mut());
             computing += now_nanos() - begin;
             *loan.header_mut() = FrameHeader {
                 width,
                 height,
-                ..self.header(frame.index, Status::OK, asked_at)
+                ..self.header(index, Status::OK, asked_at)
             };
             let n = loan.send()?;
             if self.job.mode == Mode::Realtime || n >= self.n_expected {
@@ -192,7 +220,7 @@ impl<'a> Camera<'a> {
             .n_expected
             .max(self.publisher.n_connected().min(self.job.n_consumers));
         let health = self.service.health();
-        health.sent(frame.index);
+        health.sent(index);
         health.passed(&Passage {
             waiting: None,
             computing,
@@ -202,13 +230,7 @@ impl<'a> Camera<'a> {
         Ok(())
     }
 
-    fn send_missing(&self, from: u64, n: u64) -> Result<(), Failure> {
-        for k in 0..n {
-            self.send_empty(from + k * self.job.source.step, Status::NO_FRAME)?;
-        }
-        Ok(())
-    }
-
+    /// Sends that there is no picture of a frame, and why; or that there are no more frames.
     fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
         let mut loan = self.publisher.loan(1)?;
         loan.payload_mut().fill(0);
@@ -236,8 +258,9 @@ impl<'a> Camera<'a> {
         }
     }
 
-    fn note(&self, n_sent: u64) {
-        if let Err(error) = self.place.note(n_sent) {
+    /// Notes where a restarted process goes on.
+    fn note(&mut self, n_sent: u64) {
+        if let Err(error) = self.place.note([n_sent]) {
             tracing::debug!(%error, "cannot note the place in the footage");
         }
     }

@@ -131,7 +131,7 @@ fn footage() {
 }
 
 #[test]
-fn images_of_differing_size_end_their_view_and_name_the_file() {
+fn an_image_of_another_size_costs_its_frame_and_is_named() {
     let case = Case::new("sizes", &[3; 2], PLAIN);
     picture(90, 128).save(case.path("b/0001.png")).unwrap();
     let ended = case.run();
@@ -142,7 +142,12 @@ fn images_of_differing_size_end_their_view_and_name_the_file() {
             ended.stderr
         );
     }
-    assert_ne!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let missing = case.lines("pose3d.jsonl").into_iter();
+    let missing: Vec<_> = missing.map(|it| it["views_missing"].clone()).collect();
+    let none = serde_json::json!({});
+    let expected = [none.clone(), serde_json::json!({ "b": "wrong size" }), none];
+    assert_eq!(missing, expected, "the next frame is there again");
 }
 
 #[test]

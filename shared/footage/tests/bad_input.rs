@@ -301,7 +301,7 @@ fn of_damaged(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
     let path = clip::encode(folder.path(), "damaged.mp4", &options);
     let mut bytes = fs::read(&path).unwrap();
     let middle = bytes.len() / 2;
-    let noise = (0..400_u32).map(|it| (it * it * 31 >> 3) as u8);
+    let noise = (0..400_u32).map(|it| ((it * it * 31) >> 3) as u8);
     bytes[middle..middle + 400].copy_from_slice(&noise.collect::<Vec<_>>());
     fs::write(&path, bytes).unwrap();
     let spec = SourceSpec {

@@ -45,6 +45,36 @@ impl Status {
     /// A message that this one needed was malformed.
     pub const BAD_INPUT: Self = Self(6);
 
+    /// The picture is the same, bit for bit, as many before it: the camera stands still.
+    pub const FROZEN: Self = Self(7);
+    /// The camera says the same time as of the frame before.
+    pub const TIME_REPEATED: Self = Self(8);
+    /// The camera says an earlier time than of the frame before.
+    pub const TIME_WENT_BACK: Self = Self(9);
+    /// The camera's time does not follow from that of the frame before.
+    pub const CLOCK_JUMPED: Self = Self(10);
+    /// The picture has another size than those that the run began with.
+    pub const WRONG_SIZE: Self = Self(11);
+    /// There is no camera, or it does not answer.
+    pub const UNPLUGGED: Self = Self(12);
+    /// The camera went on to a later frame.
+    pub const LEFT_OUT: Self = Self(13);
+    /// The picture cannot be decoded.
+    pub const DAMAGED: Self = Self(14);
+
+    /// What can be wrong with a camera: all reasons for a frame without a picture that it gives itself.
+    pub const CAMERA_FAULTS: [Self; 9] = [
+        Self::NO_FRAME,
+        Self::FROZEN,
+        Self::TIME_REPEATED,
+        Self::TIME_WENT_BACK,
+        Self::CLOCK_JUMPED,
+        Self::WRONG_SIZE,
+        Self::UNPLUGGED,
+        Self::LEFT_OUT,
+        Self::DAMAGED,
+    ];
+
     /// The reason in words.
     #[must_use]
     pub fn reason(self) -> &'static str {
@@ -56,6 +86,14 @@ impl Status {
             Self::NO_PREDICTION => "no prediction",
             Self::TOO_FEW_VIEWS => "too few views",
             Self::BAD_INPUT => "malformed input",
+            Self::FROZEN => "frozen picture",
+            Self::TIME_REPEATED => "repeated timestamp",
+            Self::TIME_WENT_BACK => "timestamp went back",
+            Self::CLOCK_JUMPED => "clock jumped",
+            Self::WRONG_SIZE => "wrong size",
+            Self::UNPLUGGED => "camera gone",
+            Self::LEFT_OUT => "left out by the camera",
+            Self::DAMAGED => "damaged picture",
             Self(_) => "unknown",
         }
     }

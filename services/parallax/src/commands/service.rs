@@ -102,6 +102,8 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
+        faults: deployment.cameras[view].fault.clone(),
+        frozen_after: deployment.capture.frozen_after,
         framing: prepare::framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,

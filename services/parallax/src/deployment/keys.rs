@@ -54,7 +54,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("output", "folder for the results"),
     (
         "camera",
-        "name in the rig, source (video, image, folder, glob, synth://...), source_offset_px of a cropped source",
+        "name in the rig, source (video, image, folder, glob, synth://...), source_offset_px of a cropped source, fault = \"freeze@30+20\" for a test",
     ),
     (
         "capture.mode",
@@ -83,6 +83,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("capture.start_frame", "first frame to use, from 0"),
     ("capture.frame_step", "use every n-th frame"),
     ("capture.n_frames", "most frames to use; all without it"),
+    (
+        "capture.frozen_after",
+        "repetitions of a picture, bit for bit, from which on its camera is called frozen; 0: never",
+    ),
     (
         "pose.evidence_window",
         "levels either side of every candidate's that fusion may use, or \"all\"",
@@ -237,6 +241,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     (
         "supervise.hang_limit_s",
         "how long a process may stand still before it is killed, seconds; 120 lossless, 10 realtime",
+    ),
+    (
+        "supervise.missed_beats",
+        "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed",
     ),
     (
         "supervise.max_restarts",

@@ -1,0 +1,215 @@
+//! What is to go wrong with a camera on purpose, and when.
+
+use core::fmt;
+use core::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// What goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultKind {
+    /// The camera is gone.
+    Unplug,
+    /// The picture stays as it is.
+    Freeze,
+    /// Every frame says the time of the one before the fault.
+    Repeat,
+    /// The clock goes backwards.
+    Back,
+    /// The clock jumps an hour ahead, at every frame.
+    Jump,
+    /// Every second frame is left out.
+    Slow,
+    /// Pictures have another size.
+    Size,
+    /// Pictures cannot be decoded.
+    Damage,
+}
+
+impl FaultKind {
+    const ALL: [(Self, &'static str); 8] = [
+        (Self::Unplug, "unplug"),
+        (Self::Freeze, "freeze"),
+        (Self::Repeat, "repeat"),
+        (Self::Back, "back"),
+        (Self::Jump, "jump"),
+        (Self::Slow, "slow"),
+        (Self::Size, "size"),
+        (Self::Damage, "damage"),
+    ];
+
+    /// Its name in settings.
+    pub fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|it| it.0 == self);
+        found.map_or("", |it| it.1)
+    }
+}
+
+/// Something that goes wrong during some frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fault {
+    /// What.
+    pub kind: FaultKind,
+    /// The first frame, counted from 0 in the footage.
+    pub from: u64,
+    /// How many frames of the footage.
+    pub count: u64,
+}
+
+/// A text that names no faults.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{text:?} is no fault: expected KIND@FROM+COUNT, for example freeze@30+20, KIND one of {}",
+    FaultKind::ALL.map(|it| it.1).join(", ")
+)]
+pub struct FaultError {
+    /// What was said.
+    pub text: String,
+}
+
+/// Faults of one camera, written `freeze@30+20, unplug@80+10`: the kind, the first frame and the number of frames.
+///
+/// ```
+/// let faults: capture::Faults = "freeze@30+20".parse()?;
+/// assert_eq!(faults.at(49).map(|it| it.kind), Some(capture::FaultKind::Freeze));
+/// assert_eq!(faults.at(50), None);
+/// # Ok::<(), capture::FaultError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Faults(Vec<Fault>);
+
+impl Faults {
+    /// Whether nothing goes wrong.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// What goes wrong with a frame of the footage: the first that is named, if several do.
+    pub fn at(&self, frame: u64) -> Option<Fault> {
+        let is_now = |it: &&Fault| frame >= it.from && frame - it.from < it.count;
+        self.0.iter().find(is_now).copied()
+    }
+}
+
+impl FromStr for Fault {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        let parse = || {
+            let (name, rest) = text.trim().split_once('@')?;
+            let (from, count) = rest.split_once('+')?;
+            let kind = FaultKind::ALL.iter().find(|it| it.1 == name)?.0;
+            let [from, count] = [from, count].map(|it| it.parse().ok());
+            Some(Self {
+                kind,
+                from: from?,
+                count: count.filter(|it| *it > 0)?,
+            })
+        };
+        parse().ok_or_else(|| FaultError {
+            text: text.trim().to_owned(),
+        })
+    }
+}
+
+impl FromStr for Faults {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        if text.trim().is_empty() {
+            return Ok(Self::default());
+        }
+        text.split(',')
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .map(Self)
+    }
+}
+
+impl TryFrom<String> for Faults {
+    type Error = FaultError;
+
+    fn try_from(text: String) -> Result<Self, FaultError> {
+        text.parse()
+    }
+}
+
+impl From<Faults> for String {
+    fn from(faults: Faults) -> Self {
+        faults.to_string()
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (nth, it) in self.0.iter().enumerate() {
+            let comma = if nth > 0 { ", " } else { "" };
+            write!(f, "{comma}{}@{}+{}", it.kind.name(), it.from, it.count)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_fault_lasts_as_long_as_it_says() {
+        let faults: Faults = "freeze@3+2, slow@4+9".parse().unwrap();
+        let at = |frame| faults.at(frame).map(|it| it.kind.name());
+        assert_eq!(
+            [2, 3, 4, 5, 12, 13].map(at),
+            [
+                None,
+                Some("freeze"),
+                Some("freeze"),
+                Some("slow"),
+                Some("slow"),
+                None
+            ]
+        );
+        assert_eq!(Faults::default().at(0), None);
+        let for_ever: Faults = format!("unplug@1+{}", u64::MAX).parse().unwrap();
+        assert!(for_ever.at(u64::MAX).is_some());
+    }
+
+    #[test]
+    fn what_is_no_fault_is_refused_with_an_example() {
+        for text in [
+            "melt@3+2",
+            "freeze",
+            "freeze@3",
+            "freeze@3+0",
+            "freeze@-1+2",
+            "freeze@3+2,",
+            "freeze@3+2 slow@1+1",
+        ] {
+            let said = text.parse::<Faults>().unwrap_err().to_string();
+            assert!(
+                said.contains("freeze@30+20") && said.contains("unplug"),
+                "{text}: {said}"
+            );
+        }
+        assert!(" ".parse::<Faults>().unwrap().is_empty());
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read(all in prop::collection::vec((0..8_usize, 0..u64::MAX, 1..u64::MAX), 0..4)) {
+            let fault = |(kind, from, count): (usize, u64, u64)| Fault { kind: FaultKind::ALL[kind].0, from, count };
+            let faults = Faults(all.into_iter().map(fault).collect());
+            prop_assert_eq!(faults.to_string().parse::<Faults>().unwrap(), faults);
+        }
+
+        #[test]
+        fn any_text_is_read_or_refused(text in "[a-z@+0-9, ]{0,30}") {
+            if let Ok(it) = text.parse::<Faults>() {
+                prop_assert_eq!(it.to_string().parse::<Faults>().unwrap(), it);
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Looks at what a camera gives, frame by frame: does its picture change, does its clock run?
+
+use messages::Status;
+
+/// A time may differ from what follows from the frame before by so much: a recording may have gaps, and
+/// a camera that was slow for a moment is no clock that jumped.
+const JUMP_S: f64 = 2.0;
+
+/// Remembers of a camera's last frame what it takes to judge the next one. Reads no clock.
+#[derive(Debug)]
+pub(crate) struct Guard {
+    /// Repetitions from which on a picture is frozen; 0 for never.
+    frozen_after: u32,
+    /// Frames of the footage per second.
+    rate_hz: Option<f64>,
+    last_print: Option<u64>,
+    n_same: u32,
+    /// Index and time of the last frame.
+    last: Option<(u64, f64)>,
+}
+
+impl Guard {
+    /// * `frozen_after`: repetitions from which on a picture is called frozen; 0 for never.
+    /// * `rate_hz`: frames of the footage (not only of those used) per second.
+    pub(crate) fn new(frozen_after: u32, rate_hz: Option<f64>) -> Self {
+        Self {
+            frozen_after,
+            rate_hz,
+            last_print: None,
+            n_same: 0,
+            last: None,
+        }
+    }
+
+    /// What is wrong with a frame, if anything is.
+    ///
+    /// * `index`: in the footage.
+    /// * `time_s`: what the camera says, seconds.
+    /// * `pixels`: of any size.
+    pub(crate) fn look(
+        &mut self,
+        index: u64,
+        time_s: Option<f64>,
+        pixels: &[u8],
+    ) -> Option<Status> {
+        // Both look at every frame, whatever the other finds.
+        let of_picture = self.picture(pixels);
+        let of_clock = time_s.and_then(|it| self.clock(index, it));
+        of_clock.or(of_picture)
+    }
+
+    fn picture(&mut self, pixels: &[u8]) -> Option<Status> {
+        if self.frozen_after == 0 {
+            return None;
+        }
+        let print = Some(fingerprint(pixels));
+        self.n_same = if self.last_print == print {
+            self.n_same.saturating_add(1)
+        } else {
+            0
+        };
+        self.last_print = print;
+        (self.n_same >= self.frozen_after).then_some(Status::FROZEN)
+    }
+
+    fn clock(&mut self, index: u64, time_s: f64) -> Option<Status> {
+        let (last_index, last_s) = self.last.replace((index, time_s))?;
+        let passed_s = time_s - last_s;
+        let n_frames = index.saturating_sub(last_index) as f64;
+        let expected_s = self.rate_hz.map_or(passed_s, |it| n_frames / it);
+        if passed_s == 0.0 {
+            Some(Status::TIME_REPEATED)
+        } else if passed_s < 0.0 {
+            Some(Status::TIME_WENT_BACK)
+        } else if passed_s - expected_s > JUMP_S || !time_s.is_finite() {
+            Some(Status::CLOCK_JUMPED)
+        } else {
+            None
+        }
+    }
+}
+
+/// A number made of all bytes, to tell pictures apart: four sums of products side by side, so that it
+/// costs less than a copy would.
+fn fingerprint(bytes: &[u8]) -> u64 {
+    const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mut lanes = [1, 2, 3, 4].map(|it: u64| it.wrapping_mul(PRIME));
+    let chunks = bytes.chunks_exact(32);
+    let mut rest = [0; 32];
+    rest[..chunks.remainder().len()].copy_from_slice(chunks.remainder());
+    for chunk in chunks.chain([&rest[..]]) {
+        for (lane, word) in lanes.iter_mut().zip(chunk.chunks_exact(8)) {
+            let mut bytes = [0; 8];
+            bytes.copy_from_slice(word);
+            *lane = (*lane ^ u64::from_le_bytes(bytes)).wrapping_mul(PRIME);
+            *lane ^= *lane >> 29;
+        }
+    }
+    let mix = |sum: u64, lane: &u64| (sum.rotate_left(17) ^ lane).wrapping_mul(PRIME);
+    lanes.iter().fold(bytes.len() as u64, mix)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// What is said of pictures of one colour each, at 10 Hz.
+    fn of_pictures(frozen_after: u32, colours: &[u8]) -> Vec<Option<Status>> {
+        let mut guard = Guard::new(frozen_after, Some(10.0));
+        let frames = colours.iter().enumerate();
+        let look = |(index, colour): (usize, &u8)| {
+            guard.look(index as u64, Some(index as f64 * 0.1), &[*colour; 50])
+        };
+        frames.map(look).collect()
+    }
+
+    /// What is said of times of frames at 10 Hz whose pictures change.
+    fn of_times(times_s: &[f64]) -> Vec<Option<Status>> {
+        let mut guard = Guard::new(2, Some(10.0));
+        let frames = times_s.iter().enumerate();
+        let look = |(index, time_s): (usize, &f64)| {
+            guard.look(index as u64, Some(*time_s), &[index as u8; 50])
+        };
+        frames.map(look).collect()
+    }
+
+    #[test]
+    fn a_picture_is_frozen_from_the_nth_repetition_until_it_changes() {
+        let frozen = Some(Status::FROZEN);
+        let got = of_pictures(2, &[1, 1, 2, 2, 2, 2, 3, 3]);
+        assert_eq!(got, [None, None, None, None, frozen, frozen, None, None]);
+        assert_eq!(of_pictures(0, &[1; 40]), [None; 40]);
+    }
+
+    #[test]
+    fn times_must_follow_from_one_another() {
+        let [same, back, jump] = [
+            Status::TIME_REPEATED,
+            Status::TIME_WENT_BACK,
+            Status::CLOCK_JUMPED,
+        ]
+        .map(Some);
+        assert_eq!(
+            of_times(&[0.0, 0.1, 0.1, 0.1, 0.4]),
+            [None, None, same, same, None]
+        );
+        assert_eq!(
+            of_times(&[0.0, 0.1, 0.05, 0.0, 0.4]),
+            [None, None, back, back, None]
+        );
+        // The new time is as good as the old one, once it runs.
+        assert_eq!(
+            of_times(&[0.0, 0.1, 3600.0, 3600.1, 0.4, 0.5]),
+            [None, None, jump, None, back, None]
+        );
+        assert_eq!(of_times(&[0.0, f64::INFINITY, 0.2])[1], jump);
+    }
+
+    #[test]
+    fn frames_that_were_passed_over_are_no_jump() {
+        let mut guard = Guard::new(0, Some(10.0));
+        assert_eq!(guard.look(0, Some(0.0), &[]), None);
+        assert_eq!(guard.look(500, Some(50.0), &[]), None);
+        assert_eq!(guard.look(501, None, &[]), None, "no clock");
+        assert_eq!(guard.look(510, Some(51.0), &[]), None);
+    }
+
+    #[test]
+    fn a_bad_clock_is_told_before_a_frozen_picture() {
+        let mut guard = Guard::new(1, Some(10.0));
+        guard.look(0, Some(0.0), &[7; 9]);
+        assert_eq!(
+            guard.look(1, Some(0.0), &[7; 9]),
+            Some(Status::TIME_REPEATED)
+        );
+        assert_eq!(guard.look(2, Some(0.2), &[7; 9]), Some(Status::FROZEN));
+    }
+
+    proptest! {
+        #[test]
+        fn pictures_that_differ_in_one_byte_are_told_apart(
+            mut bytes in prop::collection::vec(any::<u8>(), 1..200), at in any::<prop::sample::Index>(), by in 1_u8..,
+        ) {
+            let before = fingerprint(&bytes);
+            prop_assert_eq!(fingerprint(&bytes), before);
+            let at = at.index(bytes.len());
+            bytes[at] = bytes[at].wrapping_add(by);
+            prop_assert_ne!(fingerprint(&bytes), before);
+            bytes.push(0);
+            prop_assert_ne!(fingerprint(&bytes), before);
+        }
+
+        #[test]
+        fn a_camera_that_works_is_never_accused(
+            n in 1_usize..100, rate_hz in 0.5..200.0, jitter in 0.0..0.4, step in 1_u64..5,
+        ) {
+            let mut guard = Guard::new(1, Some(rate_hz));
+            for nth in 0..n {
+                let index = nth as u64 * step;
+                let late = if nth % 2 == 0 { jitter } else { 0.0 };
+                let time_s = (index as f64 + late) / rate_hz;
+                let pixels = [nth as u8, (nth >> 8) as u8];
+                prop_assert_eq!(guard.look(index, Some(time_s), &pixels), None);
+            }
+        }
+    }
+}

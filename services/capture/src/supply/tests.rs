@@ -1,0 +1,260 @@
+//! Cameras that fail in every way there is a name for.
+
+use std::path::Path;
+
+use footage::Canvas;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use super::*;
+
+const SIZE: Size = Size::new(12, 8);
+
+/// Images of a colour each, 10 a second.
+fn images(n: u8) -> (TempDir, SourceSpec) {
+    let folder = tempfile::tempdir().unwrap();
+    for nth in 0..n {
+        save(folder.path(), nth, SIZE);
+    }
+    let spec = SourceSpec {
+        frame_rate_hz: Some(10.0),
+        ..SourceSpec::new(folder.path().to_str().unwrap())
+    };
+    (folder, spec)
+}
+
+fn save(folder: &Path, nth: u8, size: Size) {
+    let file = folder.join(format!("{nth:03}.png"));
+    Canvas::new(size, [nth, 0, 0]).save_png(&file).unwrap();
+}
+
+/// What becomes of every frame: its picture by its colour, or in words why there is none.
+fn all(supply: &mut Supply) -> Vec<String> {
+    let mut all = Vec::new();
+    loop {
+        let index = supply.index();
+        // Half a second from frame to frame: a camera that is gone is looked for at every one.
+        match supply.step((index + 1) * PAUSE_NANOS) {
+            Step::Picture => {
+                assert_eq!(supply.pixels().len(), SIZE.rgb_bytes());
+                all.push(supply.pixels()[0].to_string());
+            }
+            Step::Nothing(status) => all.push(status.reason().to_owned()),
+            Step::End => return all,
+        }
+    }
+}
+
+fn open(spec: &SourceSpec, faults: &str, is_live: bool) -> Supply {
+    Supply::open(spec, &faults.parse().unwrap(), is_live, 2).unwrap()
+}
+
+/// What becomes of eight frames under a fault.
+fn under(faults: &str) -> Vec<String> {
+    let (_folder, spec) = images(8);
+    let [live, recorded] = [true, false].map(|is_live| all(&mut open(&spec, faults, is_live)));
+    assert_eq!(live, recorded, "{faults}");
+    live
+}
+
+#[test]
+fn every_fault_costs_its_frames_and_no_others() {
+    let cases = [
+        (
+            "unplug@2+3",
+            [
+                "0",
+                "1",
+                "camera gone",
+                "camera gone",
+                "camera gone",
+                "5",
+                "6",
+                "7",
+            ],
+        ),
+        (
+            "size@2+2",
+            ["0", "1", "wrong size", "wrong size", "4", "5", "6", "7"],
+        ),
+        (
+            "damage@1+1",
+            ["0", "damaged picture", "2", "3", "4", "5", "6", "7"],
+        ),
+        (
+            "slow@2+4",
+            [
+                "0",
+                "1",
+                "2",
+                "left out by the camera",
+                "4",
+                "left out by the camera",
+                "6",
+                "7",
+            ],
+        ),
+        (
+            "repeat@2+2",
+            [
+                "0",
+                "1",
+                "repeated timestamp",
+                "repeated timestamp",
+                "4",
+                "5",
+                "6",
+                "7",
+            ],
+        ),
+        (
+            "back@2+2",
+            [
+                "0",
+                "1",
+                "timestamp went back",
+                "timestamp went back",
+                "4",
+                "5",
+                "6",
+                "7",
+            ],
+        ),
+        (
+            "jump@2+2",
+            [
+                "0",
+                "1",
+                "clock jumped",
+                "clock jumped",
+                "timestamp went back",
+                "5",
+                "6",
+                "7",
+            ],
+        ),
+        // The picture is held, and called frozen from its second repetition on.
+        (
+            "freeze@2+3",
+            [
+                "0",
+                "1",
+                "1",
+                "frozen picture",
+                "frozen picture",
+                "5",
+                "6",
+                "7",
+            ],
+        ),
+        (
+            "unplug@0+7",
+            ["camera gone"; 7]
+                .iter()
+                .copied()
+                .chain(["7"])
+                .collect::<Vec<_>>()
+                .try_into()
+                .unwrap(),
+        ),
+    ];
+    for (faults, expected) in cases {
+        assert_eq!(under(faults), expected, "{faults}");
+    }
+}
+
+#[test]
+fn a_picture_that_was_never_there_cannot_freeze() {
+    assert_eq!(under("freeze@0+2")[..3], ["0", "0", "2"]);
+    assert_eq!(
+        under("unplug@1+2, freeze@3+2")[1..5],
+        ["camera gone", "camera gone", "3", "3"]
+    );
+}
+
+#[test]
+fn files_that_are_bad_cost_their_own_frames() {
+    let (folder, spec) = images(6);
+    save(folder.path(), 2, Size::new(6, 4));
+    std::fs::write(folder.path().join("003.png"), "no picture").unwrap();
+    let got = all(&mut open(&spec, "", false));
+    assert_eq!(got, ["0", "1", "wrong size", "damaged picture", "4", "5"]);
+}
+
+#[test]
+fn recorded_footage_that_fails_again_and_again_is_given_up_but_a_camera_is_not() {
+    let (folder, spec) = images(7);
+    for nth in 1..5 {
+        save(folder.path(), nth, Size::new(6, 4));
+    }
+    let live = all(&mut open(&spec, "", true));
+    assert_eq!(live[1..5], ["wrong size"; 4]);
+    assert_eq!(live[5..], ["5", "6"]);
+    let recorded = all(&mut open(&spec, "", false));
+    assert_eq!(recorded[1..], ["wrong size"; 6]);
+}
+
+#[test]
+fn a_camera_that_is_gone_is_not_looked_for_at_every_frame() {
+    let (folder, spec) = images(6);
+    std::fs::write(folder.path().join("001.png"), "no picture").unwrap();
+    let mut supply = open(&spec, "", true);
+    let steps = [0, 1, 2, PAUSE_NANOS, PAUSE_NANOS + 1].map(|now| supply.step(now));
+    let gone = Step::Nothing(Status::DAMAGED);
+    assert_eq!(steps, [Step::Picture, gone, gone, gone, Step::Picture]);
+    assert_eq!(
+        supply.pixels()[0],
+        4,
+        "its own frame, not the one it stopped at"
+    );
+}
+
+#[test]
+fn one_image_may_be_shown_for_ever() {
+    let (folder, _) = images(1);
+    let spec = SourceSpec {
+        count: Some(20),
+        ..SourceSpec::new(folder.path().join("000.png").to_str().unwrap())
+    };
+    assert_eq!(all(&mut open(&spec, "", false)), ["0"; 20]);
+}
+
+#[test]
+fn every_nth_frame_is_counted_by_its_index() {
+    let (_folder, spec) = images(12);
+    let spec = SourceSpec {
+        start: 1,
+        step: 3,
+        ..spec
+    };
+    let got = all(&mut open(&spec, "unplug@4+1, slow@7+4", false));
+    assert_eq!(got, ["1", "camera gone", "7", "left out by the camera"]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+    #[test]
+    fn every_frame_is_answered_once_whatever_goes_wrong(
+        kinds in prop::collection::vec((0..8_usize, 0..12_u64, 1..8_u64), 0..4),
+        skips in prop::collection::vec(0..3_u64, 12), is_live: bool,
+    ) {
+        const NAMES: [&str; 8] = ["unplug", "freeze", "repeat", "back", "jump", "slow", "size", "damage"];
+        let (_folder, spec) = images(12);
+        let text: Vec<String> = kinds.iter().map(|(kind, from, n)| format!("{}@{from}+{n}", NAMES[*kind])).collect();
+        let mut supply = open(&spec, &text.join(","), is_live);
+        let mut n = 0;
+        for skip in skips {
+            n += supply.skip(skip);
+            prop_assert_eq!(supply.index(), n);
+            let step = supply.step(n * PAUSE_NANOS);
+            if step == Step::Picture {
+                let colour = u64::from(supply.pixels()[0]);
+                prop_assert!(colour <= n, "a picture of the future");
+                let is_late = kinds.iter().any(|it| it.0 == 1);
+                prop_assert!(colour == n || is_late, "{colour} for {n}");
+            }
+            n += u64::from(step != Step::End);
+        }
+        prop_assert!(n <= 12);
+    }
+}
