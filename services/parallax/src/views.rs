@@ -1,7 +1,10 @@
 //! What became of the frames of every view.
 
 use core::fmt;
+use std::collections::BTreeMap;
 
+use messages::Status;
+use record::Missing;
 use serde::Serialize;
 use serde_json::Value;
 use supervise::{Counts, Outcome};
@@ -23,8 +26,12 @@ pub(crate) struct ViewReport {
     pub late: u64,
     /// Frames that were passed over because there was no time for them.
     pub dropped: u64,
-    /// All others: what a process held when it died, or was not reached before the run was stopped.
+    /// Frames that came while a process was not there, or that it held when it died.
+    pub lost: u64,
+    /// All others: what was not reached before the run was stopped.
     pub unanswered: u64,
+    /// What was wrong with the camera, by cause, and in how many results; a part of `empty`.
+    pub faults: BTreeMap<String, u64>,
     /// Results without this view, by reason.
     #[serde(skip)]
     pub missing: Vec<(String, u64)>,
@@ -60,15 +67,21 @@ impl ViewReport {
         let empty: u64 = empty.map(|it| it.1).sum();
         // The last count of a process that was killed may be missing.
         let answered = pose.n_sent.max(used + empty);
-        let dropped = (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
+        let passed = (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
+        let of = |reason: &str| missing.iter().find(|it| it.0 == reason);
+        let lost = of(Missing::Lost.reason()).map_or(0, |it| it.1).min(passed);
+        let faults = Status::CAMERA_FAULTS.iter();
+        let faults = faults.filter_map(|it| of(it.reason()).cloned()).collect();
         Self {
             name: name.to_owned(),
             frames,
             used,
             empty,
             late: answered - used - empty,
-            dropped,
-            unanswered: frames.saturating_sub(answered + dropped),
+            dropped: passed - lost,
+            lost,
+            unanswered: frames.saturating_sub(answered + passed),
+            faults,
             missing,
         }
     }
@@ -98,11 +111,16 @@ impl fmt::Display for ViewReport {
             (self.empty, "empty"),
             (self.late, "late"),
             (self.dropped, "dropped"),
+            (self.lost, "lost"),
             (self.unanswered, "not answered"),
         ] {
             if n > 0 {
                 write!(f, ", {n} {what}")?;
             }
+        }
+        for (nth, (cause, n)) in self.faults.iter().enumerate() {
+            let between = if nth == 0 { "; camera: " } else { ", " };
+            write!(f, "{between}{n} {cause}")?;
         }
         Ok(())
     }
@@ -130,12 +148,33 @@ mod tests {
 
     #[test]
     fn every_frame_is_counted_once() {
-        let got = view(&json!({ "no detection": 2, "late": 1, "dropped": 5 }));
-        let all = [got.used, got.empty, got.late, got.dropped, got.unanswered];
-        assert_eq!(all, [9, 2, 1, 7, 1]);
+        let got = view(&json!({ "no detection": 2, "late": 1, "dropped": 5, "process lost": 3 }));
+        let all = [
+            got.used,
+            got.empty,
+            got.late,
+            got.dropped,
+            got.lost,
+            got.unanswered,
+        ];
+        assert_eq!(all, [9, 2, 1, 4, 3, 1]);
         assert_eq!(all.iter().sum::<u64>(), got.frames);
-        let said = "a: 9 of 20 frames, 2 empty, 1 late, 7 dropped, 1 not answered";
+        let said = "a: 9 of 20 frames, 2 empty, 1 late, 4 dropped, 3 lost, 1 not answered";
         assert_eq!(got.to_string(), said);
+    }
+
+    #[test]
+    fn what_was_wrong_with_a_camera_is_told_by_cause() {
+        let got =
+            view(&json!({ "no detection": 1, "frozen picture": 1, "camera gone": 1, "late": 1 }));
+        let faults = json!({ "camera gone": 1, "frozen picture": 1 });
+        assert_eq!(serde_json::to_value(&got.faults).unwrap(), faults);
+        assert_eq!(got.empty, 3);
+        let said = got.to_string();
+        assert!(
+            said.ends_with("; camera: 1 camera gone, 1 frozen picture"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
     assert!((35.0..=100.0).contains(&(pcp3d / found)), "{accuracy:#}");
     assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");
     for view in report["run"]["views"].as_array().unwrap() {
-        let parts = ["used", "empty", "late", "dropped", "unanswered"];
+        let parts = ["used", "empty", "late", "dropped", "lost", "unanswered"];
         let sum: u64 = parts.iter().map(|it| view[it].as_u64().unwrap()).sum();
         assert_eq!(sum, 30, "{view:#}");
     }

@@ -24,7 +24,7 @@ impl Told {
         let lines = case.lines("pose3d.jsonl");
         for view in report["views"].as_array().unwrap() {
             let count = |key: &str| view[key].as_u64().unwrap();
-            let kinds = ["used", "empty", "late", "dropped", "unanswered"];
+            let kinds = ["used", "empty", "late", "dropped", "lost", "unanswered"];
             assert_eq!(
                 kinds.map(count).iter().sum::<u64>(),
                 count("frames"),
@@ -94,7 +94,8 @@ fn footage_that_nobody_paces_is_over_at_once_and_what_was_left_out_is_counted() 
 
 #[test]
 fn a_slow_consumer_does_not_slow_its_producer() {
-    let case = Case::new("pause", &[80; 2], &format!("{LIVE}{PACED}"));
+    let patient = "[supervise]\nmissed_beats = 1000\nhang_limit_s = 120\n";
+    let case = Case::new("pause", &[80; 2], &format!("{LIVE}{PACED}{patient}"));
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
     let pid = started.pid_of("pose --index 1");

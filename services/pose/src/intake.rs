@@ -11,25 +11,53 @@ pub(crate) struct Intake {
     start_frame: u64,
     frame_step: u64,
     cadence: Cadence,
-    /// Number of the frame that is expected next; unknown to a process that was restarted.
-    next: Option<u64>,
+    past: Past,
     last_frame: Option<u64>,
+}
+
+/// How far a view has come; outlives the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Past {
+    /// Number of the frame that is expected next.
+    next: u64,
     /// Frames that the camera has left out.
     n_dropped: u64,
+    /// How often the camera's process had been restarted, which counts anew then.
+    camera_epoch: u32,
+}
+
+impl Past {
+    /// As three numbers.
+    pub(crate) fn numbers(self) -> [u64; 3] {
+        [self.next, self.n_dropped, self.camera_epoch.into()]
+    }
+
+    /// The same from three numbers.
+    pub(crate) fn from_numbers([next, n_dropped, camera_epoch]: [u64; 3]) -> Self {
+        Self {
+            next,
+            n_dropped,
+            camera_epoch: camera_epoch as u32,
+        }
+    }
 }
 
 impl Intake {
-    /// * `epoch`: how often this process was restarted.
-    pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], epoch: u32) -> Self {
+    /// * `past`: what earlier lives of this process have answered or counted.
+    pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], past: Past) -> Self {
         Self {
             delivery,
             start_frame,
             frame_step: frame_step.max(1),
             cadence: Cadence::default(),
-            next: (epoch == 0).then_some(0),
+            past,
             last_frame: None,
-            n_dropped: 0,
         }
+    }
+
+    /// How far it has come.
+    pub(crate) fn past(&self) -> Past {
+        self.past
     }
 
     /// Whether a frame is to be answered: not one that came again for the sake of another receiver,
@@ -46,10 +74,19 @@ impl Intake {
     /// the camera did not leave out.
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
-        let skipped = self.next.map_or(0, |next| nth.saturating_sub(next));
-        let left_out = header.n_dropped.saturating_sub(self.n_dropped);
-        self.next = Some(nth + 1);
-        self.n_dropped = header.n_dropped;
+        let skipped = nth.saturating_sub(self.past.next);
+        let is_same_camera = header.stamp.epoch == self.past.camera_epoch;
+        let before = if is_same_camera {
+            self.past.n_dropped
+        } else {
+            0
+        };
+        let left_out = header.n_dropped.saturating_sub(before);
+        self.past = Past {
+            next: (nth + 1).max(self.past.next),
+            n_dropped: header.n_dropped,
+            camera_epoch: header.stamp.epoch,
+        };
         skipped.saturating_sub(left_out)
     }
 
@@ -90,13 +127,13 @@ mod tests {
         }
     }
 
-    fn intake(delivery: Delivery, epoch: u32) -> Intake {
-        Intake::new(delivery, [6, 3], epoch)
+    fn intake(delivery: Delivery) -> Intake {
+        Intake::new(delivery, [6, 3], Past::default())
     }
 
     #[test]
     fn every_frame_is_answered_dropped_by_the_camera_or_lost() {
-        let mut intake = intake(Delivery::Realtime, 0);
+        let mut intake = intake(Delivery::Realtime);
         // 0 and 1 are lost, the camera leaves 3 and 4 out, 5 is lost, 7 and 8 are lost before the end.
         assert_eq!(intake.n_lost_before(&header(2, 0)), 2);
         assert_eq!(intake.n_lost_before(&header(6, 2)), 1);
@@ -104,23 +141,34 @@ mod tests {
     }
 
     #[test]
-    fn a_restarted_process_does_not_count_what_its_earlier_lives_answered() {
-        let mut intake = intake(Delivery::Realtime, 1);
-        assert_eq!(intake.n_lost_before(&header(20, 3)), 0);
-        assert_eq!(intake.n_lost_before(&header(22, 3)), 1);
+    fn a_restarted_process_counts_what_came_since_its_earlier_life_answered() {
+        let mut first = intake(Delivery::Realtime);
+        assert_eq!(first.n_lost_before(&header(20, 18)), 2);
+        let past = Past::from_numbers(first.past().numbers());
+        let mut second = Intake::new(Delivery::Realtime, [6, 3], past);
+        // 21 is what the first held when it was killed; 22 the camera left out; 23 and 24 nobody saw.
+        assert_eq!(second.n_lost_before(&header(25, 19)), 3);
+        assert_eq!(second.n_lost_before(&header(26, 19)), 0);
     }
 
     #[test]
     fn a_restarted_camera_counts_anew() {
-        let mut intake = intake(Delivery::Realtime, 0);
+        let mut intake = intake(Delivery::Realtime);
+        let again = |nth, n_dropped| {
+            let mut header = header(nth, n_dropped);
+            header.stamp.epoch = 1;
+            header
+        };
         assert_eq!(intake.n_lost_before(&header(4, 4)), 0);
-        assert_eq!(intake.n_lost_before(&header(6, 0)), 1);
-        assert_eq!(intake.n_lost_before(&header(8, 1)), 0);
+        // The new life has left out five: 5 to 9.
+        assert_eq!(intake.n_lost_before(&again(10, 5)), 0);
+        assert_eq!(intake.n_lost_before(&again(12, 5)), 1);
+        assert_eq!(intake.n_lost_before(&again(14, 6)), 0);
     }
 
     #[test]
     fn a_frame_that_comes_again_is_answered_once() {
-        let mut intake = intake(Delivery::Lossless, 0);
+        let mut intake = intake(Delivery::Lossless);
         assert!(intake.takes(&header(0, 0)));
         intake.answered(&header(0, 0), 1);
         assert!(!intake.takes(&header(0, 0)));
@@ -130,7 +178,7 @@ mod tests {
     #[test]
     fn who_is_too_slow_takes_fewer_frames_only_where_frames_may_be_lost() {
         for (delivery, expected) in [(Delivery::Realtime, false), (Delivery::Lossless, true)] {
-            let mut intake = intake(delivery, 0);
+            let mut intake = intake(delivery);
             for nth in [0, 2, 4, 6] {
                 intake.answered(&header(nth, 0), 150_000_000);
             }

@@ -10,11 +10,11 @@ use messages::{
 use metrics::Passage;
 use pipeline::{ViewEstimate, ViewStep};
 use runtime::{
-    Delivery, ExitKind, Failure, Loan, OrFail as _, Publisher, Sample, Service, SlicePublisher,
-    Waiter, Woken, now_nanos,
+    Delivery, ExitKind, Failure, Loan, OrFail as _, Place, Publisher, Sample, Service,
+    SlicePublisher, Waiter, Woken, now_nanos,
 };
 
-use crate::intake::Intake;
+use crate::intake::{Intake, Past};
 
 /// What one view's process has to do.
 #[derive(Debug)]
@@ -64,7 +64,11 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         "evidence is awaited, begins"
     );
     let frame_range = [job.start_frame, job.frame_step];
-    let mut intake = Intake::new(service.delivery(), frame_range, service.epoch());
+    let file = format!("pose-{}.place", job.view);
+    let mut place = Place::new(bus.namespace().root().join(file));
+    let past = place.noted().filter(|_| service.epoch() > 0);
+    let past = past.map(Past::from_numbers).unwrap_or_default();
+    let mut intake = Intake::new(service.delivery(), frame_range, past);
     let mut memory = Memory {
         tracker: job.step.tracker(),
         responses: Vec::new(),
@@ -96,6 +100,9 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             let nth = intake.nth(header.stamp.frame);
             view.answer(sample, nth, &mut memory)?;
             intake.answered(&header, now_nanos() - begin);
+            if let Err(error) = place.note(intake.past().numbers()) {
+                tracing::debug!(%error, "cannot note how far this view has come");
+            }
             if service.stop().is_requested() {
                 return Ok(());
             }

@@ -152,7 +152,9 @@ mod tests {
             empty: 0,
             late: 0,
             dropped: 0,
+            lost: 0,
             unanswered,
+            faults: std::collections::BTreeMap::new(),
             missing: Vec::new(),
         }
     }

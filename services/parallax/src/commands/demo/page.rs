@@ -228,6 +228,7 @@ fn accounts(run: &Run<'_>) -> Table {
         "empty",
         "late",
         "passed over",
+        "lost",
         "not known",
     ];
     let mut table = table("Frames accounted for", note, columns);
@@ -242,6 +243,7 @@ fn accounts(run: &Run<'_>) -> Table {
                 it.empty,
                 it.late,
                 it.dropped,
+                it.lost,
                 it.unanswered,
             ];
             [
