@@ -200,6 +200,14 @@ impl Report {
         self.budget.as_ref()
     }
 
+    /// Cameras that do not stand where the calibration says.
+    pub(crate) fn misplaced(&self) -> Vec<String> {
+        let fits = self.recorded["summary"]["calibration"].as_object();
+        let fits = fits.into_iter().flatten();
+        let suspected = fits.filter(|it| it.1["suspected"] == true);
+        suspected.map(|it| it.0.clone()).collect()
+    }
+
     /// What the recorder wrote about the run; null if it did not.
     pub(crate) fn recorded(&self) -> &Value {
         &self.recorded
@@ -295,6 +303,7 @@ impl Report {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
             }
             self.write_views(text)?;
+            self.write_misplaced(text)?;
             self.write_latency(text)?;
         }
         writeln!(
@@ -338,6 +347,20 @@ impl Report {
         writeln!(text, "  views used    {}", used.join(", "))?;
         for view in self.views.iter().filter(|it| it.used < it.frames) {
             writeln!(text, "    {view}")?;
+        }
+        Ok(())
+    }
+
+    fn write_misplaced(&self, text: &mut String) -> core::fmt::Result {
+        for camera in self.misplaced() {
+            let it = &self.recorded["summary"]["calibration"][&camera];
+            let px = |key: &str| it[key].as_f64().unwrap_or(f64::NAN);
+            writeln!(
+                text,
+                "  calibration   {camera} does not stand where it says: cameras are {:.0} px apart with it, {:.0} px without",
+                px("residual_px"),
+                px("without_px"),
+            )?;
         }
         Ok(())
     }

@@ -21,6 +21,7 @@ mod trc;
 mod folder;
 mod lines;
 
+mod calibration;
 mod summary;
 
 mod output;
@@ -29,6 +30,7 @@ mod gather;
 
 mod service;
 
+pub use calibration::CameraFit;
 pub use config::Config;
 pub use folder::{Folder, FolderError};
 pub use frame::{FrameRecord, Picture, ViewRecord};

@@ -8,8 +8,9 @@ use messages::Status;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::calibration::Calibration;
 use crate::pose3d::{is_placed, joints, missing};
-use crate::{FrameRecord, Scene};
+use crate::{CameraFit, FrameRecord, Scene};
 
 /// What was seen and what was missed, over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -34,6 +35,8 @@ pub struct Summary {
     pub evidence_bytes_per_frame: BTreeMap<String, u64>,
     /// Root mean square reprojection error over all joints, pixels of the frame.
     pub reprojection_px: Option<f64>,
+    /// How well every camera fits the others, by name; since the recorder was started last.
+    pub calibration: BTreeMap<String, CameraFit>,
     /// Frames of all views that the cameras' side dropped.
     pub frames_dropped_by_capture: u64,
     /// Results whose number was skipped, as far as the recorder can tell.
@@ -56,6 +59,7 @@ pub(crate) struct Tally {
     dropped: Vec<u64>,
     /// By view: bytes of evidence, and frames.
     evidence: Vec<[u64; 2]>,
+    calibration: Calibration,
 }
 
 impl Tally {
@@ -74,6 +78,7 @@ impl Tally {
             last_frame: None,
             dropped: vec![0; scene.views.len()],
             evidence: vec![[0; 2]; scene.views.len()],
+            calibration: Calibration::new(scene),
         }
     }
 
@@ -123,6 +128,7 @@ impl Tally {
             }
         }
         self.searches(scene, record);
+        self.calibration.add(scene, record);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
         }
@@ -207,9 +213,11 @@ impl Tally {
     /// What was seen so far.
     pub(crate) fn summary(&self) -> Summary {
         let (sum, n) = self.squared_px;
+        let names = self.summary.views_used.iter().map(|it| &it.0);
         Summary {
             reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
             frames_dropped_by_capture: self.dropped.iter().sum(),
+            calibration: self.calibration.fits(names.cloned()),
             ..self.summary.clone()
         }
     }

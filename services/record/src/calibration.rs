@@ -1,0 +1,134 @@
+//! Whether the cameras stand where the calibration says, from what every view found on its own.
+
+use std::collections::BTreeMap;
+
+use geometry::RigWatch;
+use messages::Status;
+use serde::Serialize;
+
+use crate::{FrameRecord, Scene};
+
+/// A camera is reported once it has been suspected for so many frames in a row.
+const PERSISTENT: u32 = 10;
+
+/// How well a camera fits the others, over the last frames.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct CameraFit {
+    /// How far apart cameras see the same parts if it is one of them, pixels of its footage; unknown of
+    /// fewer than three cameras, and while too little was seen.
+    pub residual_px: Option<f64>,
+    /// The same of the others without it.
+    pub without_px: Option<f64>,
+    /// Whether it was found, at any time of the run, not to stand where the calibration says.
+    pub suspected: bool,
+}
+
+/// Follows all cameras over a run.
+#[derive(Debug)]
+pub(crate) struct Calibration {
+    watch: RigWatch,
+    /// By view: frames in a row in which it was suspected.
+    streaks: Vec<u32>,
+    fits: Vec<CameraFit>,
+}
+
+impl Calibration {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let cameras = scene.views.iter().map(|it| it.framing.camera().clone());
+        let n = scene.views.len();
+        Self {
+            watch: RigWatch::new(cameras.collect()),
+            streaks: vec![0; n],
+            fits: vec![CameraFit::default(); n],
+        }
+    }
+
+    /// Takes in what the views found in a frame, each on its own.
+    pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
+        let points: Vec<_> = (0..scene.views.len())
+            .map(|view| parts(scene, record, view))
+            .collect();
+        self.watch.note(&points);
+        let suspects = self.watch.suspects();
+        for (view, fit) in self.fits.iter_mut().enumerate() {
+            let scale = scene.views[view].source_scale();
+            fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
+            fit.without_px = self.watch.without_px(view).map(|it| it * scale);
+            let is_suspect = suspects.iter().any(|it| it.view == view);
+            let streak = &mut self.streaks[view];
+            *streak = if is_suspect { *streak + 1 } else { 0 };
+            if *streak >= PERSISTENT && !fit.suspected {
+                fit.suspected = true;
+                tracing::warn!(
+                    camera = scene.views[view].name,
+                    residual_px = fit.residual_px,
+                    without_px = fit.without_px,
+                    "does not stand where the calibration says"
+                );
+            }
+        }
+    }
+
+    /// What is known of every camera, by name.
+    ///
+    /// * `names`: of the views, in their order.
+    pub(crate) fn fits(&self, names: impl Iterator<Item = String>) -> BTreeMap<String, CameraFit> {
+        names.zip(self.fits.iter().copied()).collect()
+    }
+}
+
+/// The parts of a view's own best candidate, named after the side of the body, pixels of the frame.
+fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
+    let pose = &record.pose3d;
+    let fused = pose
+        .views
+        .get(view)
+        .filter(|it| view < pose.n_views as usize && it.status == Status::OK)?;
+    let best = record.candidates(scene, view).into_iter().next()?;
+    let mirror = scene
+        .model
+        .spec()
+        .mirror
+        .as_deref()
+        .filter(|_| fused.exchanged == 1);
+    let part = |nth: usize| mirror.map_or(nth, |it| it[nth]);
+    let layout = &scene.views[view].layout;
+    let parts = (0..best.parts.len()).map(part);
+    Some(
+        parts
+            .map(|it| best.centre(&scene.model, layout, it))
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{record, scene};
+
+    #[test]
+    fn every_camera_has_an_entry_and_of_two_nobody_is_suspected() {
+        let scene = scene();
+        let mut it = Calibration::new(&scene);
+        for frame in 0..100 {
+            it.add(&scene, &record(frame));
+        }
+        let names = scene.views.iter().map(|it| it.name.clone());
+        let fits = it.fits(names);
+        assert_eq!(fits["left"], CameraFit::default());
+        assert_eq!(fits.len(), 2);
+    }
+
+    #[test]
+    fn a_view_that_found_nobody_says_nothing_of_the_cameras() {
+        let scene = scene();
+        let mut record = record(0);
+        assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);
+        record.pose3d.views[0].status = Status::NO_DETECTION;
+        assert_eq!(parts(&scene, &record, 0), None);
+        record.views[1].pose = None;
+        assert_eq!(parts(&scene, &record, 1), None);
+        record.pose3d.n_views = 0;
+        assert_eq!(parts(&scene, &record, 1), None);
+    }
+}
