@@ -33,12 +33,12 @@ fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
 #[test]
 fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
     let case = Case::new("chaos", &[80; 3], PACED);
-    let (ended, report) = chaos(&case, "kill-pose,kill-supervisor", &PATIENT);
+    let (ended, report) = chaos(&case, "kill-pose,kill-supervisor,stall-record", &PATIENT);
     assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
     let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(printed, report, "the same on standard output");
 
-    let [pose, supervisor] = &report["scenarios"].as_array().unwrap()[..] else {
+    let [pose, supervisor, stall] = &report["scenarios"].as_array().unwrap()[..] else {
         panic!("{report:#}")
     };
     assert_eq!(pose["scenario"], "kill-pose");
@@ -60,10 +60,62 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
         json!([]),
         "nobody was struck"
     );
+    // Where nothing may be lost a recorder that stands still is waited for, and nothing is.
+    let limits = stall["limits"].as_array().unwrap().iter();
+    let written = limits.clone().find(|it| it["what"] == "results written");
+    assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");
     assert_eq!(
         case.lines("pose3d.jsonl").len(),
         0,
         "not into its own folder"
+    );
+}
+
+#[test]
+fn a_failing_camera_is_named_counted_and_back_and_a_stalled_recorder_holds_nobody_up() {
+    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let case = Case::new("chaos-camera", &[160; 3], &live);
+    let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-record", &PATIENT);
+    let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {
+        panic!("{}\n{report:#}", ended.stderr)
+    };
+    let flagged = |it: &Value| {
+        let causes = it["measured"]["flagged"].as_array().unwrap().iter();
+        let causes = causes.map(|it| (it[0].as_str().unwrap().to_owned(), it[1].as_u64().unwrap()));
+        causes.collect::<Vec<_>>()
+    };
+    for (it, n_causes) in [(unplug, 1), (clock, 3)] {
+        let flagged = flagged(it);
+        assert_eq!(flagged.len(), n_causes);
+        assert!(
+            flagged.iter().all(|it| it.1 > 0),
+            "{flagged:?}\n{}",
+            ended.stderr
+        );
+        assert!(it["measured"]["back_ms"].is_number(), "{it:#}");
+        let camera = &it["measured"]["camera"];
+        let views = it["run"]["views"].as_array().unwrap();
+        let view = views.iter().find(|it| it["name"] == *camera).unwrap();
+        for (cause, n) in flagged {
+            assert!(
+                view["faults"][&cause].as_u64() >= Some(n),
+                "{cause}: {view:#}"
+            );
+        }
+        assert_eq!(
+            it["run"]["restarts"],
+            json!([]),
+            "the process itself is well"
+        );
+    }
+    assert!(
+        stall["measured"]["stall_ms"].as_f64() >= Some(3000.0),
+        "{stall:#}"
+    );
+    assert_eq!(
+        stall["run"]["restarts"],
+        json!([]),
+        "nobody takes it for hung"
     );
 }
 
@@ -88,6 +140,8 @@ fn scenarios_are_listed_and_those_that_cannot_be_are_refused() {
         "hang-fuse",
         "kill-random",
         "kill-supervisor",
+        "camera-freeze",
+        "stall-record",
     ] {
         assert!(ended.stdout.contains(name), "{name}: {}", ended.stdout);
     }

@@ -1,11 +1,14 @@
 //! `parallax chaos`: a deployment with a fault made on purpose, once for every fault, and what held.
 
 mod barrage;
+mod camera;
 mod census;
 mod ground;
 mod judge;
+mod moved;
 mod orphans;
 mod scenario;
+mod stall;
 mod verdict;
 
 use std::path::PathBuf;
@@ -38,11 +41,17 @@ What must hold when a process is killed: its death is noticed within a second; i
 where others can go on without it, no pause between two results is longer than --max-pause-ms; what became of every \
 frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
 itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
-within the hang limit (3 s, or the deployment's, but 10 s at most) and two seconds, and may be away longer by that limit. With \
+within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit. With \
 kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
 a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
 a tenth, 32 MB and 8 files. With kill-supervisor its processes end by themselves within a second, and the next start \
 of the same deployment removes what was left, and works.
+
+With camera-... a camera fails for a fifth of the footage (its source does what `fault` says in a deployment): frames \
+are called what is wrong with them, the others' results go on (--max-pause-ms), and the camera has a part in results again within \
+--max-return-ms. With camera-moved one camera of the rig is turned by two degrees: it must be named, and no other, which \
+takes four cameras and some seconds of results. With stall-record the record process stands still for three seconds and is left alone: where the latest frame \
+wins, results are made at no less than half the rate meanwhile; where nothing may be lost, nothing is.
 
 `back` is when the process sent what the first result of its new life is made of; of fuse, quality and record, which no \
 result names, when it gave a sign of having worked. Restarts are not limited here (supervise.max_restarts), and no \
@@ -95,8 +104,6 @@ const STRIKE_AFTER: f64 = 0.4;
 const BARRAGE_UNTIL: f64 = 0.8;
 /// Nanoseconds between two kills.
 const BARRAGE_PERIOD: u64 = 2_000_000_000;
-/// How long a process of the cameras that do not exist may stand still, where that is tried.
-const SHORT_HANG: &str = "supervise.hang_limit_s=3";
 
 /// Tries everything that is asked for, and judges it.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
@@ -156,6 +163,9 @@ fn attempt(ground: &Ground, arguments: &Arguments, it: Scenario) -> Result<Verdi
         Scenario::Once(blow, service) => once(ground, arguments, blow, service),
         Scenario::Random => random(ground, arguments),
         Scenario::Supervisor => supervisor(ground, arguments),
+        Scenario::Camera(fault) => camera::attempt(ground, arguments, fault),
+        Scenario::Moved => moved::attempt(ground, arguments),
+        Scenario::Stall => stall::attempt(ground, arguments),
     }
 }
 
@@ -166,9 +176,7 @@ fn once(
     service: &'static str,
 ) -> Result<Verdict, Failure> {
     let scenario = Scenario::Once(blow, service).name();
-    let is_short = blow == Blow::Stop && ground.is_synthetic;
-    let more: &[&str] = if is_short { &[SHORT_HANG] } else { &[] };
-    let planned = ground.plan(&scenario, more)?;
+    let planned = ground.plan(&scenario, &[])?;
     let victims: Vec<&str> = planned.processes().collect();
     let victims = victims.into_iter().filter(|it| service_of(it) == service);
     let process = Rng::with_seed(arguments.seed).choice(victims.collect::<Vec<_>>());
@@ -182,7 +190,7 @@ fn once(
     let struck = |it: &str| u32::from(it == process && times.killed.is_some());
     let after = ran.aftermath(struck);
     let policy = planned.plan().policy;
-    let hang_ms = policy.hang_limit.min(policy.silence_limit).as_millis() as f64;
+    let hang_ms = policy.stopped_limit.as_millis() as f64;
     Ok(Verdict {
         scenario,
         measured: verdict::of_cost(&process, &cost, after.n_results),
@@ -289,7 +297,7 @@ mod tests {
     fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
         let processes = ["capture-0", "pose-0", "triangulate", "record"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
-        assert_eq!(all.len(), 10);
+        assert_eq!(all.len(), 17);
         let quality = Scenario::Once(Blow::Kill, "quality");
         assert!(!all.contains(&quality));
         let refused = chosen(&[all[0], quality], &processes).unwrap_err();

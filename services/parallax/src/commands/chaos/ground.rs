@@ -12,7 +12,7 @@ use super::census;
 use super::judge::Aftermath;
 use crate::cli::Globals;
 use crate::commands::run::Planned;
-use crate::deployment::Loaded;
+use crate::deployment::{Deployment, Loaded};
 use crate::inputs;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
@@ -29,8 +29,6 @@ pub(super) struct Ground {
     pub file: PathBuf,
     /// For the results, a folder for every scenario; absolute.
     pub folder: PathBuf,
-    /// Whether its cameras are those that do not exist.
-    pub is_synthetic: bool,
     /// What is replaced in the file.
     pub set: Vec<String>,
     /// How much is said.
@@ -58,7 +56,6 @@ impl Ground {
         let mut ground = Self {
             file: PathBuf::new(),
             folder,
-            is_synthetic: arguments.deployment.is_none(),
             set: Vec::new(),
             globals,
             stop: Stop::on_signals().or_fail(ExitKind::Run)?,
@@ -123,8 +120,21 @@ impl Ground {
     ///
     /// * `more`: what else is replaced in the file.
     pub(super) fn plan(&self, scenario: &str, more: &[&str]) -> Result<Planned, Failure> {
+        self.plan_with(scenario, more, &|_| ())
+    }
+
+    /// As [`Self::plan`].
+    ///
+    /// * `change`: what keys cannot say.
+    pub(super) fn plan_with(
+        &self,
+        scenario: &str,
+        more: &[&str],
+        change: &dyn Fn(&mut Deployment),
+    ) -> Result<Planned, Failure> {
         let mut loaded = Loaded::read(&self.file, &self.set(more))?;
         loaded.deployment.output = self.output(scenario);
+        change(&mut loaded.deployment);
         Planned::new(&loaded.deployment, self.globals.level())
     }
 
@@ -176,6 +186,7 @@ impl Ran {
             unanswered: report.map_or(0, |it| it.views().iter().map(|it| it.unanswered).sum()),
             failed: report.map_or_else(Vec::new, |it| it.failed_by_themselves(struck)),
             left: self.left.clone(),
+            accused: report.map_or_else(Vec::new, Report::misplaced),
         }
     }
 

@@ -12,7 +12,7 @@ use crate::trial::strike::Blow;
 /// A death must be noticed within, milliseconds.
 const NOTICE_MS: f64 = 1000.0;
 /// How much later than its limit a hang may be noticed, milliseconds.
-const LATE_MS: f64 = 2000.0;
+const LATE_MS: f64 = 1000.0;
 /// Frames that every kill may cost without anybody knowing: what the process held, and what its last report may not
 /// have counted.
 const HELD: u64 = 2;
@@ -47,13 +47,15 @@ pub(super) struct Aftermath {
     pub failed: Vec<String>,
     /// What is left in shared memory.
     pub left: Vec<String>,
+    /// Cameras that are said not to stand where the calibration says, but for one that does not.
+    pub accused: Vec<String>,
 }
 
 impl Aftermath {
     /// What must hold however a run went.
     ///
     /// * `n_kills`: processes that were struck.
-    fn judge(&self, n_kills: u64) -> Vec<Limit> {
+    pub(super) fn judge(&self, n_kills: u64) -> Vec<Limit> {
         let failure: Vec<String> = self.failure.iter().cloned().collect();
         let unanswered = self.failure.is_none().then_some(self.unanswered as f64);
         vec![
@@ -66,13 +68,17 @@ impl Aftermath {
             ),
             none_of("processes that failed by themselves", &self.failed),
             none_of("left in shared memory", &self.left),
+            none_of(
+                "cameras accused that stand where they should",
+                &self.accused,
+            ),
         ]
     }
 }
 
 /// Judges a run one process of which was struck once.
 ///
-/// * `hang_ms`: how long a process may stand still before the supervisor ends it.
+/// * `hang_ms`: how long a stopped process may give no sign of life before the supervisor ends it.
 pub(super) fn once(
     asked: &Asked,
     blow: Blow,
@@ -225,7 +231,7 @@ mod tests {
     fn every_limit_of_a_struck_process_can_be_missed_alone() {
         type Change = fn(&mut Cost, &mut Aftermath);
         let nothing: &[&str] = &[];
-        let changes: [(Change, &[&str]); 10] = [
+        let changes: [(Change, &[&str]); 11] = [
             (|_, _| (), nothing),
             (|it, _| it.noticed_ms = Some(1001.0), &["noticed after, ms"]),
             (|it, _| it.back_ms = Some(8001.0), &["back after, ms"]),
@@ -246,6 +252,10 @@ mod tests {
             (
                 |_, it| it.left = vec!["px".to_owned()],
                 &["left in shared memory"],
+            ),
+            (
+                |_, it| it.accused = vec!["c1".to_owned()],
+                &["cameras accused that stand where they should"],
             ),
             (
                 |_, it| it.failure = Some("it broke".to_owned()),

@@ -1,5 +1,7 @@
 //! The faults that can be asked for, by name.
 
+use super::camera::CameraFault;
+use super::{moved, stall};
 use crate::trial::strike::Blow;
 
 /// The services, in the order in which a frame passes them.
@@ -21,6 +23,12 @@ pub(super) enum Scenario {
     Random,
     /// `parallax run` itself is killed.
     Supervisor,
+    /// A camera fails for some time.
+    Camera(CameraFault),
+    /// A camera was moved after the calibration.
+    Moved,
+    /// The recorder stops reading for some time.
+    Stall,
 }
 
 impl Scenario {
@@ -31,6 +39,8 @@ impl Scenario {
         all.push(Self::Random);
         all.extend(once(Blow::Stop));
         all.push(Self::Supervisor);
+        all.extend(CameraFault::ALL.map(Self::Camera));
+        all.extend([Self::Moved, Self::Stall]);
         all
     }
 
@@ -47,6 +57,9 @@ impl Scenario {
             Self::Once(Blow::Stop, service) => format!("hang-{service}"),
             Self::Random => "kill-random".to_owned(),
             Self::Supervisor => "kill-supervisor".to_owned(),
+            Self::Camera(it) => it.words()[0].to_owned(),
+            Self::Moved => moved::NAME.to_owned(),
+            Self::Stall => stall::NAME.to_owned(),
         }
     }
 
@@ -61,6 +74,11 @@ impl Scenario {
             Self::Supervisor => {
                 "`parallax run` itself is killed, and the same deployment started again".to_owned()
             }
+            Self::Camera(it) => it.words()[1].to_owned(),
+            Self::Moved => "a camera was turned by two degrees after the calibration".to_owned(),
+            Self::Stall => {
+                "the record process stands still for three seconds, and goes on".to_owned()
+            }
         }
     }
 
@@ -68,7 +86,15 @@ impl Scenario {
     pub(super) fn is_possible(self, processes: &[String]) -> bool {
         match self {
             Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
-            Self::Random | Self::Supervisor => true,
+            Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
+            // Of fewer than four cameras nobody can tell which it is.
+            Self::Moved => {
+                processes
+                    .iter()
+                    .filter(|it| service_of(it) == "capture")
+                    .count()
+                    > 3
+            }
         }
     }
 }
@@ -85,7 +111,7 @@ mod tests {
     #[test]
     fn every_scenario_is_found_by_its_name_and_no_two_share_one() {
         let all = Scenario::all();
-        assert_eq!(all.len(), 14);
+        assert_eq!(all.len(), 22);
         for it in all {
             assert_eq!(Scenario::by_name(&it.name()), Ok(it));
         }
@@ -107,6 +133,13 @@ mod tests {
             "hang-pose",
             "hang-record",
             "kill-supervisor",
+            "camera-unplug",
+            "camera-freeze",
+            "camera-clock",
+            "camera-size",
+            "camera-slow",
+            "camera-damage",
+            "stall-record",
         ];
         assert_eq!(names, expected);
     }

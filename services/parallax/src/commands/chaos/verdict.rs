@@ -113,7 +113,8 @@ pub(super) fn of_orphans(it: &Orphaned, n_results: usize) -> String {
     )
 }
 
-fn ms(it: Option<f64>) -> String {
+/// Milliseconds in words.
+pub(super) fn ms(it: Option<f64>) -> String {
     it.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"))
 }
 

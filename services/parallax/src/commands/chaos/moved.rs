@@ -1,0 +1,100 @@
+//! A camera that was moved after the calibration: whether it is named.
+
+use std::path::PathBuf;
+
+use fastrand::Rng;
+use geometry::files::{Format, ReadOptions};
+use geometry::{Camera, Rig};
+use nalgebra::{UnitQuaternion, Vector3};
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde_json::json;
+
+use super::Arguments;
+use super::ground::Ground;
+use super::verdict::Verdict;
+use crate::inputs;
+use crate::trial::limit::at_least;
+
+/// By so much it is turned.
+const DEGREES: f64 = 2.0;
+/// What is tried.
+pub(super) const NAME: &str = "camera-moved";
+
+/// Turns a camera of a rig a little, up, down or to a side.
+fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
+    let bearing = core::f64::consts::TAU * random.f64();
+    let axis = Vector3::new(bearing.cos(), bearing.sin(), 0.0);
+    let turn = UnitQuaternion::new(axis * DEGREES.to_radians());
+    let cameras = rig.cameras().iter().map(|it| Camera {
+        camera_from_world: if it.name == camera {
+            turn * it.camera_from_world
+        } else {
+            it.camera_from_world
+        },
+        ..it.clone()
+    });
+    Rig::new(cameras.collect(), rig.up_in_world(), rig.source()).or_fail(ExitKind::Calibration)
+}
+
+/// Runs the deployment with the calibration of one camera wrong.
+pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
+    let plain = ground.plan(NAME, &[])?;
+    let deployment = &plain.resolved().deployment;
+    let mut random = Rng::with_seed(arguments.seed);
+    let cameras = &deployment.cameras;
+    let camera = cameras[random.usize(..cameras.len())].name.clone();
+    let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
+    let rig = moved(&rig, &camera, &mut random)?;
+    let file: PathBuf = ground.folder.join("moved-rig.toml");
+    geometry::files::write(&file, Format::Own, &rig).or_fail(ExitKind::Input)?;
+    let planned = ground.plan_with(NAME, &[], &|it| it.rig.clone_from(&file))?;
+    let ran = ground.watch(&planned, &mut |_| None);
+    let mut after = ran.aftermath(|_| 0);
+    let is_named = after.accused.contains(&camera);
+    after.accused.retain(|it| *it != camera);
+    let fits = ran.json()["recorded"]["summary"]["calibration"].clone();
+    let px = |key: &str| {
+        let px = fits[&camera][key].as_f64();
+        px.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.0} px"))
+    };
+    let measured = format!(
+        "{camera} turned by {DEGREES} degrees: {}; cameras are {} apart with it, {} without; {} results",
+        if is_named { "named" } else { "not named" },
+        px("residual_px"),
+        px("without_px"),
+        after.n_results,
+    );
+    let named = at_least("it is named", 1.0, Some(f64::from(u8::from(is_named))));
+    let limits = [named].into_iter().chain(after.judge(0)).collect();
+    Ok(Verdict {
+        scenario: NAME.to_owned(),
+        measured,
+        numbers: json!({ "camera": camera, "fits": fits }),
+        limits,
+        run: ran.json(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_camera_is_turned_where_it_stands_and_the_others_stay() {
+        let rig = scene::RigChoice::parse("ring:4").unwrap().rig().unwrap();
+        let name = rig.cameras()[2].name.clone();
+        let wrong = moved(&rig, &name, &mut Rng::with_seed(3)).unwrap();
+        for (nth, (a, b)) in rig.cameras().iter().zip(wrong.cameras()).enumerate() {
+            let off = b.camera_from_world * a.camera_from_world.inverse();
+            let expected = if nth == 2 { DEGREES } else { 0.0 };
+            assert!(
+                (off.rotation.angle().to_degrees() - expected).abs() < 1e-6,
+                "{nth}"
+            );
+            assert!(
+                (b.centre_in_world() - a.centre_in_world()).norm() < 1e-9,
+                "{nth}"
+            );
+        }
+    }
+}
