@@ -155,9 +155,10 @@ impl<'a> Camera<'a> {
             return;
         }
         let view = self.job.view;
-        match trouble {
-            Some(it) => tracing::warn!(view, frame, cause = it.reason(), "without a picture"),
-            None => tracing::info!(view, frame, "pictures again"),
+        if let Some(it) = trouble {
+            tracing::warn!(view, frame, cause = it.reason(), "without a picture");
+        } else {
+            tracing::info!(view, frame, "pictures again");
         }
         self.trouble = trouble;
     }

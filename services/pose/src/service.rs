@@ -50,24 +50,12 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         poses: bus.publisher(&topic::view_pose(job.view))?,
         evidence: bus.slice_publisher(&topic::evidence(job.view))?,
     };
-    let patience = service.patience_at_start(job.patience);
-    let n = view
-        .poses
-        .wait_for_subscribers(job.n_pose_consumers, patience);
-    tracing::info!(n, expected = job.n_pose_consumers, "candidates are awaited");
-    let n = view
-        .evidence
-        .wait_for_subscribers(job.n_evidence_consumers, patience);
-    tracing::info!(
-        n,
-        expected = job.n_evidence_consumers,
-        "evidence is awaited, begins"
-    );
-    let frame_range = [job.start_frame, job.frame_step];
+    view.wait_for_receivers();
     let file = format!("pose-{}.place", job.view);
     let mut place = Place::new(bus.namespace().root().join(file));
     let past = place.noted().filter(|_| service.epoch() > 0);
     let past = past.map(Past::from_numbers).unwrap_or_default();
+    let frame_range = [job.start_frame, job.frame_step];
     let mut intake = Intake::new(service.delivery(), frame_range, past);
     let mut memory = Memory {
         tracker: job.step.tracker(),
@@ -134,6 +122,23 @@ struct View<'a> {
 }
 
 impl View<'_> {
+    fn wait_for_receivers(&self) {
+        let job = self.job;
+        let patience = self.service.patience_at_start(job.patience);
+        let n = self
+            .poses
+            .wait_for_subscribers(job.n_pose_consumers, patience);
+        tracing::info!(n, expected = job.n_pose_consumers, "candidates are awaited");
+        let n = self
+            .evidence
+            .wait_for_subscribers(job.n_evidence_consumers, patience);
+        tracing::info!(
+            n,
+            expected = job.n_evidence_consumers,
+            "evidence is awaited, begins"
+        );
+    }
+
     /// * `nth`: which of the frames that are used this is.
     fn answer(
         &self,

@@ -100,9 +100,9 @@ impl RigWatch {
             let px = points.filter_map(|((own, a), b)| {
                 let (own, a, b) = (own.as_ref()?, a.as_ref()?, b.as_ref()?);
                 if is_one {
-                    own.from_ray(camera, &a.ray)
+                    own.px_to_ray(camera, &a.ray)
                 } else {
-                    own.from_meeting(camera, &a.ray, &b.ray)
+                    own.px_to_meeting(camera, &a.ray, &b.ray)
                 }
             });
             group.note(px.collect());
@@ -179,18 +179,18 @@ impl Seen {
     }
 
     /// How far it is from the point in which two rays meet, pixels of its camera.
-    fn from_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<f64> {
+    fn px_to_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<f64> {
         let [on_a, on_b] = closest(a, b)?;
-        self.from_point(camera, &nalgebra::center(&on_a, &on_b))
+        self.px_to_point(camera, &nalgebra::center(&on_a, &on_b))
     }
 
     /// How far it is from a ray, pixels of its camera: from where the ray comes closest to its own.
-    fn from_ray(&self, camera: &Camera, ray: &Ray) -> Option<f64> {
+    fn px_to_ray(&self, camera: &Camera, ray: &Ray) -> Option<f64> {
         let [on_ray, _] = closest(ray, &self.ray)?;
-        self.from_point(camera, &on_ray)
+        self.px_to_point(camera, &on_ray)
     }
 
-    fn from_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<f64> {
+    fn px_to_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<f64> {
         let px = nalgebra::distance(&camera.project(in_world)?, &self.at_px);
         px.is_finite().then_some(px)
     }

@@ -62,104 +62,38 @@ fn every_fault_costs_its_frames_and_no_others() {
     let cases = [
         (
             "unplug@2+3",
-            [
-                "0",
-                "1",
-                "camera gone",
-                "camera gone",
-                "camera gone",
-                "5",
-                "6",
-                "7",
-            ],
+            "0, 1, camera gone, camera gone, camera gone, 5, 6, 7",
         ),
-        (
-            "size@2+2",
-            ["0", "1", "wrong size", "wrong size", "4", "5", "6", "7"],
-        ),
-        (
-            "damage@1+1",
-            ["0", "damaged picture", "2", "3", "4", "5", "6", "7"],
-        ),
+        ("size@2+2", "0, 1, wrong size, wrong size, 4, 5, 6, 7"),
+        ("damage@1+1", "0, damaged picture, 2, 3, 4, 5, 6, 7"),
         (
             "slow@2+4",
-            [
-                "0",
-                "1",
-                "2",
-                "left out by the camera",
-                "4",
-                "left out by the camera",
-                "6",
-                "7",
-            ],
+            "0, 1, 2, left out by the camera, 4, left out by the camera, 6, 7",
         ),
         (
             "repeat@2+2",
-            [
-                "0",
-                "1",
-                "repeated timestamp",
-                "repeated timestamp",
-                "4",
-                "5",
-                "6",
-                "7",
-            ],
+            "0, 1, repeated timestamp, repeated timestamp, 4, 5, 6, 7",
         ),
         (
             "back@2+2",
-            [
-                "0",
-                "1",
-                "timestamp went back",
-                "timestamp went back",
-                "4",
-                "5",
-                "6",
-                "7",
-            ],
+            "0, 1, timestamp went back, timestamp went back, 4, 5, 6, 7",
         ),
         (
             "jump@2+2",
-            [
-                "0",
-                "1",
-                "clock jumped",
-                "clock jumped",
-                "timestamp went back",
-                "5",
-                "6",
-                "7",
-            ],
+            "0, 1, clock jumped, clock jumped, timestamp went back, 5, 6, 7",
         ),
         // The picture is held, and called frozen from its second repetition on.
         (
             "freeze@2+3",
-            [
-                "0",
-                "1",
-                "1",
-                "frozen picture",
-                "frozen picture",
-                "5",
-                "6",
-                "7",
-            ],
+            "0, 1, 1, frozen picture, frozen picture, 5, 6, 7",
         ),
         (
-            "unplug@0+7",
-            ["camera gone"; 7]
-                .iter()
-                .copied()
-                .chain(["7"])
-                .collect::<Vec<_>>()
-                .try_into()
-                .unwrap(),
+            "damage@0+6",
+            "damaged picture, damaged picture, damaged picture, damaged picture, damaged picture, damaged picture, 6, 7",
         ),
     ];
     for (faults, expected) in cases {
-        assert_eq!(under(faults), expected, "{faults}");
+        assert_eq!(under(faults).join(", "), expected, "{faults}");
     }
 }
 

@@ -34,7 +34,7 @@ fn around(n: usize) -> Vec<Camera> {
 }
 
 fn turned(camera: &Camera, axis: Vector3<f64>, degrees: f64) -> Camera {
-    let turn = UnitQuaternion::new(axis.normalize() * degrees.to_radians());
+    let turn = UnitQuaternion::new(axis * degrees.to_radians());
     Camera {
         camera_from_world: turn * camera.camera_from_world,
         ..camera.clone()

@@ -28,10 +28,10 @@ pub(super) struct Asked {
     /// Longest time from the kill until the process has a part in a result again (or, of those that no result names,
     /// until it has done something), milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
-    max_return_ms: f64,
+    pub max_return_ms: f64,
     /// Longest time without a result while a process is away without which others can go on, milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
-    max_pause_ms: f64,
+    pub max_pause_ms: f64,
 }
 
 /// What is left of a run that is over.
