@@ -137,16 +137,12 @@ fn judge(
         most_ms,
         it.map(|it| it.stall_ms),
     )];
-    limits.push(match every_frame {
-        Some(n) => at_least("results written", n as f64, Some(after.n_results as f64)),
-        None => {
-            let [before, _] = it.map_or([0.0; 2], |it| it.rates_hz);
-            at_least(
-                "results a second meanwhile",
-                SHARE * before,
-                it.map(|it| it.rates_hz[1]),
-            )
-        }
+    limits.push(if let Some(n) = every_frame {
+        at_least("results written", n as f64, Some(after.n_results as f64))
+    } else {
+        let [before, meanwhile] = it.map_or([f64::NAN; 2], |it| it.rates_hz);
+        let meanwhile = Some(meanwhile).filter(|it| it.is_finite());
+        at_least("results a second meanwhile", SHARE * before, meanwhile)
     });
     limits.extend(after.judge(0));
     limits
