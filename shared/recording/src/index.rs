@@ -67,11 +67,11 @@ impl Recording {
         lost.fold(0, u64::saturating_add)
     }
 
-    /// When the first message with a stamp was sent.
+    /// When the first message was sent that says so; signs of life do not count.
     pub fn begin(&self) -> Option<u64> {
         let stamped = self.tracks.values().filter(|it| it.kind != Kind::Health);
         let entries = stamped.flat_map(|it| &it.entries);
-        entries.map(|it| it.publish_time).min()
+        entries.map(|it| it.publish_time).filter(|it| *it > 0).min()
     }
 }
 

@@ -8,6 +8,8 @@
 mod kind;
 mod message;
 
+mod mcap;
+
 mod about;
 mod count;
 mod write;

@@ -6,10 +6,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom};
 
-use mcap::records::{Record, op};
-use mcap::{MAGIC, parse_record};
-
 use crate::cursor::{Cursor, Stop};
+use crate::mcap::{CHUNK_HEAD_BYTES, Fields, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
 use crate::{About, AboutError, Entry, Extent, Kind, Message, Recording, Track};
 use crate::{about, count, message};
 
@@ -17,13 +15,6 @@ use crate::{about, count, message};
 const MAX_RECORD_BYTES: u64 = 16 << 20;
 /// Most topics.
 const MAX_TOPICS: usize = 1024;
-/// What a chunk has before its records, without the name of its compression.
-const CHUNK_HEAD_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
-/// What a message has before its data.
-const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
-/// What every record begins with: its kind and its length.
-const RECORD_HEAD_BYTES: u64 = 1 + 8;
-
 /// A recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
@@ -174,22 +165,27 @@ impl<R: Read + Seek> Scan<'_, R> {
             op::MESSAGE => self.message(len),
             op::CHANNEL | op::METADATA if len <= MAX_RECORD_BYTES => {
                 let body = self.cursor.bytes(len)?;
-                match parse_record(op, &body) {
-                    Ok(Record::Channel(it)) => self.channel(it.id, it.topic, &it.message_encoding),
-                    Ok(Record::Metadata(it)) => {
-                        self.metadata(&it.name, &it.metadata);
-                        Ok(())
-                    }
-                    Ok(_) => Ok(()),
-                    Err(_) => Err(Stop::Damaged("a record that contradicts itself")),
-                }
+                let mut fields = Fields(&body);
+                let known = if op == op::CHANNEL {
+                    self.channel(&mut fields)
+                } else {
+                    self.metadata(&mut fields)
+                };
+                known.unwrap_or(Err(Stop::Damaged("a record that contradicts itself")))
             }
             op::CHANNEL | op::METADATA => Err(Stop::Damaged("a record beyond all measure")),
             _ => self.cursor.skip(len),
         }
     }
 
-    fn channel(&mut self, id: u16, topic: String, encoding: &str) -> Result<(), Stop> {
+    /// None if the fields are not those of a channel.
+    fn channel(&mut self, fields: &mut Fields<'_>) -> Option<Result<(), Stop>> {
+        let (id, _schema) = (fields.u16()?, fields.u16()?);
+        let (topic, encoding) = (fields.text()?, fields.text()?);
+        Some(self.add(id, topic, &encoding))
+    }
+
+    fn add(&mut self, id: u16, topic: String, encoding: &str) -> Result<(), Stop> {
         if self.channels.len() >= MAX_TOPICS {
             return Err(Stop::Damaged("more topics than any deployment has"));
         }
@@ -208,19 +204,21 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(())
     }
 
-    fn metadata(&mut self, name: &str, map: &BTreeMap<String, String>) {
-        match name {
+    /// None if the fields are not those of metadata.
+    fn metadata(&mut self, fields: &mut Fields<'_>) -> Option<Result<(), Stop>> {
+        let (name, map) = (fields.text()?, fields.map()?);
+        match name.as_str() {
             about::NAME if self.recording.about.is_err() => {
-                self.recording.about = About::from_map(map);
+                self.recording.about = About::from_map(&map);
             }
             count::NAME => {
-                let counts = map.iter();
-                let counts =
-                    counts.filter_map(|(topic, it)| Some((topic.clone(), it.parse().ok()?)));
+                let counts = map.into_iter();
+                let counts = counts.filter_map(|(topic, it)| Some((topic, it.parse().ok()?)));
                 self.recording.counts = counts.collect();
             }
             _ => {}
         }
+        Some(Ok(()))
     }
 
     fn message(&mut self, len: u64) -> Result<(), Stop> {

@@ -1,19 +1,15 @@
 //! Writing a recording: append only, so that what has been written stays whatever comes after.
 
-use core::cell::Cell;
 use core::fmt;
-use std::collections::BTreeMap;
+use core::mem::take;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
-use std::rc::Rc;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::write::NoSeek;
-use mcap::{McapError, WriteOptions};
-
+use crate::mcap::{Body, CHUNK_HEAD_BYTES, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
 use crate::{About, Count, Entry, Kind, about, count};
 
 /// Messages are gathered to so many bytes before they are written.
-const CHUNK_BYTES: u64 = 1 << 20;
+const CHUNK_BYTES: usize = 1 << 20;
 
 /// A recording cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -27,9 +23,6 @@ pub enum WriteError {
         #[source]
         source: io::Error,
     },
-    /// The format does not allow it.
-    #[error("cannot put this into an MCAP file")]
-    Format(#[source] Box<McapError>),
     /// The topic is not one of this program's.
     #[error("nothing is known of topic {0:?}")]
     Topic(String),
@@ -38,26 +31,44 @@ pub enum WriteError {
 /// Writes a recording.
 ///
 /// Between two flushes it holds at most a chunk (1 MiB, or one message if that is larger), and of
-/// every chunk its entry in the index, a few hundred bytes.
+/// every chunk its entry in the index, about a hundred bytes and ten for each of its topics.
 pub struct Writer<W: Write> {
-    inner: mcap::Writer<NoSeek<Counted<W>>>,
-    n_bytes: Rc<Cell<u64>>,
+    out: W,
+    n_bytes: u64,
+    /// Once the file could not be written, nothing more is: what follows would lie in a wrong place.
+    is_broken: bool,
     topics: Vec<Topic>,
+    chunk: Chunk,
+    /// Schemas, and channels, as they stand in the first chunk and again at the end.
+    definitions: [Vec<u8>; 2],
+    /// What is said at the end about metadata, and about chunks.
+    indexes: [Vec<u8>; 2],
+    n_metadata: u32,
+    n_chunks: u32,
+    n_schemas: u16,
+    times: Option<[u64; 2]>,
     /// Losses that the file speaks of already.
     told: Vec<u64>,
 }
 
 struct Topic {
     name: String,
-    channel: u16,
     n_recorded: u64,
+}
+
+/// Records that are not in the file yet.
+#[derive(Default)]
+struct Chunk {
+    records: Vec<u8>,
+    /// Of every topic: when its messages came, and where they lie among the records.
+    messages: BTreeMap<u16, Vec<[u64; 2]>>,
+    times: Option<[u64; 2]>,
 }
 
 impl<W: Write> fmt::Debug for Writer<W> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let n_bytes = self.n_bytes.get();
         f.debug_struct("Writer")
-            .field("n_bytes", &n_bytes)
+            .field("n_bytes", &self.n_bytes)
             .finish_non_exhaustive()
     }
 }
@@ -71,48 +82,55 @@ impl<W: Write> Writer<W> {
     ///
     /// [`WriteError`].
     pub fn begin(out: W, about: &About, topics: &[String]) -> Result<Self, WriteError> {
-        let n_bytes = Rc::new(Cell::new(0));
-        let counted = Counted {
-            out,
-            n_bytes: Rc::clone(&n_bytes),
-        };
-        let options = WriteOptions::new()
-            .compression(None)
-            .chunk_size(Some(CHUNK_BYTES))
-            .disable_seeking(true)
-            .profile("ros2")
-            .library(format!("parallax {}", about.version));
-        let inner = options.create(NoSeek::new(counted));
-        let inner = inner.map_err(|source| failed(n_bytes.get(), source))?;
         let mut writer = Self {
-            inner,
-            n_bytes,
+            out,
+            n_bytes: 0,
+            is_broken: false,
             topics: Vec::new(),
+            chunk: Chunk::default(),
+            definitions: [Vec::new(), Vec::new()],
+            indexes: [Vec::new(), Vec::new()],
+            n_metadata: 0,
+            n_chunks: 0,
+            n_schemas: 0,
+            times: None,
             told: vec![0; topics.len()],
         };
-        writer.describe(about::NAME, about.to_map())?;
-        for name in topics {
-            writer.add(name)?;
-        }
+        let mut start = MAGIC.to_vec();
+        let library = format!("parallax {}", about.version);
+        let header = Body::default().bytes(b"ros2").bytes(library.as_bytes());
+        header.finish(op::HEADER, &mut start);
+        writer.put(&start)?;
+        writer.describe(about::NAME, &about.to_map())?;
+        writer.introduce(topics)?;
         writer.flush(&vec![0; topics.len()])?;
         Ok(writer)
     }
 
-    fn add(&mut self, name: &str) -> Result<(), WriteError> {
-        let kind = Kind::of_topic(name).ok_or_else(|| WriteError::Topic(name.to_owned()))?;
-        let added = self
-            .inner
-            .add_schema(kind.schema_name(), "ros2msg", kind.schema().as_bytes())
-            .and_then(|schema| {
-                self.inner
-                    .add_channel(schema, name, "cdr", &BTreeMap::new())
+    fn introduce(&mut self, names: &[String]) -> Result<(), WriteError> {
+        let mut known = BTreeSet::new();
+        for (channel, name) in (1_u16..).zip(names) {
+            let kind = Kind::of_topic(name).ok_or_else(|| WriteError::Topic(name.clone()))?;
+            let schema = 1 + kind as u16;
+            let [schemas, channels] = &mut self.definitions;
+            if known.insert(schema) {
+                let body = Body::default().u16(schema);
+                let body = body.bytes(kind.schema_name().as_bytes()).bytes(b"ros2msg");
+                let body = body.bytes(kind.schema().as_bytes());
+                body.finish(op::SCHEMA, schemas);
+            }
+            let body = Body::default().u16(channel).u16(schema);
+            let body = body.bytes(name.as_bytes()).bytes(b"cdr");
+            body.map(&BTreeMap::new()).finish(op::CHANNEL, channels);
+            self.topics.push(Topic {
+                name: name.clone(),
+                n_recorded: 0,
             });
-        let channel = added.map_err(|source| failed(self.n_bytes(), source))?;
-        self.topics.push(Topic {
-            name: name.to_owned(),
-            channel,
-            n_recorded: 0,
-        });
+        }
+        self.n_schemas = known.len() as u16;
+        for it in &self.definitions {
+            self.chunk.records.extend_from_slice(it);
+        }
         Ok(())
     }
 
@@ -126,18 +144,30 @@ impl<W: Write> Writer<W> {
     ///
     /// [`WriteError::Write`]; then no more can be written.
     pub fn write(&mut self, topic: usize, entry: &Entry, data: &[u8]) -> Result<(), WriteError> {
+        self.check()?;
         let Some(it) = self.topics.get_mut(topic) else {
             return Ok(());
         };
-        let header = MessageHeader {
-            channel_id: it.channel,
-            sequence: it.n_recorded as u32,
-            log_time: entry.log_time,
-            publish_time: entry.publish_time,
-        };
-        let written = self.inner.write_to_known_channel(&header, data);
-        written.map_err(|source| failed(self.n_bytes.get(), source))?;
+        let (channel, time) = (topic as u16 + 1, entry.log_time);
+        let sequence = it.n_recorded as u32;
         it.n_recorded += 1;
+        if self.chunk.records.len() >= CHUNK_BYTES {
+            self.write_chunk()?;
+        }
+        let chunk = &mut self.chunk;
+        let place = [time, chunk.records.len() as u64];
+        chunk.messages.entry(channel).or_default().push(place);
+        let len = MESSAGE_HEAD_BYTES + data.len() as u64;
+        chunk.records.push(op::MESSAGE);
+        chunk.records.extend_from_slice(&len.to_le_bytes());
+        chunk.records.extend_from_slice(&channel.to_le_bytes());
+        chunk.records.extend_from_slice(&sequence.to_le_bytes());
+        chunk.records.extend_from_slice(&time.to_le_bytes());
+        let published = entry.publish_time.to_le_bytes();
+        chunk.records.extend_from_slice(&published);
+        chunk.records.extend_from_slice(data);
+        chunk.times = Some(with(chunk.times, time));
+        self.times = Some(with(self.times, time));
         Ok(())
     }
 
@@ -149,11 +179,11 @@ impl<W: Write> Writer<W> {
     ///
     /// [`WriteError::Write`]; then no more can be written.
     pub fn flush(&mut self, lost: &[u64]) -> Result<(), WriteError> {
+        self.write_chunk()?;
         if self.told != lost {
             self.tell(lost)?;
         }
-        let flushed = self.inner.flush();
-        flushed.map_err(|source| failed(self.n_bytes(), source))
+        self.out.flush().map_err(|source| self.failed(source))
     }
 
     /// Ends the recording with its counts and its index.
@@ -164,19 +194,90 @@ impl<W: Write> Writer<W> {
     ///
     /// [`WriteError::Write`].
     pub fn finish(mut self, lost: &[u64]) -> Result<(), WriteError> {
+        self.write_chunk()?;
         self.tell(lost)?;
-        let finished = self.inner.finish().map(drop);
-        finished.map_err(|source| failed(self.n_bytes(), source))
+        let mut end = Vec::new();
+        // Without a checksum of the data: every chunk has its own.
+        Body::default().u32(0).finish(op::DATA_END, &mut end);
+        self.put(&end)?;
+        let summary_start = self.n_bytes;
+        let mut summary = take(&mut self.definitions).concat();
+        self.statistics().finish(op::STATISTICS, &mut summary);
+        summary.extend(take(&mut self.indexes).concat());
+        let footer = Body::default().u64(summary_start).u64(0).u32(0);
+        footer.finish(op::FOOTER, &mut summary);
+        let n = summary.len() - size_of::<u32>();
+        let checksum = crc32fast::hash(&summary[..n]);
+        summary[n..].copy_from_slice(&checksum.to_le_bytes());
+        summary.extend_from_slice(MAGIC);
+        self.put(&summary)?;
+        self.out.flush().map_err(|source| self.failed(source))
     }
 
-    /// Messages of every topic that were written, in the order in which the topics were given.
-    pub fn n_recorded(&self) -> impl Iterator<Item = u64> {
-        self.topics.iter().map(|it| it.n_recorded)
+    fn statistics(&self) -> Body {
+        let counts = || self.topics.iter().map(|it| it.n_recorded);
+        let [first, last] = self.times.unwrap_or_default();
+        Body::default()
+            .u64(counts().sum())
+            .u16(self.n_schemas)
+            .u32(self.topics.len() as u32)
+            .u32(0)
+            .u32(self.n_metadata)
+            .u32(self.n_chunks)
+            .u64(first)
+            .u64(last)
+            .by_channel((1_u16..).zip(counts()))
     }
 
     /// Bytes that have been written.
     pub fn n_bytes(&self) -> u64 {
-        self.n_bytes.get()
+        self.n_bytes
+    }
+
+    /// Writes the records that are not in the file yet, and where each message lies among them.
+    fn write_chunk(&mut self) -> Result<(), WriteError> {
+        if self.chunk.records.is_empty() {
+            return Ok(());
+        }
+        let mut chunk = take(&mut self.chunk);
+        let n_records = chunk.records.len() as u64;
+        let [first, last] = chunk.times.unwrap_or_default();
+        let start = self.n_bytes;
+        let mut head = vec![op::CHUNK];
+        let len = CHUNK_HEAD_BYTES + n_records;
+        for it in [len, first, last, n_records] {
+            head.extend_from_slice(&it.to_le_bytes());
+        }
+        let checksum = crc32fast::hash(&chunk.records);
+        head.extend_from_slice(&checksum.to_le_bytes());
+        head.extend_from_slice(&0_u32.to_le_bytes());
+        head.extend_from_slice(&n_records.to_le_bytes());
+        self.put(&head)?;
+        self.put(&chunk.records)?;
+        let (mut index, mut offsets) = (Vec::new(), Vec::new());
+        for (channel, messages) in &chunk.messages {
+            offsets.push((*channel, self.n_bytes + index.len() as u64));
+            let places: Vec<u8> = messages
+                .iter()
+                .flatten()
+                .flat_map(|it| it.to_le_bytes())
+                .collect();
+            let body = Body::default().u16(*channel).bytes(&places);
+            body.finish(op::MESSAGE_INDEX, &mut index);
+        }
+        self.put(&index)?;
+        let entry = Body::default().u64(first).u64(last).u64(start);
+        let entry = entry.u64(RECORD_HEAD_BYTES + len);
+        let entry = entry.by_channel(offsets.into_iter());
+        let entry = entry.u64(index.len() as u64).bytes(b"");
+        let entry = entry.u64(n_records).u64(n_records);
+        entry.finish(op::CHUNK_INDEX, &mut self.indexes[1]);
+        self.n_chunks += 1;
+        // The memory serves the next chunk, but not what one very large message took.
+        chunk.records.clear();
+        chunk.records.shrink_to(2 * CHUNK_BYTES);
+        self.chunk.records = chunk.records;
+        Ok(())
     }
 
     fn tell(&mut self, lost: &[u64]) -> Result<(), WriteError> {
@@ -186,45 +287,57 @@ impl<W: Write> Writer<W> {
             (topic.name.clone(), Count { recorded, lost }.to_string())
         });
         let counts = counts.collect();
-        self.describe(count::NAME, counts)?;
+        self.describe(count::NAME, &counts)?;
         self.told = lost.to_vec();
         Ok(())
     }
 
-    fn describe(
-        &mut self,
-        name: &str,
-        metadata: BTreeMap<String, String>,
-    ) -> Result<(), WriteError> {
-        let written = self.inner.write_metadata(&Metadata {
-            name: name.to_owned(),
-            metadata,
-        });
-        written.map_err(|source| failed(self.n_bytes(), source))
+    /// Writes metadata; between chunks.
+    fn describe(&mut self, name: &str, map: &BTreeMap<String, String>) -> Result<(), WriteError> {
+        let mut record = Vec::new();
+        let body = Body::default().bytes(name.as_bytes()).map(map);
+        body.finish(op::METADATA, &mut record);
+        let [offset, len] = [self.n_bytes, record.len() as u64];
+        self.put(&record)?;
+        let entry = Body::default().u64(offset).u64(len);
+        let entry = entry.bytes(name.as_bytes());
+        entry.finish(op::METADATA_INDEX, &mut self.indexes[0]);
+        self.n_metadata += 1;
+        Ok(())
+    }
+
+    fn put(&mut self, mut bytes: &[u8]) -> Result<(), WriteError> {
+        self.check()?;
+        while !bytes.is_empty() {
+            match self.out.write(bytes) {
+                Ok(0) => return Err(self.failed(io::ErrorKind::WriteZero.into())),
+                Ok(n) => {
+                    self.n_bytes += n as u64;
+                    bytes = &bytes[n..];
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.failed(error)),
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&mut self) -> Result<(), WriteError> {
+        if self.is_broken {
+            return Err(self.failed(io::Error::other("it could not be written before")));
+        }
+        Ok(())
+    }
+
+    fn failed(&mut self, source: io::Error) -> WriteError {
+        self.is_broken = true;
+        WriteError::Write {
+            n_bytes: self.n_bytes,
+            source,
+        }
     }
 }
 
-fn failed(n_bytes: u64, source: McapError) -> WriteError {
-    match source {
-        McapError::Io(source) => WriteError::Write { n_bytes, source },
-        other => WriteError::Format(Box::new(other)),
-    }
-}
-
-/// Counts what got through.
-struct Counted<W> {
-    out: W,
-    n_bytes: Rc<Cell<u64>>,
-}
-
-impl<W: Write> Write for Counted<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let n = self.out.write(bytes)?;
-        self.n_bytes.set(self.n_bytes.get() + n as u64);
-        Ok(n)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
-    }
+fn with(times: Option<[u64; 2]>, time: u64) -> [u64; 2] {
+    times.map_or([time; 2], |[first, last]| [first.min(time), last.max(time)])
 }

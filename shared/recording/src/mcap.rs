@@ -1,0 +1,155 @@
+//! Records of the MCAP format, version 0 (mcap.dev/spec): their numbers, and how their fields lie.
+
+use std::collections::BTreeMap;
+
+/// What a file begins and ends with.
+pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
+
+/// Kinds of records.
+pub(crate) mod op {
+    pub(crate) const HEADER: u8 = 0x01;
+    pub(crate) const FOOTER: u8 = 0x02;
+    pub(crate) const SCHEMA: u8 = 0x03;
+    pub(crate) const CHANNEL: u8 = 0x04;
+    pub(crate) const MESSAGE: u8 = 0x05;
+    pub(crate) const CHUNK: u8 = 0x06;
+    pub(crate) const MESSAGE_INDEX: u8 = 0x07;
+    pub(crate) const CHUNK_INDEX: u8 = 0x08;
+    pub(crate) const STATISTICS: u8 = 0x0b;
+    pub(crate) const METADATA: u8 = 0x0c;
+    pub(crate) const METADATA_INDEX: u8 = 0x0d;
+    pub(crate) const DATA_END: u8 = 0x0f;
+}
+
+/// Bytes of what every record begins with: its kind and its length.
+pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
+/// Bytes of what a message has before its data.
+pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
+/// Bytes of what a chunk that is not compressed has before its records.
+pub(crate) const CHUNK_HEAD_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
+
+/// The fields of a record, one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct Body(Vec<u8>);
+
+impl Body {
+    pub(crate) fn u16(mut self, it: u16) -> Self {
+        self.0.extend_from_slice(&it.to_le_bytes());
+        self
+    }
+
+    pub(crate) fn u32(mut self, it: u32) -> Self {
+        self.0.extend_from_slice(&it.to_le_bytes());
+        self
+    }
+
+    pub(crate) fn u64(mut self, it: u64) -> Self {
+        self.0.extend_from_slice(&it.to_le_bytes());
+        self
+    }
+
+    /// With its length before it, 32 bits.
+    pub(crate) fn bytes(mut self, it: &[u8]) -> Self {
+        self = self.u32(it.len() as u32);
+        self.0.extend_from_slice(it);
+        self
+    }
+
+    pub(crate) fn map(self, it: &BTreeMap<String, String>) -> Self {
+        let entries = it.iter();
+        let inner = entries.fold(Self::default(), |body, (key, value)| {
+            body.bytes(key.as_bytes()).bytes(value.as_bytes())
+        });
+        self.bytes(&inner.0)
+    }
+
+    /// Numbers by the numbers of channels.
+    pub(crate) fn by_channel(self, entries: impl Iterator<Item = (u16, u64)>) -> Self {
+        let inner = entries.fold(Self::default(), |body, (key, value)| {
+            body.u16(key).u64(value)
+        });
+        self.bytes(&inner.0)
+    }
+
+    /// Appends the record to `out`.
+    pub(crate) fn finish(self, op: u8, out: &mut Vec<u8>) {
+        out.push(op);
+        out.extend_from_slice(&(self.0.len() as u64).to_le_bytes());
+        out.extend_from_slice(&self.0);
+    }
+}
+
+/// What is left of the fields of a record; every answer is none where they are too short.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fields<'a>(pub &'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(crate) fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(n)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    pub(crate) fn u16(&mut self) -> Option<u16> {
+        Some(u16::from_le_bytes(self.take(2)?.try_into().ok()?))
+    }
+
+    pub(crate) fn u32(&mut self) -> Option<u32> {
+        Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    pub(crate) fn text(&mut self) -> Option<String> {
+        let n = self.u32()?;
+        let bytes = self.take(n as usize)?;
+        String::from_utf8(bytes.to_vec()).ok()
+    }
+
+    pub(crate) fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        let n = self.u32()?;
+        let mut inner = Self(self.take(n as usize)?);
+        let mut map = BTreeMap::new();
+        while !inner.0.is_empty() {
+            map.insert(inner.text()?, inner.text()?);
+        }
+        Some(map)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn fields_are_read_as_they_were_written(
+            number: u16,
+            text: String,
+            map in prop::collection::btree_map(any::<String>(), any::<String>(), 0..4),
+            cut in 0_usize..4,
+        ) {
+            let mut record = Vec::new();
+            let body = Body::default().u16(number).bytes(text.as_bytes()).map(&map);
+            body.finish(op::METADATA, &mut record);
+            let (head, body) = record.split_at(RECORD_HEAD_BYTES as usize);
+            prop_assert_eq!(head[0], op::METADATA);
+            prop_assert_eq!(&head[1..], &(body.len() as u64).to_le_bytes());
+            let mut fields = Fields(body);
+            prop_assert_eq!(fields.u16(), Some(number));
+            prop_assert_eq!(fields.text(), Some(text));
+            prop_assert_eq!(fields.map(), Some(map));
+            prop_assert!(fields.0.is_empty());
+            let mut short = Fields(&body[..body.len().saturating_sub(cut + 1)]);
+            let all = (short.u16(), short.text(), short.map());
+            prop_assert!(all.2.is_none());
+        }
+
+        #[test]
+        fn any_bytes_are_fields_or_none(bytes: Vec<u8>) {
+            let mut fields = Fields(&bytes);
+            let _map = fields.map();
+            let _text = fields.text();
+        }
+    }
+}
