@@ -109,7 +109,6 @@ impl<'a> Camera<'a> {
             (Pace::Realtime, Some(rate)) => Pacer::realtime(service.session() + LEAD_NANOS, rate),
             _ => Pacer::as_fast_as_possible(),
         };
-        let place = format!("capture-{}.place", job.view);
         Ok(Self {
             service,
             job,
@@ -117,7 +116,7 @@ impl<'a> Camera<'a> {
             warp,
             pacer,
             waiter: service.bus().waiter(),
-            place: Place::new(service.bus().namespace().root().join(place)),
+            place: Place::of(service.bus()),
             n_dropped: 0,
             n_expected: job.n_consumers,
             trouble: None,

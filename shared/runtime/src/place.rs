@@ -5,6 +5,8 @@ use std::io::{self, Write as _};
 use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
+use crate::Bus;
+
 /// Digits of the largest number.
 const WIDTH: usize = 20;
 
@@ -19,6 +21,12 @@ impl Place {
     /// A place in a file, which is made when something is noted.
     pub fn new(path: PathBuf) -> Self {
         Self { path, file: None }
+    }
+
+    /// The place of the process that a bus belongs to.
+    pub fn of(bus: &Bus) -> Self {
+        let file = format!("{}.place", bus.process());
+        Self::new(bus.namespace().root().join(file))
     }
 
     /// What was noted last, by this life or an earlier one; `None` if nothing was.
