@@ -35,7 +35,9 @@ const LAYERS: &[&[&str]] = &[
         "fuse",
         "triangulate",
         "record",
+        "replay",
         "supervise",
+        "tape",
     ],
     &["parallax"],
 ];

@@ -4,8 +4,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
 use crate::commands::{
-    calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, run, service, synth,
-    top, train,
+    calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, record, replay, run,
+    service, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -25,6 +25,8 @@ Examples:
     parallax run my.toml --dry-run                      what would be started, and its memory
     parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
     parallax top                                        where the time of a running deployment goes
+    parallax record my.toml --out run.mcap              the same as run, and every message in one file
+    parallax replay run.mcap --from fuse --set fuse.alpha=2     its later stages again, with another value
     parallax chaos                                      processes killed on purpose, and what held
     parallax config show my.toml                        every value, and who said it
     parallax detect photo.jpg --model parse.mat --json  people in single images
@@ -88,6 +90,10 @@ pub(crate) enum Command {
     Demo(demo::Arguments),
     /// Run a deployment: all its processes, from footage to 3D.
     Run(run::Arguments),
+    /// Run a deployment, and keep every message of it in one file.
+    Record(record::Arguments),
+    /// Run the later stages of a recorded run once more.
+    Replay(replay::Arguments),
     /// Kill and stop processes of a deployment on purpose, and judge what held.
     Chaos(chaos::Arguments),
     /// Find people in single images.

@@ -10,6 +10,8 @@ pub(crate) mod eval;
 pub(crate) mod fuse_frame;
 pub(crate) mod judge;
 pub(crate) mod model;
+pub(crate) mod record;
+pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod service;
 pub(crate) mod synth;
@@ -31,6 +33,8 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Demo(it) => demo::run(&it, cli.globals),
         Command::Chaos(it) => chaos::run(&it, cli.globals),
         Command::Run(it) => run::run(&it, cli.globals),
+        Command::Record(it) => record::run(&it, cli.globals),
+        Command::Replay(it) => replay::run(&it, cli.globals),
         Command::Detect(it) => detect::run(&it),
         Command::FuseFrame(it) => fuse_frame::run(&it),
         Command::Eval(it) => eval::run(&it, cli.globals),

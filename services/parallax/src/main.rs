@@ -1,6 +1,7 @@
 //! Entry point: parse the command line, then become what it names.
 #![forbid(unsafe_code)]
 
+mod audience;
 mod budget;
 mod cli;
 mod commands;
@@ -15,6 +16,7 @@ mod prepare;
 mod search;
 mod sheet;
 mod summary;
+mod taped;
 mod trial;
 mod views;
 

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
+use crate::audience::{Audience, Replay, Stage, Tape};
 use crate::deployment::Deployment;
 use crate::inputs::{self, Footage};
 use crate::prepare::Prepared;
@@ -23,6 +24,12 @@ pub(crate) struct Resolved {
     pub deployment: Deployment,
     /// The footage of every camera.
     pub footage: Vec<Footage>,
+    /// The file that every message goes to, if there is one.
+    #[serde(default)]
+    pub tape: Option<Tape>,
+    /// The recording that stands in for the first stages, if there is one.
+    #[serde(default)]
+    pub replay: Option<Replay>,
 }
 
 impl Resolved {
@@ -31,6 +38,8 @@ impl Resolved {
         Ok(Self {
             footage: inputs::footage(deployment)?,
             deployment: deployment.clone(),
+            tape: None,
+            replay: None,
         })
     }
 
@@ -68,6 +77,11 @@ impl Resolved {
     /// How long a stage waits for a view that is late.
     pub(crate) fn patience(&self) -> Duration {
         Duration::from_millis(self.deployment.deadline_ms())
+    }
+
+    /// Whether a stage runs; if not, a recording stands in for it.
+    pub(crate) fn runs(&self, stage: Stage) -> bool {
+        self.replay.as_ref().is_none_or(|it| it.from <= stage)
     }
 
     /// Whether expected errors are predicted from the frames.
@@ -119,6 +133,7 @@ pub(crate) fn topics(
     names: Vec<String>,
 ) -> Vec<TopicPlan> {
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let audience = Audience::new(resolved, &dealing);
     let views = prepared.views.iter().enumerate();
     let plan = DeploymentPlan {
         delivery: resolved.delivery(),
@@ -132,11 +147,11 @@ pub(crate) fn topics(
                     .product::<usize>()
                     * 3,
                 evidence_values: it.plan.layout().n_responses(),
-                n_workers: dealing.readers_of(view),
+                n_workers: audience.of_evidence(view),
             })
             .collect(),
         n_workers: dealing.n_workers,
-        n_recorders: 1,
+        n_recorders: audience.n_recorders(),
         held: 1,
         held_frames: if resolved.has_network() && resolved.delivery() == Delivery::Realtime {
             quality::HELD_REALTIME
@@ -159,6 +174,9 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
         process("record", None, Role::Optional, file),
         process("triangulate", None, Role::Essential, file),
     ];
+    if resolved.tape.is_some() {
+        processes.insert(0, process("tape", None, Role::Optional, file));
+    }
     for (service, count, role) in [
         ("fuse", dealing.n_workers, Role::Redundant),
         ("quality", n_quality, Role::Optional),
@@ -167,7 +185,20 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
     ] {
         processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
     }
+    for it in &mut processes {
+        stand_in(it, resolved);
+    }
     processes
+}
+
+/// Makes a process that does not run one that sends what was recorded of it.
+fn stand_in(it: &mut ProcessSpec, resolved: &Resolved) {
+    let stage = Stage::of_service(&it.service);
+    if stage.is_some_and(|stage| !resolved.runs(stage)) {
+        it.args
+            .extend(["--stage".into(), it.service.clone().into()]);
+        "replay".clone_into(&mut it.service);
+    }
 }
 
 fn process(service: &str, index: Option<usize>, role: Role, file: &Path) -> ProcessSpec {

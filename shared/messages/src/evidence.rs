@@ -1,6 +1,6 @@
 //! The response maps of one image.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_LEVELS, Stamp, Status, Timing};

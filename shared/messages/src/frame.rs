@@ -1,6 +1,6 @@
 //! One image of one view.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{Stamp, Status, Timing};

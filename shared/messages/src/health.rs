@@ -1,6 +1,6 @@
 //! Signs of life.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Sent by every process a few times a second; a counter that stands still means a hang.

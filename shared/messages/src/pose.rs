@@ -1,6 +1,6 @@
 //! Poses in one view and in pairs of views.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_CANDIDATES, MAX_PARTS, Stamp, Status, Timing};

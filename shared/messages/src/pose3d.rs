@@ -1,6 +1,6 @@
 //! The result: joints in the world, and what every view made of it.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};

@@ -1,6 +1,6 @@
 //! How far off a view is expected to be.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_PARTS, Stamp, Status, Timing};

@@ -1,6 +1,6 @@
 //! Which frame of which view, how it went, and when.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What a message belongs to. Stages join on (session, frame), never on arrival.

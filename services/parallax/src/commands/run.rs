@@ -100,10 +100,14 @@ pub(crate) struct Planned {
 impl Planned {
     /// Reads what the deployment names, and deals the work to processes.
     pub(crate) fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
-        let resolved = Resolved::new(deployment)?;
+        Self::of(Resolved::new(deployment)?, log)
+    }
+
+    /// Deals the work of a deployment whose footage is known to processes.
+    pub(crate) fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
-        let file = file_of(deployment);
+        let file = file_of(&resolved.deployment);
         let plan = plan::plan(&resolved, &prepared, &file, log)?;
         Ok(Self { resolved, plan })
     }

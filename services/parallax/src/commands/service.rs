@@ -1,20 +1,23 @@
 //! `parallax service`: become one process of a deployment.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
 use geometry::files::ReadOptions;
+use messages::topic;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
 use viewquality::Forecaster;
 
+use crate::audience::{Audience, Stage};
 use crate::inputs;
-use crate::plan::{Dealing, Resolved};
+use crate::plan::{self, Dealing, Resolved};
 use crate::prepare::{self, Prepared};
+use crate::taped;
 
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,6 +34,10 @@ pub(crate) enum Name {
     Triangulate,
     /// The output folder.
     Record,
+    /// Every message into one file.
+    Tape,
+    /// What a recording holds of another process.
+    Replay,
 }
 
 /// Which process.
@@ -53,6 +60,9 @@ struct Own {
     /// View or worker, from 0.
     #[arg(long, default_value_t = 0)]
     index: usize,
+    /// What a recording stands in for.
+    #[arg(long)]
+    stage: Option<Stage>,
 }
 
 /// Becomes the process.
@@ -93,12 +103,15 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
         Name::Fuse => fuse(service, &resolved, own.index),
         Name::Triangulate => triangulate(service, &resolved),
         Name::Record => record(service, &resolved),
+        Name::Tape => tape(service, &resolved),
+        Name::Replay => replay(service, &resolved, own),
     }
 }
 
 fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let deployment = &resolved.deployment;
     let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
+    let dealing = Dealing::new(&[], 0);
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
@@ -107,8 +120,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         framing: prepare::framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,
-        // Pose and record, and quality if it looks at them.
-        n_consumers: 2 + usize::from(resolved.has_network()),
+        n_consumers: Audience::new(resolved, &dealing).of_frames(),
         patience: resolved.patience(),
     };
     capture::run(service, &job)
@@ -117,13 +129,13 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let audience = Audience::new(resolved, &dealing);
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let job = pose::Job {
         view,
         step: ViewStep::new(prepared.model, layout, prepared.settings.view),
-        // The workers, triangulate, record, and quality if there is one.
-        n_pose_consumers: dealing.n_workers + 2 + usize::from(resolved.has_quality()),
-        n_evidence_consumers: dealing.readers_of(view),
+        n_pose_consumers: audience.of_poses(),
+        n_evidence_consumers: audience.of_evidence(view),
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         patience: resolved.patience(),
@@ -150,13 +162,13 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         ),
     };
     let workers = resolved.deployment.fuse.workers;
-    let n_workers = Dealing::new(&prepared.pairs, workers).n_workers;
+    let dealing = Dealing::new(&prepared.pairs, workers);
     let mut job = quality::Job {
         view,
         source,
         frame_step: resolved.deployment.capture.frame_step,
         frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
-        n_consumers: n_workers + 1, // and record
+        n_consumers: Audience::new(resolved, &dealing).of_qualities(),
         patience: resolved.patience(),
     };
     quality::run(service, &mut job)
@@ -180,7 +192,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
         quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
         frame_step: resolved.deployment.capture.frame_step.max(1),
-        n_consumers: 2, // triangulate and record
+        n_consumers: Audience::new(resolved, &dealing).of_pairs(),
         patience: resolved.patience(),
     };
     fuse::run(service, &job)
@@ -199,7 +211,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         plans,
         n_pairs: dealing.pairs.len(),
         n_workers: dealing.n_workers,
-        n_consumers: 1, // record
+        n_consumers: Audience::new(resolved, &dealing).of_results(),
         // A pair that waits for a view takes this long itself.
         patience: 2 * resolved.patience(),
     };
@@ -232,4 +244,58 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         has_quality: resolved.has_quality(),
     };
     record::run(service, job)
+}
+
+fn tape(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let tape = resolved.tape.as_ref();
+    let tape = tape
+        .ok_or("there is no recording")
+        .or_fail(ExitKind::Config)?;
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let processes = plan::processes(resolved, &prepared, Path::new(""));
+    let job = tape::Job {
+        file: tape.file.clone(),
+        about: taped::about(resolved, tape)?,
+        topics: tape::Topics {
+            n_views: prepared.views.len(),
+            n_workers: dealing.n_workers,
+            has_quality: resolved.has_quality(),
+            processes: processes.into_iter().map(|it| it.name).collect(),
+        },
+        queue_bytes: tape.queue_mb.saturating_mul(1_000_000),
+    };
+    tape::run(service, job)
+}
+
+fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {
+    let prepared = Prepared::new(resolved)?;
+    let recording = resolved.replay.as_ref().zip(own.stage);
+    let (it, stage) = recording
+        .ok_or("there is no recording, or no --stage")
+        .or_fail(ExitKind::Config)?;
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let audience = Audience::new(resolved, &dealing);
+    let line = |topic: String, n_consumers: usize| replay::Line { topic, n_consumers };
+    let lines = match stage {
+        Stage::Capture => vec![line(topic::frame(own.index), audience.of_frames())],
+        Stage::Pose => vec![
+            line(topic::view_pose(own.index), audience.of_poses()),
+            line(topic::evidence(own.index), audience.of_evidence(own.index)),
+        ],
+        Stage::Quality => vec![line(
+            topic::view_quality(own.index),
+            audience.of_qualities(),
+        )],
+        Stage::Fuse => vec![line(topic::pair_pose(own.index), audience.of_pairs())],
+        Stage::Triangulate => vec![line(topic::pose3d(), audience.of_results())],
+    };
+    let job = replay::Job {
+        file: it.file.clone(),
+        lines,
+        pace: it.speed.map_or(replay::Pace::Max, replay::Pace::Times),
+        frame_step: resolved.deployment.capture.frame_step.max(1),
+        patience: resolved.patience(),
+    };
+    replay::run(service, &job)
 }

@@ -65,6 +65,47 @@ impl Loaded {
     }
 }
 
+impl Loaded {
+    /// A deployment that was read before, with other values.
+    ///
+    /// * `refused`: says what may not be replaced, by its dotted key, and why.
+    ///
+    /// Relative paths in `set` are relative to the working folder.
+    pub(crate) fn again(
+        deployment: &Deployment,
+        set: &[String],
+        refused: impl Fn(&str) -> Option<String>,
+    ) -> Result<Self, ConfigError> {
+        let on_command_line = overrides(set)?;
+        for argument in set {
+            let key = argument.split('=').next().unwrap_or_default().trim();
+            if let Some(message) = refused(key) {
+                let place = format!("--set {argument}");
+                return Err(ConfigError::Malformed { place, message });
+            }
+        }
+        let explain = |message: &str| ConfigError::explain("--set".to_owned(), message);
+        let in_file = Table::try_from(deployment);
+        let in_file = in_file.map_err(|error| explain(&error.to_string()))?;
+        let mut table = in_file.clone();
+        merge(&mut table, on_command_line.clone());
+        let read: Result<Deployment, toml::de::Error> = table.try_into();
+        let mut deployment = read.map_err(|error| explain(error.message()))?;
+        deployment.resolve(&base(Path::new("")));
+        rules::check(&deployment).map_err(|complaint| ConfigError::Value {
+            place: "--set".to_owned(),
+            key: complaint.key,
+            got: complaint.got,
+            expected: complaint.expected,
+        })?;
+        Ok(Self {
+            deployment,
+            in_file,
+            on_command_line,
+        })
+    }
+}
+
 /// What stands in the place of a file that only the defaults are asked of.
 const NO_FILE: &str = "name = \"\"\nrig = \"\"\noutput = \"\"\ncamera = []\n";
 

@@ -1,0 +1,122 @@
+//! `parallax record`: a run, and every message of it in one file.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::audience::Tape;
+use crate::cli::Globals;
+use crate::commands::run::Planned;
+use crate::deployment::Loaded;
+use crate::plan::Resolved;
+use crate::{output, taped};
+
+/// Lives of the recording process that are looked for.
+const MOST_LIVES: u32 = 64;
+
+/// What to record.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The file is MCAP: chunked, indexed, not compressed, its messages CDR with ROS 2 schemas; its metadata holds
+the settings of the run and fingerprints of the files that it read. The run leaves its results as `run` does.
+
+Where nothing may be lost (capture.mode = \"lossless\") a slow disk makes the run slower. Where the latest wins
+it never does: what does not fit into the queue is left out, counted by topic in the file, and told at the end.
+A file whose end was never written, because of a full disk or a crash, holds all up to there; a recording
+process that had to be restarted goes on in FILE.1.mcap. With anything lost the exit code is 7.
+
+Examples:
+    parallax record my.toml --out run.mcap
+    parallax record my.toml --out run.mcap --without pixels --without evidence   small: poses and results")]
+pub(crate) struct Arguments {
+    /// The deployment file.
+    config: PathBuf,
+    /// The recording.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Replace FILE if it is there.
+    #[arg(long)]
+    force: bool,
+    /// Leave out what takes most room; may be given twice.
+    #[arg(long, value_name = "WHAT")]
+    without: Vec<Bulk>,
+    /// Memory for what waits to be written, millions of bytes.
+    #[arg(long, value_name = "MB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..=65_536))]
+    queue_mb: u64,
+    /// Folder for the results, instead of the file's `output`.
+    #[arg(long, value_name = "DIR")]
+    results: Option<PathBuf>,
+    /// Replace a value, for example `--set fuse.workers=2`; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What takes most room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Bulk {
+    /// The pixels of frames; without them nothing can be replayed from pose on.
+    Pixels,
+    /// Response maps; without them nothing can be replayed from fuse on.
+    Evidence,
+}
+
+/// Runs the deployment and records it.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let mut loaded = Loaded::read(&arguments.config, &arguments.set)?;
+    if let Some(results) = &arguments.results {
+        loaded.deployment.output = std::path::absolute(results).or_fail(ExitKind::Usage)?;
+    }
+    let file = std::path::absolute(&arguments.out).or_fail(ExitKind::Usage)?;
+    let tape = Tape {
+        file: file.clone(),
+        without_pixels: arguments.without.contains(&Bulk::Pixels),
+        without_evidence: arguments.without.contains(&Bulk::Evidence),
+        queue_mb: arguments.queue_mb,
+    };
+    let resolved = Resolved {
+        tape: Some(tape),
+        ..Resolved::new(&loaded.deployment)?
+    };
+    let planned = Planned::of(resolved, globals.level())?;
+    make_way(&file, arguments.force)?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
+    let recording = taped::open(&file)?;
+    let later = (1..MOST_LIVES).map(|it| tape::file_of_life(&file, it));
+    let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
+    if arguments.json {
+        let mut value = report.json();
+        value["recording"] = taped::json(&file, &recording);
+        value["recording"]["goes_on_in"] =
+            later.iter().map(|it| it.display().to_string()).collect();
+        output::json(&value)?;
+    } else if !globals.quiet {
+        output::line(report.text())?;
+        output::line(taped::text(&file, &recording))?;
+        for file in &later {
+            output::line(format_args!("  goes on in {}", file.display()))?;
+        }
+    }
+    let flawed = !taped::is_whole(&recording) || !later.is_empty();
+    let kind = report.kind().or(flawed.then_some(ExitKind::Degraded));
+    Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
+}
+
+/// Sees that no file is in the way.
+fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
+    let lives = (0..MOST_LIVES).map(|it| tape::file_of_life(file, it));
+    for file in lives.filter(|it| it.exists()) {
+        if !force {
+            let message = format!("{} is there already", file.display());
+            let failure = Failure::new(ExitKind::Usage, message);
+            return Err(failure.with_hint("take another name, or --force to replace it"));
+        }
+        std::fs::remove_file(&file).map_err(|error| crate::inputs::in_file(&file, &error))?;
+    }
+    Ok(())
+}

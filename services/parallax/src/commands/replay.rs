@@ -1,0 +1,241 @@
+//! `parallax replay`: the later stages of a recorded run once more.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use recording::{Kind, Recording};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+
+use crate::audience::{Replay, Stage};
+use crate::cli::Globals;
+use crate::commands::run::Planned;
+use crate::deployment::Loaded;
+use crate::plan::Resolved;
+use crate::taped::{self, Settings};
+use crate::{inputs, output};
+
+/// What to replay.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The stages before --from are not run: processes under their names send what the file holds of them. The
+others run for real, with the settings of the recorded run but for what --set replaces. Where nothing may be
+lost their results are those of the recorded run, bit for bit, if neither settings nor files are others.
+
+A file that was cut off is replayed as far as it goes; the exit code is then 7. End-to-end latency means
+something at --speed 1 only; the times of the stages that run always do.
+
+Examples:
+    parallax replay run.mcap                                         from pose on, the frames are given
+    parallax replay run.mcap --from fuse --set fuse.alpha=2          without looking at the frames again
+    parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, the latest wins")]
+pub(crate) struct Arguments {
+    /// The recording.
+    file: PathBuf,
+    /// The first stage that runs.
+    #[arg(long, value_name = "STAGE", value_enum, default_value_t = Stage::Pose)]
+    from: Stage,
+    /// So many times as fast as recorded, or `max`; without it `max` where nothing may be lost, else 1.
+    #[arg(long, value_name = "X", value_parser = speed)]
+    speed: Option<Speed>,
+    /// Folder for the results; the name of the recording with `-replay` if not given.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace a value of the stages that run, or capture.mode; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How fast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Speed {
+    Max,
+    Times(f64),
+}
+
+fn speed(text: &str) -> Result<Speed, String> {
+    if text == "max" {
+        return Ok(Speed::Max);
+    }
+    match text.parse::<f64>() {
+        Ok(it) if it.is_finite() && (0.001..=1000.0).contains(&it) => Ok(Speed::Times(it)),
+        _ => Err("expected max, or a number from 0.001 to 1000".to_owned()),
+    }
+}
+
+/// Replays the recording.
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let file = std::path::absolute(&arguments.file).or_fail(ExitKind::Usage)?;
+    let recording = taped::open(&file)?;
+    if !globals.quiet {
+        output::message(taped::text(&file, &recording));
+    }
+    let settings = settings(&file, &recording)?;
+    let from = arguments.from;
+    let refused = |key: &str| refused(key, from);
+    let mut loaded = Loaded::again(&settings.resolved.deployment, &arguments.set, refused)?;
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let out = arguments.out.clone();
+    let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
+    loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
+    warn_of_other_files(&settings);
+    let mode = loaded.deployment.capture.mode;
+    let resolved = if from == Stage::Capture {
+        Resolved::new(&loaded.deployment)?
+    } else {
+        Resolved {
+            footage: settings.resolved.footage,
+            deployment: loaded.deployment,
+            tape: None,
+            replay: Some(Replay {
+                file: file.clone(),
+                from,
+                speed: match (arguments.speed, mode) {
+                    (Some(Speed::Times(it)), _) => Some(it),
+                    (None, capture::Mode::Realtime) => Some(1.0),
+                    (Some(Speed::Max), _) | (None, capture::Mode::Lossless) => None,
+                },
+            }),
+        }
+    };
+    check(&file, &recording, &resolved, from)?;
+    let planned = Planned::of(resolved, globals.level())?;
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
+    if arguments.json {
+        let mut value = report.json();
+        value["recording"] = taped::json(&file, &recording);
+        output::json(&value)?;
+    } else if !globals.quiet {
+        output::line(report.text())?;
+    }
+    let is_cut = from != Stage::Capture && !recording.extent.is_complete;
+    let kind = report.kind().or(is_cut.then_some(ExitKind::Degraded));
+    Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
+}
+
+/// The settings of the recorded run.
+fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
+    let about = recording.about.as_ref();
+    let about = about.map_err(|error| inputs::in_file(file, error))?;
+    serde_json::from_str(&about.settings).map_err(|error| {
+        let failure = inputs::in_file(file, &error);
+        let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
+        failure.with_hint(format!(
+            "recorded by version {theirs}, this is version {ours}"
+        ))
+    })
+}
+
+/// Why a value may not be replaced, if it may not: its stage is given by the recording.
+fn refused(key: &str, from: Stage) -> Option<String> {
+    let section = key.split('.').next().unwrap_or_default();
+    let is_given = match Stage::of_service(section) {
+        Some(stage) => stage < from && key != "capture.mode",
+        None => from > Stage::Capture && section == "camera",
+    };
+    let from = from.name();
+    is_given.then(|| format!("this is given by the recording with --from {from}"))
+}
+
+/// Says which files are not what they were.
+fn warn_of_other_files(settings: &Settings) {
+    for (file, recorded) in &settings.files {
+        let now = std::fs::read(file).map(|bytes| inputs::fingerprint(&bytes));
+        if now.ok() != Some(*recorded) {
+            let file = file.display();
+            output::message(format_args!("{file} is not the file of the recorded run"));
+        }
+    }
+}
+
+/// Sees that the recording holds what the first stages would send.
+fn check(
+    file: &Path,
+    recording: &Recording,
+    resolved: &Resolved,
+    from: Stage,
+) -> Result<(), Failure> {
+    let without = recording.about.as_ref().map(|it| it.without);
+    let without = without.unwrap_or_default();
+    let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
+    let looks = from == Stage::Pose || (from == Stage::Quality && resolved.has_network());
+    let fuses = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
+    let lacks = if looks && without.pixels {
+        Some("the pixels of its frames")
+    } else if fuses && without.evidence {
+        Some("evidence")
+    } else {
+        needed(resolved, from).find_map(|(kind, what)| {
+            let tracks = recording.tracks.values().filter(|it| it.kind == kind);
+            let n = tracks.map(|it| it.entries.len()).sum::<usize>();
+            (n == 0).then_some(what)
+        })
+    };
+    let Some(what) = lacks else { return Ok(()) };
+    let message = format!(
+        "{} lacks {what}, which --from {} needs",
+        file.display(),
+        from.name()
+    );
+    Err(Failure::new(ExitKind::Input, message))
+}
+
+/// What the stages before `from` send.
+fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'static str)> {
+    let all = [
+        (Stage::Capture, Kind::Frame, "frames"),
+        (Stage::Pose, Kind::ViewPose, "single-view poses"),
+        (Stage::Quality, Kind::ViewQuality, "expected errors"),
+        (Stage::Fuse, Kind::PairPose, "answers of pairs"),
+    ];
+    let has_quality = resolved.has_quality();
+    let n_cameras = resolved.deployment.cameras.len();
+    let is_sent = move |stage: Stage| match stage {
+        Stage::Quality => has_quality,
+        Stage::Fuse => n_cameras > 1,
+        _ => true,
+    };
+    let given = all.into_iter();
+    given
+        .filter(move |it| it.0 < from && is_sent(it.0))
+        .map(|it| (it.1, it.2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_is_max_or_a_number_above_nothing() {
+        assert_eq!(speed("max"), Ok(Speed::Max));
+        assert_eq!(speed("2"), Ok(Speed::Times(2.0)));
+        for other in ["0", "-1", "nan", "inf", "fast", "", "1e9"] {
+            assert!(speed(other).is_err(), "{other}");
+        }
+    }
+
+    #[test]
+    fn what_the_recording_gives_may_not_be_replaced() {
+        let may = |key, from| refused(key, from).is_none();
+        assert!(may("fuse.alpha", Stage::Fuse) && may("rig", Stage::Fuse));
+        assert!(!may("fuse.workers", Stage::Triangulate));
+        assert!(!may("pose.search", Stage::Fuse) && may("pose.search", Stage::Pose));
+        assert!(!may("capture.size", Stage::Pose) && may("capture.mode", Stage::Pose));
+        assert!(!may("camera", Stage::Pose) && may("camera", Stage::Capture));
+    }
+
+    #[test]
+    fn a_stage_is_known_by_its_service() {
+        for (service, stage) in [
+            ("pose", Some(Stage::Pose)),
+            ("record", None),
+            ("tape", None),
+        ] {
+            assert_eq!(Stage::of_service(service), stage);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Runs that are recorded and replayed: the later stages say the same once more, bit for bit.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{Case, Ended, PLAIN};
+use serde_json::{Value, json};
+
+/// What does not say when it was.
+const RESULTS: [&str; 4] = ["pose3d.jsonl", "pose3d.csv", "pose2d.jsonl", "pose3d.trc"];
+
+fn recorded(case: &Case, more: &[&str]) -> Value {
+    let arguments = ["record", "deployment.toml", "--out", "run.mcap", "--json"];
+    let ended = case.start(&[&arguments[..], more].concat()).wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    serde_json::from_str(&ended.stdout).unwrap()
+}
+
+fn replayed(case: &Case, more: &[&str]) -> Ended {
+    let ended = case.start(&[&["replay", "run.mcap"], more].concat()).wait();
+    case.assert_nothing_left();
+    ended
+}
+
+fn text(folder: &Path, name: &str) -> String {
+    fs::read_to_string(folder.join(name)).unwrap()
+}
+
+#[test]
+fn where_nothing_may_be_lost_a_replay_from_any_stage_gives_the_same_bits() {
+    const N_FRAMES: usize = 6;
+    let case = Case::new("again", &[N_FRAMES; 3], PLAIN);
+    let report = recorded(&case, &[]);
+    let recording = &report["recording"];
+    assert_eq!(recording["complete"], json!(true), "{recording:#}");
+    assert_eq!(recording["lost"], json!(0), "{recording:#}");
+    for topic in ["frame/v1/0", "view-pose/v3/1", "evidence/v3/2", "pose3d/v1"] {
+        let n = recording["topics"][topic]["messages"].as_u64().unwrap();
+        assert!(n >= N_FRAMES as u64, "{topic}: {n}");
+    }
+    for from in ["pose", "fuse", "triangulate"] {
+        let ended = replayed(&case, &["--from", from, "--out", from]);
+        assert_eq!(
+            ended.status.code(),
+            Some(0),
+            "from {from}: {}",
+            ended.stderr
+        );
+        for name in RESULTS {
+            let [before, after] = [case.path("out"), case.path(from)].map(|it| text(&it, name));
+            assert!(before == after, "{name} differs when replayed from {from}");
+        }
+    }
+    // Another value, another result; and it is not one that the recording gives.
+    let other = ["--from", "fuse", "--out", "other", "--set"];
+    let ended = replayed(&case, &[&other[..], &["triangulate.loss_px=0.01"]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let [before, after] = ["out", "other"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    assert!(before != after);
+    let ended = replayed(&case, &[&other[..], &["pose.candidates=1"]].concat());
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("given by the recording"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes() {
+    let case = Case::new("cut", &[8; 2], PLAIN);
+    recorded(&case, &[]);
+    let whole = fs::read(case.path("run.mcap")).unwrap();
+    case.write("run.mcap", &whole[..whole.len() * 2 / 3]);
+    let ended = replayed(&case, &["--from", "fuse", "--out", "part"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(
+        ended
+            .stderr
+            .contains("not complete: cut off; read up to byte"),
+        "{}",
+        ended.stderr
+    );
+    let [before, after] = ["out", "part"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    let same = before
+        .lines()
+        .zip(after.lines())
+        .take_while(|it| it.0 == it.1);
+    assert!(same.count() >= 2, "{before}\n{after}");
+    assert!(after.lines().count() < 8, "{after}");
+}
+
+#[test]
+fn what_was_left_out_or_is_in_the_way_is_told() {
+    let case = Case::new("less", &[3; 2], PLAIN);
+    let report = recorded(&case, &["--without", "pixels", "--without", "evidence"]);
+    let topics = &report["recording"]["topics"];
+    assert_eq!(topics.get("evidence/v3/0"), None);
+    assert!(report["recording"]["bytes"].as_u64().unwrap() < 1_000_000);
+    for (from, lacks) in [("pose", "the pixels of its frames"), ("fuse", "evidence")] {
+        let ended = replayed(&case, &["--from", from]);
+        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        assert!(ended.stderr.contains(lacks), "{}", ended.stderr);
+    }
+    let ended = replayed(&case, &["--from", "triangulate", "--speed", "4"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let [before, after] = ["out", "run-replay"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    assert_eq!(before, after);
+
+    let again = ["record", "deployment.toml", "--out", "run.mcap"];
+    let ended = case.start(&again).wait();
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("is there already"),
+        "{}",
+        ended.stderr
+    );
+    case.write("run.mcap", "something else");
+    let ended = replayed(&case, &[]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("not an MCAP file"),
+        "{}",
+        ended.stderr
+    );
+}

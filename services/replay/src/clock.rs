@@ -1,0 +1,144 @@
+//! From the times of a recording to those of the run that it is replayed in.
+
+use messages::{Stamp, Timing};
+use recording::Envelope;
+
+/// How fast a recording is replayed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// As fast as it can be read and taken.
+    Max,
+    /// So many times as fast as it was recorded; above 0.
+    Times(f64),
+}
+
+/// The two clocks, and how they belong together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Clock {
+    /// When the first message of the recording was sent, by its clock, nanoseconds.
+    pub recorded: u64,
+    /// When it is to be sent now, by this machine's.
+    pub now: u64,
+    /// How fast.
+    pub pace: Pace,
+}
+
+impl Clock {
+    /// When a message is to be sent; at once if nobody paces.
+    ///
+    /// * `sent_at`: when it was sent.
+    pub(crate) fn due(&self, sent_at: u64) -> u64 {
+        match self.pace {
+            Pace::Max => 0,
+            Pace::Times(times) => {
+                let since = sent_at.saturating_sub(self.recorded) as f64 / times;
+                // A float that is too large, or none, becomes the nearest integer.
+                self.now.saturating_add(since as u64)
+            }
+        }
+    }
+
+    /// A message's envelope in this run.
+    ///
+    /// Times of capture move by the same amount for all messages, so that what depends on the time
+    /// between two frames stays as it was. When a message was sent is now; what it took to compute
+    /// stays.
+    ///
+    /// * `session`: of this run.
+    /// * `epoch`: how often this process has been restarted, in addition to what it stands in for.
+    /// * `now`: of this machine's clock.
+    pub(crate) fn rebase(&self, it: &Envelope, [session, epoch, now]: [u64; 3]) -> Envelope {
+        let took = it
+            .timing
+            .sent_at_nanos
+            .saturating_sub(it.timing.received_at_nanos);
+        Envelope {
+            stamp: Stamp {
+                session,
+                captured_at_nanos: self.moved(it.stamp.captured_at_nanos),
+                epoch: it.stamp.epoch.saturating_add(epoch as u32),
+                ..it.stamp
+            },
+            timing: Timing {
+                received_at_nanos: now.saturating_sub(took),
+                sent_at_nanos: now,
+            },
+            status: it.status,
+        }
+    }
+
+    fn moved(&self, time: u64) -> u64 {
+        let moved = i128::from(time) - i128::from(self.recorded) + i128::from(self.now);
+        u64::try_from(moved.max(0)).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use messages::Status;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn clock(pace: Pace) -> Clock {
+        Clock {
+            recorded: 1000,
+            now: 50_000,
+            pace,
+        }
+    }
+
+    #[test]
+    fn twice_as_fast_takes_half_the_time() {
+        let due = |pace| clock(pace).due(1400);
+        assert_eq!(due(Pace::Times(1.0)), 50_400);
+        assert_eq!(due(Pace::Times(2.0)), 50_200);
+        assert_eq!(due(Pace::Times(0.5)), 50_800);
+        assert_eq!(due(Pace::Max), 0);
+        assert_eq!(clock(Pace::Times(1e-300)).due(u64::MAX), u64::MAX);
+    }
+
+    fn envelope(captured_at_nanos: u64, timing: [u64; 2]) -> Envelope {
+        let stamp = Stamp {
+            session: 1,
+            frame: 9,
+            captured_at_nanos,
+            view: 2,
+            epoch: 3,
+        };
+        Envelope {
+            stamp,
+            timing: Timing {
+                received_at_nanos: timing[0],
+                sent_at_nanos: timing[1],
+            },
+            status: Status::NO_DETECTION,
+        }
+    }
+
+    #[test]
+    fn a_message_is_of_this_run_and_sent_now_and_took_what_it_took() {
+        let got = clock(Pace::Max).rebase(&envelope(990, [1100, 1130]), [7, 1, 80_000]);
+        let mut expected = envelope(49_990, [79_970, 80_000]);
+        (expected.stamp.session, expected.stamp.epoch) = (7, 4);
+        assert_eq!(got, expected);
+    }
+
+    proptest! {
+        #[test]
+        fn the_time_between_two_frames_stays(
+            [first, second] in prop::array::uniform2(0_u64..1 << 60), pace in 0.1..10.0,
+        ) {
+            let clock = Clock { recorded: 0, now: 5, pace: Pace::Times(pace) };
+            let captured = |it| clock.rebase(&envelope(it, [0, 0]), [0; 3]).stamp.captured_at_nanos;
+            prop_assert_eq!(captured(first).abs_diff(captured(second)), first.abs_diff(second));
+        }
+
+        #[test]
+        fn any_times_are_taken(recorded: u64, now: u64, time: u64, timing: [u64; 2], pace in 1e-9..1e9) {
+            let clock = Clock { recorded, now, pace: Pace::Times(pace) };
+            clock.due(time);
+            clock.rebase(&envelope(time, timing), [0, u64::MAX, now]);
+        }
+    }
+}

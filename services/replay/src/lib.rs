@@ -1,0 +1,9 @@
+//! Stands in for a process of a deployment: sends what the process once sent.
+#![forbid(unsafe_code)]
+
+mod clock;
+mod mouth;
+mod service;
+
+pub use clock::Pace;
+pub use service::{Job, Line, run};

@@ -1,0 +1,122 @@
+//! Sends bytes on a topic of any kind.
+
+use core::time::Duration;
+
+use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
+use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
+use recording::{Envelope, Kind, Message};
+use runtime::{
+    Bus, Element, Header, Message as Sendable, PortError, Publisher, SendError, SlicePublisher,
+};
+
+/// The sending end of one topic.
+#[derive(Debug)]
+pub(crate) struct Mouth {
+    kind: Kind,
+    port: Port,
+}
+
+#[derive(Debug)]
+enum Port {
+    Frame(SlicePublisher<u8, FrameHeader>),
+    Evidence(SlicePublisher<f32, EvidenceHeader>),
+    ViewPose(Publisher<ViewPose>),
+    ViewQuality(Publisher<ViewQuality>),
+    PairPose(Publisher<PairPose>),
+    Pose3d(Publisher<Pose3d>),
+    /// Signs of life are every process's own.
+    Health,
+}
+
+impl Mouth {
+    pub(crate) fn open(bus: &Bus, kind: Kind, topic: &str) -> Result<Self, PortError> {
+        let port = match kind {
+            Kind::Frame => Port::Frame(bus.slice_publisher(topic)?),
+            Kind::Evidence => Port::Evidence(bus.slice_publisher(topic)?),
+            Kind::ViewPose => Port::ViewPose(bus.publisher(topic)?),
+            Kind::ViewQuality => Port::ViewQuality(bus.publisher(topic)?),
+            Kind::PairPose => Port::PairPose(bus.publisher(topic)?),
+            Kind::Pose3d => Port::Pose3d(bus.publisher(topic)?),
+            Kind::Health => Port::Health,
+        };
+        Ok(Self { kind, port })
+    }
+
+    /// See [`SlicePublisher::wait_for_subscribers`].
+    pub(crate) fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+        match &self.port {
+            Port::Frame(it) => it.wait_for_subscribers(n, limit),
+            Port::Evidence(it) => it.wait_for_subscribers(n, limit),
+            Port::ViewPose(it) => it.wait_for_subscribers(n, limit),
+            Port::ViewQuality(it) => it.wait_for_subscribers(n, limit),
+            Port::PairPose(it) => it.wait_for_subscribers(n, limit),
+            Port::Pose3d(it) => it.wait_for_subscribers(n, limit),
+            Port::Health => 0,
+        }
+    }
+
+    /// Processes that are subscribed.
+    pub(crate) fn n_connected(&self) -> usize {
+        match &self.port {
+            Port::Frame(it) => it.n_connected(),
+            Port::Evidence(it) => it.n_connected(),
+            Port::ViewPose(it) => it.n_connected(),
+            Port::ViewQuality(it) => it.n_connected(),
+            Port::PairPose(it) => it.n_connected(),
+            Port::Pose3d(it) => it.n_connected(),
+            Port::Health => 0,
+        }
+    }
+
+    /// Sends a message in another envelope. One without its array goes with one element of zero.
+    pub(crate) fn say(&self, message: &Message<'_>, it: &Envelope) -> Result<(), SendError> {
+        let mut head = message.head.to_vec();
+        it.put(self.kind, &mut head);
+        match &self.port {
+            Port::Frame(port) => array(port, &head, message.elements),
+            Port::Evidence(port) => array(port, &head, message.elements),
+            Port::ViewPose(port) => plain(port, &head),
+            Port::ViewQuality(port) => plain(port, &head),
+            Port::PairPose(port) => plain(port, &head),
+            Port::Pose3d(port) => plain(port, &head),
+            Port::Health => Ok(()),
+        }
+    }
+
+    /// Says that nothing follows.
+    pub(crate) fn end(&self, it: &Envelope) -> Result<(), SendError> {
+        let head = match self.kind {
+            Kind::Evidence | Kind::Health => return Ok(()),
+            kind => vec![0; kind.head_bytes()],
+        };
+        let end = Envelope {
+            status: Status::END,
+            ..*it
+        };
+        let message = Message {
+            head: &head,
+            elements: &[],
+        };
+        self.say(&message, &end)
+    }
+}
+
+fn plain<T: Sendable + Pod>(port: &Publisher<T>, head: &[u8]) -> Result<(), SendError> {
+    let mut message = T::zeroed();
+    bytemuck::bytes_of_mut(&mut message).copy_from_slice(head);
+    port.send(&message).map(drop)
+}
+
+fn array<E: Element + Pod, H: Header + Pod>(
+    port: &SlicePublisher<E, H>,
+    head: &[u8],
+    elements: &[u8],
+) -> Result<(), SendError> {
+    let n = elements.len() / size_of::<E>();
+    let mut loan = port.loan(n.max(1))?;
+    let room: &mut [u8] = cast_slice_mut(loan.payload_mut());
+    room[elements.len()..].fill(0);
+    room[..elements.len()].copy_from_slice(elements);
+    *loan.header_mut() = pod_read_unaligned::<H>(head);
+    loan.send().map(drop)
+}

@@ -1,0 +1,105 @@
+//! The thread that writes.
+
+use core::time::Duration;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use recording::{About, WriteError, Writer};
+
+use crate::queue::Outlet;
+
+/// What came is in the file so much later at most.
+const FLUSH_PERIOD: Duration = Duration::from_secs(1);
+
+/// The file that a life of the process writes: a restarted one takes another, beside the first.
+///
+/// * `epoch`: how often it has been restarted.
+pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
+    if epoch == 0 {
+        return file.to_owned();
+    }
+    let ending = file.extension().unwrap_or_default().to_string_lossy();
+    file.with_extension(format!("{epoch}.{ending}"))
+}
+
+/// Makes a file that is not there yet, for its owner only: it shows people.
+pub(crate) fn create(file: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true).mode(0o600).open(file)
+}
+
+/// What is to be written.
+pub(crate) struct Task {
+    pub file: File,
+    pub about: About,
+    pub topics: Vec<String>,
+}
+
+/// Writes until no more comes. When the file cannot be written any more, what comes is counted.
+pub(crate) fn write_all(task: Task, outlet: &Outlet) {
+    let begun = Writer::begin(task.file, &task.about, &task.topics);
+    let mut writer = begun.inspect_err(tell).ok();
+    let mut flushed = Instant::now();
+    while let Ok(item) = outlet.next(FLUSH_PERIOD) {
+        let Some(open) = &mut writer else {
+            if let Some(item) = item {
+                outlet.lose(&item);
+            }
+            continue;
+        };
+        let mut outcome = Ok(());
+        if let Some(item) = &item {
+            outcome = open.write(item.topic, &item.entry, &item.data);
+        }
+        if outcome.is_ok() && flushed.elapsed() >= FLUSH_PERIOD {
+            flushed = Instant::now();
+            outcome = open.flush(&outlet.lost());
+        }
+        match (item, outcome) {
+            (Some(item), Ok(())) => outlet.written(&item),
+            (None, Ok(())) => {}
+            (item, Err(error)) => {
+                tell(&error);
+                if let Some(item) = item {
+                    outlet.lose(&item);
+                }
+                writer = None;
+            }
+        }
+    }
+    if let Some(writer) = writer
+        && let Err(error) = writer.finish(&outlet.lost())
+    {
+        tell(&error);
+    }
+}
+
+fn tell(error: &WriteError) {
+    let source = core::error::Error::source(error);
+    let why = source.map(ToString::to_string).unwrap_or_default();
+    tracing::error!(%error, why, "the recording ends here; what it holds can be read");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_life_writes_a_file_of_its_own() {
+        let file = Path::new("out/run.mcap");
+        assert_eq!(file_of_life(file, 0), file);
+        assert_eq!(file_of_life(file, 2), Path::new("out/run.2.mcap"));
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.mcap");
+        create(&file).unwrap();
+        let refused = create(&file).unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
+    }
+}
