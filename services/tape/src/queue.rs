@@ -200,6 +200,6 @@ mod tests {
         assert!(inlet.push(item(0, 1)));
         drop(inlet);
         assert!(outlet.next(Duration::ZERO).unwrap().is_some());
-        assert!(outlet.next(Duration::ZERO).is_err());
+        outlet.next(Duration::ZERO).unwrap_err();
     }
 }
