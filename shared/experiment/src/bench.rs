@@ -11,15 +11,12 @@ use multiview::{PairEstimate, ViewPlan};
 use nalgebra::UnitVector3;
 use pipeline::{
     AllViewsAnswer, Answer, Combine, EstimatorError, FuseStep, PairAnswer, PairTables, Skeleton,
-    SkeletonSettings, SkeletonStep, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
+    SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
 };
 use rayon::prelude::*;
 use skeleton::{JointMap, PARSE14};
 
 use crate::{Combining, Found, Terms, Version};
-
-/// Assumptions about facing that all views at once are tried under.
-const N_STARTS: usize = 2;
 
 /// Everything but the cameras.
 #[derive(Debug, Clone)]
@@ -258,12 +255,11 @@ impl Bench {
                 skeleton
             }
             (_, Combining::AllViews | Combining::AllViewsMean) => {
-                let n = answers.iter().flatten().count();
-                let weight = match version.combining {
-                    Combining::AllViewsMean => 1.0 / (n.max(2) - 1) as f64,
-                    _ => 1.0,
+                let support = match version.combining {
+                    Combining::AllViewsMean => Support::Mean,
+                    _ => Support::Sum,
                 };
-                match step.all_views(&answers, &seen.evidence, weight, N_STARTS) {
+                match step.all_views(&answers, &seen.evidence, support) {
                     Some(all) => {
                         effort.of_all_views(&all);
                         last.run_all_views(&answers, &all)

@@ -10,8 +10,8 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    Answer, FuseStep, PairAnswer, PairTables, Skeleton, SkeletonSettings, SkeletonStep,
-    ViewEstimate, ViewSettings, ViewStep, all_pairs,
+    AllViewsAnswer, Answer, FuseStep, PairAnswer, PairTables, Skeleton, SkeletonSettings,
+    SkeletonStep, Support, ViewEstimate, ViewSettings, ViewStep, Views, all_pairs,
 };
 
 /// Why an estimator could not be made.
@@ -36,8 +36,10 @@ pub struct Estimate {
     pub start: Vec<Option<(usize, bool)>>,
     /// What was searched of every view's image.
     pub scopes: Vec<Option<Scope>>,
-    /// What every pair found.
+    /// What every pair found; empty where all views are solved at once.
     pub pairs: Vec<PairAnswer>,
+    /// What all views found at once, where they are solved so.
+    pub all_views: Option<AllViewsAnswer>,
     /// The result.
     pub skeleton: Skeleton,
 }
@@ -46,6 +48,7 @@ pub struct Estimate {
 #[derive(Debug)]
 pub struct Estimator {
     views: Vec<ViewStep>,
+    solved_in: Views,
     fuse: FuseStep,
     skeleton: SkeletonStep,
     plans: Vec<Arc<ViewPlan>>,
@@ -87,6 +90,7 @@ impl Estimator {
             trackers: steps.iter().map(ViewStep::tracker).collect(),
             n_frames: 0,
             views: steps,
+            solved_in: settings.views,
             fuse: FuseStep::new(
                 Arc::clone(model),
                 settings.fuse.clone(),
@@ -103,8 +107,9 @@ impl Estimator {
         &self.plans
     }
 
-    /// Estimates the next frame: where poses are followed, it depends on the frames before it. Runs views and pairs side by side on rayon's current pool; the result
-    /// does not depend on the number of its threads.
+    /// Estimates the next frame: where poses are followed, it depends on the frames before it. Runs views
+    /// and pairs side by side on rayon's current pool; the result does not depend on the number of its
+    /// threads.
     ///
     /// * `images`: one per view; `None` for a view that is missing.
     /// * `sigma_px`: expected error of every part of every view, where there is a prediction.
@@ -143,33 +148,51 @@ impl Estimator {
             .collect();
         let (answers, found): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
         let start = self.fuse.start(&answers);
-        let pairs: Vec<PairAnswer> = all_pairs(self.views.len())
-            .into_par_iter()
-            .filter(|pair| pair.iter().all(|&view| answers[view].is_some()))
-            .filter_map(|pair| {
-                let evidence = |view: usize| {
-                    let (layout, found) = (self.plans[view].layout(), found[view].as_ref()?);
-                    let values = &self.responses[view];
-                    let evidence = Responses::within(layout, values, &found.levels, found.scope);
-                    Some(evidence.with_bounds(&found.bounds))
-                };
-                let evidence = [evidence(pair[0])?, evidence(pair[1])?];
-                self.fuse
-                    .pair(pair, &answers, [&evidence[0], &evidence[1]], &start)
-            })
-            .collect();
+        let evidence = |view: usize| {
+            let (layout, found) = (self.plans[view].layout(), found[view].as_ref()?);
+            let values = &self.responses[view];
+            let evidence = Responses::within(layout, values, &found.levels, found.scope);
+            Some(evidence.with_bounds(&found.bounds))
+        };
+        let evidence: Vec<Option<Responses<'_>>> = (0..found.len()).map(evidence).collect();
+        let (pairs, all_views) = match self.solved_in {
+            Views::Pairs => (self.pairs(&answers, &evidence, &start), None),
+            Views::All => {
+                let found = self.fuse.all_views(&answers, &evidence, Support::Mean);
+                (Vec::new(), found)
+            }
+        };
         let scopes = found
             .iter()
             .map(|it| it.as_ref().map(|it| it.scope))
             .collect();
-        let skeleton = self.skeleton.run(&answers, &pairs);
+        let skeleton = match &all_views {
+            Some(found) => self.skeleton.run_all_views(&answers, found),
+            None => self.skeleton.run(&answers, &pairs),
+        };
         Estimate {
             answers,
             start,
             scopes,
             pairs,
+            all_views,
             skeleton,
         }
+    }
+
+    /// What every pair of the views that answered found.
+    fn pairs(
+        &self,
+        answers: &[Option<Answer>],
+        evidence: &[Option<Responses<'_>>],
+        start: &[Option<(usize, bool)>],
+    ) -> Vec<PairAnswer> {
+        let solve = |pair: [usize; 2]| {
+            let [first, second] = pair.map(|view| evidence[view].as_ref());
+            self.fuse.pair(pair, answers, [first?, second?], start)
+        };
+        let pairs = all_pairs(self.views.len()).into_par_iter();
+        pairs.filter_map(solve).collect()
     }
 }
 
@@ -178,6 +201,8 @@ impl Estimator {
 pub struct EstimatorSettings {
     /// Of the single-view step.
     pub view: ViewSettings,
+    /// What the views of a frame are solved in.
+    pub views: Views,
     /// Of the fusion step.
     pub fuse: Settings,
     /// Part-type tables.

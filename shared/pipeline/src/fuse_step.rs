@@ -47,6 +47,28 @@ pub struct PairAnswer {
     pub hypotheses: Vec<PairEstimate>,
 }
 
+/// Assumptions about facing that all views at once are tried under; as many as the message of a pair holds.
+const N_STARTS: usize = 2;
+
+/// What the views of a frame are solved in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Views {
+    /// Pairs, whose poses are then combined: the paper's way.
+    #[default]
+    Pairs,
+    /// All at once, every view supported by the mean of the terms of all others.
+    All,
+}
+
+/// How much the terms of a pair weigh where all views are solved at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Support {
+    /// As much as alone: the others of a view add up.
+    Sum,
+    /// The others of a view together weigh what the one other view of a pair does.
+    Mean,
+}
+
 /// What all views found at once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsAnswer {
@@ -63,6 +85,25 @@ pub struct AllViewsHypothesis {
     pub exchanged: Vec<bool>,
     /// The result, by index into the views that answered.
     pub estimate: AllViewsEstimate,
+}
+
+impl AllViewsAnswer {
+    /// What is left without the views that `keep` does not want; `None` if fewer than two are.
+    pub fn only(mut self, keep: impl Fn(usize) -> bool) -> Option<Self> {
+        let kept: Vec<usize> = (0..self.views.len())
+            .filter(|it| keep(self.views[*it]))
+            .collect();
+        if kept.len() < 2 {
+            return None;
+        }
+        self.views = kept.iter().map(|it| self.views[*it]).collect();
+        for it in &mut self.hypotheses {
+            it.exchanged = kept.iter().map(|place| it.exchanged[*place]).collect();
+            let poses = &it.estimate.poses;
+            it.estimate.poses = kept.iter().map(|place| poses[*place].clone()).collect();
+        }
+        Some(self)
+    }
 }
 
 impl FuseStep {
@@ -169,16 +210,13 @@ impl FuseStep {
     /// Solves all views at once, from the best starts under different assumptions about who sees the
     /// person from behind.
     ///
-    /// * `evidence`: of the views that answered.
-    /// * `weight`: of the terms of each pair; see [`AllViewsInput::weight`].
-    /// * `n_starts`: how many are tried, at least 1.
-    /// * Returns `None` if fewer than two views answered.
+    /// * `evidence`: of the views that answered; best with their bounds.
+    /// * Returns `None` if fewer than two views have an answer and evidence.
     pub fn all_views(
         &self,
         answers: &[Option<Answer>],
         evidence: &[Option<Responses<'_>>],
-        weight: f64,
-        n_starts: usize,
+        support: Support,
     ) -> Option<AllViewsAnswer> {
         let present = |it: &usize| answers[*it].is_some() && evidence[*it].is_some();
         let present: Vec<usize> = (0..answers.len()).filter(present).collect();
@@ -196,10 +234,13 @@ impl FuseStep {
                 let places = [present[first], present[second]];
                 self.tables(places, [&views[first], &views[second]])
             },
-            weight,
+            weight: match support {
+                Support::Sum => 1.0,
+                Support::Mean => 1.0 / (present.len() - 1) as f64,
+            },
         };
         let mut starts = rank_starts(&self.settings, &views, input.tables);
-        starts.truncate(n_starts.max(1));
+        starts.truncate(N_STARTS);
         let solve = |start: Start| {
             let from = AllViewsStart {
                 candidates: &start.candidates,

@@ -294,6 +294,7 @@ fn settings(
             ..view
         },
         tables,
+        views: pipeline::Views::Pairs,
         skeleton: SkeletonSettings {
             joints: arguments.joints,
             joint_map: learned.and_then(|it| it.joint_map(arguments.joints)),
