@@ -13,6 +13,8 @@ use viewquality::TrainingErrors;
 pub struct Config {
     /// Which energy.
     pub energy: Energy,
+    /// What the views of a frame are solved in.
+    pub views: Views,
     /// What was learned about several views: tables, weights, thresholds, joints.
     pub consistency: Option<PathBuf>,
     /// The rig of that file whose pairs of cameras these are; tables go by angle without it.
@@ -31,7 +33,7 @@ pub struct Config {
     pub switch: Switch,
     /// Decide for every view whether it sees the person from behind.
     pub facing: bool,
-    /// Fusion processes; the pairs are dealt to them in turn.
+    /// Most fusion processes; the pairs are dealt to them in turn.
     pub workers: usize,
     /// Most single-view solutions of a pair.
     pub max_iterations: usize,
@@ -45,6 +47,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             energy: Energy::Paper,
+            views: Views::Pairs,
             consistency: None,
             consistency_rig: None,
             alpha: None,
@@ -63,6 +66,14 @@ impl Default for Config {
 }
 
 impl Config {
+    /// Most processes that have something to do: all views at once are one piece of work.
+    pub fn most_workers(&self) -> usize {
+        match self.views {
+            Views::Pairs => self.workers,
+            Views::All => 1,
+        }
+    }
+
     /// The settings of the optimiser.
     ///
     /// * `n_candidates`: most candidates that a view offers.
@@ -111,6 +122,26 @@ impl Config {
             },
             facing: self.facing,
             n_candidates,
+        }
+    }
+}
+
+/// What the views of a frame are solved in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Views {
+    /// Pairs, whose poses are then combined, as in the paper.
+    #[default]
+    Pairs,
+    /// All at once, every view supported by all others.
+    All,
+}
+
+impl From<Views> for pipeline::Views {
+    fn from(from: Views) -> Self {
+        match from {
+            Views::Pairs => Self::Pairs,
+            Views::All => Self::All,
         }
     }
 }

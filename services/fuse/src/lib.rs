@@ -5,5 +5,5 @@ mod config;
 mod evidence;
 mod service;
 
-pub use config::{Compatibility, Config, Energy, Switch, Tau, TauFile, TauName};
+pub use config::{Compatibility, Config, Energy, Switch, Tau, TauFile, TauName, Views};
 pub use service::{Job, run};

@@ -1,13 +1,14 @@
-//! The loop: join the views' answers to a frame, solve this worker's pairs on their evidence, send.
+//! The loop: join the views' answers to a frame, solve this worker's pairs or all views on their evidence, send.
 
 use core::time::Duration;
 use std::sync::Arc;
 
+use fmp::Responses;
 use join::{Cadence, Joined, Joiner, Last, Push};
 use messages::{Cause, PairPose, Span, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
 use metrics::Passage;
 use multiview::ViewPlan;
-use pipeline::{Answer, FuseStep};
+use pipeline::{Answer, FuseStep, Support, Views};
 use runtime::{
     Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
     now_nanos,
@@ -22,7 +23,9 @@ use crate::evidence::Evidence;
 pub struct Job {
     /// The worker.
     pub worker: usize,
-    /// Its pairs: their index in the deployment, and their views.
+    /// What the views are solved in.
+    pub views: Views,
+    /// Its pairs: their index in the deployment, and their views. All views at once read the views of these.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: FuseStep,
@@ -40,6 +43,23 @@ pub struct Job {
     pub n_consumers: usize,
     /// How long a view may be silent.
     pub patience: Duration,
+}
+
+/// What all views say about a frame.
+struct Seen<'a> {
+    stamp: Stamp,
+    answers: Vec<Option<Answer>>,
+    /// How many frames old the expected errors of every view are, plus 1; 0 for none.
+    sigma_ages: Vec<u16>,
+    evidence: Vec<Option<EvidenceView<'a>>>,
+}
+
+impl Seen<'_> {
+    /// Bit `v` is set if view `v` delivered a pose in time.
+    fn views_present(&self) -> u32 {
+        let present = (0..self.answers.len()).filter(|it| self.answers[*it].is_some());
+        present.fold(0, |mask, view| mask | 1_u32 << view)
+    }
 }
 
 /// What a view says about a frame.
@@ -219,53 +239,104 @@ impl<'a> Worker<'a> {
             return Ok(());
         };
         let (answers, sigma_ages) = self.answers(joined);
-        let present = (0..answers.len()).filter(|it| answers[*it].is_some());
-        let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
-        let start = self.job.step.start(&answers);
         // Of every view: one whose partner is missing would else wait for room for ever.
         for evidence in self.evidence.iter_mut().flatten() {
             evidence.advance(joined.frame)?;
         }
-        let evidence = self.evidence_of(joined.frame);
-        for &(index, views) in &self.job.pairs {
-            let received_at_nanos = now_nanos();
-            self.service.progress().tick();
-            let answer = match views.map(|view| evidence[view].as_ref()) {
-                [Some(first), Some(second)] => {
-                    let evidence = [&first.responses(), &second.responses()];
-                    self.job.step.pair(views, &answers, evidence, &start)
-                }
-                _ => None,
-            };
-            let mut message = wire::pair_to_message(views, answer.as_ref(), views_present)
-                .or_fail(ExitKind::Run)?;
-            message.stamp = Stamp {
-                view: index as u32,
-                epoch: self.service.epoch(),
-                ..stamp
-            };
-            message.sigma_age = views.map(|view| sigma_ages[view]);
-            message.timing = Timing {
-                received_at_nanos,
-                sent_at_nanos: now_nanos(),
-            };
-            self.publisher.send(&message)?;
-            let health = self.service.health();
-            health.sent(joined.frame);
-            let sent_at = message.timing.sent_at_nanos;
-            health.passed(&Passage {
-                waiting: None,
-                computing: sent_at - received_at_nanos,
-                publishing: now_nanos() - sent_at,
-                since_capture: Some(sent_at.saturating_sub(stamp.captured_at_nanos)),
-            });
+        let seen = Seen {
+            stamp,
+            answers,
+            sigma_ages,
+            evidence: self.evidence_of(joined.frame),
+        };
+        match self.job.views {
+            Views::Pairs => self.pairs(&seen)?,
+            Views::All => self.all_views(&seen)?,
         }
-        drop(evidence);
+        drop(seen);
         // Room for the next, whatever its sender has left undone: it may have died half-way.
         for evidence in self.evidence.iter_mut().flatten() {
             evidence.advance(joined.frame + 1)?;
         }
         Ok(())
+    }
+
+    /// Solves this worker's pairs, one after the other.
+    fn pairs(&self, seen: &Seen<'_>) -> Result<(), Failure> {
+        let start = self.job.step.start(&seen.answers);
+        for &(index, views) in &self.job.pairs {
+            let received_at_nanos = now_nanos();
+            self.service.progress().tick();
+            let answer = match views.map(|view| seen.evidence[view].as_ref()) {
+                [Some(first), Some(second)] => {
+                    let evidence = [&first.responses(), &second.responses()];
+                    self.job.step.pair(views, &seen.answers, evidence, &start)
+                }
+                _ => None,
+            };
+            let message = wire::pair_to_message(views, answer.as_ref(), seen.views_present());
+            let message = message.or_fail(ExitKind::Run)?;
+            let sent_at = self.send(seen, index, message, received_at_nanos)?;
+            self.passed(seen, received_at_nanos, sent_at);
+        }
+        Ok(())
+    }
+
+    /// Solves all views at once.
+    fn all_views(&self, seen: &Seen<'_>) -> Result<(), Failure> {
+        let received_at_nanos = now_nanos();
+        self.service.progress().tick();
+        let evidence = seen.evidence.iter();
+        let evidence = evidence.map(|it| it.as_ref().map(EvidenceView::responses));
+        let evidence: Vec<Option<Responses<'_>>> = evidence.collect();
+        let step = &self.job.step;
+        let answer = step.all_views(&seen.answers, &evidence, Support::Mean);
+        let n_views = seen.answers.len();
+        let messages = wire::all_views_to_messages(n_views, answer.as_ref(), seen.views_present());
+        let messages = messages.or_fail(ExitKind::Run)?;
+        let mut first_sent_at = None;
+        for (index, message) in messages.into_iter().enumerate() {
+            let sent_at = self.send(seen, index, message, received_at_nanos)?;
+            first_sent_at.get_or_insert(sent_at);
+        }
+        if let Some(sent_at) = first_sent_at {
+            self.passed(seen, received_at_nanos, sent_at);
+        }
+        Ok(())
+    }
+
+    /// Notes where the time of an answer went.
+    fn passed(&self, seen: &Seen<'_>, received_at: u64, sent_at: u64) {
+        self.service.health().passed(&Passage {
+            waiting: None,
+            computing: sent_at - received_at,
+            publishing: now_nanos() - sent_at,
+            since_capture: Some(sent_at.saturating_sub(seen.stamp.captured_at_nanos)),
+        });
+    }
+
+    /// Sends a message; returns when.
+    fn send(
+        &self,
+        seen: &Seen<'_>,
+        index: usize,
+        mut message: PairPose,
+        received_at_nanos: u64,
+    ) -> Result<u64, Failure> {
+        message.stamp = Stamp {
+            view: index as u32,
+            epoch: self.service.epoch(),
+            ..seen.stamp
+        };
+        let ages = message.views.map(|it| seen.sigma_ages[it as usize]);
+        message.sigma_age = ages;
+        message.timing = Timing {
+            received_at_nanos,
+            sent_at_nanos: now_nanos(),
+        };
+        self.publisher.send(&message)?;
+        self.service.health().sent(seen.stamp.frame);
+        Ok(message.timing.sent_at_nanos)
     }
 
     /// The evidence of a frame, by view.

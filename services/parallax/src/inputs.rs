@@ -265,10 +265,13 @@ pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
     let prepared = crate::prepare::Prepared::new(&resolved)?;
     prepared.check_predictions(&resolved)?;
     let n_frames = resolved.n_frames();
+    let solved_in = match prepared.settings.views {
+        pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
+        pipeline::Views::All => "solved at once".to_owned(),
+    };
     Ok(format!(
-        "{} views, {} pairs, {n_frames} frames, a model of {} parts",
+        "{} views, {solved_in}, {n_frames} frames, a model of {} parts",
         prepared.views.len(),
-        prepared.pairs.len(),
         prepared.model.n_parts()
     ))
 }

@@ -100,7 +100,7 @@ impl Resolved {
 pub(crate) struct Dealing {
     /// Fusion processes.
     pub n_workers: usize,
-    /// The pairs.
+    /// The pairs; those that tell of all views, where they are solved at once.
     pub pairs: Vec<[usize; 2]>,
 }
 
@@ -132,7 +132,7 @@ pub(crate) fn topics(
     prepared: &Prepared,
     names: Vec<String>,
 ) -> Vec<TopicPlan> {
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let audience = Audience::new(resolved, &dealing);
     let views = prepared.views.iter().enumerate();
     let plan = DeploymentPlan {
@@ -167,7 +167,7 @@ pub(crate) fn topics(
 ///
 /// * `file`: the resolved deployment, which every process reads.
 pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -> Vec<ProcessSpec> {
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let n_views = prepared.views.len();
     let n_quality = if resolved.has_quality() { n_views } else { 0 };
     let mut processes = vec![

@@ -34,7 +34,8 @@ pub(crate) struct Prepared {
     pub model: Arc<Model>,
     /// The views, as they are numbered.
     pub views: Vec<View>,
-    /// The pairs of views that are fused, ascending.
+    /// The pairs of views that are fused, ascending; where all views are solved at once, every view but the
+    /// first with the one before it: as many as there are messages, and together all views.
     pub pairs: Vec<[usize; 2]>,
     /// Against gravity, where the rig knows.
     pub up_in_world: Option<UnitVector3<f64>>,
@@ -152,6 +153,11 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
 
 /// The pairs of views that are fused.
 fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
+    if deployment.fuse.views == fuse::Views::All {
+        return (1..deployment.cameras.len())
+            .map(|it| [it - 1, it])
+            .collect();
+    }
     if deployment.fuse.pairs.is_empty() {
         return all_pairs(deployment.cameras.len());
     }
@@ -205,6 +211,7 @@ fn settings(
             learned.as_ref(),
         ),
         tables,
+        views: deployment.fuse.views.into(),
         skeleton: SkeletonSettings {
             joints,
             joint_map: learned.and_then(|it| it.joint_map(joints)),

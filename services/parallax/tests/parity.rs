@@ -1,12 +1,14 @@
 //! A deployment of real processes gives the same bits as one process that does the same.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod common;
 
 use std::fmt::Write as _;
 
 use common::same_bits::OneProcess;
 use common::{Case, PLAIN, planted};
-use pipeline::EstimatorSettings;
+use pipeline::{EstimatorSettings, Views};
 
 #[test]
 fn frames_as_they_are() {
@@ -59,10 +61,21 @@ fn sigma_px(frame: usize, view: usize) -> Vec<f32> {
 
 #[test]
 fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
+    switched_off("expected", "", Views::Pairs);
+}
+
+#[test]
+fn parts_that_are_switched_off_in_views_that_are_solved_at_once() {
+    switched_off("expected-at-once", AT_ONCE, Views::All);
+}
+
+/// * `fuse`: what else the section says.
+fn switched_off(name: &str, fuse: &str, views: Views) {
     let more = PLAIN.to_owned()
+        + fuse
         + "tau = { file = \"tau.txt\" }\n[quality]\ntable = \"q.csv\"\nframe_offset = 100\n\
            frame_step = 2\nviews = { a = \"C1\", b = \"C2\" }\n";
-    let case = Case::new("expected", &[10; 3], &more);
+    let case = Case::new(name, &[10; 3], &more);
     case.write("tau.txt", format!("# all alike\n{}", "5\n".repeat(26)));
     let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
     let mut table = format!("view,frame,{}\n", parts.join(","));
@@ -82,6 +95,7 @@ fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
     let n_candidates = pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
+            views,
             fuse: config.settings(n_candidates, 1.0, None),
             ..EstimatorSettings::default()
         },
@@ -89,6 +103,40 @@ fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
         ..OneProcess::default()
     };
     one.assert_same(&case, 3, 10);
+}
+
+/// One process that solves all views at once.
+fn at_once() -> OneProcess {
+    OneProcess {
+        settings: EstimatorSettings {
+            views: Views::All,
+            ..EstimatorSettings::default()
+        },
+        ..OneProcess::default()
+    }
+}
+
+const AT_ONCE: &str = "views = \"all\"\n";
+
+#[test]
+fn four_views_that_are_solved_at_once() {
+    let case = Case::new("at-once", &[12; 4], &format!("{PLAIN}{AT_ONCE}"));
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    at_once().assert_same(&case, 4, 12);
+}
+
+#[test]
+fn views_that_are_solved_at_once_without_the_first_when_its_footage_is_over() {
+    let more = format!("{PLAIN}{AT_ONCE}");
+    let case = Case::new("at-once-less", &[5, 9, 9], &more);
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let one = OneProcess {
+        is_missing: Some(|frame, view| view == 0 && frame >= 5),
+        ..at_once()
+    };
+    one.assert_same(&case, 3, 9);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use join::{Joined, Joiner, Push};
 use messages::{Cause, PairPose, Pose3d, Stamp, Status, Timing, ViewPose, topic};
 use metrics::Passage;
 use multiview::ViewPlan;
-use pipeline::{Answer, PairAnswer, SkeletonStep};
+use pipeline::{AllViewsAnswer, Answer, PairAnswer, Skeleton, SkeletonStep, Views};
 use runtime::{
     Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
     now_nanos,
@@ -18,7 +18,9 @@ use runtime::{
 pub struct Job {
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// Number of pairs in the deployment, which are dealt to the workers in turn.
+    /// What the views are solved in.
+    pub views: Views,
+    /// Number of pairs in the deployment, or of messages about all views of a frame, which are dealt to the workers in turn.
     pub n_pairs: usize,
     /// Number of fusion workers.
     pub n_workers: usize,
@@ -140,23 +142,9 @@ impl<'a> Stage<'a> {
     fn answer(&self, joined: &Joined<Word>, step: &mut SkeletonStep) -> Result<(), Failure> {
         let received_at_nanos = now_nanos();
         let answers = self.answers(joined);
-        let pairs: Vec<PairAnswer> = joined
-            .items
-            .iter()
-            .flatten()
-            .filter_map(|it| match it {
-                Word::Pair(it) => wire::pair_from_message(it, &self.job.plans)
-                    .inspect_err(|error| tracing::warn!(%error, "unreadable pair"))
-                    .ok()
-                    .flatten(),
-                Word::Pose(_) => None,
-            })
-            // A pair may have been found from a view whose own answer did not come.
-            .filter(|it| it.views.iter().all(|&view| answers[view].is_some()))
-            .collect();
         let present = (0..answers.len()).filter(|it| answers[*it].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
-        let skeleton = step.run(&answers, &pairs);
+        let skeleton = self.skeleton(joined, &answers, step);
         let mut message =
             wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
         message.stamp = Stamp {
@@ -183,6 +171,41 @@ impl<'a> Stage<'a> {
             since_capture: Some(sent_at.saturating_sub(message.stamp.captured_at_nanos)),
         });
         Ok(())
+    }
+
+    /// Settles a frame by what was fused, and by what its views found alone.
+    fn skeleton(
+        &self,
+        joined: &Joined<Word>,
+        answers: &[Option<Answer>],
+        step: &mut SkeletonStep,
+    ) -> Skeleton {
+        let mut pairs = self.fused(joined);
+        // A view may have been used whose own answer did not come.
+        let is_here = |view: usize| answers[view].is_some();
+        match self.job.views {
+            Views::Pairs => {
+                pairs.retain(|it| it.views.iter().all(|&view| is_here(view)));
+                step.run(answers, &pairs)
+            }
+            Views::All => match all_views(&pairs).and_then(|it| it.only(is_here)) {
+                Some(found) => step.run_all_views(answers, &found),
+                None => step.run(answers, &[]),
+            },
+        }
+    }
+
+    /// What came from the workers.
+    fn fused(&self, joined: &Joined<Word>) -> Vec<PairAnswer> {
+        let words = joined.items.iter().flatten();
+        let pairs = words.filter_map(|it| match it {
+            Word::Pair(it) => wire::pair_from_message(it, &self.job.plans)
+                .inspect_err(|error| tracing::warn!(%error, "unreadable pair"))
+                .ok()
+                .flatten(),
+            Word::Pose(_) => None,
+        });
+        pairs.collect()
     }
 
     fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {
@@ -215,6 +238,14 @@ impl<'a> Stage<'a> {
         self.service.health().finished();
         waiter.linger(|| self.publisher.n_connected(), say)
     }
+}
+
+/// What all views found at once, put together.
+fn all_views(pairs: &[PairAnswer]) -> Option<AllViewsAnswer> {
+    wire::all_views_from_pairs(pairs)
+        .inspect_err(|error| tracing::warn!(%error, "unreadable answer of all views"))
+        .ok()
+        .flatten()
 }
 
 fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Word> {

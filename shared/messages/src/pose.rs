@@ -115,6 +115,9 @@ pub struct PairHypothesis {
 }
 
 /// The answer of one pair of views.
+///
+/// Where all views are solved at once, the part of their answer that is about one view and the first view that
+/// answered: the energies are those of all views, and `view` of the stamp is the view less 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PairPose.v2")]
 #[repr(C)]

@@ -127,10 +127,13 @@ impl DeploymentPlan {
             ));
         }
         for worker in 0..self.n_workers {
+            // All views at once send a message for every view but one, in one go.
+            let small = self.small(1 + self.n_recorders);
+            let buffer = small.buffer.max(self.views.len());
             topics.push(TopicPlan::messages::<PairPose>(
                 topic::pair_pose(worker),
                 self.delivery,
-                self.small(1 + self.n_recorders),
+                Limits { buffer, ..small },
             ));
         }
         topics.push(TopicPlan::messages::<Pose3d>(

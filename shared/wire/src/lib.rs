@@ -5,6 +5,7 @@
 //! allow is the limit. Entries past a count are ignored when read and zero when written.
 #![forbid(unsafe_code)]
 
+mod all_views;
 mod error;
 mod evidence;
 mod pair;
@@ -12,6 +13,7 @@ mod pose;
 mod quality;
 mod skeleton;
 
+pub use all_views::{all_views_from_pairs, all_views_to_messages};
 pub use error::WireError;
 pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
 pub use pair::{pair_from_message, pair_to_message};

@@ -92,6 +92,11 @@ pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
 
 /// Two views of [`layout`]'s size.
 pub(crate) fn plans() -> Vec<Arc<ViewPlan>> {
+    plans_of(2)
+}
+
+/// So many views of [`layout`]'s size, side by side.
+pub(crate) fn plans_of(n_views: usize) -> Vec<Arc<ViewPlan>> {
     let camera = |x: f64| Camera {
         name: format!("at {x}"),
         intrinsics: Intrinsics {
@@ -106,10 +111,11 @@ pub(crate) fn plans() -> Vec<Arc<ViewPlan>> {
     };
     let model = Arc::new(model());
     let layout = Arc::new(layout());
-    [0.0, 1.0]
-        .map(|x| {
-            let plan = ViewPlan::new(camera(x), Arc::clone(&model), Arc::clone(&layout));
+    (0..n_views)
+        .map(|view| {
+            let camera = camera(view as f64);
+            let plan = ViewPlan::new(camera, Arc::clone(&model), Arc::clone(&layout));
             Arc::new(plan)
         })
-        .into()
+        .collect()
 }

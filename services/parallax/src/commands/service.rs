@@ -128,7 +128,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let audience = Audience::new(resolved, &dealing);
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let job = pose::Job {
@@ -161,7 +161,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
                 .or_fail(ExitKind::Config)?,
         ),
     };
-    let workers = resolved.deployment.fuse.workers;
+    let workers = resolved.deployment.fuse.most_workers();
     let dealing = Dealing::new(&prepared.pairs, workers);
     let mut job = quality::Job {
         view,
@@ -176,10 +176,11 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 
 fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let plans = prepared.plans();
     let job = fuse::Job {
         worker,
+        views: prepared.settings.views,
         pairs: dealing.of(worker),
         step: FuseStep::new(
             prepared.model,
@@ -200,7 +201,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
 
 fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let plans = prepared.plans();
     let step = SkeletonStep::new(
         plans.clone(),
@@ -209,6 +210,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     );
     let job = triangulate::Job {
         plans,
+        views: prepared.settings.views,
         n_pairs: dealing.pairs.len(),
         n_workers: dealing.n_workers,
         n_consumers: Audience::new(resolved, &dealing).of_results(),
@@ -221,7 +223,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
 fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let deployment = &resolved.deployment;
-    let dealing = Dealing::new(&prepared.pairs, deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, deployment.fuse.most_workers());
     let views = prepared.views.iter().map(|it| record::View {
         name: it.name.clone(),
         framing: it.framing.clone(),

@@ -165,6 +165,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "paper, or released: what the authors' program computes",
     ),
     (
+        "fuse.views",
+        "pairs: pairs of views, then combined, as in the paper; all: every view with all others at once",
+    ),
+    (
         "fuse.consistency",
         "what `parallax train consistency` learned: part-type tables, weights, thresholds, joints",
     ),
@@ -202,11 +206,11 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "fuse.workers",
-        "fusion processes; pairs of views are dealt to them in turn",
+        "most fusion processes; pairs of views are dealt to them in turn, all views at once need one",
     ),
     (
         "fuse.max_iterations",
-        "most single-view solutions of a pair",
+        "most single-view solutions of a pair; of all views at once, half as many of every view",
     ),
     (
         "fuse.epsilon_px",

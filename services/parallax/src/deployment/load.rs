@@ -317,6 +317,24 @@ workers = 2
     }
 
     #[test]
+    fn what_has_no_meaning_for_all_views_at_once_is_refused() {
+        let text = SHORT.replace("workers = 2", "views = \"all\"");
+        read(&text, &[]).unwrap();
+        for (set, expected) in [
+            ("fuse.energy=released", "`fuse.energy` is \"released\""),
+            ("fuse.pairs=[['a', 'b']]", "`fuse.pairs` is given"),
+            (
+                "triangulate.combine=consensus",
+                "`triangulate.combine` is \"consensus\"",
+            ),
+        ] {
+            let got = refused(&text, &[set]);
+            assert!(got.contains(expected), "{got}");
+            read(&text, &["fuse.views=pairs", set]).unwrap();
+        }
+    }
+
+    #[test]
     fn text_that_is_not_toml_is_refused_with_its_line() {
         let got = refused(&SHORT.replace("[fuse]", "[fuse"), &[]);
         assert!(got.starts_with("deployment.toml:15: "), "{got}");

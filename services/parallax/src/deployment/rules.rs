@@ -4,6 +4,9 @@ use messages::{MAX_CANDIDATES, MAX_VIEWS};
 
 use super::Deployment;
 
+/// Most cameras that can be solved at once: the starts that are tried double with every one.
+const MOST_AT_ONCE: usize = 8;
+
 /// A value that cannot be.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Complaint {
@@ -125,6 +128,7 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
     within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
     not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
     not_negative("fuse.beta", it.beta.unwrap_or(0.0))?;
+    all_views(deployment)?;
     let needs_file = it.tau == fuse::Tau::Named(fuse::TauName::Learned);
     demand(
         !needs_file || it.consistency.is_some(),
@@ -161,6 +165,39 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
         )?;
     }
     Ok(())
+}
+
+/// What has no meaning where all views are solved at once.
+fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.fuse;
+    if it.views == fuse::Views::Pairs {
+        return Ok(());
+    }
+    let n_views = deployment.cameras.len();
+    demand(
+        n_views <= MOST_AT_ONCE,
+        "fuse.views",
+        &format!("\"all\" of {n_views} cameras"),
+        &format!("at most {MOST_AT_ONCE} cameras at once, or \"pairs\""),
+    )?;
+    demand(
+        it.energy == fuse::Energy::Paper,
+        "fuse.energy",
+        "\"released\"",
+        "\"paper\", the only one that all views at once have",
+    )?;
+    demand(
+        it.pairs.is_empty(),
+        "fuse.pairs",
+        "given",
+        "none, as `fuse.views` is \"all\"",
+    )?;
+    demand(
+        deployment.triangulate.combine == triangulate::Combine::Mean,
+        "triangulate.combine",
+        "\"consensus\"",
+        "\"mean\": where `fuse.views` is \"all\", there is nothing to combine",
+    )
 }
 
 fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {

@@ -1,0 +1,235 @@
+//! What all views agreed on at once, as the answers of pairs of them.
+
+use messages::PairPose;
+use multiview::{AllViewsEstimate, PairEstimate, PairStart};
+use pipeline::{AllViewsAnswer, AllViewsHypothesis, PairAnswer};
+
+use crate::error::{equal, index};
+use crate::{WireError, pair_to_message};
+
+/// Writes the answer of all views, or that there is none: message `v - 1` is about view `v` and the first
+/// view that answered; the caller fills in stamps and timing.
+///
+/// Each carries the energy of all views. The message of a view that was not solved, or is the first itself, says
+/// that there is no answer.
+///
+/// * `n_views`: of the rig.
+/// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
+///
+/// # Errors
+///
+/// [`WireError`] if something does not fit into a message.
+pub fn all_views_to_messages(
+    n_views: usize,
+    answer: Option<&AllViewsAnswer>,
+    views_present: u32,
+) -> Result<Vec<PairPose>, WireError> {
+    let message = |view: usize| {
+        let place = |it: &AllViewsAnswer| it.views.iter().position(|it| *it == view);
+        let found = answer.and_then(|it| Some((it, place(it).filter(|place| *place > 0)?)));
+        let Some((answer, place)) = found else {
+            return pair_to_message([view - 1, view], None, views_present);
+        };
+        let pair = beside_the_first(answer, place);
+        let mut message = pair_to_message(pair.views, Some(&pair), views_present)?;
+        for (slot, of) in message.hypotheses.iter_mut().zip(&answer.hypotheses) {
+            slot.n_iterations = of.estimate.iterations.len() as u32;
+        }
+        Ok(message)
+    };
+    (1..n_views).map(message).collect()
+}
+
+/// The first view of an answer, and the one at a place.
+fn beside_the_first(answer: &AllViewsAnswer, place: usize) -> PairAnswer {
+    let hypothesis = |it: &AllViewsHypothesis| PairEstimate {
+        start: PairStart {
+            candidates: [0; 2],
+            exchanged: it.exchanged[place] != it.exchanged[0],
+        },
+        energy: it.estimate.energy,
+        iterations: Vec::new(),
+        converged: it.estimate.converged,
+        active: Vec::new(),
+        poses: [0, place].map(|it_is| it.estimate.poses[it_is].clone()),
+    };
+    PairAnswer {
+        views: [answer.views[0], answer.views[place]],
+        hypotheses: answer.hypotheses.iter().map(hypothesis).collect(),
+    }
+}
+
+/// Puts the answer of all views together; `None` if there is none.
+///
+/// The iterations are empty and the share of active terms is 0 in what is read.
+///
+/// * `pairs`: of one frame, as [`pair_from_message`](crate::pair_from_message) reads them, in ascending order of
+///   their second view.
+///
+/// # Errors
+///
+/// [`WireError`] if they are not of one answer: another first view, order or number of hypotheses, or another
+/// energy.
+pub fn all_views_from_pairs(pairs: &[PairAnswer]) -> Result<Option<AllViewsAnswer>, WireError> {
+    let Some(first) = pairs.first() else {
+        return Ok(None);
+    };
+    let mut answer = AllViewsAnswer {
+        views: vec![first.views[0]],
+        hypotheses: first.hypotheses.iter().map(alone).collect(),
+    };
+    for (entry, pair) in pairs.iter().enumerate() {
+        equal("first view", pair.views[0], first.views[0])?;
+        let last = answer.views[entry];
+        index("view before", entry, last, pair.views[1])?;
+        equal(
+            "n_hypotheses",
+            pair.hypotheses.len(),
+            first.hypotheses.len(),
+        )?;
+        answer.views.push(pair.views[1]);
+        for (into, from) in answer.hypotheses.iter_mut().zip(&pair.hypotheses) {
+            if from.energy.to_bits() != into.estimate.energy.to_bits() {
+                return Err(WireError::Value {
+                    field: "energy",
+                    entry,
+                    got: from.energy,
+                    expected: "that of the other views",
+                });
+            }
+            into.exchanged.push(from.start.exchanged);
+            into.estimate.poses.push(from.poses[1].clone());
+        }
+    }
+    Ok(Some(answer))
+}
+
+/// A hypothesis that knows the first view only.
+fn alone(it: &PairEstimate) -> AllViewsHypothesis {
+    AllViewsHypothesis {
+        exchanged: vec![false],
+        estimate: AllViewsEstimate {
+            energy: it.energy,
+            iterations: Vec::new(),
+            converged: it.converged,
+            active: 0.0,
+            poses: vec![it.poses[0].clone()],
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fmp::Pose;
+    use messages::Status;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::pair_from_message;
+    use crate::testing::{any_pose, plans_of};
+
+    const N_VIEWS: usize = 5;
+
+    /// Answers of views 0 to 4, of which some are missing.
+    fn any_answer() -> impl Strategy<Value = AllViewsAnswer> {
+        let views = prop::sample::subsequence((0..N_VIEWS).collect::<Vec<_>>(), 2..=N_VIEWS);
+        views.prop_flat_map(|views| {
+            let n = views.len();
+            let hypothesis = (
+                prop::collection::vec(any_pose(), n),
+                prop::collection::vec(any::<bool>(), n),
+                -5.0..5.0,
+                any::<bool>(),
+            );
+            let hypotheses = prop::collection::vec(hypothesis.prop_map(any_hypothesis), 1..=2);
+            hypotheses.prop_map(move |hypotheses| AllViewsAnswer {
+                views: views.clone(),
+                hypotheses,
+            })
+        })
+    }
+
+    fn any_hypothesis(
+        (poses, mut exchanged, energy, converged): (Vec<Pose>, Vec<bool>, f64, bool),
+    ) -> AllViewsHypothesis {
+        exchanged[0] = false;
+        AllViewsHypothesis {
+            exchanged,
+            estimate: AllViewsEstimate {
+                energy,
+                iterations: Vec::new(),
+                converged,
+                active: 0.0,
+                poses,
+            },
+        }
+    }
+
+    fn read(messages: &[PairPose]) -> Vec<PairAnswer> {
+        let plans = plans_of(N_VIEWS);
+        let read = messages.iter().map(|it| pair_from_message(it, &plans));
+        read.filter_map(|it| it.unwrap()).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn an_answer_comes_back_as_it_was_sent(answer in any_answer()) {
+            let messages = all_views_to_messages(N_VIEWS, Some(&answer), 0b11111).unwrap();
+            prop_assert_eq!(messages.len(), N_VIEWS - 1);
+            prop_assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), Some(answer));
+        }
+
+        #[test]
+        fn a_view_whose_message_is_lost_is_left_out(answer in any_answer(), lost in 1..N_VIEWS) {
+            let mut messages = all_views_to_messages(N_VIEWS, Some(&answer), 0b11111).unwrap();
+            messages.remove(lost - 1);
+            let first = answer.views[0];
+            let expected = answer.only(|view| view == first || view != lost);
+            prop_assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn no_answer_is_sent_as_such() {
+        let messages = all_views_to_messages(3, None, 0b001).unwrap();
+        assert_eq!(messages.len(), 2);
+        assert!(messages.iter().all(|it| it.status == Status::TOO_FEW_VIEWS));
+        assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), None);
+    }
+
+    /// Views 0, 1 and 2 as they are sent.
+    fn pairs() -> [PairAnswer; 2] {
+        let pose = || Pose {
+            parts: vec![fmp::Placement::default(); 3],
+            ..Pose::default()
+        };
+        let poses = [pose(), pose(), pose()].to_vec();
+        let hypothesis = any_hypothesis((poses, vec![false; 3], 2.0, true));
+        let answer = AllViewsAnswer {
+            views: vec![0, 1, 2],
+            hypotheses: vec![hypothesis],
+        };
+        [1, 2].map(|place| beside_the_first(&answer, place))
+    }
+
+    #[test]
+    fn refuses_messages_that_are_not_of_one_answer() {
+        let change = |change: fn(&mut [PairAnswer; 2])| {
+            let mut pairs = pairs();
+            change(&mut pairs);
+            all_views_from_pairs(&pairs).unwrap_err().to_string()
+        };
+        let got = change(|it| it[1].views = [1, 2]);
+        assert_eq!(got, "first view is 1, expected 0");
+        let got = change(|it| it[1].views = [0, 1]);
+        assert_eq!(got, "view before of entry 1 is 1, the limit is 1");
+        let got = change(|it| it[1].hypotheses.clear());
+        assert_eq!(got, "n_hypotheses is 0, expected 1");
+        let got = change(|it| it[1].hypotheses[0].energy = 3.0);
+        assert_eq!(
+            got,
+            "energy of entry 1 is 3, expected that of the other views"
+        );
+        all_views_from_pairs(&pairs()).unwrap();
+    }
+}
