@@ -157,6 +157,31 @@ impl Bones {
         frames
     }
 
+    /// Height of the lowest point of the body.
+    ///
+    /// * `height`: of the person, metres.
+    pub(crate) fn lowest(&self, frames: &[Isometry3<f64>; N_BONES], height: f64) -> f64 {
+        let scale = height / 1.75;
+        let soles = FOOT
+            .iter()
+            .flat_map(|&foot| self.sole.map(|it| (frames[foot] * Point3::from(it)).z));
+        // Radii of the flesh around the joints, metres of a man of 1.75 m.
+        let round = [(PELVIS, 0.105), (CHEST, 0.112), (HEAD, 0.09)].into_iter();
+        let limbs = [
+            (UPPER_ARM, 0.05),
+            (FOREARM, 0.04),
+            (HAND, 0.03),
+            (SHIN, 0.055),
+        ];
+        let limbs = limbs
+            .into_iter()
+            .flat_map(|(pair, r)| pair.map(|it| (it, r)));
+        let joints = round
+            .chain(limbs)
+            .map(|(bone, r)| frames[bone].translation.z - r * scale);
+        soles.chain(joints).fold(f64::INFINITY, f64::min)
+    }
+
     /// The 14 joints of `skeleton::PARSE14`, in its order.
     pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
         let joint = |bone: usize| Point3::from(frames[bone].translation.vector);

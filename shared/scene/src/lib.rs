@@ -23,6 +23,8 @@ mod fabric;
 mod flesh;
 mod mesh;
 mod motion;
+mod performance;
+mod recorded;
 mod subject;
 mod wear;
 
@@ -45,6 +47,7 @@ pub mod truth;
 pub use flaws::{FlawError, Flaws};
 pub use motion::Action;
 pub use photo::photos_in;
+pub use recorded::{Posture, Recording};
 pub use rigs::{RigChoice, RigChoiceError};
 pub use scene::{Scene, SceneError, View, camera_of};
 pub use settings::{Address, AddressError, Settings};

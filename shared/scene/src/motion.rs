@@ -4,11 +4,9 @@ mod gait;
 mod keys;
 mod stance;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::body::{
-    Bones, COLLAR, FOOT, FOREARM, HAND, HEAD, N_BONES, PELVIS, Pose, SHIN, UPPER_ARM, clamped,
-};
+use crate::body::{Bones, COLLAR, FOOT, Pose, UPPER_ARM, clamped};
 use crate::dice::Dice;
 use crate::room::Block;
 use crate::subject::Subject;
@@ -158,34 +156,9 @@ impl Motion {
             Vector3::zeros()
         };
         let [x, y] = stance.place;
-        let z = stance.lift - self.lowest(&frames);
+        let z = stance.lift - self.bones.lowest(&frames, self.height());
         pose.root.translation = Translation3::new(x - middle.x, y - middle.y, z);
         pose
-    }
-
-    /// Height of the lowest point of the body.
-    fn lowest(&self, frames: &[Isometry3<f64>; N_BONES]) -> f64 {
-        let scale = self.actor.subject.proportions.height / 1.75;
-        let soles = FOOT.iter().flat_map(|&foot| {
-            self.bones
-                .sole
-                .map(|it| (frames[foot] * Point3::from(it)).z)
-        });
-        // Radii of the flesh around the joints, metres of a man of 1.75 m.
-        let round = [(PELVIS, 0.105), (2, 0.112), (HEAD, 0.09)].into_iter();
-        let limbs = [
-            (UPPER_ARM, 0.05),
-            (FOREARM, 0.04),
-            (HAND, 0.03),
-            (SHIN, 0.055),
-        ];
-        let limbs = limbs
-            .into_iter()
-            .flat_map(|(pair, r)| pair.map(|it| (it, r)));
-        let joints = round
-            .chain(limbs)
-            .map(|(bone, r)| frames[bone].translation.z - r * scale);
-        soles.chain(joints).fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -13,8 +13,10 @@ use crate::light::Light;
 use crate::mesh;
 use crate::motion::Motion;
 use crate::painter::{self, Figure, Painter};
+use crate::performance::{Course, Performance};
 use crate::photo::{Photo, photos_in};
 use crate::raster::{NOTHING, SUB};
+use crate::recorded::{Recorded, Recording};
 use crate::rigs::{self, RigChoiceError};
 use crate::room::Room;
 use crate::settings::Settings;
@@ -50,7 +52,7 @@ pub struct Scene {
     settings: Settings,
     rig: Rig,
     world_from_stage: Isometry3<f64>,
-    motion: Motion,
+    performance: Performance,
     figure: Figure,
     room: Room,
     dice: Dice,
@@ -69,29 +71,66 @@ impl Scene {
     ///
     /// [`SceneError::Rig`].
     pub fn new(settings: &Settings) -> Result<Self, SceneError> {
-        let rig = settings.rig.rig()?;
-        let world_from_stage = rigs::world_from_stage(&rig)?;
+        let subject = Subject::new(settings.subject);
+        let motion = Motion::new(&subject, settings.action, settings.seed);
+        let performance = Performance {
+            bones: motion.bones.clone(),
+            height: motion.height(),
+            name: settings.action.name().to_owned(),
+            course: Course::Acted(Box::new(motion)),
+        };
+        Self::of(settings, &subject, performance)
+    }
+
+    /// The same of a recording: the subject does what was recorded, in the middle of the room, as large as the
+    /// subject is. The action of the settings does not count.
+    ///
+    /// # Errors
+    ///
+    /// [`SceneError::Rig`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no posture.
+    pub fn of_recording(settings: &Settings, recording: &Recording) -> Result<Self, SceneError> {
+        assert!(!recording.postures.is_empty(), "a recording of nothing");
         let subject = Subject::new(settings.subject);
         let bones = Bones::new(&subject.proportions);
-        let (flesh, mesh) = mesh::of(&subject, &bones);
-        let wear = Wear::new(&subject, &flesh);
-        let motion = Motion::new(&subject, settings.action, settings.seed);
+        let height = subject.proportions.height;
+        let performance = Performance {
+            course: Course::Recorded(Box::new(Recorded::new(recording, &bones, height))),
+            bones,
+            height,
+            name: recording.name.clone(),
+        };
+        Self::of(settings, &subject, performance)
+    }
+
+    fn of(
+        settings: &Settings,
+        subject: &Subject,
+        performance: Performance,
+    ) -> Result<Self, SceneError> {
+        let rig = settings.rig.rig()?;
+        let world_from_stage = rigs::world_from_stage(&rig)?;
+        let (flesh, mesh) = mesh::of(subject, &performance.bones);
+        let wear = Wear::new(subject, &flesh);
         let dice = Dice::new(settings.seed)
             .fork("scene")
             .nth(settings.subject)
-            .fork(settings.action.name());
+            .fork(&performance.name);
         let stage_from_world = world_from_stage.inverse();
         let eyes = rig
             .cameras()
             .iter()
             .map(|it| (stage_from_world * it.centre_in_world()).cast());
         let eyes: Vec<Point3<f32>> = eyes.collect();
-        let room = Room::new(dice, &eyes, motion.furniture());
+        let room = Room::new(dice, &eyes, performance.furniture());
         Ok(Self {
             settings: settings.clone(),
             rig,
             world_from_stage,
-            motion,
+            performance,
             figure: Figure { mesh, wear },
             room,
             dice,
@@ -101,6 +140,11 @@ impl Scene {
     /// What it was made of.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// What the person does: the name of the action, or of the recording.
+    pub fn action(&self) -> &str {
+        &self.performance.name
     }
 
     /// The cameras that take the pictures.
@@ -129,11 +173,7 @@ impl Scene {
                 .iter()
                 .map(|it| it.name.clone())
                 .collect(),
-            ..Header::new(
-                self.settings.subject,
-                self.settings.action.name(),
-                self.settings.seed,
-            )
+            ..Header::new(self.settings.subject, self.action(), self.settings.seed)
         }
     }
 
@@ -144,8 +184,8 @@ impl Scene {
 
     /// The joints of `skeleton::PARSE14` at a time, metres in the world.
     pub fn joints(&self, seconds: f64) -> [[f64; 3]; N_JOINTS] {
-        let frames = self.motion.bones.frames(&self.motion.pose(seconds));
-        let joints = self.motion.bones.joints(&frames);
+        let frames = self.performance.frames(seconds);
+        let joints = self.performance.bones.joints(&frames);
         joints.map(|it| (self.world_from_stage * it).coords.into())
     }
 
@@ -291,7 +331,7 @@ impl View {
 
     fn draw(&mut self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;
-        let frames = scene.motion.bones.frames(&scene.motion.pose(seconds));
+        let frames = scene.performance.frames(seconds);
         self.painter.draw(&painter::Subject {
             figure: &scene.figure,
             frames: &frames,
@@ -304,7 +344,7 @@ impl View {
 
     fn seen(&self, frames: &[Isometry3<f64>; N_BONES], seconds: f64, repeated: bool) -> SeenJoints {
         let camera = &self.scene.rig.cameras()[self.camera];
-        let joints = self.scene.motion.bones.joints(frames);
+        let joints = self.scene.performance.bones.joints(frames);
         let in_world = joints.map(|it| self.scene.world_from_stage * it);
         let pixels = in_world.map(|it| camera.project(&it).map(|it| it.coords.into()));
         let eye = self.on_stage.centre_in_world();
@@ -339,7 +379,7 @@ impl View {
         };
         let depth = (self.on_stage.camera_from_world * at).z;
         let before = depth - 1.0 / f64::from(samples.near[row * samples.width + column]);
-        before < FLESH[joint] * self.scene.motion.height() / 1.75
+        before < FLESH[joint] * self.scene.performance.height / 1.75
     }
 
     /// Around the samples that see the person, pixels.

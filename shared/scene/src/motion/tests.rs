@@ -3,7 +3,9 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::body::{ABDOMEN, CHEST, LEFT, LIMITS, PARENT, RIGHT, THIGH};
+use crate::body::{
+    ABDOMEN, CHEST, FOREARM, HAND, LEFT, LIMITS, N_BONES, PARENT, PELVIS, RIGHT, SHIN, THIGH,
+};
 
 fn acting(number: u64, action: Action, seed: u64) -> Motion {
     Motion::new(&Subject::new(number), action, seed)
@@ -67,7 +69,7 @@ proptest! {
     ) {
         let motion = acting(number, action, seed);
         let frames = motion.bones.frames(&motion.pose(seconds));
-        let lowest = motion.lowest(&frames);
+        let lowest = motion.bones.lowest(&frames, motion.height());
         prop_assert!((-1e-9..0.12).contains(&lowest), "{}", lowest);
         let hips = frames[PELVIS].translation.vector;
         prop_assert!(hips.xy().norm() < 1.6, "{}", hips);

@@ -1,0 +1,44 @@
+//! What the person of a scene does: an action that is made up, or a recording.
+
+use nalgebra::Isometry3;
+
+use crate::body::{Bones, N_BONES};
+use crate::motion::Motion;
+use crate::recorded::Recorded;
+use crate::room::Block;
+
+/// A person in motion.
+#[derive(Debug)]
+pub(crate) struct Performance {
+    pub(crate) bones: Bones,
+    /// Standing height of the person, metres.
+    pub(crate) height: f64,
+    /// What the truth calls it.
+    pub(crate) name: String,
+    pub(crate) course: Course,
+}
+
+/// How the person moves.
+#[derive(Debug)]
+pub(crate) enum Course {
+    Acted(Box<Motion>),
+    Recorded(Box<Recorded>),
+}
+
+impl Performance {
+    /// The frames of all bones at a time, in the frame of the stage.
+    pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
+        match &self.course {
+            Course::Acted(motion) => self.bones.frames(&motion.pose(seconds)),
+            Course::Recorded(it) => it.frames(seconds),
+        }
+    }
+
+    /// Chairs, tables and mats that it needs; nobody knows what a recording needs.
+    pub(crate) fn furniture(&self) -> Vec<Block> {
+        match &self.course {
+            Course::Acted(motion) => motion.furniture(),
+            Course::Recorded(_) => Vec::new(),
+        }
+    }
+}

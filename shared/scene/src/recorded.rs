@@ -1,0 +1,236 @@
+//! Recorded motion, put on the skeleton of a subject.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::body::{
+    ABDOMEN, Bones, CHEST, COLLAR, FOOT, FOREARM, HAND, HEAD, LEFT, N_BONES, NECK, PARENT, PELVIS,
+    RIGHT, SHIN, THIGH, UPPER_ARM,
+};
+use crate::truth::N_JOINTS;
+
+/// Where the joints of somebody were over time, as motion capture has them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// What it is called; stands where else the action does.
+    pub name: String,
+    /// Postures a second.
+    pub rate_hz: f64,
+    /// At least one.
+    pub postures: Vec<Posture>,
+}
+
+/// Where the joints were at one time: metres, z up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Posture {
+    /// Those of `skeleton::PARSE14`.
+    pub joints: [[f64; 3]; N_JOINTS],
+    /// The toes of the right and of the left foot, if they are known; feet follow the shins without them.
+    pub toes: Option<[[f64; 3]; 2]>,
+}
+
+impl Recording {
+    /// From the first posture to the last, seconds.
+    pub fn seconds(&self) -> f64 {
+        self.postures.len().saturating_sub(1) as f64 / self.rate_hz
+    }
+
+    /// Between two postures; before the first and after the last nobody moves.
+    fn at(&self, seconds: f64) -> Posture {
+        let last = self.postures.len() - 1;
+        let place = (seconds * self.rate_hz).clamp(0.0, last as f64);
+        let nth = (place as usize).min(last);
+        let (from, to) = (self.postures[nth], self.postures[(nth + 1).min(last)]);
+        let share = place - nth as f64;
+        let mix = |a: [f64; 3], b: [f64; 3]| {
+            core::array::from_fn(|axis| a[axis] + share * (b[axis] - a[axis]))
+        };
+        let pair = from.toes.zip(to.toes);
+        Posture {
+            joints: core::array::from_fn(|it| mix(from.joints[it], to.joints[it])),
+            toes: pair.map(|(a, b)| core::array::from_fn(|it| mix(a[it], b[it]))),
+        }
+    }
+}
+
+/// Indices of the joints of `skeleton::PARSE14`, left first.
+const HIPS: [usize; 2] = [3, 2];
+const KNEES: [usize; 2] = [4, 1];
+const ANKLES: [usize; 2] = [5, 0];
+const SHOULDERS: [usize; 2] = [9, 8];
+const ELBOWS: [usize; 2] = [10, 7];
+const WRISTS: [usize; 2] = [11, 6];
+const NECK_JOINT: usize = 12;
+const HEAD_JOINT: usize = 13;
+
+/// Share of the postures whose lowest point may lie below the floor: the recording is not exact.
+const BELOW_FLOOR: f64 = 0.05;
+
+/// A recording as a subject would perform it: directions are those of the recording, lengths the subject's.
+///
+/// The way is scaled as the legs are, moved to the middle of the room, and put on the floor. No joint is
+/// kept within limits: what was recorded is what somebody did.
+#[derive(Debug, Clone)]
+pub(crate) struct Recorded {
+    recording: Recording,
+    bones: Bones,
+    /// Lengths of the subject per length of the recorded person.
+    scale: f64,
+    /// From the scaled recording to the stage.
+    shift: Vector3<f64>,
+}
+
+impl Recorded {
+    /// * `height`: of the subject, metres.
+    pub(crate) fn new(recording: &Recording, bones: &Bones, height: f64) -> Self {
+        let mut it = Self {
+            scale: leg(bones) / recorded_leg(recording),
+            recording: recording.clone(),
+            bones: bones.clone(),
+            shift: Vector3::zeros(),
+        };
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let mut lowest = Vec::new();
+        for posture in &it.recording.postures {
+            let frames = it.posed(posture);
+            let at = frames[PELVIS].translation.vector;
+            for axis in 0..2 {
+                low[axis] = low[axis].min(at[axis]);
+                high[axis] = high[axis].max(at[axis]);
+            }
+            lowest.push(it.bones.lowest(&frames, height));
+        }
+        lowest.sort_by(f64::total_cmp);
+        let floor = lowest[(BELOW_FLOOR * lowest.len() as f64) as usize];
+        let middle = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]));
+        it.shift = -Vector3::new(middle[0], middle[1], floor);
+        it
+    }
+
+    /// The frames of all bones at a time, in the frame of the stage.
+    pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
+        self.posed(&self.recording.at(seconds))
+    }
+
+    fn posed(&self, posture: &Posture) -> [Isometry3<f64>; N_BONES] {
+        let turns = turns(&self.bones, posture);
+        let joint = |it: usize| Vector3::from(posture.joints[it]);
+        let hips = (joint(HIPS[LEFT]) + joint(HIPS[RIGHT])) / 2.0;
+        let root = hips * self.scale + self.shift;
+        let mut frames = turns.map(|turn| Isometry3::from_parts(Translation3::from(root), turn));
+        for bone in 1..N_BONES {
+            let Some(parent) = PARENT[bone] else { continue };
+            let at = frames[parent] * Point3::from(self.bones.offset[bone]);
+            frames[bone].translation = at.into();
+        }
+        frames
+    }
+}
+
+/// Length of a leg, metres.
+fn leg(bones: &Bones) -> f64 {
+    bones.offset[SHIN[LEFT]].norm() + bones.offset[FOOT[LEFT]].norm()
+}
+
+/// Median length of the recorded legs, metres.
+fn recorded_leg(recording: &Recording) -> f64 {
+    let length = |posture: &Posture, side: usize| {
+        let [hip, knee, ankle] =
+            [HIPS, KNEES, ANKLES].map(|it| Vector3::from(posture.joints[it[side]]));
+        (knee - hip).norm() + (ankle - knee).norm()
+    };
+    let all = recording.postures.iter();
+    let mut all: Vec<f64> = all
+        .flat_map(|it| [0, 1].map(|side| length(it, side)))
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2].max(1e-3)
+}
+
+/// The turns of all bones, in the frame of the recording.
+fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
+    let joint = |it: usize| Vector3::from(posture.joints[it]);
+    let across = |pair: [usize; 2]| joint(pair[LEFT]) - joint(pair[RIGHT]);
+    let offset = &bones.offset;
+    let mut turns = [UnitQuaternion::identity(); N_BONES];
+    let hips = (joint(HIPS[LEFT]) + joint(HIPS[RIGHT])) / 2.0;
+    let spine = offset[ABDOMEN] + offset[CHEST] + offset[NECK];
+    let up = joint(NECK_JOINT) - hips;
+    turns[PELVIS] = turned(spine, up, across(HIPS));
+    turns[CHEST] = turned(spine, up, across(SHOULDERS));
+    let half = turns[PELVIS].try_slerp(&turns[CHEST], 0.5, 1e-9);
+    turns[ABDOMEN] = half.unwrap_or(turns[CHEST]);
+    let head = joint(HEAD_JOINT) - joint(NECK_JOINT);
+    turns[HEAD] = turned(offset[HEAD] + bones.head_top, head, across(SHOULDERS));
+    turns[NECK] = turns[HEAD];
+    for side in [LEFT, RIGHT] {
+        turns[COLLAR[side]] = turns[CHEST];
+        let arm = [SHOULDERS, ELBOWS, WRISTS].map(|it| joint(it[side]));
+        // Elbows fold forward, knees backward.
+        let [upper, fore] = hinged(&turns[CHEST], arm, -1.0);
+        turns[UPPER_ARM[side]] = upper;
+        turns[FOREARM[side]] = fore;
+        turns[HAND[side]] = fore;
+        let leg = [HIPS, KNEES, ANKLES].map(|it| joint(it[side]));
+        let [thigh, shin] = hinged(&turns[PELVIS], leg, 1.0);
+        turns[THIGH[side]] = thigh;
+        turns[SHIN[side]] = shin;
+        turns[FOOT[side]] = match posture.toes {
+            Some(toes) => {
+                let toe = Vector3::from(toes[1 - side]) - leg[2];
+                turned(bones.sole[0], toe, shin * Vector3::y())
+            }
+            None => shin,
+        };
+    }
+    turns
+}
+
+/// The turns of the two bones of a limb, which hang down at rest, from where its three joints are.
+///
+/// The axis of the hinge between them follows from the bend; of a straight limb it is that of the trunk.
+///
+/// * `fold`: 1 if the hinge folds backward, -1 if forward.
+fn hinged(
+    trunk: &UnitQuaternion<f64>,
+    [top, middle, end]: [Vector3<f64>; 3],
+    fold: f64,
+) -> [UnitQuaternion<f64>; 2] {
+    let down = -Vector3::z();
+    let upper = unit(middle - top, trunk * down);
+    let lower = unit(end - middle, upper);
+    let carried = UnitQuaternion::rotation_between(&(trunk * down), &upper)
+        .unwrap_or_else(UnitQuaternion::identity);
+    let straight = carried * (trunk * Vector3::y());
+    let bend = fold * upper.cross(&lower);
+    // From 9 to 27 degrees the bend takes over.
+    let share = ((bend.norm() - 0.15) / 0.3).clamp(0.0, 1.0);
+    let share = share * share * (3.0 - 2.0 * share);
+    let axis = straight * (1.0 - share) + unit(bend, straight) * share;
+    let upper = turned(down, upper, axis);
+    [upper, turned(down, lower, upper * Vector3::y())]
+}
+
+/// The turn that takes `from` to the direction of `along`, and the axis y as near to `left` as that allows.
+fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQuaternion<f64> {
+    let basis = |along: Vector3<f64>, left: Vector3<f64>| {
+        let along = unit(along, Vector3::z());
+        let any = if along.y.abs() < 0.9 {
+            Vector3::y()
+        } else {
+            Vector3::x()
+        };
+        let off = |it: Vector3<f64>| it - along * it.dot(&along);
+        let left = unit(off(left), unit(off(any), Vector3::y()));
+        Matrix3::from_columns(&[left.cross(&along), left, along])
+    };
+    let turn = basis(along, left) * basis(from, Vector3::y()).transpose();
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn))
+}
+
+/// A vector of length 1 of that direction, or `other` where it has none.
+fn unit(it: Vector3<f64>, other: Vector3<f64>) -> Vector3<f64> {
+    it.try_normalize(1e-9).unwrap_or(other)
+}
+
+#[cfg(test)]
+mod tests;
