@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use c3d::{C3d, C3dError};
+use sequences::{MarkerTable, Motion, MotionError, MotionOptions, read_motion};
 
 use crate::shared_dir;
 
@@ -96,4 +97,100 @@ fn other_laboratories_files_are_read_and_an_empty_one_is_named() {
         matches!(empty, Err(C3dError::Short { got: 0, .. })),
         "{empty:?}"
     );
+}
+
+/// How tall the person stands at most, and how far a leg's length strays from its median, metres.
+fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
+    let norm = |a: [f64; 3], b: [f64; 3]| {
+        let square = (0..3).map(|it| (a[it] - b[it]).powi(2));
+        square.sum::<f64>().sqrt()
+    };
+    let tops = motion
+        .joints
+        .iter()
+        .map(|it| it[13][2] - it[0][2].min(it[5][2]));
+    let shins = motion
+        .joints
+        .iter()
+        .map(|it| norm(it[3], it[4]) + norm(it[4], it[5]));
+    let mut shins: Vec<f64> = shins.collect();
+    shins.sort_by(f64::total_cmp);
+    let at = |share: f64| shins[(share * (shins.len() - 1) as f64) as usize];
+    (tops.fold(0.0, f64::max), at(0.9) - at(0.1))
+}
+
+#[test]
+fn files_of_three_laboratories_become_joints_by_the_presets() {
+    let Some(dir) = shared_dir() else { return };
+    let data = dir.join("data");
+    let options = MotionOptions::default();
+    for (file, n_frames, rate_hz, height) in [
+        ("c3d/others/cmu_02_05.c3d", 1854, 120.0, 1.5..1.8),
+        ("pose2sim_balancing/reference_0-69.trc", 70, 60.0, 1.3..1.9),
+    ] {
+        let motion = read_motion(&data.join(file), None, &options).unwrap();
+        assert!(motion.toes.is_some(), "{file}");
+        assert_eq!(
+            (motion.joints.len(), motion.rate_hz),
+            (n_frames, rate_hz),
+            "{file}"
+        );
+        let (tall, noise) = height_and_leg_noise(&motion);
+        println!(
+            "{file}: {tall:.2} m from ankle to head, legs vary by {:.0} mm",
+            1000.0 * noise
+        );
+        assert!(height.contains(&tall), "{file}: {tall}");
+        assert!(noise < 0.1, "{file}: {noise}");
+    }
+    // Markers are not seen for a second and more: the frames are named, and others can be taken.
+    let file = data.join("c3d/others/mocap36.c3d");
+    let MotionError::Gap { frames, .. } = read_motion(&file, None, &options).unwrap_err() else {
+        panic!("a gap")
+    };
+    println!(
+        "mocap36.c3d: no markers in frames {}-{}",
+        frames[0], frames[1]
+    );
+    let before = MotionOptions {
+        frames: Some([1, frames[0] - 1]),
+        ..options
+    };
+    let motion = read_motion(&file, None, &before).unwrap();
+    let (tall, noise) = height_and_leg_noise(&motion);
+    println!("before: {tall:.2} m, legs vary by {:.0} mm", 1000.0 * noise);
+    assert!((1.4..1.9).contains(&tall), "{tall}");
+}
+
+#[test]
+fn files_without_a_whole_person_or_of_nothing_are_refused() {
+    let Some(dir) = shared_dir() else { return };
+    let dir = dir.join("data/c3d");
+    for file in ["trc/Knee.trc", "others/Gait.c3d", "sample01/Eb015pr.c3d"] {
+        let got = read_motion(&dir.join(file), None, &MotionOptions::default());
+        assert!(
+            matches!(got, Err(MotionError::NoPreset { .. })),
+            "{file}: {got:?}"
+        );
+    }
+    for file in [
+        "trc/UpperLimbStatic.trc",
+        "trc/Empty.trc",
+        "trc/Truncated.trc",
+        "trc/markers.trc",
+        "others/Empty.c3d",
+    ] {
+        let got = read_motion(&dir.join(file), None, &MotionOptions::default());
+        assert!(
+            matches!(got, Err(MotionError::Trc { .. } | MotionError::C3d { .. })),
+            "{file}: {got:?}"
+        );
+    }
+    let table = MarkerTable::preset("cmu");
+    let got = read_motion(
+        &dir.join("others/Gait.c3d"),
+        table.as_ref(),
+        &MotionOptions::default(),
+    );
+    assert!(matches!(got, Err(MotionError::NoMarker { .. })), "{got:?}");
 }

@@ -1,0 +1,200 @@
+//! The motion of one person from a C3D or TRC file: joints over time, in metres and z up.
+//!
+//! Markers become joints by a [`MarkerTable`]. What is read is checked: gaps are bridged up to a limit, legs must be
+//! as long as legs are, heads above feet, and knees must fold backward, which they do not where axes are mirrored or
+//! sides exchanged.
+
+mod check;
+mod error;
+mod table;
+mod trial;
+
+use std::path::Path;
+
+pub use error::MotionError;
+pub use table::{MarkerTable, PRESETS};
+
+use skeleton::PARSE14;
+use trial::Trial;
+
+/// Which part of a file to take, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionOptions {
+    /// First and last frame, as the file counts; all without it.
+    pub frames: Option<[u32; 2]>,
+    /// The longest gap of a marker that is bridged by a straight line, seconds.
+    pub max_gap_s: f64,
+}
+
+impl Default for MotionOptions {
+    /// All frames; a quarter of a second.
+    fn default() -> Self {
+        Self {
+            frames: None,
+            max_gap_s: 0.25,
+        }
+    }
+}
+
+/// Where the joints of a person were over time: metres, z up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Postures a second.
+    pub rate_hz: f64,
+    /// `[frame]`: the joints of `skeleton::PARSE14`.
+    pub joints: Vec<[[f64; 3]; 14]>,
+    /// `[frame]`: the toes of the right and of the left foot; `None` where the table does not name them.
+    pub toes: Option<Vec<[[f64; 3]; 2]>>,
+}
+
+/// Reads a file.
+///
+/// * `table`: how markers become joints; without it that of [`PRESETS`] whose markers are all there.
+///
+/// # Errors
+///
+/// [`MotionError`].
+pub fn read_motion(
+    file: &Path,
+    table: Option<&MarkerTable>,
+    options: &MotionOptions,
+) -> Result<Motion, MotionError> {
+    let trial = Trial::read(file)?;
+    let table = match table {
+        Some(table) => table.clone(),
+        None => preset_for(&trial).ok_or_else(|| MotionError::NoPreset {
+            path: file.to_owned(),
+            markers: trial.names.clone(),
+        })?,
+    };
+    let trial = trial.part(file, options)?;
+    let columns = Columns::new(file, &trial, &table, options)?;
+    let names = PARSE14.joints.iter().map(|it| it.name);
+    let joints: Vec<Vec<[f64; 3]>> = names
+        .map(|it| columns.joint(&table, it))
+        .collect::<Result<_, _>>()?;
+    let toes = if table.has_toes() {
+        let [right, left] = ["right toes", "left toes"].map(|it| columns.joint(&table, it));
+        Some((right?, left?))
+    } else {
+        None
+    };
+    let n = trial.frames.len();
+    let motion = Motion {
+        rate_hz: trial.rate_hz,
+        joints: (0..n)
+            .map(|frame| core::array::from_fn(|joint| joints[joint][frame]))
+            .collect(),
+        toes: toes.map(|(right, left)| (0..n).map(|it| [right[it], left[it]]).collect()),
+    };
+    check::check(file, &motion)?;
+    Ok(motion)
+}
+
+/// The preset whose markers a trial has.
+fn preset_for(trial: &Trial) -> Option<MarkerTable> {
+    let tables = PRESETS.iter().filter_map(|it| MarkerTable::preset(it));
+    let mut fitting = tables.filter(|it| it.markers().all(|name| trial.marker(name).is_some()));
+    fitting.next()
+}
+
+/// The markers that a table needs, without gaps: metres, z up.
+struct Columns<'a> {
+    path: &'a Path,
+    of_marker: Vec<(String, Vec<[f64; 3]>)>,
+}
+
+impl<'a> Columns<'a> {
+    fn new(
+        path: &'a Path,
+        trial: &Trial,
+        table: &MarkerTable,
+        options: &MotionOptions,
+    ) -> Result<Self, MotionError> {
+        let metres = match table.unit_metres() {
+            Some(given) => given,
+            None => trial.metres_per_unit(path)?,
+        };
+        let mut of_marker: Vec<(String, Vec<[f64; 3]>)> = Vec::new();
+        for name in table.markers() {
+            if of_marker.iter().any(|it| it.0 == name) {
+                continue;
+            }
+            let index = trial.marker(name).ok_or_else(|| MotionError::NoMarker {
+                path: path.to_owned(),
+                name: name.to_owned(),
+                markers: trial.names.clone(),
+            })?;
+            let seen: Vec<Option<[f64; 3]>> = trial.frames.iter().map(|it| it[index]).collect();
+            let points =
+                bridged(&seen, options.max_gap_s * trial.rate_hz).map_err(|[from, to]| {
+                    MotionError::Gap {
+                        path: path.to_owned(),
+                        marker: name.to_owned(),
+                        frames: [from, to].map(|it| trial.first + it as u32),
+                        seconds: (to - from + 1) as f64 / trial.rate_hz,
+                        max_gap_s: options.max_gap_s,
+                    }
+                })?;
+            let upright = points.into_iter().map(|it| table.upright(it));
+            let points = upright.map(|it| it.map(|it| it * metres)).collect();
+            of_marker.push((name.to_owned(), points));
+        }
+        Ok(Self { path, of_marker })
+    }
+
+    /// A joint in every frame: the sum of its markers.
+    fn joint(&self, table: &MarkerTable, joint: &str) -> Result<Vec<[f64; 3]>, MotionError> {
+        let no_joint = || MotionError::NoJoint {
+            path: self.path.to_owned(),
+            joint: joint.to_owned(),
+        };
+        let weights = table.joint(joint).ok_or_else(no_joint)?;
+        let n = self.of_marker.first().map_or(0, |it| it.1.len());
+        let mut sum = vec![[0.0; 3]; n];
+        for (name, weight) in weights {
+            let column = self.of_marker.iter().find(|it| it.0 == *name);
+            let (_, points) = column.ok_or_else(no_joint)?;
+            for (into, point) in sum.iter_mut().zip(points) {
+                for axis in 0..3 {
+                    into[axis] += weight * point[axis];
+                }
+            }
+        }
+        Ok(sum)
+    }
+}
+
+/// A marker without gaps: straight lines between what was seen, at the ends what was seen next.
+///
+/// # Errors
+///
+/// The first and last frame of the first gap that is longer than `longest` frames; of all, if nothing was seen.
+fn bridged(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [usize; 2]> {
+    let mut points: Vec<[f64; 3]> = Vec::with_capacity(seen.len());
+    while points.len() < seen.len() {
+        let begin = points.len();
+        if let Some(point) = seen[begin] {
+            points.push(point);
+            continue;
+        }
+        let end = seen[begin..].iter().position(Option::is_some);
+        let end = end.map_or(seen.len(), |it| begin + it);
+        let (before, after) = (points.last().copied(), seen.get(end).copied().flatten());
+        let too_long = (end - begin) as f64 > longest + 1e-9;
+        let (Some(from), false) = (before.or(after), too_long) else {
+            return Err([begin, end - 1]);
+        };
+        let to = after.unwrap_or(from);
+        for nth in begin..end {
+            let share = (nth - begin + 1) as f64 / (end - begin + 1) as f64;
+            points.push(core::array::from_fn(|axis| {
+                from[axis] + share * (to[axis] - from[axis])
+            }));
+        }
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests;

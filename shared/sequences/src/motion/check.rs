@@ -1,0 +1,71 @@
+//! Whether a motion can be that of a person.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::{Motion, MotionError};
+
+/// Hips, knees and ankles among the joints of `skeleton::PARSE14`, left first.
+const LEGS: [[usize; 3]; 2] = [[3, 4, 5], [2, 1, 0]];
+const HEAD: usize = 13;
+
+/// How long a leg can be, metres: that of a small child, and of the tallest man with markers that lie badly.
+const LEG_METRES: [f64; 2] = [0.3, 1.5];
+
+/// Refuses what no person does.
+pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
+    let refuse = |what: String| {
+        let path = path.to_owned();
+        Err(MotionError::Implausible { path, what })
+    };
+    let joint = |frame: &[[f64; 3]; 14], it: usize| Vector3::from(frame[it]);
+    let all = || motion.joints.iter();
+    let length = |frame, [hip, knee, ankle]: [usize; 3]| {
+        let [hip, knee, ankle] = [hip, knee, ankle].map(|it| joint(frame, it));
+        (knee - hip).norm() + (ankle - knee).norm()
+    };
+    let leg = median(all().flat_map(|frame| LEGS.map(|it| length(frame, it))));
+    if !(LEG_METRES[0]..=LEG_METRES[1]).contains(&leg) {
+        return refuse(format!(
+            "a leg would be {leg:.3} m long: another unit? (unit = \"mm\" in a marker table)"
+        ));
+    }
+    let above = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
+    let head = median(all().map(above));
+    // Who lies down is as high as low; who stands on the head all the time is read with a wrong axis.
+    if head < -0.3 * leg {
+        return refuse(format!(
+            "the head would be {:.2} m below the feet: another axis points up? (up = \"y\" in a marker table)",
+            -head
+        ));
+    }
+    let fold: f64 = all().map(fold).sum();
+    if fold < 0.0 {
+        return refuse(
+            "knees would fold forward: left and right are exchanged, or the axes are mirrored"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// How much the knees fold backward; negative if forward, 0 if they are straight.
+fn fold(frame: &[[f64; 3]; 14]) -> f64 {
+    let joint = |it: usize| Vector3::from(frame[it]);
+    let left = joint(LEGS[0][0]) - joint(LEGS[1][0]);
+    let of_leg = |[hip, knee, ankle]: [usize; 3]| {
+        let thigh = (joint(knee) - joint(hip)).try_normalize(1e-9);
+        let shin = (joint(ankle) - joint(knee)).try_normalize(1e-9);
+        let axis = thigh.zip(shin).map(|(a, b)| a.cross(&b));
+        let axis = axis.filter(|it| it.norm() > 0.2);
+        axis.map_or(0.0, |it| it.dot(&left))
+    };
+    LEGS.into_iter().map(of_leg).sum()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

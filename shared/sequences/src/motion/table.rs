@@ -1,0 +1,164 @@
+//! How the markers of a file become joints.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use skeleton::PARSE14;
+
+use super::MotionError;
+
+/// Names of the tables that Parallax knows; they stand in `configs/markers`.
+pub const PRESETS: [&str; 4] = ["cmu", "pose2sim", "parallax", "optitrack36"];
+
+const TEXTS: [&str; 4] = [
+    include_str!("../../../../configs/markers/cmu.toml"),
+    include_str!("../../../../configs/markers/pose2sim.toml"),
+    include_str!("../../../../configs/markers/parallax.toml"),
+    include_str!("../../../../configs/markers/optitrack36.toml"),
+];
+
+const TOES: [&str; 2] = ["right toes", "left toes"];
+
+/// How the markers of a file become joints: sums of markers with weights that add up to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarkerTable {
+    up: Axis,
+    unit_metres: Option<f64>,
+    joints: BTreeMap<String, Vec<(String, f64)>>,
+}
+
+/// The file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    /// The axis of the motion file that points up.
+    up: Axis,
+    /// What the motion file counts in, if it does not say so, or is wrong.
+    #[serde(default)]
+    unit: Option<String>,
+    joints: BTreeMap<String, Markers>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "a list of markers, or markers with weights")]
+enum Markers {
+    Mean(Vec<String>),
+    Sum(BTreeMap<String, f64>),
+}
+
+impl MarkerTable {
+    /// One of [`PRESETS`].
+    pub fn preset(name: &str) -> Option<Self> {
+        let place = PRESETS.iter().position(|it| *it == name)?;
+        Self::parse(TEXTS[place]).ok()
+    }
+
+    /// Reads the file of a table.
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError::Io`], [`MotionError::Table`].
+    pub fn read(path: &Path) -> Result<Self, MotionError> {
+        let text = std::fs::read_to_string(path).map_err(|source| MotionError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text).map_err(|what| MotionError::Table {
+            path: path.to_owned(),
+            what,
+        })
+    }
+
+    /// Reads the text of a table; the error says what is wrong with it.
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let file: File = toml::from_str(text).map_err(|it| it.to_string())?;
+        let unit_metres = match &file.unit {
+            None => None,
+            Some(unit) => Some(metres_per(unit).ok_or(format!("unit {unit:?} is not known"))?),
+        };
+        let known = PARSE14.joints.iter().map(|it| it.name);
+        let missing = known.clone().find(|it| !file.joints.contains_key(*it));
+        if let Some(joint) = missing {
+            return Err(format!("nothing makes the joint {joint:?}"));
+        }
+        let mut joints = BTreeMap::new();
+        for (joint, markers) in file.joints {
+            if !known.clone().chain(TOES).any(|it| it == joint) {
+                return Err(format!("{joint:?} is no joint"));
+            }
+            let weights = weights(markers).map_err(|it| format!("{joint:?}: {it}"))?;
+            joints.insert(joint, weights);
+        }
+        if joints.contains_key(TOES[0]) != joints.contains_key(TOES[1]) {
+            return Err("toes of one foot only".to_owned());
+        }
+        Ok(Self {
+            up: file.up,
+            unit_metres,
+            joints,
+        })
+    }
+
+    /// The markers of a joint with their weights.
+    pub(super) fn joint(&self, name: &str) -> Option<&[(String, f64)]> {
+        self.joints.get(name).map(Vec::as_slice)
+    }
+
+    /// The markers that it needs, some several times.
+    pub(super) fn markers(&self) -> impl Iterator<Item = &str> {
+        self.joints.values().flatten().map(|it| it.0.as_str())
+    }
+
+    pub(super) fn has_toes(&self) -> bool {
+        self.joints.contains_key(TOES[0])
+    }
+
+    pub(super) fn unit_metres(&self) -> Option<f64> {
+        self.unit_metres
+    }
+
+    /// A point of the file with z up: axes change places in a circle, so that left stays left.
+    pub(super) fn upright(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self.up {
+            Axis::X => [y, z, x],
+            Axis::Y => [z, x, y],
+            Axis::Z => [x, y, z],
+        }
+    }
+}
+
+fn weights(markers: Markers) -> Result<Vec<(String, f64)>, String> {
+    let weights: Vec<(String, f64)> = match markers {
+        Markers::Mean(names) => {
+            let share = 1.0 / names.len() as f64;
+            names.into_iter().map(|it| (it, share)).collect()
+        }
+        Markers::Sum(weights) => weights.into_iter().collect(),
+    };
+    let sum: f64 = weights.iter().map(|it| it.1).sum();
+    if (sum - 1.0).abs() > 1e-6 || weights.iter().any(|it| !it.1.is_finite()) {
+        return Err(format!("the weights add up to {sum}, not to 1"));
+    }
+    Ok(weights)
+}
+
+/// Metres in a unit of that name.
+pub(super) fn metres_per(unit: &str) -> Option<f64> {
+    match unit.trim().to_ascii_lowercase().as_str() {
+        "mm" => Some(0.001),
+        "cm" => Some(0.01),
+        "dm" => Some(0.1),
+        "m" => Some(1.0),
+        "in" => Some(0.0254),
+        _ => None,
+    }
+}
