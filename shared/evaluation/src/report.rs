@@ -72,6 +72,14 @@ impl Report {
         }
     }
 
+    /// Sticks of both sides in one column each, as they are published, with their names.
+    pub fn limbs(&self, rule: PcpRule) -> [(&'static str, Pcp); COLUMNS.len()] {
+        COLUMNS.map(|(name, sticks)| {
+            let sticks = sticks.iter().map(|&it| self.sticks(rule)[it]);
+            (name, sum(sticks))
+        })
+    }
+
     /// All joints together, which is the mean over [`PCK_GROUPS`].
     ///
     /// * `share`: index into [`PCK_SHARES`].
@@ -127,8 +135,7 @@ impl fmt::Display for Report {
         write!(out, " {:>8}", "total")?;
         for (rule, name) in RULES.into_iter().zip(["mean of ends", "both ends"]) {
             write!(out, "\n{name:<18}")?;
-            for (_, sticks) in COLUMNS {
-                let of_both = sum(sticks.iter().map(|&it| self.sticks(rule)[it]));
+            for (_, of_both) in self.limbs(rule) {
                 write!(out, " {:>8.1}", of_both.percent())?;
             }
             write!(out, " {:>8.1}", self.pcp(rule).percent())?;

@@ -5,6 +5,8 @@
 //! it with the truth, and [`Summary`] adds up: as JSON, as one page of HTML ([`html`]) and as LaTeX
 //! ([`latex`]), the paper's own numbers beside ours ([`published()`]).
 //!
+//! [`Pictures`] are single pictures of annotated people, with a page of their own ([`pictures_html`]).
+//!
 //! Solving and scoring are apart: other thresholds and other truths need no second run.
 #![forbid(unsafe_code)]
 
@@ -19,15 +21,17 @@ mod record;
 mod score;
 mod summary;
 
+mod pictures;
 mod published;
 mod report;
 
 pub use bench::{Bench, Expectation, Expected, Look, Setup, Trial};
 pub use film::{Film, FilmError, FilmSettings};
+pub use pictures::{Intervals, Judged, Pictures};
 pub use predicted::{Judgement, Predicted, judge};
 pub use published::published;
 pub use record::{Found, Header, Record, RecordError, read_records};
-pub use report::{Page, html, latex};
+pub use report::{Page, html, latex, pictures_html, pictures_latex};
 pub use score::{FrameScore, Joints, score, seen};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
 pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};

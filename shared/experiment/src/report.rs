@@ -2,9 +2,11 @@
 
 mod figure;
 mod page;
+mod pictures;
 mod table;
 
 pub use page::{Page, html};
+pub use pictures::{pictures_html, pictures_latex};
 pub use table::latex;
 
 /// A number with so many digits after the point, or a dash.

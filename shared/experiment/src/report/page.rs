@@ -16,7 +16,7 @@ pub struct Page<'a> {
     pub about: &'a [(String, String)],
 }
 
-const STYLE: &str = "body{font:14px/1.45 system-ui,sans-serif;margin:2em auto;max-width:1100px;padding:0 1em;color:#222}\
+pub(super) const STYLE: &str = "body{font:14px/1.45 system-ui,sans-serif;margin:2em auto;max-width:1100px;padding:0 1em;color:#222}\
 table{border-collapse:collapse;margin:1em 0}td,th{padding:.25em .7em;text-align:right;border-bottom:1px solid #ddd}\
 td:first-child,th:first-child,.name{text-align:left}small{color:#666}svg text{font:11px system-ui,sans-serif;fill:#444}\
 .grid{stroke:#ddd}.mid{text-anchor:middle}.end{text-anchor:end}.scroll{overflow-x:auto}\
@@ -28,18 +28,8 @@ pub fn html(page: &Page<'_>) -> String {
     let mut out = String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
     out.push_str("<meta name=\"viewport\" content=\"width=device-width\">\n<title>Evaluation</title>\n<style>");
     out.push_str(STYLE);
-    out.push_str("</style>\n<h1>Evaluation</h1>\n<table>\n");
-    for (key, value) in page.about {
-        put(
-            &mut out,
-            format_args!(
-                "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-                escape(key),
-                escape(value)
-            ),
-        );
-    }
-    out.push_str("</table>\n");
+    out.push_str("</style>\n<h1>Evaluation</h1>\n");
+    about_table(&mut out, page.about);
     out.push_str("<p class=\"key\">");
     for (version, title) in titles.iter().enumerate() {
         put(
@@ -69,6 +59,22 @@ pub fn html(page: &Page<'_>) -> String {
     predictions(&mut out, page.summary);
     out.push_str("</html>\n");
     out
+}
+
+/// What was run: key and value.
+pub(super) fn about_table(out: &mut String, about: &[(String, String)]) {
+    out.push_str("<table>\n");
+    for (key, value) in about {
+        put(
+            out,
+            format_args!(
+                "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
+                escape(key),
+                escape(value)
+            ),
+        );
+    }
+    out.push_str("</table>\n");
 }
 
 /// The paper's main tables: PCP3D by group, and what was published.
@@ -226,6 +232,6 @@ fn figures(out: &mut String, group: &Group, titles: &[String]) {
     }
 }
 
-fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
+pub(super) fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
     out.push_str(&std::fmt::format(text));
 }

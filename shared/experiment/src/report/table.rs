@@ -69,7 +69,7 @@ fn cells(group: &Group, versions: &[Version]) -> Vec<String> {
     versions.iter().zip(&group.versions).map(cell).collect()
 }
 
-fn begin(out: &mut String, caption: &str, n_columns: usize) {
+pub(super) fn begin(out: &mut String, caption: &str, n_columns: usize) {
     let columns = "c".repeat(n_columns);
     let lines = [
         "\\begin{table}".to_owned(),
@@ -80,16 +80,16 @@ fn begin(out: &mut String, caption: &str, n_columns: usize) {
     out.push_str(&lines.join("\n"));
 }
 
-fn end(out: &mut String) {
+pub(super) fn end(out: &mut String) {
     out.push_str("\\hline\n\\end{tabular}\n\\end{table}\n");
 }
 
-fn line(out: &mut String, cells: &[String]) {
+pub(super) fn line(out: &mut String, cells: &[String]) {
     out.push_str(&cells.join(" & "));
     out.push_str(" \\\\\n");
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let escape = |it: char| match it {
         '_' | '&' | '%' | '#' | '$' | '{' | '}' => format!("\\{it}"),
         it => it.to_string(),

@@ -1,0 +1,219 @@
+//! Single pictures of annotated people: the numbers of PARSE and LSP, on one page as those of sequences.
+
+use evaluation::{Bootstrap, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate};
+
+use crate::Joints;
+
+/// What was found on the pictures of one data set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pictures {
+    /// Name of the data set.
+    pub name: String,
+    /// People who could not be used.
+    pub n_left_out: usize,
+    /// The true joints, a person each.
+    pub truths: Vec<Joints>,
+    /// For each person what [`Judged`] counts; `None` where nothing was found.
+    pub found: Vec<[Option<Joints>; 2]>,
+}
+
+/// Which detection of a picture is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judged {
+    /// The best one of the picture, which is how PCP is published.
+    Best,
+    /// The best one that covers the person, which is how PCK is.
+    OnPerson,
+}
+
+impl Judged {
+    /// Both, in the order of [`Pictures::found`].
+    pub const ALL: [Self; 2] = [Self::Best, Self::OnPerson];
+
+    /// In words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Best => "best detection of every image",
+            Self::OnPerson => "best detection on the person",
+        }
+    }
+}
+
+/// Confidence intervals over pictures, percent; `None` without a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Intervals {
+    /// Of PCP by the mean of both ends, and by both ends.
+    pub pcp: [Option<[f64; 2]>; 2],
+    /// Of PCK at each of [`PCK_SHARES`].
+    pub pck: [Option<[f64; 2]>; 2],
+}
+
+impl Pictures {
+    /// The numbers of one kind of detection.
+    pub fn report(&self, which: Judged) -> Report {
+        evaluate(self.pairs(which))
+    }
+
+    /// How sure they are: pictures are drawn again.
+    pub fn intervals(&self, which: Judged, bootstrap: &Bootstrap) -> Intervals {
+        let each: Vec<Report> = self.pairs(which).map(|it| evaluate([it])).collect();
+        let over = |count: &dyn Fn(&Report) -> Pcp| {
+            let share = |it: &Report| {
+                let count = count(it);
+                Share {
+                    sum: 100.0 * count.correct as f64,
+                    n: count.total as f64,
+                }
+            };
+            bootstrap.interval(&each.iter().map(share).collect::<Vec<_>>())
+        };
+        Intervals {
+            pcp: RULES.map(|(rule, _)| over(&|it| it.pcp(rule))),
+            pck: [0, 1].map(|share| over(&|it| it.pck(share))),
+        }
+    }
+
+    fn pairs(&self, which: Judged) -> impl Iterator<Item = (Option<&Joints>, &Joints)> {
+        let place = which as usize;
+        let found = self.found.iter().map(move |it| it[place].as_ref());
+        found.zip(&self.truths)
+    }
+}
+
+/// The rules of PCP, and what they are called.
+const RULES: [(PcpRule, &str); 2] = [
+    (PcpRule::MeanOfEnds, "mean of ends"),
+    (PcpRule::BothEnds, "both ends"),
+];
+
+/// A table: its title, the names of its columns, and its rows.
+pub(crate) struct Table {
+    pub(crate) title: String,
+    pub(crate) columns: Vec<String>,
+    pub(crate) rows: Vec<(String, Vec<f64>, Option<[f64; 2]>)>,
+}
+
+/// The tables of a data set: PCP and PCK of either kind of detection, percent.
+pub(crate) fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for which in Judged::ALL {
+        let report = set.report(which);
+        let intervals = set.intervals(which, bootstrap);
+        let title = |what: &str| {
+            let (n, missed) = (report.n_images(), report.n_missed());
+            let judged = which.title();
+            format!(
+                "{}: {what}, {judged}; {n} images, nothing found on {missed}",
+                set.name
+            )
+        };
+        let limbs = report.limbs(PcpRule::MeanOfEnds).map(|it| it.0);
+        let by_rule = RULES
+            .iter()
+            .zip(intervals.pcp)
+            .map(|((rule, name), interval)| {
+                let mut row: Vec<f64> = report
+                    .limbs(*rule)
+                    .iter()
+                    .map(|it| it.1.percent())
+                    .collect();
+                row.push(report.pcp(*rule).percent());
+                ((*name).to_owned(), row, interval)
+            });
+        tables.push(Table {
+            title: title("PCP, %"),
+            columns: columns(limbs.into_iter(), "total"),
+            rows: by_rule.collect(),
+        });
+        let by_share = PCK_SHARES.iter().enumerate().map(|(share, of_size)| {
+            let mut row: Vec<f64> = report.groups(share).iter().map(Pcp::percent).collect();
+            row.push(report.pck(share).percent());
+            (
+                format!("within {of_size} of size"),
+                row,
+                intervals.pck[share],
+            )
+        });
+        tables.push(Table {
+            title: title("PCK, %"),
+            columns: columns(PCK_GROUPS.iter().map(|it| it.0), "mean"),
+            rows: by_share.collect(),
+        });
+    }
+    tables
+}
+
+fn columns<'a>(names: impl Iterator<Item = &'a str>, last: &'a str) -> Vec<String> {
+    names.chain([last]).map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{pictures_html, pictures_latex};
+
+    fn person(x: f64) -> Joints {
+        core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64])
+    }
+
+    /// Two of three pictures have their person, of whom one is found elsewhere by the best detection.
+    fn pictures() -> Pictures {
+        let (here, there) = (Some(person(0.0)), Some(person(500.0)));
+        Pictures {
+            name: "parse & co".to_owned(),
+            n_left_out: 1,
+            truths: vec![person(0.0); 3],
+            found: vec![[here, here], [there, here], [None, None]],
+        }
+    }
+
+    #[test]
+    fn both_kinds_of_detections_are_counted_apart() {
+        let total = |which| pictures().report(which).pck(0).percent().round();
+        assert_eq!(total(Judged::Best), 33.0);
+        assert_eq!(total(Judged::OnPerson), 67.0);
+    }
+
+    #[test]
+    fn intervals_hold_the_number_and_have_no_width_where_all_are_alike() {
+        let bootstrap = Bootstrap::default();
+        let it = pictures().intervals(Judged::OnPerson, &bootstrap);
+        let [low, high] = it.pcp[0].unwrap();
+        assert!(low < 66.0 && 67.0 < high, "{low} {high}");
+        let one = Pictures {
+            truths: vec![person(0.0); 9],
+            found: vec![[Some(person(0.0)); 2]; 9],
+            ..pictures()
+        };
+        let it = one.intervals(Judged::Best, &bootstrap);
+        assert_eq!((it.pcp[1], it.pck[1]), (Some([100.0; 2]), Some([100.0; 2])));
+        let none = Pictures {
+            truths: Vec::new(),
+            found: Vec::new(),
+            ..pictures()
+        };
+        assert_eq!(none.intervals(Judged::Best, &bootstrap).pcp, [None; 2]);
+    }
+
+    #[test]
+    fn the_page_and_the_tables_say_every_number_and_escape_names() {
+        let (sets, bootstrap) = ([pictures()], Bootstrap::default());
+        let about = [("model".to_owned(), "<m>".to_owned())];
+        let page = pictures_html(&sets, &about, &bootstrap);
+        for text in [
+            "parse &amp; co",
+            "&lt;m&gt;",
+            "33.3",
+            "66.7",
+            "within 0.2 of size",
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+        let tex = pictures_latex(&sets, &bootstrap);
+        assert_eq!(tex.matches("\\begin{table}").count(), 4);
+        assert!(
+            tex.contains("parse \\& co") && tex.contains("66.7"),
+            "{tex}"
+        );
+    }
+}
