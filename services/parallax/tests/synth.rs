@@ -1,4 +1,5 @@
 //! Sequences of people who do not exist, from the command to the last process of a deployment.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
 
@@ -220,6 +221,107 @@ fn several_sequences_have_a_folder_each_and_one_list_of_people() {
             .iter()
             .filter(|it| matches!(it.fault, datasets::Fault::Image(_)));
         assert_eq!(pictures.count(), 0, "every picture is there");
+    }
+}
+
+/// The joints of a sequence as a TRC file has them, y up.
+fn trc(case: &Case, folder: &str, rate: u32) -> String {
+    let names = skeleton::PARSE14.joints.iter();
+    let names: Vec<String> = names.map(|it| it.name.replace(' ', "_")).collect();
+    let rows = truth(case, folder).1.into_iter().map(|frame| {
+        let cells = frame.joints.iter().flat_map(|[x, y, z]| [y, z, x]);
+        let cells: Vec<String> = cells.map(f64::to_string).collect();
+        format!(
+            "{}\t{}\t{}\n",
+            frame.frame + 1,
+            frame.seconds,
+            cells.join("\t")
+        )
+    });
+    let (n, names) = (names.len(), names.join("\t\t\t"));
+    let head = format!("a\nDataRate\tNumMarkers\tUnits\n{rate}\t{n}\tm\nFrame#\tTime\t{names}\n\n");
+    head + &rows.collect::<String>()
+}
+
+fn truth(case: &Case, folder: &str) -> (Header, Vec<Frame>) {
+    let text = fs::read_to_string(case.path(folder).join("truth.jsonl")).unwrap();
+    let mut lines = text.lines();
+    let header = Header::parse(lines.next().unwrap()).unwrap();
+    let frames = lines.map(|it| Frame::parse(it, &header).unwrap()).collect();
+    (header, frames)
+}
+
+#[test]
+fn what_was_recorded_is_done_by_somebody_else() {
+    let case = case("synth-motion");
+    let first = ["first", "--live", "--rig", "ring:2", "--actions", "boxing"];
+    let ended = synth(
+        &case,
+        &[&first[..], &["--frames", "5", "--rate", "10"]].concat(),
+    );
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.write("My take.trc", trc(&case, "first", 10));
+    let second = [
+        "second",
+        "--motion",
+        "My take.trc",
+        "--subjects",
+        "2",
+        "--no-masks",
+    ];
+    let small = ["--rig", "ring:2", "--rate", "10", "--model", "model.plx"];
+    let ended = synth(&case, &[&second[..], &small].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let (header, got) = truth(&case, "second");
+    assert_eq!((header.subject, header.action.as_str()), (2, "my-take"));
+    let recorded = truth(&case, "first").1;
+    assert_eq!(got.len(), 5, "as many as were recorded");
+    assert!(case.path("second/cameras/c2/000004.png").is_file());
+    for (got, recorded) in got.iter().zip(&recorded) {
+        for [from, to] in [
+            [2, 1],
+            [1, 0],
+            [3, 4],
+            [4, 5],
+            [8, 7],
+            [7, 6],
+            [9, 10],
+            [10, 11],
+        ] {
+            let along = |it: &Frame| {
+                let [a, b] = [from, to].map(|joint| nalgebra::Vector3::from(it.joints[joint]));
+                b - a
+            };
+            let angle = along(got).angle(&along(recorded));
+            assert!(angle < 1e-6, "{from} to {to}: {angle}");
+        }
+    }
+}
+
+#[test]
+fn a_recording_that_cannot_be_done_is_refused_with_the_right_code() {
+    let case = case("synth-motion-refused");
+    let first = ["first", "--live", "--rig", "ring:2", "--frames", "5"];
+    let ended = synth(&case, &[&first[..], &["--rate", "10"]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.write("My take.trc", trc(&case, "first", 10));
+    let small = ["--motion", "My take.trc", "--rate", "10", "--rig", "ring:2"];
+    for (more, code, words) in [
+        (&["--frames", "6"][..], 2, "ends after 5"),
+        (&["--live"], 2, "cannot be used with"),
+        (&["--actions", "boxing"], 2, "cannot be used with"),
+        (&["--motion-frames", "2-9"], 2, "not among its frames 1-5"),
+        (&["--markers", "cmu"], 4, "no marker"),
+        (&["--markers", "absent.toml"], 4, "absent.toml"),
+    ] {
+        let ended = synth(&case, &[&["third"], &small[..], more].concat());
+        assert_eq!(
+            ended.status.code(),
+            Some(code),
+            "{more:?}: {}",
+            ended.stderr
+        );
+        assert!(ended.stderr.contains(words), "{more:?}: {}", ended.stderr);
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod chosen;
 mod files;
+mod motion;
 mod sequence;
 
 use std::path::{Path, PathBuf};
@@ -12,13 +13,14 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
-use scene::{Action, Flaws, RigChoice, Settings};
+use scene::{Action, Flaws, Recording, RigChoice, Settings};
 use serde_json::{Value, json};
 
 use crate::cli::Globals;
 use crate::{inputs, output};
 pub(crate) use chosen::rate;
 use chosen::{actions, rig, subjects};
+use motion::MotionArguments;
 use sequence::{People, Sequence};
 
 const HELP: &str = "\
@@ -34,6 +36,11 @@ shape, clothes, manners. The seed chooses the performance, the room and the lamp
 RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]] (metres; 4.2 and 1.5 if not \
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
+With --motion the subjects do what a C3D or TRC file has: limbs point as they did, lengths are those of the subject, \
+and the way is moved to the middle of the room. No joint is kept within limits. A table (--markers) says how markers \
+become joints; gaps are bridged up to --motion-gap seconds, longer ones are refused by their frames, and so is what no \
+person does: legs of another length, a head below the feet, knees that fold forward.
+
 With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
 from which each capture process makes its own pictures while it runs, and the truth is that of the same pictures.
 
@@ -48,6 +55,7 @@ Examples:
     parallax synth out/set --subjects 1-20 --actions all --rate 2 --frames 10 --rig ring:4:6.5 --format jpg
     parallax model judge person.mat out/set/people-as-seen.jsonl
     parallax synth out/bad --noise 8 --blur 1 --desync 0.04 --drop 0.05 --calibration-degrees 1
+    parallax synth out/punch --motion 02_05.c3d --motion-frames 1-600 --rig umpm
     parallax synth out/live --live --frames 900 --rig umpm --actions gestures";
 
 /// How pictures are stored.
@@ -77,9 +85,9 @@ pub(crate) struct Arguments {
     /// Seed of the performance, the room and the lamps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Frames of every camera.
-    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    frames: u64,
+    /// Frames of every camera; 60, or as many as were recorded, if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    frames: Option<u64>,
     /// Frames a second; few make pictures that differ.
     #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = chosen::rate)]
     rate: f64,
@@ -98,6 +106,9 @@ pub(crate) struct Arguments {
     /// Write no pictures: cameras of the deployment make them while it runs.
     #[arg(long)]
     live: bool,
+    /// What was recorded.
+    #[command(flatten)]
+    motion: MotionArguments,
     /// What is wrong with the cameras.
     #[command(flatten)]
     flaws: FlawArguments,
@@ -160,10 +171,62 @@ impl FlawArguments {
     }
 }
 
+/// Frames of every camera where nothing is said.
+const N_FRAMES: u64 = 60;
+
+/// What all sequences of one command share.
+struct Job<'a> {
+    arguments: &'a Arguments,
+    flaws: Flaws,
+    recording: Option<Recording>,
+    /// Of every camera.
+    n_frames: u64,
+}
+
+impl Job<'_> {
+    /// The actions, one of which stands for what was recorded.
+    fn actions(&self) -> &[Action] {
+        match self.recording {
+            Some(_) => &[Action::Walking],
+            None => &self.arguments.actions,
+        }
+    }
+
+    fn n_sequences(&self) -> usize {
+        self.arguments.subjects.len() * self.actions().len()
+    }
+
+    /// The name of a sequence.
+    fn name(&self, subject: u64, action: Action) -> String {
+        let recorded = self.recording.as_ref().map(|it| it.name.as_str());
+        format!("s{subject}-{}", recorded.unwrap_or(action.name()))
+    }
+
+    fn settings(&self, subject: u64, action: Action) -> Settings {
+        let arguments = self.arguments;
+        Settings {
+            rig: absolute(&arguments.rig),
+            subject,
+            action,
+            seed: arguments.seed,
+            rate_hz: arguments.rate,
+            backdrop: arguments.backdrop.as_deref().map(absolute_path),
+            flaws: self.flaws,
+        }
+    }
+}
+
 /// Writes all sequences.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let flaws = arguments.flaws.flaws()?;
     arguments.rig.rig().map_err(chosen::no_rig)?;
+    let recording = arguments.motion.recording()?;
+    let asked = arguments.frames;
+    let job = Job {
+        arguments,
+        flaws: arguments.flaws.flaws()?,
+        n_frames: motion::n_frames(asked, arguments.rate, recording.as_ref(), N_FRAMES)?,
+        recording,
+    };
     begin(&arguments.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let threads = arguments.threads.map_or(0, usize::from);
@@ -172,29 +235,21 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .thread_name(|it| format!("synth-{it}"))
         .build()
         .or_fail(ExitKind::Run)?;
-    let bar = bar(arguments, globals)?;
+    let bar = bar(&job, globals)?;
     let begin = Instant::now();
-    let is_one = arguments.subjects.len() * arguments.actions.len() == 1;
+    let is_one = job.n_sequences() == 1;
     let mut all = People::default();
     let mut sequences = Vec::new();
     for &subject in &arguments.subjects {
-        for &action in &arguments.actions {
-            let name = format!("s{subject}-{}", action.name());
+        for &action in job.actions() {
+            let name = job.name(subject, action);
             let folder = if is_one {
                 arguments.out.clone()
             } else {
                 arguments.out.join(&name)
             };
-            let settings = Settings {
-                rig: absolute(&arguments.rig),
-                subject,
-                action,
-                seed: arguments.seed,
-                rate_hz: arguments.rate,
-                backdrop: arguments.backdrop.as_deref().map(absolute_path),
-                flaws,
-            };
-            let sequence = Sequence::new(arguments, &settings, &folder, &name)?;
+            let settings = job.settings(subject, action);
+            let sequence = Sequence::new(&job, &settings, &folder, &name)?;
             let people = pool.install(|| sequence.write(&stop, &bar))?;
             sequences.push(report(&sequence, &people));
             people.write(&folder)?;
@@ -205,12 +260,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if !is_one {
         all.write(&arguments.out)?;
     }
-    tell(
-        arguments,
-        globals,
-        &sequences,
-        begin.elapsed().as_secs_f64(),
-    )?;
+    let seconds = begin.elapsed().as_secs_f64();
+    tell(arguments, globals, &sequences, seconds)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -239,13 +290,13 @@ fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-fn bar(arguments: &Arguments, globals: Globals) -> Result<ProgressBar, Failure> {
-    let rig = arguments.rig.rig().map_err(chosen::no_rig)?;
-    let n = arguments.subjects.len() * arguments.actions.len() * rig.cameras().len();
+fn bar(job: &Job<'_>, globals: Globals) -> Result<ProgressBar, Failure> {
+    let rig = job.arguments.rig.rig().map_err(chosen::no_rig)?;
+    let n = job.n_sequences() * rig.cameras().len();
     let bar = if globals.quiet || !output::is_lively() {
         ProgressBar::hidden()
     } else {
-        ProgressBar::new(n as u64 * arguments.frames)
+        ProgressBar::new(n as u64 * job.n_frames)
     };
     let style = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(style) {
@@ -258,7 +309,7 @@ fn report(sequence: &Sequence<'_>, people: &People) -> Value {
     json!({
         "folder": sequence.folder(),
         "subject": sequence.settings().subject,
-        "action": sequence.settings().action.name(),
+        "action": sequence.action(),
         "seed": sequence.settings().seed,
         "pictures": sequence.n_pictures(),
         "people": people.len(),

@@ -86,13 +86,22 @@ pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     Ok(())
 }
 
+/// What a deployment says besides what the scene does.
+pub(super) struct Deployed<'a> {
+    /// Of the sequence.
+    pub(super) name: &'a str,
+    pub(super) arguments: &'a Arguments,
+    /// Of every camera.
+    pub(super) n_frames: u64,
+}
+
 /// Writes the deployment.
 pub(super) fn deployment(
     folder: &Path,
-    name: &str,
-    arguments: &Arguments,
+    deployed: &Deployed<'_>,
     scene: &Scene,
 ) -> Result<(), Failure> {
+    let (name, arguments) = (deployed.name, deployed.arguments);
     let settings = scene.settings();
     let quoted = |it: &str| toml::Value::from(it).to_string();
     let model = arguments.model.as_deref().map_or(String::new(), |it| {
@@ -104,7 +113,7 @@ pub(super) fn deployment(
         "# Written by `parallax synth`: subject {}, {}, seed {seed}. The truth is in truth.jsonl.\n\n\
          name = {}\nrig = \"rig.toml\"\n{model}output = \"out\"\n",
         settings.subject,
-        settings.action.name(),
+        scene.action(),
         quoted(&format!("synth-{name}-{seed}")),
     );
     for camera in scene.rig().cameras() {
@@ -112,7 +121,7 @@ pub(super) fn deployment(
             let address = Address {
                 settings: settings.clone(),
                 camera: camera.name.clone(),
-                n_frames: arguments.frames,
+                n_frames: deployed.n_frames,
             };
             address.to_string()
         } else {

@@ -10,7 +10,7 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::truth::{Frame, View as Seen};
 use scene::{Scene, SceneError, Settings, View};
 
-use super::{Arguments, Shared, files};
+use super::{Arguments, Job, Shared, files};
 use crate::inputs;
 
 /// Frames that one thread makes one after the other, of one camera.
@@ -20,6 +20,8 @@ const CHUNK: u64 = 8;
 #[derive(Debug)]
 pub(super) struct Sequence<'a> {
     arguments: &'a Arguments,
+    /// Of every camera.
+    n_frames: u64,
     scene: Shared,
     folder: PathBuf,
     name: String,
@@ -28,15 +30,20 @@ pub(super) struct Sequence<'a> {
 impl<'a> Sequence<'a> {
     /// Puts the scene together and makes the folders.
     pub(super) fn new(
-        arguments: &'a Arguments,
+        job: &Job<'a>,
         settings: &Settings,
         folder: &Path,
         name: &str,
     ) -> Result<Self, Failure> {
-        let scene = Arc::new(Scene::new(settings).map_err(failed)?);
+        let arguments = job.arguments;
+        let scene = match &job.recording {
+            Some(recording) => Scene::of_recording(settings, recording),
+            None => Scene::new(settings),
+        };
         let it = Self {
             arguments,
-            scene,
+            n_frames: job.n_frames,
+            scene: Arc::new(scene.map_err(failed)?),
             folder: folder.to_owned(),
             name: name.to_owned(),
         };
@@ -59,6 +66,10 @@ impl<'a> Sequence<'a> {
         self.scene.settings()
     }
 
+    pub(super) fn action(&self) -> &str {
+        self.scene.action()
+    }
+
     pub(super) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -68,7 +79,7 @@ impl<'a> Sequence<'a> {
     }
 
     pub(super) fn n_pictures(&self) -> u64 {
-        self.arguments.frames * self.n_cameras() as u64
+        self.n_frames * self.n_cameras() as u64
     }
 
     /// Writes everything but the annotated people, which are handed back.
@@ -79,7 +90,7 @@ impl<'a> Sequence<'a> {
             .map(|it| View::new(&self.scene, it))
             .collect();
         let views = views.map_err(failed)?;
-        let n_chunks = self.arguments.frames.div_ceil(CHUNK);
+        let n_chunks = self.n_frames.div_ceil(CHUNK);
         let tasks: Vec<(usize, u64)> = (0..n_chunks)
             .flat_map(|chunk| (0..views.len()).map(move |camera| (camera, chunk)))
             .collect();
@@ -87,7 +98,7 @@ impl<'a> Sequence<'a> {
             .par_iter()
             .map(|&(camera, chunk)| {
                 let mut view = views[camera].clone();
-                let last = (CHUNK * (chunk + 1)).min(self.arguments.frames);
+                let last = (CHUNK * (chunk + 1)).min(self.n_frames);
                 (CHUNK * chunk..last)
                     .map(|frame| {
                         if stop.is_requested() {
@@ -107,7 +118,12 @@ impl<'a> Sequence<'a> {
             &frames,
         )?;
         files::rigs(&self.folder, &self.scene)?;
-        files::deployment(&self.folder, &self.name, self.arguments, &self.scene)?;
+        let deployed = files::Deployed {
+            name: &self.name,
+            arguments: self.arguments,
+            n_frames: self.n_frames,
+        };
+        files::deployment(&self.folder, &deployed, &self.scene)?;
         Ok(self.people(&frames))
     }
 
@@ -142,7 +158,7 @@ impl<'a> Sequence<'a> {
                 views: (0..n_cameras).map(of_camera).collect(),
             }
         };
-        (0..self.arguments.frames).map(frame).collect()
+        (0..self.n_frames).map(frame).collect()
     }
 
     /// Everybody who is in a picture; a picture that repeats the one before is no other.
