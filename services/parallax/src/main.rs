@@ -9,6 +9,7 @@ mod deployment;
 mod describe;
 mod exit;
 mod inputs;
+mod judged;
 mod live;
 mod output;
 mod plan;

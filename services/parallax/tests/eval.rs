@@ -73,6 +73,74 @@ fn poses(case: &Case) -> PathBuf {
     case.path("out/poses/planted-walk.jsonl")
 }
 
+/// The figure in three frames of each view, as annotated people.
+fn people(case: &Case) -> &'static str {
+    let mut lines = String::new();
+    for camera in planted::rig(3).cameras() {
+        for frame in 0..3 {
+            let at = planted::joints(frame).into_iter();
+            let at = at.map(|it| camera.project(&it.into()).unwrap());
+            let joints: Vec<[f64; 2]> = at.map(|it| [it.x, it.y]).collect();
+            let image = format!("{}/{frame:04}.png", camera.name);
+            let line = serde_json::json!({ "image": image, "joints": joints });
+            lines += &(line.to_string() + "\n");
+        }
+    }
+    case.write("people.jsonl", lines);
+    "people.jsonl"
+}
+
+#[test]
+fn single_pictures_are_judged_as_model_judge_does() {
+    let case = case(3, 3);
+    let people = people(&case);
+    let who = [people, "--only", "2-8", "--json"];
+    let judged = case.start(&[&["model", "judge", "model.plx"], &who[..]].concat());
+    let judged = judged.wait();
+    assert_eq!(judged.status.code(), Some(0), "{}", judged.stderr);
+    let judged: Value = serde_json::from_str(&judged.stdout).unwrap();
+    let more = ["eval", "--model", "model.plx", "--out", "out"];
+    let ended = case.start(&[&more, &who[..]].concat()).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let mut report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let got = &mut report["pictures"][0];
+    assert_eq!(got["name"], "people");
+    for which in ["best", "on_person"] {
+        let intervals = got[which]["intervals"].take();
+        got[which].as_object_mut().unwrap().remove("intervals");
+        assert_eq!(got[which], judged[which], "{which}");
+        let ends = intervals["pck"]["0.2"].as_array().unwrap();
+        let total = judged[which]["pck"]["0.2"]["total"].as_f64().unwrap();
+        assert!(ends[0].as_f64().unwrap() <= total && total <= ends[1].as_f64().unwrap());
+    }
+    assert_eq!(got["images"], judged["images"]);
+    let [page, json, tex] = &reports(&case)[..] else {
+        panic!("three reports")
+    };
+    assert!(page.contains("best detection on the person") && tex.contains("\\begin{tabular}"));
+    assert!(json.contains("\"intervals\""));
+    let found = fs::read_to_string(case.path("out/poses/people.jsonl")).unwrap();
+    assert_eq!(found.lines().count(), 7);
+}
+
+#[test]
+fn options_of_sequences_are_refused_for_single_pictures_and_the_other_way_round() {
+    let case = case(1, 1);
+    let people = people(&case);
+    for (words, expected) in [
+        (&[people, "--oracle"][..], "--oracle has no meaning"),
+        (&[people, "--resume"], "--resume has no meaning"),
+        (&[people, "walk.toml"], "not judged in one run"),
+        (&["walk.toml", "--only", "1"], "there are none"),
+        (&[people, people], "people is given twice"),
+    ] {
+        let words = [&["eval", "--model", "model.plx", "--out", "out"], words].concat();
+        let ended = case.start(&words).wait();
+        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+    }
+}
+
 #[test]
 fn a_report_holds_every_version_and_goes_on_where_it_was_cut_off() {
     let case = case(3, 3);

@@ -1,6 +1,7 @@
 //! `parallax eval`: the paper's evaluation on sequences whose joints are known.
 
 mod job;
+mod pictures;
 mod report;
 
 use std::fs;
@@ -9,12 +10,14 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 
 use clap::Args;
+use datasets::Selection;
 use experiment::{FilmSettings, Version};
 use fuse::Config;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence, SequenceError};
 use viewquality::Forecaster;
 
+use super::judge::selection;
 use crate::cli::Globals;
 use crate::inputs;
 use job::Job;
@@ -23,7 +26,7 @@ pub(super) use job::no_film;
 
 const HELP: &str = "\
 SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax synth`, or a description \
-(configs/sequences/). Every frame is solved on its own: once in every view, then by each version.
+(configs/sequences/); or single pictures (below). Every frame is solved on its own: once in every view, then by each version.
 
 Versions: fmp (every view alone, then triangulation), geometry, appearance (part types too), adaptive \
 (parts of large expected error switched off). They combine pairs of views by their mean, as the paper does; \
@@ -37,6 +40,10 @@ without any, a tenth of the person's size.
 
 --fuse FILE is the [fuse] section of a deployment: energy, alpha, beta, compatibility, tau, facing ...
 
+Single pictures of people with 14 joints (the folders of PARSE and LSP, JSON lines) are judged as `model judge` \
+does, with the same numbers: PCP and PCK of the best detection of a picture, and of the best one on the person, with \
+intervals; --only and --without choose among them. They and sequences are not judged in one run.
+
 OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
 --resume frames that are there are not solved again; other settings are refused. --json prints the report's \
 numbers.
@@ -46,6 +53,7 @@ Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a 
 
 Examples:
     parallax eval configs/sequences/pose2sim-balancing.toml --model parse.mat --size 272x480 --every 5 --out out/eval
+    parallax eval PARSE --only 101-200 --model parse.mat --out out/parse
     parallax eval HumanEva_I --model he.txt --fuse he.toml --sigma errors.csv --out out/humaneva --resume";
 
 /// What to evaluate, and how.
@@ -101,6 +109,12 @@ pub(crate) struct Arguments {
     /// Most frames of each sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
+    /// Single pictures: who is judged, everybody if not given.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    only: Option<Selection>,
+    /// Single pictures: who is left out.
+    #[arg(long, value_name = "SELECTION", value_parser = selection)]
+    without: Option<Selection>,
     /// Which part of each sequence: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
@@ -147,6 +161,9 @@ fn share(text: &str) -> Result<[f64; 2], String> {
 /// Evaluates.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    if are_pictures(arguments)? {
+        return pictures::run(arguments, &stop);
+    }
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;
@@ -202,6 +219,21 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             Err(Failure::new(ExitKind::Degraded, message))
         }
     }
+}
+
+/// Whether single pictures are to be judged; refuses them besides sequences.
+fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
+    let n = arguments.sequences.iter().filter(|it| pictures::is_one(it));
+    let n = n.count();
+    let selects = arguments.only.is_some() || arguments.without.is_some();
+    let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));
+    if n == 0 && selects {
+        return refuse("--only and --without choose single pictures, and there are none");
+    }
+    if n > 0 && n < arguments.sequences.len() {
+        return refuse("single pictures and sequences are not judged in one run");
+    }
+    Ok(n > 0)
 }
 
 fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
