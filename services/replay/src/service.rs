@@ -57,12 +57,9 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         .set_total(tracks.first().map_or(0, |it| it.entries.len() as u64));
     let speaker = Speaker::open(service, job, &tracks, &recording)?;
     speaker.wait_for_all();
-    let place = Place::of(service.bus());
-    let begin = if service.epoch() == 0 {
-        0
-    } else {
-        place.sent()
-    };
+    let mut place = Place::of(service.bus());
+    let noted = place.noted().filter(|_| service.epoch() > 0);
+    let [begin]: [u64; 1] = noted.unwrap_or([0]);
     let mut buffer = Vec::new();
     let mut end = None;
     for (nth, (line, entry)) in (0_u64..).zip(&order).skip(begin as usize) {
@@ -83,7 +80,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             continue;
         }
         speaker.say(*line, &message, &envelope)?;
-        if let Err(error) = place.note(nth + 1) {
+        if let Err(error) = place.note([nth + 1]) {
             tracing::debug!(%error, "cannot note the place in the recording");
         }
     }

@@ -1,6 +1,6 @@
 //! Where the time of one process goes, and what it has lost.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// Most rows of a [`Metrics`]: a wait for every view, and what is not of one view.
