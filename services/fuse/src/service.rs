@@ -8,13 +8,13 @@ use join::{Cadence, Joined, Joiner, Last, Push};
 use messages::{Cause, PairPose, Span, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
 use metrics::Passage;
 use multiview::ViewPlan;
-use pipeline::{Answer, FuseStep, Support, Views};
+use pipeline::{Answer, FuseStep, PairAnswer, Support, Views};
 use runtime::{
     Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
     now_nanos,
 };
 
-use wire::EvidenceView;
+use wire::{EvidenceView, Expected, WireError};
 
 use crate::evidence::Evidence;
 
@@ -108,7 +108,7 @@ struct Worker<'a> {
     poses: Vec<Subscriber<ViewPose>>,
     qualities: Vec<Subscriber<ViewQuality>>,
     /// By view; only those that a pair of this worker needs.
-    evidence: Vec<Option<Evidence>>,
+    evidence: Vec<Option<Evidence<'a>>>,
     publisher: Publisher<PairPose>,
     joiner: Joiner<Word>,
     /// The last expected errors of every view.
@@ -128,7 +128,7 @@ impl<'a> Worker<'a> {
             }
             let needed = job.pairs.iter().any(|it| it.1.contains(&view));
             evidence.push(if needed {
-                Some(Evidence::open(service, view, waiter)?)
+                Some(Evidence::open(service, view, job.frame_step, waiter)?)
             } else {
                 None
             });
@@ -162,8 +162,13 @@ impl<'a> Worker<'a> {
                 self.joiner.alive(view, now_nanos());
             }
             while let Some(message) = self.poses[view].receive()? {
-                let (stamp, status) = (message.stamp, message.status);
-                self.take(view, stamp, status, Word::Pose(Box::new(message)));
+                let plan = &self.job.plans[view];
+                let checked = self.wanted(view).check(&message.stamp, &message.timing);
+                let read = || wire::candidates_from_message(&message, plan.model(), plan.layout());
+                if self.accepts(checked.and_then(|()| read().map(drop)), "view-pose") {
+                    let (stamp, status) = (message.stamp, message.status);
+                    self.take(view, stamp, status, Word::Pose(Box::new(message)));
+                }
             }
         }
         for view in 0..self.qualities.len() {
@@ -171,18 +176,41 @@ impl<'a> Worker<'a> {
                 self.joiner.alive(n_views + view, now_nanos());
             }
             while let Some(message) = self.qualities[view].receive()? {
-                let (stamp, status) = (message.stamp, message.status);
-                let word = Word::Quality(Box::new(message));
-                self.take(n_views + view, stamp, status, word);
+                let n_parts = self.job.plans[view].model().n_parts();
+                let checked = self.wanted(view).check(&message.stamp, &message.timing);
+                let read = || expected_errors(&message, n_parts);
+                if self.accepts(checked.and_then(|()| read().map(drop)), "view-quality") {
+                    let (stamp, status) = (message.stamp, message.status);
+                    let word = Word::Quality(Box::new(message));
+                    self.take(n_views + view, stamp, status, word);
+                }
             }
         }
         Ok(())
     }
 
-    fn take(&mut self, input: usize, stamp: Stamp, status: Status, word: Word) {
-        if stamp.session != self.service.session() {
-            return;
+    /// What a view's messages are checked against.
+    fn wanted(&self, view: usize) -> Expected {
+        Expected {
+            session: self.service.session(),
+            view,
+            now_nanos: now_nanos(),
         }
+    }
+
+    /// Counts what is refused, before it can take the place of what is right.
+    fn accepts(&self, checked: Result<(), WireError>, topic: &str) -> bool {
+        checked
+            .inspect_err(|error| self.refuse(error, topic))
+            .is_ok()
+    }
+
+    fn refuse(&self, error: &WireError, topic: &str) {
+        let health = self.service.health();
+        health.refuse(error.refusal(), topic, error);
+    }
+
+    fn take(&mut self, input: usize, stamp: Stamp, status: Status, word: Word) {
         if status == Status::END {
             self.joiner.end(input);
             return;
@@ -197,8 +225,10 @@ impl<'a> Worker<'a> {
             self.expected
                 .keep(view, stamp.frame, captured_at, quality.clone());
         }
-        if self.joiner.push(input, stamp.frame, word, now_nanos()) == Push::Late {
-            self.service.health().dropped(Cause::Late, 1);
+        match self.joiner.push(input, stamp.frame, word, now_nanos()) {
+            Push::Taken => {}
+            Push::Late => self.service.health().dropped(Cause::Late, 1),
+            Push::Full => self.service.health().dropped(Cause::QueueFull, 1),
         }
     }
 
@@ -274,8 +304,7 @@ impl<'a> Worker<'a> {
                 }
                 _ => None,
             };
-            let message = wire::pair_to_message(views, answer.as_ref(), seen.views_present());
-            let message = message.or_fail(ExitKind::Run)?;
+            let message = self.message(views, answer.as_ref(), seen.views_present())?;
             let sent_at = self.send(seen, index, message, received_at_nanos)?;
             self.passed(seen, received_at_nanos, sent_at);
         }
@@ -339,6 +368,26 @@ impl<'a> Worker<'a> {
         Ok(message.timing.sent_at_nanos)
     }
 
+    /// The answer of a pair. Responses that are no numbers make an energy that is none: their sender is
+    /// to blame, and the frame is.
+    fn message(
+        &self,
+        views: [usize; 2],
+        answer: Option<&PairAnswer>,
+        views_present: u32,
+    ) -> Result<PairPose, Failure> {
+        let message = wire::pair_to_message(views, answer, views_present);
+        message.or_else(|error| {
+            self.refuse(&error, "evidence");
+            let nothing = wire::pair_to_message(views, None, views_present);
+            let nothing = nothing.or_fail(ExitKind::Run)?;
+            Ok(PairPose {
+                status: Status::BAD_INPUT,
+                ..nothing
+            })
+        })
+    }
+
     /// The evidence of a frame, by view.
     fn evidence_of(&self, frame: u64) -> Vec<Option<EvidenceView<'_>>> {
         let views = self.evidence.iter().zip(&self.job.plans);
@@ -357,10 +406,7 @@ impl<'a> Worker<'a> {
                     return None;
                 };
                 let read = wire::candidates_from_message(pose, plan.model(), plan.layout());
-                let candidates = read
-                    .inspect_err(|error| tracing::warn!(view, %error, "unreadable candidates"))
-                    .ok()
-                    .filter(|it| !it.is_empty())?;
+                let candidates = read.ok().filter(|it| !it.is_empty())?;
                 let mut answer = Answer {
                     candidates,
                     sigma_px: None,
@@ -397,10 +443,7 @@ impl<'a> Worker<'a> {
     /// Adds expected errors to an answer; `None` if there are none, or they cannot be read.
     fn expect(&self, answer: &mut Answer, view: usize, quality: &ViewQuality) -> Option<()> {
         let n_parts = self.job.plans[view].model().n_parts();
-        let read = wire::sigma_from_message(quality, n_parts)
-            .and_then(|sigma| Ok((sigma, wire::tau_from_message(quality, n_parts)?)))
-            .inspect_err(|error| tracing::warn!(view, %error, "unreadable errors"));
-        let (sigma_px, tau_px) = read.ok()?;
+        let (sigma_px, tau_px) = expected_errors(quality, n_parts).ok()?;
         (answer.sigma_px, answer.tau_px) = (sigma_px, tau_px);
         answer.sigma_px.as_ref().map(|_| ())
     }
@@ -417,6 +460,14 @@ impl<'a> Worker<'a> {
         self.service.health().finished();
         waiter.linger(|| self.publisher.n_connected(), say)
     }
+}
+
+/// The expected errors of the parts, and the thresholds that came with them.
+type Errors = (Option<Vec<f32>>, Option<Vec<f32>>);
+
+fn expected_errors(message: &ViewQuality, n_parts: usize) -> Result<Errors, WireError> {
+    let sigma_px = wire::sigma_from_message(message, n_parts)?;
+    Ok((sigma_px, wire::tau_from_message(message, n_parts)?))
 }
 
 fn joiner(delivery: Delivery, n_inputs: usize, patience: Duration) -> Joiner<Word> {

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use messages::Refusal;
 use metrics::Reading;
 use runtime::ExitKind;
 use serde_json::{Value, json};
@@ -122,6 +123,8 @@ pub(crate) struct Report {
     /// Most memory that every process has held, shared memory included, bytes.
     peaks: Vec<(String, u64)>,
     n_dropped: u64,
+    /// Messages that every process refused, by cause.
+    refused: Vec<(String, [u64; Refusal::N])>,
     is_lossless: bool,
     views: Vec<ViewReport>,
     budget: Option<Budget>,
@@ -164,6 +167,11 @@ impl Report {
                 .map(|it| (it.name.clone(), it.counts.peak_memory_bytes))
                 .collect(),
             n_dropped: processes.iter().map(|it| it.counts.n_dropped).sum(),
+            refused: processes
+                .iter()
+                .filter(|it| it.counts.refused.iter().any(|n| *n > 0))
+                .map(|it| (it.name.clone(), it.counts.refused))
+                .collect(),
             is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
             views: ViewReport::all(resolved, outcome, &recorded["summary"]),
             budget: resolved
@@ -259,6 +267,7 @@ impl Report {
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
             "dropped": self.n_dropped,
+            "refused": self.refused.iter().map(|(name, counts)| (name.as_str(), by_cause(counts))).collect::<BTreeMap<_, _>>(),
             "views": self.views,
             "latency_budget": self.budget.as_ref().map(Budget::json),
             "processes": self.measured,
@@ -317,6 +326,7 @@ impl Report {
         if let Some(budget) = &self.budget {
             writeln!(text, "  budget        {}", budget.verdict())?;
         }
+        self.write_refused(text)?;
         self.write_memory(text)?;
         let restarts: Vec<String> = self
             .restarts
@@ -361,6 +371,19 @@ impl Report {
                 px("residual_px"),
                 px("without_px"),
             )?;
+        }
+        Ok(())
+    }
+
+    /// Nothing where nothing was refused, as in every run without a broken sender.
+    fn write_refused(&self, text: &mut String) -> core::fmt::Result {
+        for (process, counts) in &self.refused {
+            let causes = by_cause(counts);
+            let causes: Vec<String> = causes
+                .iter()
+                .map(|(cause, n)| format!("{cause} {n}"))
+                .collect();
+            writeln!(text, "  refused       {process}: {}", causes.join(", "))?;
         }
         Ok(())
     }
@@ -414,4 +437,11 @@ fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
         Some((it.name.clone(), told))
     });
     said.collect()
+}
+
+/// The causes for which something was refused, and how often.
+fn by_cause(counts: &[u64; Refusal::N]) -> BTreeMap<&'static str, u64> {
+    let all = Refusal::ALL.iter().zip(counts);
+    let some = all.filter(|it| *it.1 > 0);
+    some.map(|(cause, n)| (cause.name(), *n)).collect()
 }

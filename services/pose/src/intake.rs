@@ -4,6 +4,9 @@ use join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 
+/// Most frames that are lost at once: hours of them, or a sender that counts wrong.
+const MOST_LOST: u64 = 1 << 16;
+
 /// Looks at the frames of one view as they come.
 #[derive(Debug)]
 pub(crate) struct Intake {
@@ -64,7 +67,7 @@ impl Intake {
     /// and not one that there is no time for.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
-        self.last_frame.is_none_or(|last| last < frame)
+        self.last_frame != Some(frame)
             && (self.delivery == Delivery::Lossless
                 || header.status != Status::OK
                 || self.cadence.takes(self.nth(frame)))
@@ -75,6 +78,9 @@ impl Intake {
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
         let skipped = nth.saturating_sub(self.past.next);
+        if skipped > MOST_LOST {
+            return 0;
+        }
         let is_same_camera = header.stamp.epoch == self.past.camera_epoch;
         let before = if is_same_camera {
             self.past.n_dropped
@@ -119,7 +125,7 @@ mod tests {
         FrameHeader {
             stamp: Stamp {
                 frame: 6 + 3 * nth,
-                captured_at_nanos: nth * 100_000_000,
+                captured_at_nanos: nth.wrapping_mul(100_000_000),
                 ..Stamp::default()
             },
             n_dropped,
@@ -164,6 +170,18 @@ mod tests {
         assert_eq!(intake.n_lost_before(&again(10, 5)), 0);
         assert_eq!(intake.n_lost_before(&again(12, 5)), 1);
         assert_eq!(intake.n_lost_before(&again(14, 6)), 0);
+    }
+
+    #[test]
+    fn who_once_counted_wrong_is_heard_again_and_costs_no_count() {
+        let mut intake = intake(Delivery::Lossless);
+        assert_eq!(intake.n_lost_before(&header(0, 0)), 0);
+        intake.answered(&header(0, 0), 1);
+        assert_eq!(intake.n_lost_before(&header(1 << 38, 0)), 0);
+        intake.answered(&header(1 << 38, 0), 1);
+        assert!(intake.takes(&header(1, 0)));
+        assert_eq!(intake.n_lost_before(&header(1, 0)), 0);
+        assert_eq!(intake.n_lost_before(&header(3, 0)), 1);
     }
 
     #[test]

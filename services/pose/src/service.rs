@@ -70,7 +70,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             Delivery::Realtime => frames.latest()?,
         } {
             let header = *sample.header();
-            if header.stamp.session != service.session() {
+            if !view.is_ours(&sample) {
                 continue;
             }
             if header.status == Status::END {
@@ -137,6 +137,21 @@ impl View<'_> {
             expected = job.n_evidence_consumers,
             "evidence is awaited, begins"
         );
+    }
+
+    /// Whether a frame is one of this view and run; counts it if it is not.
+    fn is_ours(&self, frame: &Sample<u8, FrameHeader>) -> bool {
+        let expected = wire::Expected {
+            session: self.service.session(),
+            view: self.job.view,
+            now_nanos: now_nanos(),
+        };
+        let checked = wire::check_frame(frame.header(), frame.payload().len(), &expected);
+        if let Err(error) = &checked {
+            let health = self.service.health();
+            health.refuse(error.refusal(), "frame", error);
+        }
+        checked.is_ok()
     }
 
     /// * `nth`: which of the frames that are used this is.

@@ -1,33 +1,36 @@
 //! The frames of a view, held where they lie until their poses come.
 
 use messages::FrameHeader;
-use runtime::{Delivery, Failure, Sample, Service, SliceSubscriber};
+use runtime::{Delivery, Failure, Sample, Service, SliceSubscriber, now_nanos};
 
 /// Frames that are held at the same time where the latest wins: three that wait, and one that is taken.
 pub const HELD_REALTIME: usize = 4;
+/// So far ahead of the poses is nobody but who counts wrong, frames of the footage that are used.
+const FAR: u64 = 4096;
 
 /// Frames that wait for their poses.
 #[derive(Debug)]
-pub(crate) struct Frames {
+pub(crate) struct Frames<'a> {
     subscriber: SliceSubscriber<u8, FrameHeader>,
     held: Vec<Sample<u8, FrameHeader>>,
-    session: u64,
-    delivery: Delivery,
+    service: &'a Service,
+    view: usize,
     frame_step: u64,
 }
 
-impl Frames {
+impl<'a> Frames<'a> {
     /// * `frame_step`: distance between the frames used, at least 1.
     pub(crate) fn new(
         subscriber: SliceSubscriber<u8, FrameHeader>,
-        service: &Service,
+        service: &'a Service,
+        view: usize,
         frame_step: u64,
     ) -> Self {
         Self {
             subscriber,
             held: Vec::new(),
-            session: service.session(),
-            delivery: service.delivery(),
+            service,
+            view,
             frame_step: frame_step.max(1),
         }
     }
@@ -35,9 +38,9 @@ impl Frames {
     /// Takes in what has come: one frame where nothing may be lost, for its sender waits; else all, and
     /// keeps those that are likeliest to be asked for.
     pub(crate) fn listen(&mut self) -> Result<(), Failure> {
-        while self.delivery == Delivery::Realtime || self.held.is_empty() {
+        while self.service.delivery() == Delivery::Realtime || self.held.is_empty() {
             match self.subscriber.receive()? {
-                Some(it) if it.header().stamp.session == self.session => self.held.push(it),
+                Some(it) if self.is_ours(&it) => self.held.push(it),
                 Some(_) => {}
                 None => break,
             }
@@ -52,12 +55,13 @@ impl Frames {
 
     /// Gives back what is older than a frame, and takes what there is up to it.
     pub(crate) fn advance(&mut self, frame: u64) -> Result<(), Failure> {
-        self.held.retain(|it| it.header().stamp.frame >= frame);
-        while self.delivery == Delivery::Lossless && self.held.is_empty() {
+        let wanted = frame..=frame.saturating_add(FAR.saturating_mul(self.frame_step));
+        let is_wanted = |it: &Sample<_, FrameHeader>| wanted.contains(&it.header().stamp.frame);
+        self.held.retain(is_wanted);
+        while self.service.delivery() == Delivery::Lossless && self.held.is_empty() {
             match self.subscriber.receive()? {
                 Some(it) => {
-                    let stamp = it.header().stamp;
-                    if stamp.session == self.session && stamp.frame >= frame {
+                    if is_wanted(&it) && self.is_ours(&it) {
                         self.held.push(it);
                     }
                 }
@@ -65,6 +69,22 @@ impl Frames {
             }
         }
         Ok(())
+    }
+
+    /// Whether a frame is one of this view and run; counts it if it is not.
+    fn is_ours(&self, frame: &Sample<u8, FrameHeader>) -> bool {
+        let expected = wire::Expected {
+            session: self.service.session(),
+            view: self.view,
+            now_nanos: now_nanos(),
+        };
+        let checked = wire::check_frame(frame.header(), frame.payload().len(), &expected);
+        if let Err(error) = &checked {
+            self.service
+                .health()
+                .refuse(error.refusal(), "frame", error);
+        }
+        checked.is_ok()
     }
 
     /// A frame, if it is there.

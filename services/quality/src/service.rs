@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::sync::Arc;
 
-use fmp::{Layout, Model};
+use fmp::{Layout, LocalScore, Model, Pose};
 use kernels::Rgb8View;
 use messages::{FrameHeader, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
 use metrics::Passage;
@@ -11,6 +11,7 @@ use runtime::{
     ExitKind, Failure, OrFail as _, Publisher, Sample, Service, Waiter, Woken, now_nanos,
 };
 use viewquality::{Forecaster, Predictor, Seen};
+use wire::WireError;
 
 use crate::frames::Frames;
 
@@ -64,7 +65,7 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
         Source::Table(_) => None,
         Source::Network(_) => {
             let frames = bus.slice_subscriber(&topic::frame(job.view), &mut waiter)?;
-            Some(Frames::new(frames, service, job.frame_step))
+            Some(Frames::new(frames, service, job.view, job.frame_step))
         }
     };
     let publisher = bus.publisher::<ViewQuality>(&topic::view_quality(job.view))?;
@@ -74,7 +75,15 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
             frames.listen()?;
         }
         while let Some(pose) = poses.receive()? {
-            if pose.stamp.session != service.session() {
+            let expected = wire::Expected {
+                session: service.session(),
+                view: job.view,
+                now_nanos: now_nanos(),
+            };
+            if let Err(error) = expected.check(&pose.stamp, &pose.timing) {
+                service
+                    .health()
+                    .refuse(error.refusal(), "view-pose", &error);
                 continue;
             }
             if pose.status == Status::END {
@@ -85,7 +94,7 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
             let received_at_nanos = now_nanos();
             service.health().received(1);
             service.progress().tick();
-            let mut message = answer(job, &pose, frames.as_mut())?;
+            let mut message = answer(service, job, &pose, frames.as_mut())?;
             message.stamp = Stamp {
                 epoch: service.epoch(),
                 ..pose.stamp
@@ -131,9 +140,10 @@ fn end(
 }
 
 fn answer(
+    service: &Service,
     job: &mut Job,
     pose: &ViewPose,
-    frames: Option<&mut Frames>,
+    frames: Option<&mut Frames<'_>>,
 ) -> Result<ViewQuality, Failure> {
     let frame = pose.stamp.frame;
     match (&mut job.source, frames) {
@@ -146,7 +156,15 @@ fn answer(
         (Source::Network(looking), Some(frames)) => {
             frames.listen()?;
             frames.advance(frame)?;
-            let message = look(looking, pose, frames.of(frame), job.frame_scale);
+            let read = candidates(looking, pose).map_err(|error| {
+                service
+                    .health()
+                    .refuse(error.refusal(), "view-pose", &error);
+            });
+            let message = match read {
+                Ok(read) => look(looking, read, (frame, frames.of(frame)), job.frame_scale),
+                Err(()) => wire::sigma_to_message(None).or_fail(ExitKind::Run),
+            };
             // What is done with goes back to the camera.
             frames.advance(frame + 1)?;
             message
@@ -155,31 +173,28 @@ fn answer(
     }
 }
 
+/// The candidates of a view, and how well the parts of the first one fit.
+type Read = (Vec<Pose>, Vec<LocalScore>);
+
+fn candidates(looking: &Looking, pose: &ViewPose) -> Result<Read, WireError> {
+    let candidates = wire::candidates_from_message(pose, &looking.model, &looking.layout)?;
+    let scores = wire::local_from_message(pose, looking.model.n_parts())?;
+    Ok((candidates, scores))
+}
+
 /// Runs the network on the best candidate, on the frame where it lies in shared memory. What cannot be
 /// predicted is said to be so, and why goes to the log: a view is worth more than its expected errors.
 fn look(
     looking: &mut Looking,
-    pose: &ViewPose,
-    frame: Option<&Sample<u8, FrameHeader>>,
+    (candidates, scores): Read,
+    (frame_number, frame): (u64, Option<&Sample<u8, FrameHeader>>),
     frame_scale: f32,
 ) -> Result<ViewQuality, Failure> {
     let (model, layout) = (&looking.model, &looking.layout);
     let nothing = || wire::sigma_to_message(None).or_fail(ExitKind::Run);
-    if pose.status != Status::OK {
+    if candidates.is_empty() {
         return nothing();
     }
-    let frame_number = pose.stamp.frame;
-    let read = wire::candidates_from_message(pose, model, layout).and_then(|candidates| {
-        let scores = wire::local_from_message(pose, model.n_parts())?;
-        Ok((candidates, scores))
-    });
-    let (candidates, scores) = match read {
-        Ok(read) => read,
-        Err(error) => {
-            tracing::warn!(frame_number, %error, "unreadable candidates");
-            return nothing();
-        }
-    };
     let Some(frame) = frame else {
         tracing::debug!(frame_number, "the frame is gone");
         return nothing();

@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
+use messages::{FrameHeader, MAX_VIEWS, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 
 use crate::missing::Voice;
 use crate::{FrameRecord, Picture, ViewRecord};
 
 /// Frames that are kept while their results are awaited; beyond it the oldest are forgotten.
 const MOST_FRAMES: usize = 512;
+
+/// Pairs of as many views as a rig may have.
+const MOST_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 
 /// What was said about frames whose results have not come yet.
 #[derive(Debug)]
@@ -74,7 +77,10 @@ impl Gather {
     }
 
     pub(crate) fn pair(&mut self, pair: &PairPose) {
-        self.parts(pair.stamp.frame).pairs.push(*pair);
+        let pairs = &mut self.parts(pair.stamp.frame).pairs;
+        if pairs.len() < MOST_PAIRS {
+            pairs.push(*pair);
+        }
     }
 
     /// The record of a frame whose result has come; earlier ones will get none any more.
@@ -166,6 +172,15 @@ mod tests {
         let mut gather = Gather::new(1);
         gather.pose(9, &pose(0));
         assert_eq!(gather.result(&pose3d(0)).views.len(), 1);
+    }
+
+    #[test]
+    fn who_repeats_an_answer_for_ever_fills_no_memory() {
+        let mut gather = Gather::new(1);
+        for _ in 0..1000 {
+            gather.pair(&PairPose::default());
+        }
+        assert_eq!(gather.result(&pose3d(0)).pairs.len(), 120);
     }
 
     #[test]

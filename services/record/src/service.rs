@@ -15,6 +15,7 @@ use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, Vie
 use runtime::{
     ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Subscriber, Waiter, Woken, now_nanos,
 };
+use wire::{Expected, WireError};
 
 use crate::gather::Gather;
 use crate::{Config, Folder, FrameRecord, Output, Picture, Scene};
@@ -60,7 +61,8 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
         ports.listen(service, &mut gather, &writer)?;
         // The result last: what it was made of has been taken in by then.
         while let Some(pose3d) = ports.pose3d.receive()? {
-            if pose3d.stamp.session != service.session() {
+            let check = |it: Expected| it.check(&pose3d.stamp, &pose3d.timing);
+            if !is_ours(service, ("pose3d", 0), check) {
                 continue;
             }
             if pose3d.status == Status::END {
@@ -69,8 +71,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
             }
             service.health().received(1);
             if let Err(error) = wire::check_pose3d(&pose3d, n_views, n_joints) {
-                tracing::warn!(%error, "unreadable result");
-                service.health().dropped(Cause::Malformed, 1);
+                service.health().refuse(error.refusal(), "pose3d", &error);
                 continue;
             }
             ports.listen(service, &mut gather, &writer)?;
@@ -154,11 +155,12 @@ impl Ports {
         gather: &mut Gather,
         writer: &Writer,
     ) -> Result<(), Failure> {
-        let session = service.session();
         for (view, frames) in self.frames.iter().enumerate() {
             while let Some(sample) = frames.receive()? {
                 let header = *sample.header();
-                if header.stamp.session == session {
+                let n_bytes = sample.payload().len();
+                let check = |it: Expected| wire::check_frame(&header, n_bytes, &it);
+                if is_ours(service, ("frame", view), check) {
                     let size = [header.width as usize, header.height as usize];
                     let wanted = header.status == Status::OK && writer.draws(header.stamp.frame);
                     let picture = wanted.then(|| Picture {
@@ -173,27 +175,55 @@ impl Ports {
             let is_there = poses.n_publishers() > 0 && self.frames[view].n_publishers() > 0;
             gather.is_there(view, is_there);
             while let Some(pose) = poses.receive()? {
-                if pose.stamp.session == session {
+                let check = |it: Expected| it.check(&pose.stamp, &pose.timing);
+                if is_ours(service, ("view-pose", view), check) {
                     gather.pose(view, &pose);
                 }
             }
         }
         for (view, qualities) in self.qualities.iter().enumerate() {
             while let Some(quality) = qualities.receive()? {
-                if quality.stamp.session == session && quality.status != Status::END {
+                let check = |it: Expected| it.check(&quality.stamp, &quality.timing);
+                let is_ours = is_ours(service, ("view-quality", view), check);
+                if is_ours && quality.status != Status::END {
                     gather.quality(view, &quality);
                 }
             }
         }
-        for pairs in &self.pairs {
+        let n_workers = self.pairs.len();
+        for (worker, pairs) in self.pairs.iter().enumerate() {
             while let Some(pair) = pairs.receive()? {
-                if pair.stamp.session == session && pair.status != Status::END {
+                let check = |it: Expected| match pair.status {
+                    Status::END => it.check_end(&pair.stamp, &pair.timing),
+                    _ => it.check_pair(&pair.stamp, &pair.timing, n_workers),
+                };
+                let is_ours = is_ours(service, ("pair-pose", worker), check);
+                if is_ours && pair.status != Status::END {
                     gather.pair(&pair);
                 }
             }
         }
         Ok(())
     }
+}
+
+/// Whether a message is what its topic is for; counts it if it is not.
+///
+/// * `topic`: what it is about, and the number of its sender.
+fn is_ours(
+    service: &Service,
+    (topic, sender): (&str, usize),
+    check: impl FnOnce(Expected) -> Result<(), WireError>,
+) -> bool {
+    let checked = check(Expected {
+        session: service.session(),
+        view: sender,
+        now_nanos: now_nanos(),
+    });
+    if let Err(error) = &checked {
+        service.health().refuse(error.refusal(), topic, error);
+    }
+    checked.is_ok()
 }
 
 /// The thread that writes, and the queue before it.

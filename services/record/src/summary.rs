@@ -145,7 +145,7 @@ impl Tally {
                 .pose
                 .filter(|it| it.status == Status::OK || it.status == Status::NO_DETECTION);
             let Some(pose) = searched else { continue };
-            *bytes += pose.evidence_bytes;
+            *bytes = bytes.saturating_add(pose.evidence_bytes);
             *n += 1;
             let summary = &mut self.summary;
             let of_view = summary.searches.entry(view.name.clone()).or_default();
@@ -163,7 +163,7 @@ impl Tally {
             (frame.saturating_sub(last) / step).saturating_sub(1)
         });
         self.summary.frames += 1;
-        self.summary.frames_missed += skipped;
+        self.summary.frames_missed = self.summary.frames_missed.saturating_add(skipped);
         self.summary.frames_with_pose += u64::from(has_pose);
     }
 

@@ -1,6 +1,6 @@
 //! What became of a run.
 
-use messages::{Health, Metrics};
+use messages::{Health, Metrics, Refusal};
 
 /// What became of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,16 +65,20 @@ pub struct Counts {
     pub n_dropped: u64,
     /// Most memory that any of its lives has held, shared memory included, bytes.
     pub peak_memory_bytes: u64,
+    /// Messages that it refused, by cause ([`Refusal::ALL`]); signs of life that were not its own count
+    /// here too.
+    pub refused: [u64; Refusal::N],
 }
 
 impl Counts {
     /// With what a process has done since it was started.
     pub(crate) fn and(self, health: Option<&Health>) -> Self {
         health.map_or(self, |health| Self {
-            n_received: self.n_received + health.n_received,
-            n_sent: self.n_sent + health.n_sent,
-            n_dropped: self.n_dropped + health.n_dropped,
+            n_received: self.n_received.saturating_add(health.n_received),
+            n_sent: self.n_sent.saturating_add(health.n_sent),
+            n_dropped: self.n_dropped.saturating_add(health.n_dropped),
             peak_memory_bytes: self.peak_memory_bytes.max(health.peak_memory_bytes),
+            refused: std::array::from_fn(|it| self.refused[it].saturating_add(health.refused[it])),
         })
     }
 }

@@ -76,11 +76,8 @@ impl Fault for SuperviseError {
         match self {
             Self::Lock(error) => error.hint(),
             Self::Preflight(error) => error.hint(),
-            Self::Bus(_)
-            | Self::Port(_)
-            | Self::Unusable { .. }
-            | Self::GivenUp { .. }
-            | Self::Watch(_) => None,
+            Self::Bus(error) => error.hint(),
+            Self::Port(_) | Self::Unusable { .. } | Self::GivenUp { .. } | Self::Watch(_) => None,
         }
     }
 }
@@ -249,7 +246,7 @@ impl Supervisor<'_> {
         }
         match watch.signs.latest() {
             Ok(Some(health)) => {
-                if watch.note_health(&health, now) {
+                if watch.note_health(&health, self.plan.session, now) {
                     (self.on_event)(Event::Health {
                         process: &watch.spec.name,
                         health: &health,

@@ -6,7 +6,7 @@ use std::os::unix::process::ExitStatusExt as _;
 use std::process::ExitStatus;
 use std::time::Instant;
 
-use messages::{Health, Metrics};
+use messages::{Health, Metrics, Refusal};
 use runtime::{Child, ExitKind, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
@@ -136,10 +136,20 @@ impl Watch {
         self.output.push_back(line.to_owned());
     }
 
-    /// Takes note of a sign of life. Those of earlier lives are ignored.
-    pub(crate) fn note_health(&mut self, health: &Health, now: Instant) -> bool {
+    /// Takes note of a sign of life. Those of earlier lives are ignored, those of other processes and
+    /// runs counted.
+    pub(crate) fn note_health(&mut self, health: &Health, session: u64, now: Instant) -> bool {
+        if health.session != session {
+            return self.refuse(Refusal::Session);
+        }
         if health.epoch != self.epoch {
             return false;
+        }
+        let Some(pid) = self.child().map(Child::pid) else {
+            return false;
+        };
+        if pid != health.pid {
+            return self.refuse(Refusal::Sender);
         }
         self.signed.note(health.at_nanos, now);
         self.turned.note(health.n_loops, now);
@@ -152,6 +162,11 @@ impl Watch {
     /// Takes note of times and counts, which a killed process has sent too.
     pub(crate) fn note_metrics(&mut self, metrics: &Metrics) {
         self.measured = Some(*metrics);
+    }
+
+    fn refuse(&mut self, cause: Refusal) -> bool {
+        self.past.refused[cause as usize] += 1;
+        false
     }
 
     /// Counts the time from now on: the supervisor itself has been asleep.

@@ -12,6 +12,7 @@ use runtime::{
     Delivery, ExitKind, Failure, OrFail as _, Publisher, Service, Subscriber, Waiter, Woken,
     now_nanos,
 };
+use wire::{Expected, WireError};
 
 /// What the process has to do.
 #[derive(Debug)]
@@ -20,8 +21,9 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// What the views are solved in.
     pub views: Views,
-    /// Number of pairs in the deployment, or of messages about all views of a frame, which are dealt to the workers in turn.
-    pub n_pairs: usize,
+    /// The pairs of the deployment, or a view beside each that is not the first, which are dealt to the workers in
+    /// turn.
+    pub pairs: Vec<[usize; 2]>,
     /// Number of fusion workers.
     pub n_workers: usize,
     /// Processes that take the result.
@@ -85,7 +87,11 @@ impl<'a> Stage<'a> {
         Ok(Self {
             service,
             job,
-            joiner: joiner(service.delivery(), poses.len() + job.n_pairs, job.patience),
+            joiner: joiner(
+                service.delivery(),
+                poses.len() + job.pairs.len(),
+                job.patience,
+            ),
             poses,
             pairs,
             publisher: bus.publisher(&topic::pose3d())?,
@@ -100,10 +106,9 @@ impl<'a> Stage<'a> {
                 self.joiner.alive(view, now_nanos());
             }
             while let Some(message) = self.poses[view].receive()? {
-                if message.stamp.session != self.service.session() {
-                    continue;
-                }
-                if message.status == Status::END {
+                if let Err(error) = self.check_pose(view, &message) {
+                    self.refuse(&error, "view-pose");
+                } else if message.status == Status::END {
                     self.joiner.end(view);
                 } else {
                     self.take(view, message.stamp.frame, Word::Pose(Box::new(message)));
@@ -111,17 +116,16 @@ impl<'a> Stage<'a> {
             }
         }
         for worker in 0..self.pairs.len() {
-            let its = (worker..self.job.n_pairs).step_by(self.job.n_workers);
+            let its = (worker..self.job.pairs.len()).step_by(self.job.n_workers);
             if self.pairs[worker].n_publishers() > 0 {
                 let now = now_nanos();
                 its.clone()
                     .for_each(|pair| self.joiner.alive(n_views + pair, now));
             }
             while let Some(message) = self.pairs[worker].receive()? {
-                if message.stamp.session != self.service.session() {
-                    continue;
-                }
-                if message.status == Status::END {
+                if let Err(error) = self.check_pair(worker, &message) {
+                    self.refuse(&error, "pair-pose");
+                } else if message.status == Status::END {
                     its.clone().for_each(|pair| self.joiner.end(n_views + pair));
                 } else {
                     let input = n_views + message.stamp.view as usize;
@@ -132,10 +136,47 @@ impl<'a> Stage<'a> {
         Ok(())
     }
 
+    fn expected(&self, view: usize) -> Expected {
+        Expected {
+            session: self.service.session(),
+            view,
+            now_nanos: now_nanos(),
+        }
+    }
+
+    /// All of it, before it can take the place of what is right.
+    fn check_pose(&self, view: usize, message: &ViewPose) -> Result<(), WireError> {
+        let expected = self.expected(view);
+        expected.check(&message.stamp, &message.timing)?;
+        let plan = &self.job.plans[view];
+        wire::candidates_from_message(message, plan.model(), plan.layout()).map(drop)
+    }
+
+    /// The end is about all pairs of the worker, and names none.
+    fn check_pair(&self, worker: usize, message: &PairPose) -> Result<(), WireError> {
+        let expected = self.expected(worker);
+        if message.status == Status::END {
+            return expected.check_end(&message.stamp, &message.timing);
+        }
+        expected.check_pair(&message.stamp, &message.timing, self.job.n_workers)?;
+        match self.job.views {
+            Views::Pairs => wire::check_views(message, &self.job.pairs)?,
+            Views::All => wire::check_all_views(message, self.job.plans.len())?,
+        }
+        wire::pair_from_message(message, &self.job.plans).map(drop)
+    }
+
+    fn refuse(&self, error: &WireError, topic: &str) {
+        let health = self.service.health();
+        health.refuse(error.refusal(), topic, error);
+    }
+
     fn take(&mut self, input: usize, frame: u64, word: Word) {
         self.service.health().received(1);
-        if self.joiner.push(input, frame, word, now_nanos()) == Push::Late {
-            self.service.health().dropped(Cause::Late, 1);
+        match self.joiner.push(input, frame, word, now_nanos()) {
+            Push::Taken => {}
+            Push::Late => self.service.health().dropped(Cause::Late, 1),
+            Push::Full => self.service.health().dropped(Cause::QueueFull, 1),
         }
     }
 
@@ -216,7 +257,6 @@ impl<'a> Stage<'a> {
                     return None;
                 };
                 let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())
-                    .inspect_err(|error| tracing::warn!(%error, "unreadable candidates"))
                     .ok()
                     .filter(|it| !it.is_empty())?;
                 Some(Answer {

@@ -29,7 +29,12 @@ pub enum Push {
     Taken,
     /// Its frame has already been given out, or its input has already spoken about that frame.
     Late,
+    /// So many frames wait for others that there is no room for one more.
+    Full,
 }
+
+/// Most frames that wait at the same time: hours of them, or a sender that counts wrong.
+const MOST_PENDING: usize = 1 << 16;
 
 /// Collects messages by frame, in the order of frames.
 #[derive(Debug)]
@@ -119,9 +124,13 @@ impl<T> Joiner<T> {
         };
         it.heard_at = Some(now);
         it.down = false;
-        it.last_frame = it.last_frame.max(Some(frame));
+        // Not the largest: who once spoke of a frame far ahead is waited for again once it counts right.
+        it.last_frame = Some(frame);
         if frame < self.next_frame {
             return Push::Late;
+        }
+        if self.pending.len() >= MOST_PENDING && !self.pending.contains_key(&frame) {
+            return Push::Full;
         }
         let slot = self.pending.entry(frame).or_insert_with(|| Slot {
             items: (0..n).map(|_| None).collect(),
@@ -160,7 +169,7 @@ impl<T> Joiner<T> {
             }
         }
         let (frame, slot) = self.pending.pop_first()?;
-        self.next_frame = frame + 1;
+        self.next_frame = frame.saturating_add(1);
         Some(Joined {
             frame,
             items: slot.items,
@@ -235,6 +244,34 @@ mod tests {
         joiner.push(1, 0, 'b', 60);
         let got = joiner.next(60).unwrap();
         assert_eq!(got.items, [Some('a'), Some('b')]);
+    }
+
+    #[test]
+    fn who_once_counted_wrong_is_waited_for_again() {
+        let mut joiner = Joiner::new(2, 100);
+        joiner.push(1, u64::MAX, (), 0);
+        joiner.push(0, 0, (), 0);
+        assert_eq!(frames(&mut joiner, 0), [(0, vec![true, false])]);
+        joiner.push(1, 1, (), 10);
+        joiner.push(0, 2, (), 10);
+        assert_eq!(frames(&mut joiner, 10), [(1, vec![false, true])]);
+        joiner.push(1, 2, (), 20);
+        assert_eq!(frames(&mut joiner, 20), [(2, vec![true, true])]);
+        joiner.end(0);
+        joiner.end(1);
+        assert_eq!(frames(&mut joiner, 30), [(u64::MAX, vec![false, true])]);
+        assert!(joiner.is_over(30));
+    }
+
+    #[test]
+    fn who_speaks_of_ever_more_frames_fills_no_memory() {
+        let mut joiner = Joiner::new(2, 100);
+        for frame in 0..MOST_PENDING as u64 {
+            assert_eq!(joiner.push(1, frame, (), 0), Push::Taken);
+        }
+        assert_eq!(joiner.push(1, 1 << 20, (), 0), Push::Full);
+        assert_eq!(joiner.push(0, 5, (), 0), Push::Taken, "a frame that waits");
+        assert_eq!(joiner.n_pending(), MOST_PENDING);
     }
 
     #[test]

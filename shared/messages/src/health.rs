@@ -3,9 +3,11 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
+use crate::Refusal;
+
 /// Sent by every process a few times a second; a counter that stands still means a hang.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Health.v2")]
+#[type_name("Health.v3")]
 #[repr(C)]
 pub struct Health {
     /// Run of the deployment.
@@ -39,4 +41,6 @@ pub struct Health {
     pub reserved: u32,
     /// Work that the process has before it, if it knows (capture: frames in the footage), else 0.
     pub n_total: u64,
+    /// Messages that were refused, by cause: [`Refusal::ALL`].
+    pub refused: [u64; Refusal::N],
 }

@@ -14,6 +14,7 @@ mod metrics;
 mod pose;
 mod pose3d;
 mod quality;
+mod refusal;
 mod stamp;
 pub mod topic;
 
@@ -26,6 +27,7 @@ pub use metrics::{
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Pose3d};
 pub use quality::ViewQuality;
+pub use refusal::Refusal;
 pub use stamp::{Stamp, Status, Timing};
 
 /// Most parts of a model that messages can carry.
@@ -52,7 +54,7 @@ const _: () = {
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
     assert!(size_of::<Pose3d>() == 11600);
-    assert!(size_of::<Health>() == 104);
+    assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
     assert!(size_of::<Metrics>() == 176 + MAX_ROWS * 56);
 };

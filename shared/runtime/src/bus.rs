@@ -16,11 +16,12 @@ use iceoryx2::service::builder::event::EventCreateError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 
+use crate::deployment::OVERHEAD_BYTES;
 use crate::log::adopt_transport_log;
 use crate::payload::{Header, Message};
 use crate::service::{self, PortError};
 use crate::topic::TopicPlan;
-use crate::{Namespace, NamespaceError, Progress, Stop};
+use crate::{Namespace, NamespaceError, PrivacyError, Progress, Stop, free_shared_memory, private};
 
 /// How long a sender waits for a receiver without room, unless told otherwise.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -37,11 +38,28 @@ pub enum BusError {
         #[source]
         source: io::Error,
     },
+    /// The deployment is another user's.
+    #[error(transparent)]
+    Privacy(#[from] PrivacyError),
     /// The namespace does not suit iceoryx2.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
+    /// There is no room for the queues of a process. Without it the system would kill the process when it
+    /// first wrote to them.
+    #[error(
+        "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
+        .needed_bytes / 1000, .free_bytes / 1000
+    )]
+    Full {
+        /// Name of the process.
+        process: String,
+        /// What is needed.
+        needed_bytes: u64,
+        /// What is free.
+        free_bytes: u64,
+    },
     /// The process cannot be registered.
-    #[error("cannot register process {process:?} below {root:?}; is the directory another user's?")]
+    #[error("cannot register process {process:?} below {root:?}")]
     Node {
         /// Name of the process.
         process: String,
@@ -102,8 +120,10 @@ impl Bus {
     ///
     /// # Errors
     ///
-    /// [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`], [`BusError::Name`].
+    /// [`BusError::Full`], [`BusError::Privacy`], [`BusError::Directory`], [`BusError::Namespace`], [`BusError::Node`],
+    /// [`BusError::Name`].
     pub fn open(namespace: &Namespace, process: &str, stop: &Stop) -> Result<Self, BusError> {
+        check_room(process, free_shared_memory().unwrap_or(u64::MAX))?;
         let config = prepare(namespace)?;
         let name = NodeName::new(process).ok().ok_or_else(|| BusError::Name {
             name: process.to_owned(),
@@ -118,6 +138,7 @@ impl Bus {
                 root: namespace.root().to_owned(),
                 source,
             })?;
+        private::shared_memory(namespace)?;
         Ok(Self {
             node: Arc::new(node),
             namespace: namespace.clone(),
@@ -235,6 +256,17 @@ impl Seed {
     }
 }
 
+fn check_room(process: &str, free_bytes: u64) -> Result<(), BusError> {
+    if free_bytes >= OVERHEAD_BYTES {
+        return Ok(());
+    }
+    Err(BusError::Full {
+        process: process.to_owned(),
+        needed_bytes: OVERHEAD_BYTES,
+        free_bytes,
+    })
+}
+
 /// Makes the directory of a deployment and points iceoryx2 to it.
 pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
     adopt_transport_log();
@@ -244,6 +276,7 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         path: path.clone(),
         source,
     };
+    private::directory(namespace)?;
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(directory)?;
     }

@@ -6,6 +6,8 @@ use messages::{
     EvidenceHeader, FrameHeader, Health, Metrics, PairPose, Pose3d, ViewPose, ViewQuality, topic,
 };
 
+use rustix::process::{Resource, getrlimit};
+
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
 
 /// Small messages that wait for one subscriber when the latest wins.
@@ -18,8 +20,12 @@ const LARGE_BUFFER: usize = 1;
 const SPARE: usize = 2;
 /// Those who look at times and counts at the same time, besides the supervisor.
 const ONLOOKERS: usize = 4;
+/// Files that every process has open, whatever its topics.
+const DESCRIPTORS: u64 = 40;
+/// Files that a topic takes in the process that keeps it in being: 6.6 were measured.
+const DESCRIPTORS_A_TOPIC: u64 = 7;
 /// Queues and management of one process, bytes: ten times what is measured.
-const OVERHEAD_BYTES: u64 = 1 << 20;
+pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
 /// What decides the topics of a deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +73,14 @@ pub enum PreflightError {
         /// The topic that takes most, with its size.
         largest: String,
     },
+    /// A process could not open all that it has to.
+    #[error("deployment needs {needed} open files in one process, the limit is {limit} open files")]
+    Descriptors {
+        /// What the process that opens most takes.
+        needed: u64,
+        /// What it may open.
+        limit: u64,
+    },
     /// The file system of shared memory cannot be asked.
     #[error("cannot tell how much of /dev/shm is free")]
     Unknown(#[source] io::Error),
@@ -87,6 +101,9 @@ impl Fault for PreflightError {
                      (its default is 64m)"
                 ))
             }
+            Self::Descriptors { needed, .. } => Some(format!(
+                "allow more: `ulimit -n {needed}`, in a systemd unit LimitNOFILE={needed}"
+            )),
             Self::Unknown(_) => None,
         }
     }
@@ -169,16 +186,28 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     [health.without_wake_up(), metrics.without_wake_up()]
 }
 
-/// Checks that the pools of all topics fit into what is free of `/dev/shm`.
+/// Checks that the pools of all topics fit into what is free of `/dev/shm`, and that the process that has
+/// all topics open, the supervisor, may open so many files.
 ///
 /// # Errors
 ///
 /// [`PreflightError`].
 pub fn preflight(topics: &[TopicPlan]) -> Result<(), PreflightError> {
+    if let Some(limit) = getrlimit(Resource::Nofile).current {
+        check_descriptors(topics.len() as u64, limit)?;
+    }
     check_room(
         topics,
         free_shared_memory().map_err(PreflightError::Unknown)?,
     )
+}
+
+fn check_descriptors(n_topics: u64, limit: u64) -> Result<(), PreflightError> {
+    let needed = DESCRIPTORS + DESCRIPTORS_A_TOPIC * n_topics;
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(PreflightError::Descriptors { needed, limit })
 }
 
 fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightError> {
@@ -201,7 +230,7 @@ fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightErro
 
 #[cfg(test)]
 mod tests {
-    use super::{DeploymentPlan, PreflightError, ViewPlan, check_room};
+    use super::{DeploymentPlan, PreflightError, ViewPlan, check_descriptors, check_room};
     use crate::{Delivery, Fault as _};
 
     fn plan() -> DeploymentPlan {
@@ -279,6 +308,15 @@ mod tests {
         assert!(error.to_string().contains("67 MB are free"), "{error}");
         assert!(error.to_string().contains("evidence/v3/"), "{error}");
         assert!(error.hint().unwrap().contains("--shm-size"), "{error}");
+    }
+
+    #[test]
+    fn too_few_open_files_are_refused_with_the_numbers() {
+        check_descriptors(10, 110).unwrap();
+        let error = check_descriptors(10, 109).unwrap_err();
+        let said = "deployment needs 110 open files in one process, the limit is 109 open files";
+        assert_eq!(error.to_string(), said);
+        assert!(error.hint().unwrap().contains("ulimit -n 110"));
     }
 
     #[test]

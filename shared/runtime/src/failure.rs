@@ -175,13 +175,21 @@ impl<E: Fault> From<E> for Failure {
     }
 }
 
-impl Fault for crate::BusError {}
+const ROOM: &str =
+    "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
+
+impl Fault for crate::BusError {
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Privacy(error) => error.hint(),
+            Self::Full { .. } => Some(ROOM.to_owned()),
+            _ => None,
+        }
+    }
+}
 impl Fault for crate::PortError {
     fn hint(&self) -> Option<String> {
-        matches!(self, Self::Memory { .. }).then(|| {
-            "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)"
-                .to_owned()
-        })
+        matches!(self, Self::Memory { .. }).then(|| ROOM.to_owned())
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
-use messages::{Cause, Health as HealthMessage, Metrics, Span, topic};
+use messages::{Cause, Health as HealthMessage, Metrics, Refusal, Span, topic};
 use metrics::{Meter, Passage, Rates};
 
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory, now_nanos};
@@ -48,6 +48,7 @@ struct Counts {
     n_total: AtomicU64,
     last_frame: AtomicU64,
     finished: AtomicU32,
+    refused: [AtomicU64; Refusal::N],
     ended: AtomicBool,
     began_at_nanos: u64,
     meter: Mutex<Meter>,
@@ -69,6 +70,7 @@ impl Health {
             n_total: AtomicU64::new(0),
             last_frame: AtomicU64::new(0),
             finished: AtomicU32::new(0),
+            refused: [const { AtomicU64::new(0) }; Refusal::N],
             ended: AtomicBool::new(false),
             began_at_nanos: now_nanos(),
             meter: Mutex::default(),
@@ -124,6 +126,16 @@ impl Health {
     pub fn dropped(&self, cause: Cause, n: u64) {
         if n > 0 {
             self.counts.meter(|it| it.dropped(cause, n));
+        }
+    }
+
+    /// Counts a message that was refused, and logs why: the first of every cause, and then every time
+    /// there are twice as many.
+    pub fn refuse(&self, cause: Refusal, topic: &str, why: &dyn core::fmt::Display) {
+        self.dropped(Cause::Malformed, 1);
+        let n = 1 + self.counts.refused[cause as usize].fetch_add(1, Ordering::Relaxed);
+        if n.is_power_of_two() {
+            tracing::warn!(n, topic, cause = cause.name(), "refused a message: {why}");
         }
     }
 
@@ -246,6 +258,7 @@ impl Counts {
             finished: self.finished.load(Ordering::Relaxed),
             reserved: 0,
             n_total: self.n_total.load(Ordering::Relaxed),
+            refused: self.refused.each_ref().map(|it| it.load(Ordering::Relaxed)),
         }
     }
 

@@ -1,9 +1,9 @@
 //! One run of a deployment at a time, beginning and ending with nothing left behind.
 
 use core::time::Duration;
-use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, Write as _};
-use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Instant;
@@ -15,7 +15,7 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
-use crate::{BusError, ExitKind, Fault, Namespace};
+use crate::{BusError, ExitKind, Fault, Namespace, private};
 
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub(crate) const LOCK_FILE: &str = "lock";
@@ -71,7 +71,8 @@ impl Fault for LockError {
                 Some("stop it, or run this one under another name with `--set name=...`".to_owned())
             }
             Self::StillAlive { .. } => Some("end them with kill -9".to_owned()),
-            Self::File { .. } | Self::Bus(_) => None,
+            Self::Bus(error) => error.hint(),
+            Self::File { .. } => None,
         }
     }
 }
@@ -93,6 +94,7 @@ impl Namespace {
     /// [`LockError`].
     pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
         let file = lock_file(self)?;
+        private::shared_memory(self).map_err(BusError::from)?;
         let config = self.config().map_err(BusError::from)?;
         let begin = Instant::now();
         loop {
@@ -172,16 +174,13 @@ fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
         source,
     };
     loop {
-        DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(namespace.root())
-            .map_err(failed)?;
+        private::directory(namespace).map_err(BusError::from)?;
         let opened = OpenOptions::new()
             .read(true)
             .write(true)
             .create(true)
             .truncate(false)
+            .mode(0o600)
             .open(&path);
         let mut file = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,

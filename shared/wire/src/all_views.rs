@@ -40,6 +40,32 @@ pub fn all_views_to_messages(
     (1..n_views).map(message).collect()
 }
 
+/// Checks that a message is about the view that its number says, and an earlier one.
+///
+/// * `n_views`: of the rig.
+///
+/// # Errors
+///
+/// [`WireError`] if there is no such view, or the message names others.
+pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireError> {
+    let nth = index("answer", 0, message.stamp.view as usize, n_views.saturating_sub(1))?;
+    let [first, second] = message.views.map(|it| it as usize);
+    let sender = |field, got, expected| {
+        Err(WireError::Sender {
+            field,
+            got,
+            expected,
+        })
+    };
+    if second != nth + 1 {
+        return sender("view of the answer", second, nth + 1);
+    }
+    if first > nth {
+        return sender("first view of the answer", first, nth);
+    }
+    Ok(())
+}
+
 /// The first view of an answer, and the one at a place.
 fn beside_the_first(answer: &AllViewsAnswer, place: usize) -> PairAnswer {
     let hypothesis = |it: &AllViewsHypothesis| PairEstimate {

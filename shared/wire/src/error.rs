@@ -1,5 +1,7 @@
 //! Why a message was refused.
 
+use messages::Refusal;
+
 /// A message says something that cannot be, or a value does not fit into its message.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WireError {
@@ -47,6 +49,56 @@ pub enum WireError {
         /// What would do.
         expected: &'static str,
     },
+    /// The message is from another run.
+    #[error("session is {got}, expected {expected}")]
+    Session {
+        /// The run that it names.
+        got: u64,
+        /// The receiver's.
+        expected: u64,
+    },
+    /// The message does not come from whom the topic belongs to.
+    #[error("{field} is {got}, but this is the topic of {expected}")]
+    Sender {
+        /// What it names.
+        field: &'static str,
+        /// The sender that it names.
+        got: usize,
+        /// The one that the topic belongs to.
+        expected: usize,
+    },
+    /// The message speaks of a time that has not come yet.
+    #[error("{field} lies {} ms ahead of the clock", .ahead_nanos / 1_000_000)]
+    Future {
+        /// The time stamp.
+        field: &'static str,
+        /// How far ahead it is.
+        ahead_nanos: u64,
+    },
+    /// No footage has so many frames.
+    #[error("{field} is {got}, the limit is {limit}")]
+    Frame {
+        /// The number.
+        field: &'static str,
+        /// Its value.
+        got: u64,
+        /// Largest value allowed.
+        limit: u64,
+    },
+}
+
+impl WireError {
+    /// Under which cause the receiver counts it.
+    pub fn refusal(&self) -> Refusal {
+        match self {
+            Self::TooMany { .. } | Self::Mismatch { .. } => Refusal::Size,
+            Self::OutOfRange { .. } => Refusal::Index,
+            Self::Value { .. } => Refusal::Number,
+            Self::Session { .. } => Refusal::Session,
+            Self::Sender { .. } => Refusal::Sender,
+            Self::Future { .. } | Self::Frame { .. } => Refusal::Time,
+        }
+    }
 }
 
 /// Refuses a count above `limit`.

@@ -12,17 +12,19 @@ mod pair;
 mod pose;
 mod quality;
 mod skeleton;
+mod stamp;
 
-pub use all_views::{all_views_from_pairs, all_views_to_messages};
+pub use all_views::{check_all_views, all_views_from_pairs, all_views_to_messages};
 pub use error::WireError;
 pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
-pub use pair::{pair_from_message, pair_to_message};
+pub use pair::{check_views, pair_from_message, pair_to_message};
 pub use pose::{
     candidates_from_message, candidates_to_message, local_from_message, local_to_message,
     pose_from_message, pose_to_message,
 };
 pub use quality::{sigma_from_message, sigma_to_message, tau_from_message, tau_to_message};
 pub use skeleton::{check_pose3d, end_of_results, skeleton_to_message};
+pub use stamp::{Expected, check_frame};
 
 #[cfg(test)]
 mod testing;

@@ -91,6 +91,27 @@ pub fn pair_from_message(
     }))
 }
 
+/// Checks that an answer is about the views of the pair that it names.
+///
+/// * `pairs`: those of the deployment.
+///
+/// # Errors
+///
+/// [`WireError`] if there is no such pair, or it is one of other views.
+pub fn check_views(message: &PairPose, pairs: &[[usize; 2]]) -> Result<(), WireError> {
+    let pair = index("pair", 0, message.stamp.view as usize, pairs.len())?;
+    for (got, expected) in message.views.iter().zip(pairs[pair]) {
+        if *got as usize != expected {
+            return Err(WireError::Sender {
+                field: "view of the pair",
+                got: *got as usize,
+                expected,
+            });
+        }
+    }
+    Ok(())
+}
+
 fn estimate(message: &PairHypothesis, plans: [&ViewPlan; 2]) -> Result<PairEstimate, WireError> {
     let read = |side: usize| -> Result<Pose, WireError> {
         pose_from_message(
@@ -118,6 +139,7 @@ fn estimate(message: &PairHypothesis, plans: [&ViewPlan; 2]) -> Result<PairEstim
 
 #[cfg(test)]
 mod tests {
+    use messages::Refusal;
     use proptest::prelude::*;
 
     use super::*;
@@ -222,6 +244,24 @@ mod tests {
         Pose {
             parts: vec![fmp::Placement::default(); 3],
             ..Pose::default()
+        }
+    }
+
+    #[test]
+    fn an_answer_is_about_the_views_of_its_pair() {
+        let pairs = [[0, 1], [0, 2], [1, 2]];
+        let mut message = pair_to_message([0, 2], None, 0).unwrap();
+        message.stamp.view = 1;
+        check_views(&message, &pairs).unwrap();
+        for (pair, cause) in [
+            (0, Refusal::Sender),
+            (2, Refusal::Sender),
+            (3, Refusal::Index),
+            (u32::MAX, Refusal::Index),
+        ] {
+            message.stamp.view = pair;
+            let error = check_views(&message, &pairs).unwrap_err();
+            assert_eq!(error.refusal(), cause, "{error}");
         }
     }
 }

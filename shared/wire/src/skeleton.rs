@@ -7,7 +7,7 @@ use messages::{
 use pipeline::Skeleton;
 
 use crate::WireError;
-use crate::error::{count, equal};
+use crate::error::{count, equal, finite};
 
 /// Writes a skeleton; the caller fills in stamp and timing.
 ///
@@ -46,23 +46,38 @@ pub fn end_of_results(session: u64) -> Pose3d {
     message
 }
 
-/// Checks the counts of a result against the receiver's rig and joint set.
+/// Checks the counts of a result against the receiver's rig and joint set, and that what it has found
+/// lies somewhere.
 ///
 /// # Errors
 ///
-/// [`WireError`] if it is for other views or joints, or a count is larger than its array. A result
+/// [`WireError`] if it is for other views or joints, a count is larger than its array, or a joint or
+/// a part that was found has a coordinate that is not finite. A result
 /// without a skeleton may have counts of 0.
 pub fn check_pose3d(message: &Pose3d, n_views: usize, n_joints: usize) -> Result<(), WireError> {
-    count("n_joints", message.n_joints as usize, MAX_JOINTS)?;
+    let joints = count("n_joints", message.n_joints as usize, MAX_JOINTS)?;
     let views = count("n_views", message.n_views as usize, MAX_VIEWS)?;
     for view in &message.views[..views] {
-        count("n_parts", view.n_parts as usize, MAX_PARTS)?;
+        let n = count("n_parts", view.n_parts as usize, MAX_PARTS)?;
+        if view.status == Status::OK {
+            all_finite("centres", view.centres_px[..n].as_flattened())?;
+        }
+    }
+    for joint in &message.joints[..joints] {
+        if joint.status == Status::OK {
+            all_finite("in_world", &joint.in_world)?;
+        }
     }
     if message.status != Status::OK && message.n_views == 0 {
         return Ok(());
     }
     equal("n_views", message.n_views as usize, n_views)?;
     equal("n_joints", message.n_joints as usize, n_joints)
+}
+
+fn all_finite(field: &'static str, numbers: &[f64]) -> Result<(), WireError> {
+    let mut entries = numbers.iter().enumerate();
+    entries.try_for_each(|(entry, it)| finite(field, entry, *it).map(|_| ()))
 }
 
 /// A result without anything in it.
@@ -210,6 +225,21 @@ mod tests {
         got.views[1].n_parts = 0;
         got.n_views = u32::MAX;
         assert!(check_pose3d(&got, 2, 2).is_err());
+    }
+
+    #[test]
+    fn refuses_what_was_found_nowhere() {
+        let good = skeleton_to_message(&skeleton(), 0b11).unwrap();
+        let refused = |change: fn(&mut Pose3d)| {
+            let mut message = good;
+            change(&mut message);
+            check_pose3d(&message, 2, 2).is_err()
+        };
+        assert!(refused(|it| it.joints[0].in_world[2] = f64::NAN));
+        assert!(refused(|it| it.views[0].centres_px[1][0] = f64::INFINITY));
+        // What was not found may say anything.
+        assert!(!refused(|it| it.joints[1].in_world[0] = f64::NAN));
+        assert!(!refused(|it| it.views[1].centres_px[0][0] = f64::NAN));
     }
 
     #[test]

@@ -211,9 +211,9 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = triangulate::Job {
         plans,
         views: prepared.settings.views,
-        n_pairs: dealing.pairs.len(),
         n_workers: dealing.n_workers,
         n_consumers: Audience::new(resolved, &dealing).of_results(),
+        pairs: dealing.pairs,
         // A pair that waits for a view takes this long itself.
         patience: 2 * resolved.patience(),
     };

@@ -1,0 +1,192 @@
+//! A deployment is one user's, whatever the umask is and whatever others have left.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stderr, reason = "a test that cannot try all says so")]
+
+mod common;
+
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use common::{Deployment, namespace};
+use messages::{FrameHeader, ViewPose};
+use runtime::{
+    Bus, BusError, Delivery, Fault as _, Limits, LockError, Namespace, PrivacyError, Stop,
+    TopicPlan,
+};
+use rustix::fs::Mode;
+use rustix::process::{getuid, umask};
+
+/// Nobody's: not root's, and not that of whoever runs tests.
+const OTHER: u32 = 65_534;
+
+fn is_root() -> bool {
+    getuid().is_root()
+}
+
+/// All files and directories below, and it itself.
+fn below(path: &Path, found: &mut Vec<PathBuf>) {
+    found.push(path.to_owned());
+    for entry in fs::read_dir(path).into_iter().flatten() {
+        below(&entry.unwrap().path(), found);
+    }
+}
+
+/// What a deployment that runs has in the file system and in shared memory.
+fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    below(deployment.namespace().root(), &mut files);
+    let memory = common::shared_memory(deployment.namespace()).into_iter();
+    files.extend(memory.map(|it| Path::new("/dev/shm").join(it)));
+    files
+}
+
+/// A deployment with ports open on a topic of each kind; `use_it` looks at it.
+fn with_ports(use_it: impl FnOnce(&Deployment)) {
+    let limits = Limits::new(1, 1, 1);
+    let deployment = Deployment::new(&[
+        TopicPlan::messages::<ViewPose>("pose".to_owned(), Delivery::Lossless, limits),
+        TopicPlan::slices::<u8, FrameHeader>("frame".to_owned(), Delivery::Realtime, limits, 99),
+    ]);
+    let bus = deployment.bus("one");
+    let mut waiter = bus.waiter();
+    let poses = bus.subscriber::<ViewPose>("pose", &mut waiter).unwrap();
+    let frames = bus.slice_subscriber::<u8, FrameHeader>("frame", &mut waiter);
+    let to_poses = bus.publisher::<ViewPose>("pose").unwrap();
+    let to_frames = bus.slice_publisher::<u8, FrameHeader>("frame").unwrap();
+    to_poses.send(&ViewPose::default()).unwrap();
+    to_frames.loan(9).unwrap().send().unwrap();
+    use_it(&deployment);
+    drop((poses, frames, to_poses, to_frames));
+}
+
+#[test]
+fn nobody_else_may_enter_whatever_the_umask_is() {
+    umask(Mode::empty());
+    with_ports(|deployment| {
+        let root = deployment.namespace().root();
+        assert_eq!(fs::metadata(root).unwrap().mode() & 0o7777, 0o700);
+        let lock = fs::metadata(root.join("lock")).unwrap();
+        assert_eq!(lock.mode() & 0o7777, 0o600);
+        let memory = common::shared_memory(deployment.namespace());
+        assert!(memory.len() > 4, "{memory:?}");
+        for name in memory {
+            let file = fs::metadata(Path::new("/dev/shm").join(&name)).unwrap();
+            assert_eq!(file.mode() & 0o077, 0, "{name} is open to others");
+            assert_eq!(file.uid(), getuid().as_raw(), "{name}");
+        }
+    });
+}
+
+#[test]
+fn another_user_can_open_nothing() {
+    umask(Mode::empty());
+    if !is_root() {
+        eprintln!("not root: what another user sees is told from modes alone, in the test above");
+        return;
+    }
+    with_ports(|deployment| {
+        let files = all_files(deployment);
+        assert!(files.len() > 10, "{files:?}");
+        for file in files {
+            let opened = Command::new("setpriv")
+                .args(["--reuid=65534", "--regid=65534", "--clear-groups"])
+                .args(["head", "-c1"])
+                .arg(&file)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .status();
+            assert!(!opened.unwrap().success(), "{} is open", file.display());
+        }
+    });
+}
+
+#[test]
+fn a_directory_that_was_open_is_shut() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let namespace = namespace(base.path());
+    fs::create_dir(namespace.root()).unwrap();
+    fs::set_permissions(namespace.root(), Permissions::from_mode(0o777)).unwrap();
+    let lock = namespace.acquire().unwrap();
+    let mode = fs::metadata(namespace.root()).unwrap().mode();
+    assert_eq!(mode & 0o7777, 0o700);
+    drop(lock);
+}
+
+/// That it is said whose the path is.
+fn assert_foreign(error: &BusError, path: &Path, owner: u32) {
+    let text = error.to_string();
+    let said = match error {
+        BusError::Privacy(PrivacyError::Foreign { path, .. }) => Some(path.as_path()),
+        _ => None,
+    };
+    assert_eq!(said, Some(path), "{error}");
+    assert!(text.contains(&owner.to_string()), "{text}");
+    let hint = error.hint().unwrap();
+    assert!(
+        hint.contains(&format!("rm -r {}", path.display())),
+        "{hint}"
+    );
+}
+
+#[test]
+fn the_directory_of_another_user_is_refused_with_his_name() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let (namespace, owner) = if is_root() {
+        let namespace = namespace(base.path());
+        fs::create_dir(namespace.root()).unwrap();
+        chown(namespace.root(), Some(OTHER), None).unwrap();
+        (namespace, OTHER)
+    } else {
+        (Namespace::below("usr", Path::new("/")).unwrap(), 0)
+    };
+    let Err(LockError::Bus(error)) = namespace.acquire() else {
+        panic!("it is another user's");
+    };
+    assert_foreign(&error, namespace.root(), owner);
+    let error = Bus::open(&namespace, "one", &Stop::new().unwrap()).unwrap_err();
+    assert_foreign(&error, namespace.root(), owner);
+}
+
+#[test]
+fn what_another_user_has_put_in_the_way_is_named() {
+    if !is_root() {
+        eprintln!("not root: no file can be given to another user");
+        return;
+    }
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    // Where the directories of a user would lie.
+    chown(base.path(), Some(OTHER), None).unwrap();
+    let own = namespace(base.path());
+    let Err(LockError::Bus(error)) = own.acquire() else {
+        panic!("it is below another user's");
+    };
+    assert_foreign(&error, base.path(), OTHER);
+    // What would be taken for shared memory of the deployment.
+    chown(base.path(), Some(0), None).unwrap();
+    let leftover = PathBuf::from(format!("/dev/shm/{}7.data", own.prefix()));
+    fs::write(&leftover, "x").unwrap();
+    chown(&leftover, Some(OTHER), None).unwrap();
+    let Err(LockError::Bus(error)) = own.acquire() else {
+        panic!("it is another user's");
+    };
+    assert_foreign(&error, &leftover, OTHER);
+    assert!(leftover.exists(), "it is not ours to remove");
+    fs::remove_file(&leftover).unwrap();
+    drop(own.acquire().unwrap());
+}
+
+#[test]
+fn a_file_in_the_place_of_the_directory_is_named() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let namespace = namespace(base.path());
+    fs::write(namespace.root(), "x").unwrap();
+    let error = namespace.acquire().unwrap_err();
+    assert!(error.to_string().contains("is not a directory"), "{error}");
+    // Nor is a way to another one followed.
+    fs::remove_file(namespace.root()).unwrap();
+    std::os::unix::fs::symlink(base.path(), namespace.root()).unwrap();
+    let error = namespace.acquire().unwrap_err();
+    assert!(error.to_string().contains("is not a directory"), "{error}");
+}
