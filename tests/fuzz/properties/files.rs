@@ -1,0 +1,215 @@
+//! What must hold of every reader of files, whatever is in them.
+
+use c3d::C3d;
+use consistency::{Appearance, Learned};
+use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
+use fmp::Model;
+use fmp::files::{describe, mat, own, text};
+use geometry::files::{ReadOptions, humaneva, opencv, pose2sim, qualisys, umpm};
+use multiview::Compatibility;
+use scene::Address;
+use scene::truth::{Frame, Header};
+use training::Checkpoint;
+use viewquality::{Card, Network, Table, Tau};
+
+/// A payload behind our own header: magic, version 1, length and FNV-1a.
+fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
+    let hash = payload.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
+    let length = payload.len() as u64;
+    let header = [&magic[..], &[1, 0, 0, 0], &length.to_le_bytes()].concat();
+    [&header[..], &u64::to_le_bytes(hash), payload].concat()
+}
+/// The authors' text models.
+pub fn model_text(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    if let Ok(Ok(model)) = text::parse(input).map(Model::new) {
+        let bytes = own::encode(&model).expect("small models fit");
+        assert_eq!(own::decode(&bytes).as_ref().ok(), Some(model.spec()));
+    }
+}
+
+/// Yang & Ramanan's MATLAB models.
+pub fn model_mat(input: &[u8]) {
+    if let Ok(Ok(model)) = mat::parse(input).map(Model::new) {
+        assert!(describe(&model).n_filters > 0);
+    }
+}
+
+/// The payload of our own model files, under a right checksum.
+pub fn model_own(payload: &[u8]) {
+    let file = with_checksum(own::MAGIC, payload);
+    if let Ok(Ok(model)) = own::decode(&file).map(Model::new) {
+        let again = own::encode(&model).expect("small models fit");
+        assert_eq!(own::decode(&again).as_ref().ok(), Some(model.spec()));
+    }
+}
+
+/// Tables of expected errors, and thresholds.
+pub fn quality_table(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    if let Ok(table) = Table::parse(input, 2) {
+        assert!(table.n_rows() > 0);
+    }
+    if let Ok(tau) = Tau::parse(input, 2) {
+        assert!(tau.px().iter().all(|it| it.is_finite()));
+    }
+}
+
+/// Networks that predict errors: what their files say of themselves, and the files themselves.
+pub fn quality_network(input: &[u8]) {
+    if let Ok(text) = core::str::from_utf8(input) {
+        let entries = text.lines().filter_map(|it| it.split_once('='));
+        if let Ok(card) = Card::parse(entries, 2) {
+            let entries = card.entries();
+            let entries = entries.iter().map(|(name, it)| (*name, it.as_str()));
+            assert_eq!(Card::parse(entries, 2), Ok(card));
+        }
+    }
+    let _outcome = Network::parse(input.to_vec(), 2);
+}
+
+/// Part-type tables, and the joint of two of them.
+pub fn type_table(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let (there, back) = input.split_once('#').unwrap_or((input, input));
+    let tables = [there, back].map(|it| Compatibility::parse(it, &[2, 3]));
+    if let [Ok(there), Ok(back)] = tables {
+        let (_, disagreement) =
+            Compatibility::joint_from_conditionals(&there, &back).expect("the same types");
+        assert!((0.0..1.000_001).contains(&disagreement));
+    }
+}
+
+/// What was learned about several views: the file, and the tables that are made of it.
+pub fn consistency(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let Ok(learned) = Learned::parse(input) else {
+        return;
+    };
+    let again = learned.write().expect("its numbers are finite");
+    assert_eq!(Learned::parse(&again).expect("it was written"), learned);
+    for appearance in [Appearance::Joint, Appearance::Lift] {
+        let tables = learned.by_angle(appearance);
+        for angle in [-3.5, -1.0, 0.0, 1.0, 3.5] {
+            if let Some(it) = tables.at(angle) {
+                assert!(it.joint.value(0, 0, 0).is_finite());
+            }
+        }
+        for rig in &learned.rigs {
+            let _tables = learned.of_rig(&rig.name, &["c1", "c2"], appearance);
+        }
+    }
+}
+
+/// Every calibration format that is one text.
+pub fn calibration(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let options = ReadOptions {
+        size: Some([640, 480]),
+        ..ReadOptions::default()
+    };
+    if let Ok(rig) = geometry::files::own::parse(input, &options) {
+        let again = geometry::files::own::write(&rig);
+        let _rig = geometry::files::own::parse(&again, &options).expect("it was written");
+    }
+    let _pose2sim = pose2sim::parse(input, &options);
+    let _qualisys = qualisys::parse(input, &options);
+    let _humaneva = humaneva::parse("C1", input, &options);
+    let _umpm = umpm::parse("l", input, &options);
+    let _opencv = opencv::parse(&[("cam01", input)], &options);
+}
+
+/// Our own annotation file, line by line, and skeletons.
+pub fn people_lines(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    for line in input.lines() {
+        if let Ok((person, name)) = parse_line(line) {
+            let again = to_line(&person, name.as_deref()).expect("it was Unicode");
+            let (again, same_name) = parse_line(&again).expect("it was written");
+            assert_eq!(
+                (again.image, again.visible, same_name),
+                (person.image, person.visible, name)
+            );
+            assert_eq!(
+                format!("{:?}", again.joints),
+                format!("{:?}", person.joints)
+            );
+        }
+    }
+    if let Ok(table) = SkeletonTable::parse(input) {
+        let joints = vec![[1.0, 2.0]; table.n_joints()];
+        assert_eq!(table.parts_of(&joints).len(), table.n_parts());
+    }
+}
+
+/// The MATLAB annotations of PARSE and LSP.
+pub fn people_mat(input: &[u8]) {
+    for people in [parse_labels(input), parse_joints(input)]
+        .into_iter()
+        .flatten()
+    {
+        for (joints, visible) in people {
+            assert_eq!(joints.len(), visible.len());
+        }
+    }
+}
+
+/// The payload of the checkpoints of trainings, under a right checksum.
+pub fn training_checkpoint(payload: &[u8]) {
+    let file = with_checksum(*b"PLXTRAIN", payload);
+    if let Ok((checkpoint, stamp)) = Checkpoint::from_bytes(&file) {
+        let again = checkpoint.to_bytes(stamp).expect("small checkpoints fit");
+        let (_, same) = Checkpoint::from_bytes(&again).expect("it was written");
+        assert_eq!(same, stamp);
+    }
+}
+
+/// C3D files, in all encodings.
+pub fn motion_c3d(input: &[u8]) {
+    if let Ok(trial) = C3d::parse(input) {
+        let n_points = trial.n_frames() * trial.n_points();
+        assert!(8 * n_points <= input.len() || trial.n_points() == 0);
+        for frame in 0..trial.n_frames() {
+            assert_eq!(trial.frame(frame).len(), trial.n_points());
+        }
+    }
+}
+
+/// Addresses of scenes, and lines of their truth.
+pub fn scene_text(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    if let Ok(address) = Address::parse(input) {
+        assert_eq!(
+            Address::parse(&address.to_string()).expect("it was written"),
+            address
+        );
+    }
+    let mut lines = input.lines();
+    if let Some(Ok(header)) = lines.next().map(Header::parse) {
+        for line in lines {
+            if let Ok(frame) = Frame::parse(line, &header) {
+                let again = frame.to_line().expect("numbers of JSON are finite");
+                assert_eq!(
+                    Frame::parse(&again, &header).expect("it was written"),
+                    frame
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,481 @@
+//! What must hold of every decoder of messages: each begins with messages that are right, and the input
+//! says what in them is changed, ten bytes a change: field, entry, and the value.
+
+use std::sync::{Arc, OnceLock};
+
+use fmp::{
+    Edge, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose, Spring, Springs,
+};
+use geometry::{Camera, Intrinsics, Lens};
+use kernels::Rgb8View;
+use messages::{
+    EvidenceHeader, FrameHeader, FusedView, Joint3d, MAX_CANDIDATES, MAX_JOINTS, MAX_LEVELS,
+    MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Stamp, Status, Timing, ViewPose,
+    ViewQuality,
+};
+use multiview::{Settings, ViewPlan};
+use nalgebra::Isometry3;
+use pipeline::{Answer, FuseStep, PairTables, SkeletonSettings, SkeletonStep};
+use wire::Expected;
+
+const SIZE: [usize; 2] = [80, 60];
+const EXPECTED: Expected = Expected {
+    session: 7,
+    view: 0,
+    now_nanos: 1_000_000_000,
+};
+
+/// One number of a message is to be another one.
+#[derive(Clone, Copy)]
+struct Change {
+    field: u8,
+    entry: u8,
+    value: u64,
+}
+
+impl Change {
+    fn all(input: &[u8]) -> impl Iterator<Item = Self> {
+        let (changes, _) = input.as_chunks::<10>();
+        changes.iter().map(|&[field, entry, ref value @ ..]| Self {
+            field,
+            entry,
+            value: u64::from_le_bytes(*value),
+        })
+    }
+
+    /// One of `n` entries.
+    fn of(self, n: usize) -> usize {
+        usize::from(self.entry) % n
+    }
+
+    fn float(self) -> f32 {
+        f32::from_bits(self.value as u32)
+    }
+
+    fn double(self) -> f64 {
+        f64::from_bits(self.value)
+    }
+}
+
+/// Three parts in a chain with one, two and three types, seen by two cameras.
+struct World {
+    model: Arc<Model>,
+    plans: Vec<Arc<ViewPlan>>,
+    fuse: FuseStep,
+}
+
+fn world() -> &'static World {
+    static WORLD: OnceLock<World> = OnceLock::new();
+    WORLD.get_or_init(|| {
+        let model = Arc::new(model());
+        let layout = Arc::new(Layout::new(&model, SIZE[0], SIZE[1]).expect("it fits"));
+        let plans: Vec<_> = [0.0, 1.0]
+            .map(|x| ViewPlan::new(camera(x), Arc::clone(&model), Arc::clone(&layout)))
+            .map(Arc::new)
+            .into();
+        let settings = Settings {
+            facing: false,
+            ..Settings::default()
+        };
+        World {
+            fuse: FuseStep::new(
+                Arc::clone(&model),
+                settings,
+                plans.clone(),
+                PairTables::default(),
+            ),
+            model,
+            plans,
+        }
+    })
+}
+
+fn camera(x: f64) -> Camera {
+    Camera {
+        name: format!("at {x}"),
+        intrinsics: Intrinsics {
+            fx: 80.0,
+            fy: 80.0,
+            cx: 39.5,
+            cy: 29.5,
+            size: SIZE.map(|it| it as u32),
+            lens: Lens::default(),
+        },
+        camera_from_world: Isometry3::translation(x, 0.0, 3.0),
+    }
+}
+
+fn model() -> Model {
+    let filter = |seed: usize| Filter {
+        rows: 3,
+        cols: 3,
+        weights: (0..9 * N_CHANNELS)
+            .map(|it| ((seed + it) % 7) as f64 * 0.1)
+            .collect(),
+    };
+    let spring = Spring {
+        w: [0.01, 0.0, 0.02, 0.0],
+        anchor: [0, 1],
+    };
+    let part = |part: usize, first: usize| PartSpec {
+        name: format!("part {part}"),
+        filter_of_type: (first..=first + part).collect(),
+        edge: (part > 0).then(|| Edge {
+            parent: part - 1,
+            bias: vec![vec![0.0; part + 1]; part],
+            springs: Springs::PerChildType(vec![spring; part + 1]),
+        }),
+    };
+    let spec = ModelSpec {
+        name: "chain".to_owned(),
+        parts: vec![part(0, 0), part(1, 1), part(2, 3)],
+        filters: (0..6).map(filter).collect(),
+        root_bias: 0.0,
+        interval: 2,
+        cell_px: 4,
+        threshold: -1.0,
+        mirror: None,
+    };
+    Model::new(spec).expect("it is a tree")
+}
+
+fn pose() -> Pose {
+    let place = |mixture: u8| Placement {
+        x: 2,
+        y: 2,
+        mixture,
+    };
+    Pose {
+        score: 1.0,
+        level: 0,
+        parts: vec![place(0), place(1), place(2)],
+    }
+}
+
+fn stamp() -> (Stamp, Timing) {
+    let stamp = Stamp {
+        session: EXPECTED.session,
+        frame: 3,
+        captured_at_nanos: 900_000_000,
+        view: 0,
+        epoch: 0,
+    };
+    (stamp, Timing::default())
+}
+
+fn change_stamp(stamp: &mut Stamp, timing: &mut Timing, it: Change) {
+    match it.entry % 6 {
+        0 => stamp.session = it.value,
+        1 => stamp.frame = it.value,
+        2 => stamp.captured_at_nanos = it.value,
+        3 => stamp.view = it.value as u32,
+        4 => timing.received_at_nanos = it.value,
+        _ => timing.sent_at_nanos = it.value,
+    }
+}
+
+fn change_pose(pose: &mut PoseMessage, field: u8, it: Change) {
+    let part = it.of(MAX_PARTS);
+    match field {
+        0 => pose.score = it.float(),
+        1 => pose.level = it.value as u16,
+        2 => pose.n_parts = it.value as u16,
+        3 => pose.x[part] = it.value as u16,
+        4 => pose.y[part] = it.value as u16,
+        _ => pose.mixture[part] = it.value as u8,
+    }
+}
+
+/// Every message that is copied, and frames: what is let through lies where it says.
+pub fn wire_messages(input: &[u8]) {
+    frame(input);
+    candidates(input);
+    expected_errors(input);
+    pair(input);
+    result(input);
+}
+
+fn frame(input: &[u8]) {
+    let (stamp, timing) = stamp();
+    let mut header = FrameHeader {
+        stamp,
+        timing,
+        width: 4,
+        height: 3,
+        ..FrameHeader::default()
+    };
+    let mut pixels = vec![0; 36];
+    for it in Change::all(input) {
+        match it.field % 6 {
+            0 => change_stamp(&mut header.stamp, &mut header.timing, it),
+            1 => header.width = it.value as u32,
+            2 => header.height = it.value as u32,
+            3 => header.status = Status(it.value as u32),
+            4 => header.n_dropped = it.value,
+            _ => pixels.resize(usize::from(it.value as u16), 0),
+        }
+    }
+    let is_good = wire::check_frame(&header, pixels.len(), &EXPECTED).is_ok();
+    if is_good && header.status == Status::OK {
+        let size = [header.width as usize, header.height as usize];
+        let image = Rgb8View::new(size[0], size[1], &pixels).expect("its pixels fill it");
+        assert_eq!([image.width(), image.height()], size);
+    }
+}
+
+/// Candidates as they come, changed.
+fn view_pose(input: &[u8]) -> ViewPose {
+    let mut message = wire::candidates_to_message(&[pose(), pose()], SIZE).expect("they fit");
+    for it in Change::all(input) {
+        let candidate = it.value.to_le_bytes()[7];
+        let candidate = &mut message.candidates[usize::from(candidate) % MAX_CANDIDATES];
+        match it.field % 12 {
+            field @ 0..6 => change_pose(candidate, field, it),
+            6 => message.status = Status(it.value as u32),
+            7 => message.n_candidates = it.value as u32,
+            8 => message.width = it.value as u32,
+            9 => message.height = it.value as u32,
+            10 => message.local[it.of(MAX_PARTS)].margin = it.float(),
+            _ => change_stamp(&mut message.stamp, &mut message.timing, it),
+        }
+    }
+    message
+}
+
+fn candidates(input: &[u8]) {
+    let World { model, plans, .. } = world();
+    let message = view_pose(input);
+    if let Ok(poses) = wire::candidates_from_message(&message, model, plans[0].layout()) {
+        let centres = poses
+            .iter()
+            .flat_map(|it| it.centres(model, plans[0].layout()));
+        assert!(centres.flatten().all(f64::is_finite));
+    }
+    if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
+        assert!(scores.iter().all(|it| it.margin.is_finite()));
+    }
+}
+
+/// Expected errors as they come, changed.
+fn view_quality(input: &[u8]) -> ViewQuality {
+    let mut message = wire::sigma_to_message(Some(&[1.0, 2.0, 3.0])).expect("they fit");
+    for it in Change::all(input) {
+        match it.field % 5 {
+            0 => message.status = Status(it.value as u32),
+            1 => message.n_parts = it.value as u32,
+            2 => message.sigma_px[it.of(MAX_PARTS)] = it.float(),
+            3 => message.n_thresholds = it.value as u32,
+            _ => message.tau_px[it.of(MAX_PARTS)] = it.float(),
+        }
+    }
+    message
+}
+
+fn expected_errors(input: &[u8]) {
+    let message = view_quality(input);
+    for n_parts in [3, message.n_parts as usize] {
+        let sigma = wire::sigma_from_message(&message, n_parts).ok().flatten();
+        let tau = wire::tau_from_message(&message, n_parts).ok().flatten();
+        for px in sigma.into_iter().chain(tau) {
+            assert!(px.len() == n_parts && px.iter().all(|it| it.is_finite() && *it >= 0.0));
+        }
+    }
+}
+
+/// The answer of a pair as it comes, changed.
+fn pair_pose(input: &[u8]) -> PairPose {
+    let mut message = wire::pair_to_message([0, 1], None, 3).expect("it fits");
+    (message.stamp, message.timing) = stamp();
+    (message.status, message.n_hypotheses) = (Status::OK, 2);
+    for it in &mut message.hypotheses {
+        it.poses = [pose(), pose()].map(|it| wire::pose_to_message(&it).expect("it fits"));
+    }
+    for it in Change::all(input) {
+        let place = it.value.to_le_bytes()[7];
+        let hypothesis = &mut message.hypotheses[usize::from(place & 1)];
+        match it.field % 14 {
+            field @ 0..6 => {
+                change_pose(
+                    &mut hypothesis.poses[usize::from(place >> 1 & 1)],
+                    field,
+                    it,
+                );
+            }
+            6 => message.status = Status(it.value as u32),
+            7 => message.n_hypotheses = it.value as u32,
+            8 => message.views[it.of(2)] = it.value as u32,
+            9 => hypothesis.energy = it.double(),
+            10 => hypothesis.start[it.of(2)] = it.value as u8,
+            11 => hypothesis.active_parts = it.value,
+            12 => hypothesis.exchanged = it.value as u32 & 1,
+            _ => change_stamp(&mut message.stamp, &mut message.timing, it),
+        }
+    }
+    message
+}
+
+fn pair(input: &[u8]) {
+    let World { plans, .. } = world();
+    let message = pair_pose(input);
+    let checked = EXPECTED.check_pair(&message.stamp, &message.timing, 1);
+    if checked.is_ok() && wire::check_views(&message, &[[0, 1]]).is_ok() {
+        assert_eq!((message.stamp.view, message.views), (0, [0, 1]));
+    }
+    if let Ok(Some(answer)) = wire::pair_from_message(&message, plans) {
+        assert!(answer.views[0] < answer.views[1] && answer.views[1] < plans.len());
+        assert!(answer.hypotheses.iter().all(|it| it.energy.is_finite()));
+    }
+}
+
+fn result(input: &[u8]) {
+    let (stamp, timing) = stamp();
+    let mut message = Pose3d {
+        stamp,
+        timing,
+        status: Status::OK,
+        n_joints: 14,
+        n_views: 2,
+        views_present: 3,
+        views_used: 3,
+        n_pairs: 1,
+        facing_margin: 0.0,
+        joints: [Joint3d::default(); MAX_JOINTS],
+        views: [FusedView::default(); MAX_VIEWS],
+    };
+    for it in Change::all(input) {
+        match it.field % 6 {
+            0 => message.n_joints = it.value as u32,
+            1 => message.n_views = it.value as u32,
+            2 => message.views[it.of(MAX_VIEWS)].n_parts = it.value as u32,
+            3 => message.joints[it.of(MAX_JOINTS)].in_world[0] = it.double(),
+            4 => message.views[it.of(MAX_VIEWS)].centres_px[0][1] = it.double(),
+            _ => message.status = Status(it.value as u32),
+        }
+    }
+    if wire::check_pose3d(&message, 2, 14).is_ok() && message.status == Status::OK {
+        assert_eq!((message.n_views, message.n_joints), (2, 14));
+        let joints = message.joints[..14].iter();
+        assert!(joints.flat_map(|it| it.in_world).all(f64::is_finite));
+    }
+}
+
+/// Evidence, candidates, expected errors and pairs of one frame, up to the skeleton: what is let through
+/// is computed with.
+pub fn wire_fusion(input: &[u8]) {
+    let World { model, plans, fuse } = world();
+    let (input, pairs) = input.split_at(input.len() / 2);
+    let message = view_pose(input);
+    let Ok(candidates) = wire::candidates_from_message(&message, model, plans[0].layout()) else {
+        return;
+    };
+    if candidates.is_empty() {
+        return;
+    }
+    let quality = view_quality(input);
+    let sigma = wire::sigma_from_message(&quality, model.n_parts());
+    let changed = Answer {
+        candidates,
+        sigma_px: sigma.ok().flatten(),
+        tau_px: None,
+    };
+    let whole = Answer {
+        candidates: vec![pose()],
+        sigma_px: None,
+        tau_px: None,
+    };
+    let answers = [Some(changed), Some(whole)];
+    let mut found = Vec::new();
+    let (header, values) = evidence(input);
+    let (whole_header, whole_values) = evidence(&[]);
+    let read = wire::evidence_from_message(&header, &values, plans[0].layout());
+    let other = wire::evidence_from_message(&whole_header, &whole_values, plans[1].layout());
+    if let (Ok(first), Ok(second)) = (read, other) {
+        let start = fuse.start(&answers);
+        let evidence = [&first.responses(), &second.responses()];
+        let answer = fuse.pair([0, 1], &answers, evidence, &start);
+        let sent = wire::pair_to_message([0, 1], answer.as_ref(), 3);
+        // Responses that are no numbers may make an energy that is none, which is not sent.
+        if let Some(read) = sent.ok().map(|it| wire::pair_from_message(&it, plans)) {
+            found.extend(read.expect("it was written"));
+        }
+    }
+    found.extend(
+        wire::pair_from_message(&pair_pose(pairs), plans)
+            .ok()
+            .flatten(),
+    );
+    let mut step = SkeletonStep::new(plans.clone(), None, settings());
+    let skeleton = step.run(&answers, &found);
+    let message = wire::skeleton_to_message(&skeleton, 3).expect("it fits");
+    assert_eq!(message.n_views, 2);
+}
+
+/// Every part is a joint: the joint sets of people have more parts than the chain.
+fn settings() -> SkeletonSettings {
+    static PARTS: [skeleton::Joint; 3] = [
+        skeleton::Joint {
+            name: "a",
+            parts: &[0],
+        },
+        skeleton::Joint {
+            name: "b",
+            parts: &[1],
+        },
+        skeleton::Joint {
+            name: "c",
+            parts: &[2],
+        },
+    ];
+    static CHAIN: skeleton::JointSet = skeleton::JointSet {
+        name: "chain",
+        joints: &PARTS,
+        limbs: &[],
+    };
+    SkeletonSettings {
+        joints: &CHAIN,
+        ..SkeletonSettings::default()
+    }
+}
+
+/// Response maps as they come, changed.
+fn evidence(input: &[u8]) -> (EvidenceHeader, Vec<f32>) {
+    let layout = world().plans[0].layout();
+    let n_levels = layout.levels.len();
+    let mut header = EvidenceHeader {
+        width: SIZE[0] as u32,
+        height: SIZE[1] as u32,
+        n_levels: n_levels as u32,
+        x: [0, SIZE[0] as u32],
+        y: [0, SIZE[1] as u32],
+        scope_levels: [0, n_levels as u16],
+        ..EvidenceHeader::default()
+    };
+    for level in 0..n_levels {
+        header.levels[level] = level as u16;
+        (header.best[level], header.size[level]) = (f32::INFINITY, 1e3);
+    }
+    let n = layout.n_responses();
+    let mut values: Vec<f32> = (0..n).map(|it| (it * 37 % 101) as f32 * 0.01).collect();
+    for it in Change::all(input) {
+        let level = it.of(MAX_LEVELS);
+        match it.field % 11 {
+            0 => header.width = it.value as u32,
+            1 => header.n_levels = it.value as u32,
+            2 => header.x[it.of(2)] = it.value as u32,
+            3 => header.y[it.of(2)] = it.value as u32,
+            4 => header.scope_levels[it.of(2)] = it.value as u16,
+            5 => header.levels[level] = it.value as u16,
+            6 => header.best[level] = it.float(),
+            7 => header.size[level] = it.float(),
+            8 => values.truncate(it.value as usize),
+            9 => values.fill(it.float()),
+            _ => {
+                let n = values.len().max(1);
+                if let Some(value) = values.get_mut((it.value >> 32) as usize % n) {
+                    *value = it.float();
+                }
+            }
+        }
+    }
+    (header, values)
+}

@@ -1,0 +1,33 @@
+//! What must hold of every reader and decoder, whatever it is given: the body of every fuzz target, also
+//! run by a plain test over the seeds and their mutations.
+
+mod files;
+mod messages;
+
+pub use files::{
+    calibration, consistency, model_mat, model_own, model_text, motion_c3d, people_lines,
+    people_mat, quality_network, quality_table, scene_text, training_checkpoint, type_table,
+};
+pub use messages::{wire_fusion, wire_messages};
+
+/// A target by name.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const TARGETS: [Target; 15] = [
+    ("calibration", calibration),
+    ("consistency", consistency),
+    ("model_mat", model_mat),
+    ("model_own", model_own),
+    ("model_text", model_text),
+    ("motion_c3d", motion_c3d),
+    ("people_lines", people_lines),
+    ("people_mat", people_mat),
+    ("quality_network", quality_network),
+    ("quality_table", quality_table),
+    ("scene_text", scene_text),
+    ("training_checkpoint", training_checkpoint),
+    ("type_table", type_table),
+    ("wire_fusion", wire_fusion),
+    ("wire_messages", wire_messages),
+];
