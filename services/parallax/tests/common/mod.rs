@@ -103,6 +103,11 @@ impl Case {
         Started::new(self.folder(), arguments)
     }
 
+    /// The same from a shell script; `$PARALLAX` is the program.
+    pub(crate) fn start_in_shell(&self, script: &str) -> Started {
+        Started::in_shell(self.folder(), script)
+    }
+
     /// Runs the deployment to its end.
     pub(crate) fn run(&self) -> Ended {
         let ended = self.start(&["run", "deployment.toml", "--json"]).wait();

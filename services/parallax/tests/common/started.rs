@@ -51,6 +51,15 @@ impl Started {
         Some(Self::from_command(folder, command))
     }
 
+    /// The same from a shell script; `$PARALLAX` is the program.
+    pub(crate) fn in_shell(folder: &Path, script: &str) -> Self {
+        let mut command = Command::new("sh");
+        command
+            .args(["-ec", script])
+            .env("PARALLAX", env!("CARGO_BIN_EXE_parallax"));
+        Self::from_command(folder, command)
+    }
+
     fn from_command(folder: &Path, mut command: Command) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -164,7 +173,7 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
 }
 
 /// Processes whose command line names a folder, with its words.
-fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
+pub(crate) fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
     let folder = folder.to_str().unwrap();
     let entries = fs::read_dir("/proc").unwrap();
     entries

@@ -1,0 +1,351 @@
+//! Somebody publishes into a running deployment what nobody of it would say: it is refused and counted,
+//! by cause, and the run goes on.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use core::time::Duration;
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use common::started::signal;
+use common::{Case, Ended, PACED, Started};
+use messages::{
+    EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_VIEWS, PairPose,
+    Pose3d, Stamp, Status, Timing, ViewPose, topic,
+};
+use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter, now_nanos};
+use serde_json::Value;
+
+const N_FRAMES: usize = 200;
+/// What takes longer has got stuck.
+const WATCHDOG: Duration = Duration::from_mins(2);
+
+/// A process that is no part of the deployment but may read and write its memory: the same user's.
+struct Rogue {
+    bus: Bus,
+    _waiter: Waiter,
+    session: u64,
+}
+
+impl Rogue {
+    /// Joins a deployment, and learns its session from the signs of life.
+    fn join(case: &Case) -> Self {
+        let namespace = Namespace::new(&case.name).unwrap();
+        let bus = Bus::open(&namespace, "rogue", &Stop::new().unwrap()).unwrap();
+        let mut waiter = bus.waiter();
+        let signs = bus.subscriber::<Health>(&topic::health("record"), &mut waiter);
+        let signs = signs.unwrap();
+        let session = until(|| signs.latest().unwrap()).session;
+        Self {
+            bus,
+            _waiter: waiter,
+            session,
+        }
+    }
+
+    /// Kills a process and takes its place before it is back.
+    ///
+    /// * `victim`: as on its command line.
+    fn replace<T>(
+        &self,
+        started: &mut Started,
+        victim: &str,
+        publisher: impl Fn(&Bus) -> Result<T, PortError>,
+    ) -> T {
+        let refused = publisher(&self.bus).err().unwrap();
+        assert!(matches!(refused, PortError::Publisher { .. }), "{refused}");
+        loop {
+            signal("KILL", started.pid_of(victim).into());
+            // On a busy machine its successor may be there first.
+            let begin = Instant::now();
+            while begin.elapsed() < Duration::from_secs(3) {
+                if let Ok(it) = publisher(&self.bus) {
+                    return it;
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    /// As the right sender would have it.
+    fn stamp(&self, view: u32, frame: u64) -> (Stamp, Timing) {
+        let now = now_nanos();
+        let stamp = Stamp {
+            session: self.session,
+            frame,
+            captured_at_nanos: now,
+            view,
+            epoch: 0,
+        };
+        let timing = Timing {
+            received_at_nanos: now,
+            sent_at_nanos: now,
+        };
+        (stamp, timing)
+    }
+
+    /// Every way in which a stamp can be wrong.
+    fn wrong_stamps(&self, view: u32) -> [(Stamp, Timing); 6] {
+        let (stamp, timing) = self.stamp(view, 5);
+        let ahead = now_nanos() + 3_600_000_000_000;
+        [
+            (
+                Stamp {
+                    session: 1,
+                    ..stamp
+                },
+                timing,
+            ),
+            (
+                Stamp {
+                    view: u32::MAX,
+                    ..stamp
+                },
+                timing,
+            ),
+            (
+                Stamp {
+                    captured_at_nanos: ahead,
+                    ..stamp
+                },
+                timing,
+            ),
+            (
+                Stamp {
+                    captured_at_nanos: u64::MAX,
+                    ..stamp
+                },
+                timing,
+            ),
+            (
+                Stamp {
+                    frame: u64::MAX,
+                    ..stamp
+                },
+                timing,
+            ),
+            (
+                stamp,
+                Timing {
+                    sent_at_nanos: u64::MAX,
+                    ..timing
+                },
+            ),
+        ]
+    }
+}
+
+/// Waits until there is something.
+fn until<T>(mut look: impl FnMut() -> Option<T>) -> T {
+    let begin = Instant::now();
+    loop {
+        if let Some(it) = look() {
+            return it;
+        }
+        assert!(begin.elapsed() < WATCHDOG, "waited in vain");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// A run of two views that has begun.
+fn begun(name: &str, more: &str) -> (Case, Started, Rogue) {
+    let more = more.to_owned() + "[supervise]\nmax_restarts = 50\n";
+    let case = Case::new(name, &[N_FRAMES; 2], &more);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    let rogue = Rogue::join(&case);
+    (case, started, rogue)
+}
+
+/// What a run that went on to its end refused, as `process cause`.
+fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    assert!(!ended.stderr.contains("panic"), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let restarts = report["restarts"].as_array().unwrap();
+    let restarted: BTreeSet<&str> = restarts
+        .iter()
+        .map(|it| it["process"].as_str().unwrap())
+        .collect();
+    assert_eq!(restarted.len(), 1, "only the replaced one: {restarted:?}");
+    let last = case.lines("pose3d.jsonl").pop().unwrap();
+    assert_eq!(last["frame"], N_FRAMES as u64 - 1, "{}", ended.stderr);
+    assert_eq!(last["views_present"].as_array().unwrap().len(), 2, "{last}");
+    let processes = report["refused"].as_object().unwrap().iter();
+    let all = processes.flat_map(|(process, causes)| {
+        let causes = causes.as_object().unwrap().keys();
+        causes.map(move |cause| format!("{process} {cause}"))
+    });
+    all.collect()
+}
+
+fn assert_all(refused: &BTreeSet<String>, processes: &[&str], causes: &[&str]) {
+    for process in processes {
+        for cause in causes {
+            let it = format!("{process} {cause}");
+            assert!(refused.contains(&it), "{it} is not in {refused:?}");
+        }
+    }
+}
+
+#[test]
+fn who_is_no_part_of_a_deployment_can_neither_speak_another_type_nor_beside_the_right_sender() {
+    let (case, started, rogue) = begun("types", PACED);
+    let wrong_type = rogue.bus.publisher::<PairPose>(&topic::view_pose(0));
+    assert!(matches!(wrong_type, Err(PortError::WrongType { .. })));
+    let wrong_header = rogue
+        .bus
+        .slice_publisher::<u8, EvidenceHeader>(&topic::frame(0));
+    assert!(matches!(wrong_header, Err(PortError::WrongType { .. })));
+    let second = rogue.bus.publisher::<ViewPose>(&topic::view_pose(0));
+    assert!(matches!(second, Err(PortError::Publisher { .. })));
+    drop(rogue);
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(report["refused"], serde_json::json!({}));
+    case.assert_nothing_left();
+}
+
+#[test]
+fn frames_whose_sizes_do_not_match_are_refused() {
+    let (case, mut started, rogue) = begun("frames", PACED);
+    let frames: SlicePublisher<u8, FrameHeader> =
+        rogue.replace(&mut started, "capture --index 0", |bus| {
+            bus.slice_publisher(&topic::frame(0))
+        });
+    let send = |header: FrameHeader, n_bytes: usize| {
+        let mut loan = frames.loan(n_bytes).unwrap();
+        loan.payload_mut().fill(7);
+        *loan.header_mut() = header;
+        loan.send().unwrap();
+    };
+    assert_eq!(frames.wait_for_subscribers(2, WATCHDOG), 2);
+    for (stamp, timing) in rogue.wrong_stamps(0) {
+        send(
+            FrameHeader {
+                stamp,
+                timing,
+                ..FrameHeader::default()
+            },
+            1,
+        );
+    }
+    for size in [[0, 1], [u32::MAX; 2], [1 << 31, 1 << 31], [96, 127]] {
+        let (stamp, timing) = rogue.stamp(0, 50);
+        let header = FrameHeader {
+            stamp,
+            timing,
+            width: size[0],
+            height: size[1],
+            ..FrameHeader::default()
+        };
+        send(header, 96 * 128 * 3);
+    }
+    drop((frames, rogue));
+    let refused = refused(&case, &started.wait());
+    let causes = ["session", "sender", "time", "size"];
+    assert_all(&refused, &["pose-0", "record"], &causes);
+}
+
+#[test]
+fn pairs_and_results_of_nobody_are_refused() {
+    let (case, mut started, rogue) = begun("pairs", PACED);
+    let pairs: Publisher<PairPose> = rogue.replace(&mut started, "fuse --index 0", |bus| {
+        bus.publisher(&topic::pair_pose(0))
+    });
+    assert_eq!(pairs.wait_for_subscribers(2, WATCHDOG), 2);
+    for (stamp, timing) in rogue.wrong_stamps(0) {
+        let wrong = PairPose {
+            stamp,
+            timing,
+            ..PairPose::default()
+        };
+        pairs.send(&wrong).unwrap();
+    }
+    for frame in 0..N_FRAMES as u64 {
+        let (stamp, timing) = rogue.stamp(0, frame);
+        let mut wrong = PairPose {
+            stamp,
+            timing,
+            n_hypotheses: if frame % 3 == 0 { u32::MAX } else { 2 },
+            views: if frame % 3 == 1 {
+                [u32::MAX; 2]
+            } else {
+                [0, 1]
+            },
+            ..PairPose::default()
+        };
+        wrong.hypotheses[0].energy = f64::NAN;
+        pairs.send(&wrong).unwrap();
+    }
+    drop((pairs, rogue));
+    let refused = refused(&case, &started.wait());
+    let stamps = ["session", "time"];
+    assert_all(&refused, &["triangulate", "record"], &stamps);
+    assert_all(&refused, &["triangulate"], &["index", "sender", "size"]);
+}
+
+#[test]
+fn results_and_signs_of_life_of_nobody_are_refused() {
+    let (case, mut started, rogue) = begun("results", PACED);
+    let results: Publisher<Pose3d> = rogue.replace(&mut started, "triangulate", |bus| {
+        bus.publisher(&topic::pose3d())
+    });
+    let signs: Option<Publisher<Health>> = rogue.bus.publisher(&topic::health("triangulate")).ok();
+    let (stamp, timing) = rogue.stamp(0, 20);
+    let good = Pose3d {
+        stamp,
+        timing,
+        status: Status::OK,
+        n_joints: 14,
+        n_views: 2,
+        views_present: u32::MAX,
+        views_used: u32::MAX,
+        n_pairs: u32::MAX,
+        facing_margin: f64::NAN,
+        joints: [Joint3d::default(); MAX_JOINTS],
+        views: [FusedView::default(); MAX_VIEWS],
+    };
+    assert_eq!(results.wait_for_subscribers(1, WATCHDOG), 1);
+    for (stamp, timing) in rogue.wrong_stamps(0) {
+        results
+            .send(&Pose3d {
+                stamp,
+                timing,
+                ..good
+            })
+            .unwrap();
+    }
+    for (n_views, n_joints) in [(u32::MAX, 14), (2, u32::MAX), (17, 33)] {
+        results
+            .send(&Pose3d {
+                n_views,
+                n_joints,
+                ..good
+            })
+            .unwrap();
+    }
+    let mut nowhere = good;
+    nowhere.joints[3].in_world[1] = f64::NAN;
+    results.send(&nowhere).unwrap();
+    if let Some(signs) = signs {
+        for session in [rogue.session, 1] {
+            let wrong = Health {
+                session,
+                pid: 1,
+                epoch: 1,
+                n_sent: u64::MAX,
+                refused: [u64::MAX; 6],
+                ..Health::default()
+            };
+            signs.send(&wrong).unwrap();
+        }
+    }
+    drop((results, rogue));
+    let refused = refused(&case, &started.wait());
+    let causes = ["session", "sender", "time", "size", "number"];
+    assert_all(&refused, &["record"], &causes);
+}
