@@ -3,6 +3,7 @@
 mod error;
 mod keys;
 mod load;
+mod processes;
 mod rules;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use error::ConfigError;
 pub(crate) use keys::Entry;
 pub(crate) use load::Loaded;
+pub(crate) use processes::Runtime;
 
 /// Everything a user may say about a run. Defaults are those of the services' `Config`s.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,6 +52,9 @@ pub(crate) struct Deployment {
     /// Deadlines and restarts.
     #[serde(default)]
     pub supervise: Supervision,
+    /// Cores, priorities, and how processes wait.
+    #[serde(default)]
+    pub runtime: Runtime,
 }
 
 /// Section `[supervise]`: how long to wait, and how often to try again.

@@ -14,6 +14,7 @@ mod live;
 mod output;
 mod plan;
 mod prepare;
+mod scheduling;
 mod search;
 mod sheet;
 mod summary;

@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use runtime::{
-    Delivery, DeploymentPlan, ExitKind, Failure, HEARTBEAT, Namespace, OrFail as _, TopicPlan,
-    now_nanos,
+    Delivery, DeploymentPlan, ExitKind, Failure, HEARTBEAT, Namespace, OrFail as _, Scheduling,
+    TopicPlan, now_nanos,
 };
 use serde::{Deserialize, Serialize};
 use supervise::{Plan, Policy, ProcessSpec, Role};
@@ -186,6 +186,7 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
         processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
     }
     for it in &mut processes {
+        it.scheduling = resolved.deployment.runtime.of(&it.service, &it.name);
         stand_in(it, resolved);
     }
     processes
@@ -211,6 +212,7 @@ fn process(service: &str, index: Option<usize>, role: Role, file: &Path) -> Proc
         service: service.to_owned(),
         args,
         role,
+        scheduling: Scheduling::default(),
     }
 }
 

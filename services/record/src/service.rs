@@ -165,7 +165,7 @@ impl Ports {
                     let wanted = header.status == Status::OK && writer.draws(header.stamp.frame);
                     let picture = wanted.then(|| Picture {
                         size,
-                        rgb: sample.payload().to_vec(),
+                        rgb: frames.copy_of(&sample),
                     });
                     gather.frame(view, &header, picture);
                 }

@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use runtime::{Delivery, Namespace, TopicPlan};
+use runtime::{Delivery, Namespace, Scheduling, TopicPlan};
 use tracing::Level;
 
 /// A deployment, as the supervisor sees it.
@@ -39,6 +39,8 @@ pub struct ProcessSpec {
     pub args: Vec<OsString>,
     /// What becomes of the run without it.
     pub role: Role,
+    /// What it asks of the system's scheduler.
+    pub scheduling: Scheduling,
 }
 
 /// What becomes of the run when a process has been given up.

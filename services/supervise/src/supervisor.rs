@@ -201,6 +201,7 @@ impl Supervisor<'_> {
             delivery: self.plan.delivery,
             supervisor: Some(std::process::id()),
             log: self.plan.log,
+            scheduling: watch.spec.scheduling.clone(),
         };
         let mut args = vec!["service".into(), watch.spec.service.clone().into()];
         args.extend(launch.to_args());

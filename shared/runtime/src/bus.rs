@@ -21,7 +21,9 @@ use crate::log::adopt_transport_log;
 use crate::payload::{Header, Message};
 use crate::service::{self, PortError};
 use crate::topic::TopicPlan;
-use crate::{Namespace, NamespaceError, PrivacyError, Progress, Stop, free_shared_memory, private};
+use crate::{
+    Copies, Namespace, NamespaceError, PrivacyError, Progress, Stop, free_shared_memory, private,
+};
 
 /// How long a sender waits for a receiver without room, unless told otherwise.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -109,7 +111,9 @@ pub struct Bus {
     process: String,
     stop: Stop,
     progress: Progress,
+    copies: Copies,
     patience: Duration,
+    spins: bool,
 }
 
 impl Bus {
@@ -145,7 +149,9 @@ impl Bus {
             process: process.to_owned(),
             stop: stop.clone(),
             progress: Progress::default(),
+            copies: Copies::default(),
             patience: PATIENCE,
+            spins: false,
         })
     }
 
@@ -154,6 +160,15 @@ impl Bus {
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
+        self
+    }
+
+    /// Sets whether waiters of this bus look for messages without pause instead of sleeping until one
+    /// comes: the receiver takes a core for itself, and a message arrives in a microsecond or two. They
+    /// sleep if it is not set.
+    #[must_use]
+    pub fn with_spin(mut self, spins: bool) -> Self {
+        self.spins = spins;
         self
     }
 
@@ -185,6 +200,15 @@ impl Bus {
     /// The counter of the process's main loop.
     pub fn progress(&self) -> &Progress {
         &self.progress
+    }
+
+    /// Bytes that the ports of this bus have copied; those of the signs of life are none of them.
+    pub fn copies(&self) -> &Copies {
+        &self.copies
+    }
+
+    pub(crate) fn spins(&self) -> bool {
+        self.spins
     }
 
     pub(crate) fn patience(&self) -> Duration {
@@ -243,7 +267,7 @@ pub(crate) struct Seed {
 }
 
 impl Seed {
-    /// The bus, with a counter of its own: what the thread does is no progress of the main loop.
+    /// The bus, with counters of its own: what the thread does is no progress of the main loop.
     pub(crate) fn grow(self) -> Bus {
         Bus {
             node: self.node,
@@ -251,7 +275,9 @@ impl Seed {
             process: self.process,
             stop: self.stop,
             progress: Progress::default(),
+            copies: Copies::default(),
             patience: PATIENCE,
+            spins: false,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use tracing::Level;
 
-use crate::{Delivery, ExitKind, Fault, Namespace, NamespaceError};
+use crate::{Delivery, ExitKind, Fault, Namespace, NamespaceError, Scheduling};
 
 /// The arguments of a service are not those that a supervisor gives.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -54,6 +54,8 @@ pub struct Launch {
     pub supervisor: Option<u32>,
     /// The least important events that are logged.
     pub log: Level,
+    /// What it asks of the system's scheduler.
+    pub scheduling: Scheduling,
 }
 
 const DEPLOYMENT: &str = "--deployment";
@@ -64,8 +66,9 @@ const EPOCH: &str = "--epoch";
 const DELIVERY: &str = "--delivery";
 const SUPERVISOR: &str = "--supervisor";
 const LOG: &str = "--log";
-const FLAGS: [&str; 8] = [
-    DEPLOYMENT, BASE, PROCESS, SESSION, EPOCH, DELIVERY, SUPERVISOR, LOG,
+const SCHEDULING: &str = "--scheduling";
+const FLAGS: [&str; 9] = [
+    DEPLOYMENT, BASE, PROCESS, SESSION, EPOCH, DELIVERY, SUPERVISOR, LOG, SCHEDULING,
 ];
 
 impl Launch {
@@ -93,6 +96,9 @@ impl Launch {
         ];
         if let Some(pid) = self.supervisor {
             args.extend([SUPERVISOR.into(), pid.to_string().into()]);
+        }
+        if self.scheduling != Scheduling::default() {
+            args.extend([SCHEDULING.into(), self.scheduling.to_string().into()]);
         }
         args
     }
@@ -130,6 +136,13 @@ impl Launch {
                 None => None,
             },
             log: given.parsed(LOG, "error, warn, info, debug or trace")?,
+            scheduling: match given.find(SCHEDULING) {
+                Some(_) => given.parsed(
+                    SCHEDULING,
+                    "cores=0,1 fifo=1 round-robin=1 lock-memory spin",
+                )?,
+                None => Scheduling::default(),
+            },
         };
         Ok((launch, rest))
     }
@@ -204,6 +217,7 @@ mod tests {
             delivery: Delivery::Lossless,
             supervisor: Some(4711),
             log: Level::DEBUG,
+            scheduling: "cores=0,2 fifo=7 spin".parse().unwrap(),
         }
     }
 

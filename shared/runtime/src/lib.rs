@@ -7,7 +7,9 @@ mod topic;
 
 mod bus;
 mod clean;
+mod copies;
 mod lock;
+mod mapped;
 mod memory;
 mod payload;
 mod private;
@@ -27,6 +29,7 @@ mod place;
 mod process;
 mod progress;
 mod remains;
+mod scheduling;
 mod stop;
 mod terminal;
 
@@ -34,12 +37,14 @@ pub use bus::{Bus, BusError, Topic};
 pub use child::{Child, freeze, kill, thaw, wait_for_any};
 pub use clean::Cleaner;
 pub use clock::now_nanos;
+pub use copies::Copies;
 pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, preflight, process_topics};
 pub use failure::{ExitKind, Failure, Fault, OrFail};
 pub use health::{HEARTBEAT, Health, HealthError};
 pub use launch::{Launch, LaunchError};
 pub use lock::{DeploymentLock, LockError};
 pub use log::init_logging;
+pub use mapped::{Mapped, mapped_at};
 pub use memory::{MemoryError, free_shared_memory, peak_memory};
 pub use namespace::{Namespace, NamespaceError};
 pub use onlooker::{Onlooker, OnlookerError, Sighting};
@@ -50,6 +55,9 @@ pub use process::{Service, raise_file_limit, run_service};
 pub use progress::Progress;
 pub use publisher::{Loan, Publisher, SendError, SlicePublisher};
 pub use remains::{Remains, deployments};
+pub use scheduling::{
+    Denied, MAX_CORES, Policy, RealTime, Refusal, Scheduling, SchedulingError, own_cores,
+};
 pub use service::PortError;
 pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};

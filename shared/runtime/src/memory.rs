@@ -16,6 +16,7 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 use rustix::mm::{Advice, madvise};
 
+use crate::mapped::Mapping;
 use crate::payload::{Element, Header};
 
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -95,6 +96,7 @@ pub(crate) fn populate(
     let name = port.to_string();
     for mapping in maps.lines().filter_map(Mapping::parse) {
         let own = mapping.writable
+            && mapping.shared
             && mapping.path.starts_with(&begin)
             && Path::new(mapping.path)
                 .extension()
@@ -117,32 +119,7 @@ pub(crate) fn assume_written<E: Element, H: Header>(
     unsafe { sample.assume_init() }
 }
 
-/// One line of `/proc/self/maps`.
-#[derive(Debug, PartialEq, Eq)]
-struct Mapping<'a> {
-    address: usize,
-    len: usize,
-    writable: bool,
-    path: &'a str,
-}
-
-impl<'a> Mapping<'a> {
-    /// `7f0000000000-7f0000001000 rw-s 00000000 00:1a 42    /dev/shm/name`.
-    fn parse(line: &'a str) -> Option<Self> {
-        let mut words = line.split_ascii_whitespace();
-        let (begin, end) = words.next()?.split_once('-')?;
-        let permissions = words.next()?;
-        let path = words.nth(3)?;
-        let address = usize::from_str_radix(begin, 16).ok()?;
-        let end = usize::from_str_radix(end, 16).ok()?;
-        Some(Self {
-            address,
-            len: end.checked_sub(address)?,
-            writable: permissions.starts_with("rw") && permissions.ends_with('s'),
-            path,
-        })
-    }
-
+impl Mapping<'_> {
     /// Enters the first pages, a share of all, into the page table. A kernel before 5.14 cannot, and
     /// does no harm.
     fn touch(&self, [share, of]: [usize; 2]) {
@@ -182,30 +159,5 @@ fn reserve(mapping: &Mapping<'_>) -> Result<(), MemoryError> {
             free_bytes: free_shared_memory().map_err(failed)?,
         }),
         Err(error) => Err(failed(error.into())),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Mapping;
-
-    #[test]
-    fn reads_a_line_of_the_memory_map() {
-        let line = "7f0000000000-7f0000003000 rw-s 00000000 00:1a 42                     /dev/shm/px1_2.data";
-        let mapping = Mapping::parse(line);
-        assert_eq!(
-            mapping,
-            Some(Mapping {
-                address: 0x7f00_0000_0000,
-                len: 0x3000,
-                writable: true,
-                path: "/dev/shm/px1_2.data",
-            })
-        );
-    }
-
-    #[test]
-    fn an_anonymous_mapping_has_no_path() {
-        assert_eq!(Mapping::parse("7f0-7f1 rw-p 00000000 00:00 0 "), None);
     }
 }

@@ -110,15 +110,24 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
         end_with(supervisor)?;
     }
     raise_file_limit();
+    // Before there are other threads, which begin as this one then is.
+    for denied in launch.scheduling.apply() {
+        tracing::warn!(hint = denied.hint(), "{denied}; going on without");
+    }
     let stop = Stop::on_signals()
         .map_err(|error| Failure::new(ExitKind::Run, error).with_hint("signals are needed"))?;
     let bus = Bus::open(&launch.namespace, &launch.process, &stop)?;
+    let bus = bus.with_spin(launch.scheduling.spin);
     let health = Health::start(&bus, &launch)?;
-    body(&Service {
+    let service = Service {
         bus,
         health,
         launch,
-    })
+    };
+    let result = body(&service);
+    let copied_bytes = service.bus.copies().bytes();
+    tracing::info!(copied_bytes, "ports have done their work");
+    result
 }
 
 /// Has the kernel end this process when its supervisor dies.

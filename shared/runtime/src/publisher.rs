@@ -18,7 +18,7 @@ use crate::memory;
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
 use crate::topic::Delivery;
-use crate::{Progress, Stop};
+use crate::{Copies, Progress, Stop};
 
 /// Longest pause between two looks at the subscribers of a topic.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);
@@ -99,6 +99,7 @@ impl<T: Message> Publisher<T> {
             .publisher
             .loan_slice_uninit(1)
             .map_err(|source| self.port.loan_failed(1, source))?;
+        self.port.copies.add(size_of::<T>());
         self.port
             .deliver(sample.write_from_slice(core::slice::from_ref(message)))
     }
@@ -211,6 +212,7 @@ struct Port<E: Message, H: Header> {
     messages: Messages<E, H>,
     stop: Stop,
     progress: Progress,
+    copies: Copies,
     /// How long a slow receiver is waited for.
     patience: Duration,
 }
@@ -286,6 +288,7 @@ impl<E: Message, H: Header> Port<E, H> {
             messages,
             stop: bus.stop().clone(),
             progress: bus.progress().clone(),
+            copies: bus.copies().clone(),
             patience: bus.patience(),
         })
     }

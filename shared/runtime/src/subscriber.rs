@@ -11,11 +11,11 @@ use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
 use iceoryx2::sample::Sample as IoxSample;
 
-use crate::Waiter;
 use crate::bus::Bus;
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
 use crate::topic::Delivery;
+use crate::{Copies, Waiter};
 
 /// A message could not be taken in.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +52,7 @@ impl<T: Message> Subscriber<T> {
     pub fn receive(&self) -> Result<Option<T>, ReceiveError> {
         while let Some(sample) = self.port.receive()? {
             if let Some(message) = sample.payload().first() {
+                self.port.copies.add(size_of::<T>());
                 return Ok(Some(*message));
             }
         }
@@ -111,6 +112,13 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
         }
     }
 
+    /// A copy of an array, for whoever keeps it longer than its sender can do without the memory. It is
+    /// counted ([`Bus::copies`]).
+    pub fn copy_of(&self, sample: &Sample<E, H>) -> Vec<E> {
+        self.port.copies.add(size_of_val(sample.payload()));
+        sample.payload().to_vec()
+    }
+
     /// Processes that may send, dead ones included until they are cleaned away.
     pub fn n_publishers(&self) -> usize {
         self.port.n_publishers()
@@ -143,6 +151,7 @@ struct Port<E: Message, H: Header> {
     /// Tells publishers that this subscriber hears them; only where nothing may be lost.
     ready: Option<Notifier<ipc::Service>>,
     known_publishers: RefCell<Vec<u128>>,
+    copies: Copies,
 }
 
 impl Bus {
@@ -185,7 +194,10 @@ impl<E: Message, H: Header> Port<E, H> {
             Delivery::Realtime => None,
             Delivery::Lossless => Some(bus.notifier(&service::ready_name(topic))?),
         };
-        if extras.wakes {
+        if waiter.spins() {
+            // Nobody need wake who is awake.
+            waiter.look_without_pause();
+        } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
         }
         let subscriber =
@@ -202,6 +214,7 @@ impl<E: Message, H: Header> Port<E, H> {
             messages,
             ready,
             known_publishers: RefCell::new(Vec::new()),
+            copies: bus.copies().clone(),
         };
         port.connect();
         Ok(port)

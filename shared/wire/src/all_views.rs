@@ -48,7 +48,12 @@ pub fn all_views_to_messages(
 ///
 /// [`WireError`] if there is no such view, or the message names others.
 pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireError> {
-    let nth = index("answer", 0, message.stamp.view as usize, n_views.saturating_sub(1))?;
+    let nth = index(
+        "answer",
+        0,
+        message.stamp.view as usize,
+        n_views.saturating_sub(1),
+    )?;
     let [first, second] = message.views.map(|it| it as usize);
     let sender = |field, got, expected| {
         Err(WireError::Sender {

@@ -14,7 +14,7 @@ mod quality;
 mod skeleton;
 mod stamp;
 
-pub use all_views::{check_all_views, all_views_from_pairs, all_views_to_messages};
+pub use all_views::{all_views_from_pairs, all_views_to_messages, check_all_views};
 pub use error::WireError;
 pub use evidence::{EvidenceView, evidence_from_message, evidence_to_message};
 pub use pair::{check_views, pair_from_message, pair_to_message};

@@ -17,7 +17,7 @@ use crate::cli::Globals;
 use crate::deployment::Loaded;
 use crate::trial::Point;
 use crate::trial::results::{self, Moment};
-use crate::trial::stage::{self, Cast, Stage};
+use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 use crate::trial::strike::{Blow, Strike, Times};
 use crate::{inputs, output};
 use limits::Asked;
@@ -105,6 +105,7 @@ impl Arguments {
             seed: self.seed,
             rate_hz: self.rate,
             n_frames: self.n_frames(),
+            n_cameras: N_CAMERAS,
             deadline_ms: self.deadline_ms,
             name: &self.name,
             command: "demo",

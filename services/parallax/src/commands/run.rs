@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
-use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory};
+use runtime::{ExitKind, Failure, OrFail as _, Scheduling, Stop, free_shared_memory};
 use supervise::{Event, Plan};
 use tracing::Level;
 
@@ -14,7 +14,7 @@ use crate::deployment::{Deployment, Loaded};
 use crate::plan::{self, Resolved};
 use crate::prepare::Prepared;
 use crate::summary::{Report, Watcher};
-use crate::{inputs, output};
+use crate::{inputs, output, scheduling};
 
 /// What to run.
 #[derive(Debug, Args)]
@@ -108,7 +108,10 @@ impl Planned {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
         let file = file_of(&resolved.deployment);
-        let plan = plan::plan(&resolved, &prepared, &file, log)?;
+        let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
+        for warning in scheduling::permit(&mut plan.processes, Scheduling::rehearse) {
+            tracing::warn!("{warning}");
+        }
         Ok(Self { resolved, plan })
     }
 
@@ -174,7 +177,8 @@ fn file_of(deployment: &Deployment) -> PathBuf {
 fn show(plan: &Plan) -> Result<ExitCode, Failure> {
     output::line(format_args!("{} processes:", plan.processes.len()))?;
     for process in &plan.processes {
-        output::line(format_args!("  {}", process.name))?;
+        let line = format!("  {:<12} {}", process.name, process.scheduling);
+        output::line(line.trim_end())?;
     }
     let total: u64 = plan.topics.iter().map(runtime::TopicPlan::pool_bytes).sum();
     let free = free_shared_memory().or_fail(ExitKind::Run)?;

@@ -259,6 +259,26 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "supervise.latency_budget_ms",
         "a run fails if 1 frame in 100 takes longer from capture to result; none without it",
     ),
+    (
+        "runtime.spin",
+        "stages look for messages without pause: least latency, a whole core each, for machines with cores to spare",
+    ),
+    (
+        "runtime.cores",
+        "cores that a service or one of its processes may run on, { pose = [0, 1], fuse-0 = [2] }",
+    ),
+    (
+        "runtime.priority",
+        "real-time priority of a service or one of its processes, { pose = 10 }, 1 to 99",
+    ),
+    (
+        "runtime.policy",
+        "fifo or round-robin: who runs of those with the same real-time priority",
+    ),
+    (
+        "runtime.lock_memory",
+        "keep in memory what processes have once used",
+    ),
 ];
 
 impl Loaded {

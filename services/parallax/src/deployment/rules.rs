@@ -1,6 +1,7 @@
 //! What must hold of a deployment before anything is started.
 
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
+use runtime::MAX_CORES;
 
 use super::Deployment;
 
@@ -31,6 +32,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     }
     let beats = it.supervise.missed_beats as usize;
     within("supervise.missed_beats", beats, 1, 1_000_000)?;
+    runtime(it)?;
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
     demand(
@@ -197,6 +199,49 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         "triangulate.combine",
         "\"consensus\"",
         "\"mean\": where `fuse.views` is \"all\", there is nothing to combine",
+    )
+}
+
+fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.runtime;
+    for (name, cores) in &it.cores {
+        is_process(deployment, "runtime.cores", name)?;
+        demand(
+            !cores.is_empty(),
+            "runtime.cores",
+            &format!("empty for {name:?}"),
+            "at least one core",
+        )?;
+        for &core in cores {
+            within("runtime.cores", core, 0, MAX_CORES - 1)?;
+        }
+    }
+    for (name, &priority) in &it.priority {
+        is_process(deployment, "runtime.priority", name)?;
+        within("runtime.priority", usize::from(priority), 1, 99)?;
+    }
+    Ok(())
+}
+
+/// Whether a name is that of a service, or of a process of the deployment.
+fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
+    let n_views = deployment.cameras.len();
+    let services = [
+        ("capture", n_views),
+        ("pose", n_views),
+        ("quality", n_views),
+        ("fuse", deployment.fuse.workers),
+        ("triangulate", 0),
+        ("record", 0),
+    ];
+    let is_one = services.iter().any(|&(service, n)| {
+        name == service || (0..n).any(|index| name == format!("{service}-{index}"))
+    });
+    demand(
+        is_one,
+        key,
+        &format!("{name:?}"),
+        "capture, pose, quality, fuse, triangulate, record, or one process of these, such as pose-0",
     )
 }
 

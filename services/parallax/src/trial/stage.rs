@@ -1,4 +1,4 @@
-//! Four cameras that do not exist around a person who does not either, and their deployment.
+//! Cameras that do not exist around a person who does not either, and their deployment.
 
 use std::path::{Path, PathBuf};
 
@@ -10,8 +10,8 @@ use scene::{Action, Address, RigChoice, Scene, Settings};
 use super::Point;
 use crate::inputs;
 
-/// Cameras, evenly around the stage.
-const N_CAMERAS: usize = 4;
+/// Cameras of a demo, evenly around the stage.
+pub(crate) const N_CAMERAS: usize = 4;
 /// How far from its middle, and how high, metres.
 const RADIUS: f64 = 4.2;
 const HEIGHT: f64 = 1.5;
@@ -33,6 +33,8 @@ pub(crate) struct Cast<'a> {
     pub rate_hz: f64,
     /// Frames of every camera.
     pub n_frames: u64,
+    /// Cameras, evenly around the stage.
+    pub n_cameras: usize,
     /// How long a stage waits for a view that is late, milliseconds.
     pub deadline_ms: u64,
     /// Name of the deployment.
@@ -59,7 +61,7 @@ impl Stage {
     pub(crate) fn new(cast: &Cast<'_>, folder: PathBuf) -> Result<Self, Failure> {
         std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
         let ring = RigChoice::Ring {
-            n: N_CAMERAS,
+            n: cast.n_cameras,
             radius: RADIUS,
             height: HEIGHT,
         };

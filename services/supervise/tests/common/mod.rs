@@ -8,7 +8,7 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use messages::FrameHeader;
-use runtime::{Delivery, Limits, Namespace, Stop, TopicPlan, process_topics};
+use runtime::{Delivery, Limits, Namespace, Scheduling, Stop, TopicPlan, process_topics};
 use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
 use tracing::Level;
 
@@ -59,6 +59,7 @@ impl Case {
                 service: "dummy".to_owned(),
                 args: behaviour.split(' ').map(Into::into).collect(),
                 role,
+                scheduling: Scheduling::default(),
             });
         let health = processes
             .iter()

@@ -7,7 +7,8 @@ use std::process::ExitCode;
 
 use messages::FrameHeader;
 use runtime::{
-    Bus, Delivery, Failure, Limits, Namespace, Stop, TopicPlan, preflight, process_topics,
+    Bus, Delivery, Failure, Limits, Namespace, Scheduling, Stop, TopicPlan, preflight,
+    process_topics,
 };
 use supervise::{Event, Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
@@ -27,6 +28,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         service: "dummy".to_owned(),
         args: vec!["hang-once".into()],
         role: Role::Essential,
+        scheduling: Scheduling::default(),
     });
     let plan = Plan {
         executable: "/proc/self/exe".into(),

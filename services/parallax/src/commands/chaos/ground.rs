@@ -16,7 +16,7 @@ use crate::deployment::{Deployment, Loaded};
 use crate::inputs;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
-use crate::trial::stage::{self, Cast, Stage};
+use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 
 /// Of the cameras that do not exist: frames a second, and how long a stage waits for a view that is late.
 const RATE_HZ: f64 = 5.0;
@@ -84,6 +84,7 @@ impl Ground {
             seed: arguments.seed,
             rate_hz: RATE_HZ,
             n_frames: (RATE_HZ * f64::from(arguments.seconds)) as u64,
+            n_cameras: N_CAMERAS,
             deadline_ms: DEADLINE_MS,
             name: "chaos",
             command: "chaos",

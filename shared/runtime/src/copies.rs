@@ -1,0 +1,26 @@
+//! A count of the bytes that ports have copied.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Counts bytes that ports copied into or out of shared memory; clones share the count.
+///
+/// Messages of fixed size are copied, both ways. Arrays (pixels, evidence) are written and read where they lie:
+/// of them only what [`copy_of`](crate::SliceSubscriber::copy_of) hands out counts, which is what the recorder
+/// draws on.
+#[derive(Debug, Clone, Default)]
+pub struct Copies {
+    bytes: Arc<AtomicU64>,
+}
+
+impl Copies {
+    /// Counts a copy.
+    pub(crate) fn add(&self, bytes: usize) {
+        self.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
+    }
+
+    /// How many bytes were copied.
+    pub fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,280 @@
+//! On which cores a process runs, how urgently, and whether its memory may leave the machine's.
+#![expect(
+    unsafe_code,
+    reason = "sched_setscheduler has no safe binding that takes the number of a priority"
+)]
+
+mod denied;
+mod text;
+
+use std::io;
+use std::thread;
+
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::process::{Resource, getrlimit};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+
+pub use denied::{Denied, Refusal};
+pub use text::SchedulingError;
+
+/// What a process asks of the system's scheduler. The default asks for nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Scheduling {
+    /// Cores that it may run on, as Linux numbers them from 0; if empty those that it was started on.
+    pub cores: Vec<usize>,
+    /// To run before everything that has no real-time priority.
+    pub real_time: Option<RealTime>,
+    /// To keep in memory what it has once used (`mlockall`).
+    pub lock_memory: bool,
+    /// To look for messages without pause instead of sleeping until one comes.
+    pub spin: bool,
+}
+
+/// A priority above that of all ordinary processes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RealTime {
+    /// Who runs of those with the same priority.
+    pub policy: Policy,
+    /// 1 to 99; the highest runs.
+    pub priority: u8,
+}
+
+/// Who runs of those with the same real-time priority.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Policy {
+    /// Who came first, until it sleeps (`SCHED_FIFO`).
+    #[default]
+    Fifo,
+    /// All in turn (`SCHED_RR`).
+    RoundRobin,
+}
+
+/// Cores that Linux can number here.
+pub const MAX_CORES: usize = CpuSet::MAX_CPU;
+
+/// The capability to lock any amount of memory (capabilities(7)).
+const CAP_IPC_LOCK: u32 = 14;
+
+impl Scheduling {
+    /// Asks the system for all of it, for the calling thread and those it will start: call it first in
+    /// a process. What is denied is left as it was, and said.
+    pub fn apply(&self) -> Vec<Denied> {
+        let memory = if self.lock_memory {
+            lock_memory()
+        } else {
+            None
+        };
+        [self.apply_to_thread(), memory.into_iter().collect()].concat()
+    }
+
+    /// What [`apply`](Self::apply) would say in a process that this one starts: tried on a thread that
+    /// ends at once, so that nothing of this process changes.
+    pub fn rehearse(&self) -> Vec<Denied> {
+        let wanted = self.clone();
+        let thread = thread::Builder::new().name("rehearsal".to_owned());
+        let tried = thread.spawn(move || wanted.apply_to_thread());
+        let tried = tried.ok().and_then(|it| it.join().ok());
+        let memory = self.lock_memory.then(memory_limit).flatten();
+        let memory = memory.map(|limit_bytes| Denied::Memory {
+            limit_bytes: Some(limit_bytes),
+            source: io::ErrorKind::PermissionDenied.into(),
+        });
+        [tried.unwrap_or_default(), memory.into_iter().collect()].concat()
+    }
+
+    /// The same without what was denied.
+    #[must_use]
+    pub fn without(mut self, denied: &[Denied]) -> Self {
+        for it in denied {
+            match it {
+                Denied::Cores { allowed, .. } => self.cores.retain(|core| allowed.contains(core)),
+                Denied::RealTime { .. } => self.real_time = None,
+                Denied::Memory { .. } => self.lock_memory = false,
+            }
+        }
+        self
+    }
+
+    fn apply_to_thread(&self) -> Vec<Denied> {
+        let real_time = self.real_time.and_then(RealTime::apply);
+        let cores = keep_to(&self.cores);
+        cores.into_iter().chain(real_time).collect()
+    }
+}
+
+impl RealTime {
+    fn apply(self) -> Option<Denied> {
+        let policy = match self.policy {
+            Policy::Fifo => libc::SCHED_FIFO,
+            Policy::RoundRobin => libc::SCHED_RR,
+        };
+        let parameters = libc::sched_param {
+            sched_priority: i32::from(self.priority),
+        };
+        // SAFETY: the call reads `parameters`, which lives, and changes how the calling thread (0) is
+        // scheduled and nothing in memory.
+        let status = unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) };
+        (status != 0).then(|| Denied::RealTime {
+            asked: self,
+            source: io::Error::last_os_error().into(),
+        })
+    }
+}
+
+/// Keeps the calling thread to those of the cores that it may use.
+fn keep_to(asked: &[usize]) -> Option<Denied> {
+    if asked.is_empty() {
+        return None;
+    }
+    let mut wanted = CpuSet::new();
+    for &core in asked.iter().filter(|it| **it < MAX_CORES) {
+        wanted.set(core);
+    }
+    // The system takes those that exist and that the process's group may use, if there are any.
+    let refusal = sched_setaffinity(None, &wanted).err();
+    let allowed = own_cores().unwrap_or_default();
+    let are_all = asked.iter().all(|it| allowed.contains(it));
+    (refusal.is_some() || !are_all).then(|| Denied::Cores {
+        asked: asked.to_vec(),
+        allowed,
+        source: refusal.map(|it| io::Error::from(it).into()),
+    })
+}
+
+/// The cores that the calling thread may run on, ascending.
+///
+/// # Errors
+///
+/// The system does not say.
+pub fn own_cores() -> io::Result<Vec<usize>> {
+    let set = sched_getaffinity(None)?;
+    Ok((0..MAX_CORES).filter(|it| set.is_set(*it)).collect())
+}
+
+/// Keeps every page that was or will be used where it is.
+fn lock_memory() -> Option<Denied> {
+    if let Some(limit_bytes) = memory_limit() {
+        // Within a limit it would succeed now, and a later allocation fail.
+        return Some(Denied::Memory {
+            limit_bytes: Some(limit_bytes),
+            source: io::ErrorKind::PermissionDenied.into(),
+        });
+    }
+    // On fault: of a pool only what is used, not the chunks that nobody ever needs.
+    let flags = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
+    mlockall(flags).err().map(|error| Denied::Memory {
+        limit_bytes: None,
+        source: io::Error::from(error).into(),
+    })
+}
+
+/// How much memory this process may lock, bytes; none if there is no limit.
+fn memory_limit() -> Option<u64> {
+    let limit = getrlimit(Resource::Memlock).current?;
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    (!has_capability(&status, CAP_IPC_LOCK)).then_some(limit)
+}
+
+/// Whether `/proc/PID/status` says that a process has a capability.
+fn has_capability(status: &str, capability: u32) -> bool {
+    let effective = status.lines().find_map(|it| it.strip_prefix("CapEff:"));
+    let mask = effective.and_then(|it| u64::from_str_radix(it.trim(), 16).ok());
+    mask.is_some_and(|it| it >> capability & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On a thread of its own, for what is asked for stays.
+    fn on_a_thread<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> T {
+        let thread = thread::Builder::new().spawn(body).unwrap();
+        thread.join().unwrap()
+    }
+
+    #[test]
+    fn a_thread_and_those_it_starts_keep_to_their_cores() {
+        let last = *own_cores().unwrap().last().unwrap();
+        let scheduling = Scheduling {
+            cores: vec![last],
+            ..Scheduling::default()
+        };
+        let got = on_a_thread(move || {
+            let denied = scheduling.apply();
+            (
+                denied,
+                own_cores().unwrap(),
+                on_a_thread(own_cores).unwrap(),
+            )
+        });
+        assert_eq!(got, (vec![], vec![last], vec![last]));
+        assert!(own_cores().unwrap().contains(&last), "this one goes on");
+    }
+
+    #[test]
+    fn cores_that_are_not_there_are_said_and_the_others_used() {
+        let first = own_cores().unwrap()[0];
+        let none = MAX_CORES + 7;
+        let scheduling = Scheduling {
+            cores: vec![first, none],
+            ..Scheduling::default()
+        };
+        let asked = scheduling.clone();
+        let (denied, cores) = on_a_thread(move || (asked.apply(), own_cores().unwrap()));
+        assert_eq!(cores, [first]);
+        let [Denied::Cores { asked, .. }] = &denied[..] else {
+            panic!("{denied:?}")
+        };
+        assert_eq!(asked, &[first, none]);
+        assert_eq!(scheduling.without(&denied).cores, [first]);
+    }
+
+    #[test]
+    fn a_rehearsal_says_what_the_real_thing_would_and_changes_nothing() {
+        let scheduling = Scheduling {
+            cores: vec![own_cores().unwrap()[0], MAX_CORES],
+            real_time: Some(RealTime {
+                policy: Policy::RoundRobin,
+                priority: 1,
+            }),
+            ..Scheduling::default()
+        };
+        let before = own_cores().unwrap();
+        let rehearsed = scheduling.rehearse();
+        assert_eq!(own_cores().unwrap(), before);
+        let asked = scheduling.clone();
+        assert_eq!(rehearsed, on_a_thread(move || asked.apply()));
+        let rest = scheduling.without(&rehearsed);
+        assert_eq!(
+            on_a_thread(move || rest.apply()),
+            [],
+            "what is left is granted"
+        );
+    }
+
+    #[test]
+    fn a_priority_that_does_not_exist_is_denied() {
+        let real_time = Some(RealTime {
+            policy: Policy::Fifo,
+            priority: 200,
+        });
+        let scheduling = Scheduling {
+            real_time,
+            ..Scheduling::default()
+        };
+        let denied = scheduling.rehearse();
+        assert!(
+            matches!(denied[..], [Denied::RealTime { .. }]),
+            "{denied:?}"
+        );
+        assert_eq!(scheduling.without(&denied), Scheduling::default());
+    }
+
+    #[test]
+    fn capabilities_are_bits_counted_from_the_right() {
+        let status = "Name:\tx\nCapPrm:\tffffffffffffffff\nCapEff:\t0000000000004000\n";
+        assert!(has_capability(status, 14));
+        assert!(!has_capability(status, 13) && !has_capability(status, 15));
+        assert!(!has_capability("", 14));
+    }
+}

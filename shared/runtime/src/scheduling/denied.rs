@@ -1,0 +1,95 @@
+//! What the system does not grant a process, and what to try.
+
+use std::io;
+
+use super::{Policy, RealTime, text};
+
+/// Something that the system does not grant. The process can go on without.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Denied {
+    /// Not all cores may be used.
+    #[error(
+        "cannot run on cores {}: {} may be used", text::list(.asked), text::list(.allowed)
+    )]
+    Cores {
+        /// What was asked for.
+        asked: Vec<usize>,
+        /// What may be used.
+        allowed: Vec<usize>,
+        /// Why, if the system said so.
+        #[source]
+        source: Option<Refusal>,
+    },
+    /// The real-time priority may not be used.
+    #[error("cannot run at real-time priority {} ({})", .asked.priority, .asked.policy.system_name())]
+    RealTime {
+        /// What was asked for.
+        asked: RealTime,
+        /// Why.
+        #[source]
+        source: Refusal,
+    },
+    /// Memory may not be locked, or not all of it.
+    #[error("cannot lock memory{}", limit(.limit_bytes.as_ref()))]
+    Memory {
+        /// How much may be locked, bytes; none if that is not the reason.
+        limit_bytes: Option<u64>,
+        /// Why.
+        #[source]
+        source: Refusal,
+    },
+}
+
+/// Why the system said no.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct Refusal {
+    text: String,
+}
+
+impl From<io::Error> for Refusal {
+    fn from(error: io::Error) -> Self {
+        Self {
+            text: error.to_string(),
+        }
+    }
+}
+
+impl From<io::ErrorKind> for Refusal {
+    fn from(kind: io::ErrorKind) -> Self {
+        Self {
+            text: kind.to_string(),
+        }
+    }
+}
+
+impl Denied {
+    /// What to try.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Cores { .. } => {
+                "name cores of this machine that its container, its slice or `taskset` leave to it (`nproc`, `taskset -cp $$`)"
+            }
+            Self::RealTime { .. } => {
+                "`ulimit -r 99` (root or /etc/security/limits.conf: rtprio), systemd LimitRTPRIO=99, Docker --cap-add=SYS_NICE, or `setcap cap_sys_nice+ep` on the executable"
+            }
+            Self::Memory { .. } => {
+                "`ulimit -l unlimited` (root or /etc/security/limits.conf: memlock), systemd LimitMEMLOCK=infinity, Docker --cap-add=IPC_LOCK"
+            }
+        }
+    }
+}
+
+impl Policy {
+    /// What Linux calls it.
+    pub fn system_name(self) -> &'static str {
+        match self {
+            Self::Fifo => "SCHED_FIFO",
+            Self::RoundRobin => "SCHED_RR",
+        }
+    }
+}
+
+fn limit(bytes: Option<&u64>) -> String {
+    bytes.map_or_else(String::new, |it| format!(" beyond {it} bytes"))
+}
