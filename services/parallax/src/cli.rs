@@ -4,8 +4,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use tracing::Level;
 
 use crate::commands::{
-    calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, record, replay, run,
-    service, synth, top, train,
+    bench, calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, record,
+    replay, run, service, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
 
@@ -28,6 +28,7 @@ Examples:
     parallax record my.toml --out run.mcap              the same as run, and every message in one file
     parallax replay run.mcap --from fuse --set fuse.alpha=2     its later stages again, with another value
     parallax chaos                                      processes killed on purpose, and what held
+    parallax bench transport                            how long a message takes from process to process
     parallax config show my.toml                        every value, and who said it
     parallax detect photo.jpg --model parse.mat --json  people in single images
     parallax model import parse.mat --out parse.plx     another format's model as our own
@@ -96,6 +97,9 @@ pub(crate) enum Command {
     Replay(replay::Arguments),
     /// Kill and stop processes of a deployment on purpose, and judge what held.
     Chaos(chaos::Arguments),
+    /// Measure how fast messages travel, and how fast whole deployments are.
+    #[command(subcommand)]
+    Bench(bench::Command),
     /// Find people in single images.
     Detect(detect::Arguments),
     /// Fuse one synchronised set of still images, in this process.

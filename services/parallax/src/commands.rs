@@ -1,5 +1,6 @@
 //! The commands, one file each.
 
+pub(crate) mod bench;
 pub(crate) mod calib;
 pub(crate) mod chaos;
 pub(crate) mod config;
@@ -26,12 +27,17 @@ use crate::cli::{Cli, Command};
 
 /// Does what the command line asks for.
 pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
-    if !matches!(cli.command, Command::Service(_)) {
+    let becomes_another = matches!(
+        cli.command,
+        Command::Service(_) | Command::Bench(bench::Command::Receive(_))
+    );
+    if !becomes_another {
         init_logging("parallax", cli.globals.level());
     }
     match cli.command {
         Command::Demo(it) => demo::run(&it, cli.globals),
         Command::Chaos(it) => chaos::run(&it, cli.globals),
+        Command::Bench(it) => bench::run(&it, cli.globals),
         Command::Run(it) => run::run(&it, cli.globals),
         Command::Record(it) => record::run(&it, cli.globals),
         Command::Replay(it) => replay::run(&it, cli.globals),

@@ -1,0 +1,397 @@
+//! The deployment under load, one run of it, and what that took.
+
+use core::fmt::{self, Display, Formatter};
+use std::fs;
+use std::path::PathBuf;
+
+use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
+use scene::Action;
+use serde_json::{Value, json};
+
+use super::load::Arguments;
+use super::pictures;
+use super::spread::Spread;
+use crate::cli::Globals;
+use crate::commands::run::Planned;
+use crate::deployment::{Deployment, Loaded};
+use crate::inputs;
+use crate::summary::Report;
+use crate::trial::results::{self, Moment};
+use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
+use crate::trial::strike::{Blow, Strike};
+
+/// How long a stage waits for a view of cameras that do not exist, milliseconds.
+const DEADLINE_MS: u64 = 500;
+/// What is computed, in the order in which a frame passes it.
+const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
+/// Ticks of a second in which the kernel counts processor time (`USER_HZ`).
+const TICKS_HZ: f64 = 100.0;
+
+/// One run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Case {
+    /// Cameras.
+    pub n_views: usize,
+    /// Whether every frame is taken, as fast as that goes.
+    pub is_lossless: bool,
+    /// Whether the process of the last camera is dead.
+    pub has_dead: bool,
+}
+
+impl Display for Case {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let plural = if self.n_views == 1 { "" } else { "s" };
+        write!(f, "{} view{plural}", self.n_views)?;
+        f.write_str(match (self.is_lossless, self.has_dead) {
+            (_, true) => ", one dead",
+            (true, false) => ", every frame",
+            (false, false) => "",
+        })
+    }
+}
+
+impl Case {
+    /// The name of its folder.
+    fn folder(self) -> String {
+        self.to_string().replace(", ", "-").replace(' ', "-")
+    }
+
+    /// What is replaced in the deployment.
+    fn set(self) -> Vec<&'static str> {
+        let mut set = if self.is_lossless {
+            vec!["capture.mode=lossless", "capture.pace=fast"]
+        } else {
+            vec!["capture.mode=realtime", "capture.pace=realtime"]
+        };
+        if self.has_dead {
+            set.push("supervise.max_restarts=0");
+        }
+        set
+    }
+}
+
+/// What a run took.
+#[derive(Debug)]
+pub(super) struct Measured {
+    /// The run.
+    pub case: Case,
+    /// Results; after its death if a camera died.
+    pub n_results: usize,
+    /// Results a second, from the first to the last.
+    pub rate_hz: Option<f64>,
+    /// From the first picture to the result, milliseconds.
+    pub end_to_end: Option<Spread>,
+    /// Computing time of every stage, milliseconds; over the whole run.
+    pub stages: Vec<(&'static str, Spread)>,
+    /// Processor time of all processes, seconds; over the whole run.
+    pub cpu_seconds: f64,
+    /// Frames and messages that were dropped.
+    pub n_dropped: u64,
+    /// What `run` says of it.
+    pub run: Value,
+}
+
+impl Measured {
+    /// Processor time of a result, milliseconds. Of a run in which a camera died it would be that of another number of
+    /// results.
+    pub(super) fn cpu_ms_per_result(&self) -> Option<f64> {
+        let is_whole = self.n_results > 0 && !self.case.has_dead;
+        is_whole.then(|| 1e3 * self.cpu_seconds / self.n_results as f64)
+    }
+
+    /// For programs.
+    pub(super) fn json(&self) -> Value {
+        let stages = self.stages.iter();
+        let stages = stages.map(|(name, it)| ((*name).to_owned(), json!(it)));
+        json!({
+            "run": self.case.to_string(),
+            "views": self.case.n_views,
+            "one_dead": self.case.has_dead,
+            "results": self.n_results,
+            "rate_hz": self.rate_hz,
+            "end_to_end_ms": self.end_to_end,
+            "stages_ms": stages.collect::<serde_json::Map<_, _>>(),
+            "cpu_seconds": self.cpu_seconds,
+            "dropped": self.n_dropped,
+            "summary": self.run,
+        })
+    }
+}
+
+/// The deployment under load.
+#[derive(Debug)]
+pub(super) struct Course {
+    /// Its file.
+    file: PathBuf,
+    /// For the results, a folder for every run; absolute.
+    folder: PathBuf,
+    /// Pictures that were made beforehand: a folder of each camera.
+    pictures: Option<PathBuf>,
+    /// What is replaced in the file for all runs.
+    set: Vec<String>,
+    n_views: usize,
+    globals: Globals,
+}
+
+impl Course {
+    /// Looks at the deployment, or makes the one with cameras that do not exist. `None` if it was stopped meanwhile.
+    pub(super) fn new(
+        arguments: &Arguments,
+        globals: Globals,
+        stop: &Stop,
+    ) -> Result<Option<Self>, Failure> {
+        let folder = stage::absolute(&arguments.out)?;
+        fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        let name = toml::Value::from(arguments.name.clone());
+        let mut set = arguments.set.clone();
+        set.extend([format!("name={name}"), "record.overlay_every=0".to_owned()]);
+        if arguments.spin {
+            set.push("runtime.spin=true".to_owned());
+        }
+        let mut course = Self {
+            file: PathBuf::new(),
+            folder,
+            pictures: None,
+            set,
+            n_views: arguments.views.unwrap_or(N_CAMERAS),
+            globals,
+        };
+        let is_ready = match &arguments.deployment {
+            Some(file) => {
+                course.file = stage::absolute(file)?;
+                course.shorten(arguments)?;
+                true
+            }
+            None => course.play(arguments, stop)?,
+        };
+        Ok(is_ready.then_some(course))
+    }
+
+    /// Cameras.
+    pub(super) fn n_views(&self) -> usize {
+        self.n_views
+    }
+
+    /// Writes the deployment with cameras that do not exist, and their pictures; false if it was stopped.
+    fn play(&mut self, arguments: &Arguments, stop: &Stop) -> Result<bool, Failure> {
+        let n_frames = (arguments.rate * f64::from(arguments.seconds)).round() as u64;
+        let cast = Cast {
+            subject: 1,
+            action: Action::Walking,
+            seed: arguments.seed,
+            rate_hz: arguments.rate,
+            n_frames: n_frames.max(1),
+            n_cameras: self.n_views,
+            deadline_ms: DEADLINE_MS,
+            name: "bench",
+            command: "bench",
+        };
+        let stage = Stage::new(&cast, self.folder.clone())?;
+        self.file = stage.write(&cast)?;
+        if arguments.live {
+            return Ok(true);
+        }
+        let folder = self.folder.join("pictures");
+        let is_done = pictures::draw(&stage.settings, cast.n_frames, &folder, stop, self.globals)?;
+        self.pictures = Some(folder);
+        Ok(is_done)
+    }
+
+    /// Takes no more of the footage than some seconds, and no more cameras than there are.
+    fn shorten(&mut self, arguments: &Arguments) -> Result<(), Failure> {
+        let deployment = Loaded::read(&self.file, &self.set)?.deployment;
+        let n_cameras = deployment.cameras.len();
+        self.n_views = arguments.views.unwrap_or(n_cameras);
+        if self.n_views > n_cameras {
+            let message = format!("--views {}: the deployment has {n_cameras}", self.n_views);
+            return Err(Failure::new(ExitKind::Usage, message));
+        }
+        let planned = Planned::new(&deployment, self.globals.level())?;
+        let resolved = planned.resolved();
+        if let Some(hz) = resolved.frame_rate_hz() {
+            let step = deployment.capture.frame_step.max(1) as f64;
+            let n_frames = ((hz * f64::from(arguments.seconds) / step) as u64).max(1);
+            if n_frames < resolved.n_frames() {
+                self.set.push(format!("capture.n_frames={n_frames}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// What is run.
+    fn deployment(&self, case: Case) -> Result<Deployment, Failure> {
+        let more = case.set().into_iter().map(str::to_owned);
+        let set: Vec<String> = self.set.iter().cloned().chain(more).collect();
+        let mut it = Loaded::read(&self.file, &set)?.deployment;
+        it.output = self.folder.join(case.folder());
+        keep_views(&mut it, case.n_views);
+        if let Some(folder) = &self.pictures {
+            for camera in &mut it.cameras {
+                camera.source = folder.join(&camera.name).to_string_lossy().into_owned();
+            }
+        }
+        Ok(it)
+    }
+
+    /// Runs it. `None` if it was stopped.
+    pub(super) fn measure(&self, case: Case, stop: &Stop) -> Result<Option<Measured>, Failure> {
+        let deployment = self.deployment(case)?;
+        let planned = Planned::new(&deployment, self.globals.level())?;
+        let victim = format!("capture-{}", case.n_views - 1);
+        let mut strike = case.has_dead.then(|| Strike::new(Blow::Kill, &victim, 0.0));
+        let before = cpu_seconds_of_children()?;
+        let report = planned.carry_out(self.globals, stop, &mut |event| {
+            strike
+                .as_mut()
+                .and_then(|it| it.note(event, now_nanos(), Blow::deal))
+        })?;
+        let cpu_seconds = cpu_seconds_of_children()? - before;
+        if stop.is_requested() {
+            return Ok(None);
+        }
+        let names: Vec<String> = deployment
+            .cameras
+            .iter()
+            .map(|it| it.name.clone())
+            .collect();
+        let mut moments = results::read(&deployment.output, &names)?;
+        if let Some(strike) = &strike {
+            let killed = strike.times().killed;
+            let since = killed.map_or(f64::INFINITY, |it| {
+                it.saturating_sub(planned.session()) as f64 / 1e6
+            });
+            moments.retain(|it| it.captured_ms().is_some_and(|it| it > since));
+        }
+        Ok(Some(measured(case, &moments, cpu_seconds, &report)))
+    }
+}
+
+fn measured(case: Case, moments: &[Moment], cpu_seconds: f64, report: &Report) -> Measured {
+    let took = |it: &Moment| Some(it.sent_ms - it.captured_ms()?);
+    let run = report.json();
+    let stages = &report.recorded()["latency"]["stages"];
+    Measured {
+        case,
+        n_results: moments.len(),
+        rate_hz: rate_hz(moments),
+        end_to_end: Spread::of(moments.iter().filter_map(took).collect()),
+        stages: STAGES
+            .into_iter()
+            .filter_map(|it| Some((it, spread(&stages[it])?)))
+            .collect(),
+        cpu_seconds,
+        n_dropped: run["dropped"].as_u64().unwrap_or(0),
+        run,
+    }
+}
+
+/// Results a second, from the first to the last.
+fn rate_hz(moments: &[Moment]) -> Option<f64> {
+    let sent = || moments.iter().map(|it| it.sent_ms);
+    let (first, last) = (sent().reduce(f64::min)?, sent().reduce(f64::max)?);
+    (last > first).then(|| 1e3 * (moments.len() - 1) as f64 / (last - first))
+}
+
+/// Percentiles as the recorder writes them.
+fn spread(value: &Value) -> Option<Spread> {
+    let ms = |key: &str| value[key].as_f64();
+    Some(Spread {
+        n: value["count"].as_u64()? as usize,
+        p50: ms("p50_ms")?,
+        p99: ms("p99_ms")?,
+        p99_9: ms("p99_9_ms")?,
+        max: ms("max_ms")?,
+    })
+}
+
+/// Leaves the first cameras, and of the settings what speaks of no others.
+fn keep_views(it: &mut Deployment, n_views: usize) {
+    it.cameras.truncate(n_views);
+    let names: Vec<String> = it.cameras.iter().map(|it| it.name.clone()).collect();
+    let is_kept = |name: &String| names.contains(name);
+    it.fuse.pairs.retain(|pair| pair.iter().all(is_kept));
+    it.fuse
+        .compatibility
+        .retain(|it| it.views.iter().all(is_kept));
+    it.quality.views.retain(|name, _| is_kept(name));
+}
+
+/// Processor time of the processes that this one has started and that have ended, seconds.
+fn cpu_seconds_of_children() -> Result<f64, Failure> {
+    let stat = fs::read_to_string("/proc/self/stat").or_fail(ExitKind::Run)?;
+    let seconds = parse_stat(&stat).ok_or("/proc/self/stat is not as it was expected");
+    seconds.or_fail(ExitKind::Run)
+}
+
+/// Fields 16 and 17 (`proc_pid_stat(5)`), counted from behind the name, which may contain anything.
+fn parse_stat(stat: &str) -> Option<f64> {
+    let (_, fields) = stat.rsplit_once(") ")?;
+    let mut fields = fields.split(' ').skip(13);
+    let mut ticks = || fields.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / TICKS_HZ)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trial::results::{Seen, Shot};
+
+    fn moment(captured_ms: f64, sent_ms: f64) -> Moment {
+        let shot = Shot {
+            epoch: 0,
+            captured_ms,
+            sent_ms: captured_ms + 1.0,
+        };
+        Moment {
+            frame: 0,
+            epoch: 0,
+            sent_ms,
+            joints: Vec::new(),
+            views: vec![Seen {
+                shot: Some(shot),
+                ..Seen::default()
+            }],
+        }
+    }
+
+    #[test]
+    fn results_are_counted_from_the_first_to_the_last() {
+        let moments = [0.0, 100.0, 250.0, 400.0].map(|it| moment(it, it + 30.0));
+        assert_eq!(rate_hz(&moments), Some(7.5));
+        assert_eq!(rate_hz(&moments[..1]), None);
+        assert_eq!(rate_hz(&[]), None);
+    }
+
+    #[test]
+    fn processor_time_of_children_is_read_whatever_the_program_is_called() {
+        let stat = "7 (a) b) S 1 2 3 4 5 6 7 8 9 10 1100 1200 250 50 20 0";
+        assert_eq!(parse_stat(stat), Some(3.0));
+        assert_eq!(parse_stat("7 (a) S 1 2"), None);
+        assert!(cpu_seconds_of_children().is_ok_and(|it| it >= 0.0));
+    }
+
+    #[test]
+    fn percentiles_are_read_as_the_recorder_writes_them() {
+        let written =
+            json!({ "count": 3, "p50_ms": 1.0, "p99_ms": 2.0, "p99_9_ms": 3.0, "max_ms": 4.0 });
+        let expected = Spread {
+            n: 3,
+            p50: 1.0,
+            p99: 2.0,
+            p99_9: 3.0,
+            max: 4.0,
+        };
+        assert_eq!(spread(&written), Some(expected));
+        assert_eq!(spread(&Value::Null), None);
+    }
+
+    #[test]
+    fn every_run_has_a_folder_of_its_own() {
+        let case = Case {
+            n_views: 2,
+            is_lossless: false,
+            has_dead: true,
+        };
+        assert_eq!(case.folder(), "2-views-one-dead");
+    }
+}

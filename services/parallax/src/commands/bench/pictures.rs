@@ -1,0 +1,76 @@
+//! Pictures of cameras that do not exist, made before they are needed.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use image::ExtendedColorType;
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use scene::{Scene, Settings, View};
+
+use crate::cli::Globals;
+use crate::{inputs, output};
+
+/// Writes the first pictures of every camera into a folder of its name; false if it was stopped.
+pub(super) fn draw(
+    settings: &Settings,
+    n_frames: u64,
+    folder: &Path,
+    stop: &Stop,
+    globals: Globals,
+) -> Result<bool, Failure> {
+    let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Run)?);
+    let cameras = scene.rig().cameras();
+    let n_pictures = n_frames * cameras.len() as u64;
+    if !globals.quiet {
+        output::message(format_args!("making {n_pictures} pictures ..."));
+    }
+    let bar = if globals.quiet || !output::is_lively() {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(n_pictures)
+    };
+    let drawn: Result<Vec<()>, Failure> = (0..cameras.len())
+        .into_par_iter()
+        .map(|camera| {
+            let folder = folder.join(&cameras[camera].name);
+            let mut view = View::new(&scene, camera).or_fail(ExitKind::Run)?;
+            draw_view(&mut view, n_frames, &folder, &mut || {
+                bar.inc(1);
+                stop.is_requested()
+            })
+        })
+        .collect();
+    bar.finish_and_clear();
+    drawn?;
+    Ok(!stop.is_requested())
+}
+
+/// Makes the folder anew: those of another bench must not be among them.
+///
+/// * `is_enough`: asked after every picture.
+fn draw_view(
+    view: &mut View,
+    n_frames: u64,
+    folder: &Path,
+    is_enough: &mut dyn FnMut() -> bool,
+) -> Result<(), Failure> {
+    if folder.exists() {
+        std::fs::remove_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+    }
+    std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+    let size = view.size();
+    let mut rgb = vec![0; size.rgb_bytes()];
+    for frame in 0..n_frames {
+        view.picture(frame, &mut rgb);
+        let file = folder.join(format!("{frame:06}.png"));
+        let [width, height] = [size.width as u32, size.height as u32];
+        image::save_buffer(&file, &rgb, width, height, ExtendedColorType::Rgb8)
+            .map_err(|error| inputs::in_file(&file, &error))?;
+        if is_enough() {
+            break;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,199 @@
+//! What was measured: a table for people, JSON for programs, a record for later.
+
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+use runpage::Limit;
+use runtime::{ExitKind, Failure};
+use serde_json::{Value, json};
+
+use super::Output;
+use super::occasion::Occasion;
+use crate::cli::Globals;
+use crate::{inputs, output};
+
+/// What was measured.
+#[derive(Debug)]
+pub(super) struct Report {
+    /// Which bench: a word.
+    pub bench: &'static str,
+    /// What the table shows, in a line.
+    pub title: String,
+    /// When, where and of what; as it began.
+    pub occasion: Occasion,
+    /// What was set, by name.
+    pub settings: Value,
+    /// The table: heads, then rows.
+    pub table: Vec<Vec<String>>,
+    /// Lines below it.
+    pub notes: Vec<String>,
+    /// What had to hold.
+    pub limits: Vec<Limit>,
+    /// The numbers, for programs.
+    pub numbers: Value,
+}
+
+impl Report {
+    /// Prints it, and appends it to the record; the exit code.
+    pub(super) fn publish(&self, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
+        if let Some(file) = &to.record {
+            self.append(file)
+                .map_err(|error| inputs::in_file(file, &error))?;
+        }
+        if to.json {
+            output::json(&self.json())?;
+        } else if !globals.quiet {
+            output::line(self.text())?;
+        }
+        let status = if self.is_held() {
+            0
+        } else {
+            ExitKind::Limit.status()
+        };
+        Ok(ExitCode::from(status))
+    }
+
+    fn is_held(&self) -> bool {
+        self.limits.iter().all(|it| it.held)
+    }
+
+    fn append(&self, file: &Path) -> std::io::Result<()> {
+        if let Some(folder) = file.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        let text = format!(
+            "\n## {}: {}\n\n```\n{}\n```\n",
+            self.occasion.date,
+            self.bench,
+            self.text()
+        );
+        let mut record = OpenOptions::new().create(true).append(true).open(file)?;
+        // In one piece: two that end at once do not mix.
+        record.write_all(text.as_bytes())
+    }
+
+    /// For programs.
+    fn json(&self) -> Value {
+        let limits = self.limits.iter().map(
+            |it| json!({ "what": it.what, "asked": it.asked, "got": it.got, "held": it.held }),
+        );
+        json!({
+            "schema_version": 1,
+            "bench": self.bench,
+            "occasion": self.occasion,
+            "settings": self.settings,
+            "numbers": self.numbers,
+            "limits": limits.collect::<Vec<_>>(),
+            "held": self.is_held(),
+        })
+    }
+
+    /// For people.
+    fn text(&self) -> String {
+        let mut lines = vec![self.title.clone()];
+        lines.extend(self.occasion.text().lines().map(str::to_owned));
+        lines.push(settings(&self.settings));
+        lines.push(String::new());
+        lines.extend(aligned(&self.table));
+        lines.extend(self.notes.iter().cloned());
+        for it in &self.limits {
+            let word = if it.held { "held  " } else { "MISSED" };
+            lines.push(format!(
+                "{word} {:<44} {:>12}   {}",
+                it.what, it.asked, it.got
+            ));
+        }
+        lines.join("\n")
+    }
+}
+
+/// `name value, name value`.
+fn settings(value: &Value) -> String {
+    let entries = value.as_object().into_iter().flatten();
+    let said = entries.map(|(name, value)| match value {
+        Value::String(text) if text.is_empty() => format!("{name} none"),
+        Value::String(text) => format!("{name} {text}"),
+        other => format!("{name} {other}"),
+    });
+    said.collect::<Vec<_>>().join(", ")
+}
+
+/// Rows as lines: the first column begins, the others end below their heads.
+fn aligned(table: &[Vec<String>]) -> Vec<String> {
+    let n_columns = table.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| {
+        let cells = table.iter().filter_map(|row| row.get(column));
+        cells.map(|it| it.chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..n_columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate();
+        let cells = cells.map(|(column, (cell, &width))| {
+            if column == 0 {
+                format!("{cell:<width$}")
+            } else {
+                format!("{cell:>width$}")
+            }
+        });
+        let line = cells.collect::<Vec<_>>().join("  ");
+        line.trim_end().to_owned()
+    };
+    table.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trial::limit;
+
+    fn report(got: f64) -> Report {
+        let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
+        Report {
+            bench: "transport",
+            title: "one hop".to_owned(),
+            occasion: Occasion::now(),
+            settings: json!({ "messages": 7, "cores": "" }),
+            table: vec![
+                row(["who", "p50", "max"]),
+                row(["somebody", "1.5", "10.25"]),
+            ],
+            notes: vec!["a note".to_owned()],
+            limits: vec![limit::at_most("p50, us", 2.0, Some(got))],
+            numbers: json!([1.5]),
+        }
+    }
+
+    #[test]
+    fn numbers_stand_below_their_heads() {
+        let text = report(1.5).text();
+        assert!(text.contains("\nwho       p50    max\n"), "{text}");
+        assert!(text.contains("\nsomebody  1.5  10.25\na note\n"), "{text}");
+        assert!(text.contains("\ncores none, messages 7\n"), "{text}");
+    }
+
+    #[test]
+    fn a_limit_that_was_missed_is_named_and_decides_the_exit_code() {
+        for (got, held, word) in [(1.5, true, "held  "), (2.5, false, "MISSED")] {
+            let report = report(got);
+            assert_eq!(report.is_held(), held);
+            assert_eq!(report.json()["held"], held);
+            assert!(report.text().contains(&format!("{word} p50, us")));
+        }
+    }
+
+    #[test]
+    fn records_follow_one_another_in_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("new/record.md");
+        for _ in 0..2 {
+            report(1.0).append(&file).unwrap();
+        }
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert_eq!(text.matches("\n## ").count(), 2);
+        assert_eq!(text.matches("commit ").count(), 2);
+        assert_eq!(text.matches("messages 7").count(), 2);
+        assert_eq!(text.matches("```").count(), 4);
+    }
+}

@@ -1,0 +1,138 @@
+//! Cores, priorities and locked memory: set where they may be, and said where not.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+
+mod common;
+
+use std::fs;
+use std::process::{Command, Output};
+
+use common::{Case, PACED};
+
+/// A line of `/proc/PID/status`.
+fn status_of(pid: u32, key: &str) -> String {
+    let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+    let line = status.lines().find_map(|it| it.strip_prefix(key));
+    line.unwrap().trim().to_owned()
+}
+
+#[test]
+fn processes_run_on_the_cores_that_the_deployment_gives_them() {
+    let cores = runtime::own_cores().unwrap();
+    let (first, last) = (cores[0], cores[cores.len() - 1]);
+    let text = format!(
+        "{PACED}[runtime]\nspin = true\ncores = {{ pose = [{first}], pose-1 = [{last}], record = [{last}] }}\n"
+    );
+    let case = Case::new("cores", &[80; 2], &text);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    for (process, core) in [("pose-0", first), ("pose-1", last), ("record", last)] {
+        let pid = started.pid_of(process);
+        // It says so before it does anything else.
+        let expected = core.to_string();
+        started.until(process, |_| {
+            status_of(pid, "Cpus_allowed_list:") == expected
+        });
+    }
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(
+        !ended.stderr.contains("going on without"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn a_dry_run_shows_what_every_process_is_given() {
+    let more = "[runtime]\nspin = true\ncores = { fuse = [0, 9999] }\n";
+    let case = Case::new("shown", &[2; 3], more);
+    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("`runtime.cores` is 9999"),
+        "{}",
+        ended.stderr
+    );
+    case.edit("deployment.toml", "9999", "1000");
+    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let lines: Vec<Vec<&str>> = ended
+        .stdout
+        .lines()
+        .map(|it| it.split_whitespace().collect())
+        .collect();
+    for expected in [
+        &["pose-0", "spin"][..],
+        &["fuse-0", "cores=0", "spin"],
+        &["capture-0"],
+    ] {
+        assert!(
+            lines.contains(&expected.to_vec()),
+            "{expected:?}: {lines:?}"
+        );
+    }
+    let warning = "fuse-0: cannot run on cores 0,1000:";
+    assert_eq!(ended.stderr.matches(warning).count(), 1, "{}", ended.stderr);
+}
+
+#[test]
+fn a_process_that_is_none_of_the_deployment_is_refused_by_name() {
+    let case = Case::new(
+        "unknown",
+        &[2; 2],
+        "[runtime]\npriority = { pose-2 = 10 }\n",
+    );
+    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("`runtime.priority` is \"pose-2\""),
+        "{}",
+        ended.stderr
+    );
+}
+
+/// Runs the deployment without the right to a real-time priority or to lock memory; none if that cannot be had.
+fn without_rights(case: &Case) -> Option<Output> {
+    let limits = ["--rtprio=0", "--memlock=65536:65536"];
+    let parallax = [env!("CARGO_BIN_EXE_parallax"), "run", "deployment.toml"];
+    // The owner of the machine needs no limits, unless this is taken away too.
+    let drop = ["setpriv", "--bounding-set=-sys_nice,-ipc_lock"];
+    let drop = [&drop[..], &["--inh-caps=-sys_nice,-ipc_lock"]].concat();
+    let is_owner = status_of(std::process::id(), "Uid:").starts_with('0');
+    let drop = if is_owner { drop } else { Vec::new() };
+    let words = [&limits[..], &drop, &parallax].concat();
+    let mut command = Command::new("prlimit");
+    let output = command
+        .current_dir(case.folder())
+        .args(words)
+        .output()
+        .ok()?;
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let is_tool = ["prlimit:", "setpriv:"]
+        .iter()
+        .any(|it| stderr.starts_with(it));
+    (!is_tool).then_some(output)
+}
+
+#[test]
+fn what_may_not_be_is_said_once_with_what_to_try_and_the_run_goes_on() {
+    let more = "[record]\noverlay_every = 0\n[capture]\nupright = false\n\
+                [runtime]\nlock_memory = true\npriority = { pose = 50, triangulate = 50 }\n";
+    let case = Case::new("rights", &[4; 2], more);
+    let Some(output) = without_rights(&case) else {
+        eprintln!("skipped: rights cannot be given up here");
+        return;
+    };
+    case.assert_nothing_left();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    for words in [
+        "triangulate, pose-0, pose-1: cannot run at real-time priority 50 (SCHED_FIFO)",
+        "cannot lock memory beyond 65536 bytes",
+        "ulimit -r",
+        "ulimit -l",
+    ] {
+        assert_eq!(stderr.matches(words).count(), 1, "{words}: {stderr}");
+    }
+}
