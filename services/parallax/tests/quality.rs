@@ -110,7 +110,8 @@ fn of_view(case: &Case, name: &str) -> Vec<Value> {
 fn no_frame_waits_for_a_network_that_stands_still() {
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
                 frame_rate_hz = 5\n[record]\noverlay_every = 0\n\
-                [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n";
+                [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
+                [supervise]\nmissed_beats = 1000\n";
     let case = Case::new("stopped", &[100; 2], more);
     case.write("q.onnx", network(0.02).file());
     let mut started = case.start(&["run", "deployment.toml", "--json"]);

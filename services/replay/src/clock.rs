@@ -17,13 +17,23 @@ pub enum Pace {
 pub(crate) struct Clock {
     /// When the first message of the recording was sent, by its clock, nanoseconds.
     pub recorded: u64,
-    /// When it is to be sent now, by this machine's.
-    pub now: u64,
+    /// From the first message to the last, nanoseconds.
+    pub length: u64,
+    /// When the run was planned, by this machine's clock.
+    pub planned: u64,
     /// How fast.
     pub pace: Pace,
 }
 
+/// With a clock running, the first message goes out this much after the run was planned.
+const LEAD_NANOS: u64 = 2_000_000_000;
+
 impl Clock {
+    /// When the first message is to be sent, by this machine's clock, if somebody paces.
+    fn begin(&self) -> u64 {
+        self.planned.saturating_add(LEAD_NANOS)
+    }
+
     /// When a message is to be sent; at once if nobody paces.
     ///
     /// * `sent_at`: when it was sent.
@@ -33,7 +43,7 @@ impl Clock {
             Pace::Times(times) => {
                 let since = sent_at.saturating_sub(self.recorded) as f64 / times;
                 // A float that is too large, or none, becomes the nearest integer.
-                self.now.saturating_add(since as u64)
+                self.begin().saturating_add(since as u64)
             }
         }
     }
@@ -41,7 +51,8 @@ impl Clock {
     /// A message's envelope in this run.
     ///
     /// Times of capture move by the same amount for all messages, so that what depends on the time
-    /// between two frames stays as it was. When a message was sent is now; what it took to compute
+    /// between two frames stays as it was, and so far that nothing is sent before it was captured, even if
+    /// it is replayed faster than it was recorded. When a message was sent is now; what it took to compute
     /// stays.
     ///
     /// * `session`: of this run.
@@ -68,7 +79,16 @@ impl Clock {
     }
 
     fn moved(&self, time: u64) -> u64 {
-        let moved = i128::from(time) - i128::from(self.recorded) + i128::from(self.now);
+        let (first, ahead) = match self.pace {
+            Pace::Max => (self.planned, self.length),
+            Pace::Times(times) if times > 1.0 => {
+                let left = (self.length as f64 / times) as u64;
+                (self.begin(), self.length.saturating_sub(left))
+            }
+            Pace::Times(_) => (self.begin(), 0),
+        };
+        let first = i128::from(first) - i128::from(ahead);
+        let moved = i128::from(time) - i128::from(self.recorded) + first;
         u64::try_from(moved.max(0)).unwrap_or(u64::MAX)
     }
 }
@@ -83,7 +103,8 @@ mod tests {
     fn clock(pace: Pace) -> Clock {
         Clock {
             recorded: 1000,
-            now: 50_000,
+            length: 500,
+            planned: 50_000,
             pace,
         }
     }
@@ -91,9 +112,10 @@ mod tests {
     #[test]
     fn twice_as_fast_takes_half_the_time() {
         let due = |pace| clock(pace).due(1400);
-        assert_eq!(due(Pace::Times(1.0)), 50_400);
-        assert_eq!(due(Pace::Times(2.0)), 50_200);
-        assert_eq!(due(Pace::Times(0.5)), 50_800);
+        let first = 50_000 + LEAD_NANOS;
+        assert_eq!(due(Pace::Times(1.0)), first + 400);
+        assert_eq!(due(Pace::Times(2.0)), first + 200);
+        assert_eq!(due(Pace::Times(0.5)), first + 800);
         assert_eq!(due(Pace::Max), 0);
         assert_eq!(clock(Pace::Times(1e-300)).due(u64::MAX), u64::MAX);
     }
@@ -119,7 +141,7 @@ mod tests {
     #[test]
     fn a_message_is_of_this_run_and_sent_now_and_took_what_it_took() {
         let got = clock(Pace::Max).rebase(&envelope(990, [1100, 1130]), [7, 1, 80_000]);
-        let mut expected = envelope(49_990, [79_970, 80_000]);
+        let mut expected = envelope(49_490, [79_970, 80_000]);
         (expected.stamp.session, expected.stamp.epoch) = (7, 4);
         assert_eq!(got, expected);
     }
@@ -129,14 +151,31 @@ mod tests {
         fn the_time_between_two_frames_stays(
             [first, second] in prop::array::uniform2(0_u64..1 << 60), pace in 0.1..10.0,
         ) {
-            let clock = Clock { recorded: 0, now: 5, pace: Pace::Times(pace) };
+            let clock = Clock { recorded: 0, length: 1 << 60, planned: 1 << 61, pace: Pace::Times(pace) };
             let captured = |it| clock.rebase(&envelope(it, [0, 0]), [0; 3]).stamp.captured_at_nanos;
             prop_assert_eq!(captured(first).abs_diff(captured(second)), first.abs_diff(second));
         }
 
         #[test]
-        fn any_times_are_taken(recorded: u64, now: u64, time: u64, timing: [u64; 2], pace in 1e-9..1e9) {
-            let clock = Clock { recorded, now, pace: Pace::Times(pace) };
+        fn nothing_is_sent_before_it_was_captured(
+            at in 0_u64..1 << 40, ago in 0_u64..1 << 30, pace in prop_oneof![
+                Just(Pace::Max), (0.1..10.0).prop_map(Pace::Times)
+            ],
+        ) {
+            let (recorded, length, planned) = (1 << 35, 1 << 40, 1 << 50);
+            let clock = Clock { recorded, length, planned, pace };
+            let sent_at = recorded + at;
+            let captured = clock.rebase(&envelope(sent_at - ago, [0, 0]), [0; 3]).stamp;
+            // A float of 2^40 is exact to less than a microsecond.
+            let sent_now = clock.due(sent_at).max(planned);
+            prop_assert!(captured.captured_at_nanos <= sent_now + 1000);
+        }
+
+        #[test]
+        fn any_times_are_taken(
+            [recorded, length, now]: [u64; 3], time: u64, timing: [u64; 2], pace in 1e-9..1e9,
+        ) {
+            let clock = Clock { recorded, length, planned: now, pace: Pace::Times(pace) };
             clock.due(time);
             clock.rebase(&envelope(time, timing), [0, u64::MAX, now]);
         }

@@ -14,9 +14,6 @@ use crate::Pace;
 use crate::clock::Clock;
 use crate::mouth::Mouth;
 
-/// With a clock running, the first message goes out this much after the run was planned.
-const LEAD_NANOS: u64 = 2_000_000_000;
-
 /// What the process has to do.
 #[derive(Debug)]
 pub struct Job {
@@ -143,13 +140,15 @@ impl<'a> Speaker<'a> {
         let mouths = lines
             .zip(tracks)
             .map(|(line, track)| Mouth::open(service.bus(), track.kind, &line.topic));
+        let [recorded, ended] = recording.span().unwrap_or([0; 2]);
         Ok(Self {
             service,
             job,
             mouths: mouths.collect::<Result<_, _>>()?,
             clock: Clock {
-                recorded: recording.begin().unwrap_or(0),
-                now: service.session().saturating_add(LEAD_NANOS),
+                recorded,
+                length: ended.saturating_sub(recorded),
+                planned: service.session(),
                 pace: job.pace,
             },
             waiter: service.bus().waiter(),

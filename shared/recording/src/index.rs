@@ -67,11 +67,15 @@ impl Recording {
         lost.fold(0, u64::saturating_add)
     }
 
-    /// When the first message was sent that says so; signs of life do not count.
-    pub fn begin(&self) -> Option<u64> {
+    /// When the first and the last message were sent, of those that say so; signs of life do not count.
+    pub fn span(&self) -> Option<[u64; 2]> {
         let stamped = self.tracks.values().filter(|it| it.kind != Kind::Health);
-        let entries = stamped.flat_map(|it| &it.entries);
-        entries.map(|it| it.publish_time).filter(|it| *it > 0).min()
+        let times = stamped.flat_map(|it| &it.entries).map(|it| it.publish_time);
+        let times = times.filter(|it| *it > 0);
+        times.fold(None, |span, it| {
+            let [first, last] = span.unwrap_or([it; 2]);
+            Some([first.min(it), last.max(it)])
+        })
     }
 }
 
