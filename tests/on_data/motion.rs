@@ -192,5 +192,5 @@ fn files_without_a_whole_person_or_of_nothing_are_refused() {
         table.as_ref(),
         &MotionOptions::default(),
     );
-    assert!(matches!(got, Err(MotionError::NoMarker { .. })), "{got:?}");
+    assert!(matches!(got, Err(MotionError::Gap { .. })), "{got:?}");
 }

@@ -10,7 +10,7 @@ const MAX_BYTES: usize = 16 << 10;
 /// Times that may wait; a decoder is a few frames ahead at most.
 const MAX_TIMES: usize = 1024;
 /// How long the time of a frame that is there may take.
-const PATIENCE: Duration = Duration::from_secs(5);
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Reads a log to its end in a thread of its own, so that a decoder with much to say does not block.
 #[derive(Debug)]

@@ -65,21 +65,8 @@ impl Video {
     /// Reads the next frame, and gives its index in the footage; `None` at the end of a video that came
     /// whole.
     ///
-    /// An index that was expected is left out where the decoder could make nothing of a frame; a picture of a time that
-    /// has been given already, of which damage makes some, is passed over.
+    /// An index that was expected is left out where the decoder could make nothing of a frame.
     pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
-        while self.fill(rgb)? {
-            if let Some(index) = self.index() {
-                self.last_index = index;
-                self.n_read += 1;
-                return Ok(Some(index));
-            }
-        }
-        Ok(None)
-    }
-
-    /// Reads a picture; `false` at the end of a video that came whole.
-    fn fill(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
             match self.stdout.read(&mut rgb[filled..]) {
@@ -95,31 +82,26 @@ impl Video {
             }
         }
         if filled == rgb.len() {
-            return Ok(true);
+            self.last_index = self.index();
+            self.n_read += 1;
+            return Ok(Some(self.last_index));
         }
         self.check_end(filled > 0)?;
-        Ok(false)
+        Ok(None)
     }
 
     /// The index of the frame that has just been read: by its time where frames are equally spaced, else
-    /// by counting; `None` if that time has been given already.
-    fn index(&self) -> Option<u64> {
+    /// by counting.
+    fn index(&self) -> u64 {
         let counted = match self.n_read {
             0 => self.start,
             _ => self.last_index.saturating_add(self.step),
         };
         let Some(rate_hz) = self.probe.regular_hz() else {
-            return Some(counted);
+            return counted;
         };
-        let told = self
-            .log
-            .next_time_s()
-            .map(|it| (it * rate_hz).round() as u64);
-        match told {
-            Some(it) if self.n_read == 0 => Some(it.max(counted)),
-            Some(it) => (it >= counted).then_some(it),
-            None => Some(counted),
-        }
+        let told = self.log.next_time_s().map(|it| (it * rate_hz).round());
+        told.map_or(counted, |it| counted.max(it as u64))
     }
 
     /// Tells a video that is over from one that is cut off.
