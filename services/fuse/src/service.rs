@@ -321,8 +321,18 @@ impl<'a> Worker<'a> {
         let step = &self.job.step;
         let answer = step.all_views(&seen.answers, &evidence, Support::Mean);
         let n_views = seen.answers.len();
-        let messages = wire::all_views_to_messages(n_views, answer.as_ref(), seen.views_present());
-        let messages = messages.or_fail(ExitKind::Run)?;
+        let present = seen.views_present();
+        let messages = wire::all_views_to_messages(n_views, answer.as_ref(), present);
+        // As for pairs: responses that are no numbers cost the frame, not the process.
+        let messages = messages.or_else(|error| {
+            self.refuse(&error, "evidence");
+            let mut nothing =
+                wire::all_views_to_messages(n_views, None, present).or_fail(ExitKind::Run)?;
+            for message in &mut nothing {
+                message.status = Status::BAD_INPUT;
+            }
+            Ok::<_, Failure>(nothing)
+        })?;
         let mut first_sent_at = None;
         for (index, message) in messages.into_iter().enumerate() {
             let sent_at = self.send(seen, index, message, received_at_nanos)?;
