@@ -51,8 +51,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         evidence: bus.slice_publisher(&topic::evidence(job.view))?,
     };
     view.wait_for_receivers();
-    let file = format!("pose-{}.place", job.view);
-    let mut place = Place::new(bus.namespace().root().join(file));
+    let mut place = Place::of(bus);
     let past = place.noted().filter(|_| service.epoch() > 0);
     let past = past.map(Past::from_numbers).unwrap_or_default();
     let frame_range = [job.start_frame, job.frame_step];
