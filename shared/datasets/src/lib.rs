@@ -46,5 +46,5 @@ pub use picture::Picture;
 pub use read::{DatasetError, ReadOptions, read};
 pub use sample::Sample;
 pub use select::{SelectError, Selection};
-pub use sides::Sides;
+pub use sides::{Sides, UnknownSides};
 pub use table::{SkeletonFileError, SkeletonSpec, SkeletonTable, TableError};

@@ -1,5 +1,7 @@
 //! Left and right: as people call their own sides, or as they are seen.
 
+use core::str::FromStr;
+
 use crate::Person;
 
 /// Whose left and right the joints of a data set are called by.
@@ -9,23 +11,31 @@ use crate::Person;
 /// people who are seen from behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// Left as left alone as it was marked.
+    /// As they were marked.
     #[default]
     Marked,
     /// As if everybody faced the camera: who is seen from behind has left and right exchanged.
     Seen,
 }
 
-impl Sides {
-    /// By its name: `marked` or `seen`.
-    pub fn by_name(name: &str) -> Option<Self> {
+/// A name that is not one of sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected marked or seen")]
+pub struct UnknownSides;
+
+impl FromStr for Sides {
+    type Err = UnknownSides;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSides> {
         match name {
-            "marked" => Some(Self::Marked),
-            "seen" => Some(Self::Seen),
-            _ => None,
+            "marked" => Ok(Self::Marked),
+            "seen" => Ok(Self::Seen),
+            _ => Err(UnknownSides),
         }
     }
+}
 
+impl Sides {
     /// Calls the joints of a person by these sides.
     ///
     /// * `joint_mirror`: the joint on the other side for every joint, see

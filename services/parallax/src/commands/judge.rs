@@ -40,15 +40,11 @@ pub(crate) struct Arguments {
     without: Option<Selection>,
     /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
     /// exchanged.
-    #[arg(long, value_name = "SIDES", default_value = "marked", value_parser = sides)]
+    #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
     /// Print JSON.
     #[arg(long)]
     json: bool,
-}
-
-fn sides(name: &str) -> Result<Sides, String> {
-    Sides::by_name(name).ok_or_else(|| "expected marked or seen".to_owned())
 }
 
 pub(super) fn selection(text: &str) -> Result<Selection, String> {
@@ -62,9 +58,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let options = options(arguments.only.as_ref(), arguments.without.as_ref());
     let read = datasets::read(&arguments.dataset, &options);
     let mut people = read.map_err(super::train::unread)?;
-    let mirror = SkeletonTable::published().joint_mirror().to_vec();
+    let table = SkeletonTable::published();
     let sided = people.people.into_iter();
-    people.people = sided.map(|it| arguments.sides.of(it, &mirror)).collect();
+    let sided = sided.map(|it| arguments.sides.of(it, table.joint_mirror()));
+    people.people = sided.collect();
     let pictures = judged::judged(&Search::new(model), "", &people, || false)?;
     let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
     if arguments.json {

@@ -248,8 +248,8 @@ fn sides(values: &[&str]) -> Result<Sides, Failure> {
     let Some(name) = values.last() else {
         return Ok(Sides::default());
     };
-    Sides::by_name(name).ok_or_else(|| {
-        let message = format!("--sides {name}: expected marked or seen");
+    name.parse().map_err(|error| {
+        let message = format!("--sides {name}: {error}");
         Failure::new(ExitKind::Usage, message)
     })
 }
