@@ -3,7 +3,7 @@
 use fmp::N_CHANNELS;
 use kernels::MIRRORED_CHANNEL;
 
-use crate::shape::Shape;
+use crate::shape::{Coordinates, Shape};
 
 /// Where every number of a model's vector goes in its mirror image, and with which sign.
 ///
@@ -41,8 +41,8 @@ impl Symmetry {
         for part in 0..shape.n_parts() {
             for k in 0..shape.n_types(part) {
                 let (own, their) = ((part, k), (mirror[part], of(part, k)));
-                filters(shape, &mut mirrored, own, their);
-                springs(shape, &mut mirrored, own, their);
+                filters((&at, shape.side), &mut mirrored, own, their);
+                springs(&at, &mut mirrored, own, their);
                 let parent = shape.parents[part];
                 for of_parent in 0..parent.map_or(0, |it| shape.n_types(it)) {
                     let parent = parent.unwrap_or_default();
@@ -70,12 +70,16 @@ impl Symmetry {
 /// A part and one of its types.
 type Typed = (usize, usize);
 
-fn filters(shape: &Shape, mirrored: &mut [(u32, f64)], own: Typed, their: Typed) {
-    let at = shape.coordinates();
+fn filters(
+    (at, side): (&Coordinates, usize),
+    mirrored: &mut [(u32, f64)],
+    own: Typed,
+    their: Typed,
+) {
     let [from, to] = [own, their].map(|(part, k)| at.filter(part, k));
-    for cell in 0..shape.side * shape.side {
-        let (row, col) = (cell / shape.side, cell % shape.side);
-        let flipped = row * shape.side + shape.side - 1 - col;
+    for cell in 0..side * side {
+        let (row, col) = (cell / side, cell % side);
+        let flipped = row * side + side - 1 - col;
         for (channel, its) in MIRRORED_CHANNEL.iter().enumerate() {
             let to = to + flipped * N_CHANNELS + its;
             mirrored[from + cell * N_CHANNELS + channel].0 = to as u32;
@@ -83,8 +87,7 @@ fn filters(shape: &Shape, mirrored: &mut [(u32, f64)], own: Typed, their: Typed)
     }
 }
 
-fn springs(shape: &Shape, mirrored: &mut [(u32, f64)], own: Typed, their: Typed) {
-    let at = shape.coordinates();
+fn springs(at: &Coordinates, mirrored: &mut [(u32, f64)], own: Typed, their: Typed) {
     for (axis, sign) in [-1.0, 1.0].into_iter().enumerate() {
         let [from, to] = [own, their].map(|(part, k)| at.quadratic(part, k) + axis);
         mirrored[from].0 = to as u32;
