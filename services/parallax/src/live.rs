@@ -10,6 +10,8 @@ use std::time::Instant;
 use metrics::{Reading, ReadingError};
 use runtime::{Failure, Keys, Namespace, Onlooker, OrFail as _, Sighting, Stop, now_nanos};
 
+use crate::plan::SERVICES;
+
 pub(crate) use describe::{describe, measured};
 pub(crate) use table::table;
 
@@ -134,18 +136,10 @@ impl Member {
 
 /// Where in the way of a frame a process stands.
 fn place(process: &str) -> (usize, usize, String) {
-    const ORDER: [&str; 6] = [
-        "capture",
-        "pose",
-        "quality",
-        "fuse",
-        "triangulate",
-        "record",
-    ];
     let (service, index) = process.split_once('-').unwrap_or((process, "0"));
-    let nth = ORDER.iter().position(|it| *it == service);
+    let nth = SERVICES.iter().position(|it| *it == service);
     let index = index.parse().unwrap_or(usize::MAX);
-    (nth.unwrap_or(ORDER.len()), index, process.to_owned())
+    (nth.unwrap_or(SERVICES.len()), index, process.to_owned())
 }
 
 /// Looks at a deployment for as long as it runs.

@@ -32,6 +32,16 @@ pub(crate) struct Resolved {
     pub replay: Option<Replay>,
 }
 
+/// The services, in the order in which a frame passes them.
+pub(crate) const SERVICES: [&str; 6] = [
+    "capture",
+    "pose",
+    "quality",
+    "fuse",
+    "triangulate",
+    "record",
+];
+
 impl Resolved {
     /// Looks at the footage of a deployment.
     pub(crate) fn new(deployment: &Deployment) -> Result<Self, Failure> {

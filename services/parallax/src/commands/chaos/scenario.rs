@@ -2,17 +2,8 @@
 
 use super::camera::CameraFault;
 use super::{moved, stall};
+use crate::plan::SERVICES;
 use crate::trial::strike::Blow;
-
-/// The services, in the order in which a frame passes them.
-const SERVICES: [&str; 6] = [
-    "capture",
-    "pose",
-    "quality",
-    "fuse",
-    "triangulate",
-    "record",
-];
 
 /// A fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
