@@ -1,6 +1,6 @@
 //! What a view brings to fusion: its camera, where its cells lie, and its own answer.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use fmp::{Layout, Model, Placement, Pose};
 use geometry::Camera;
@@ -14,11 +14,14 @@ pub struct ViewPlan {
     camera: Camera,
     model: Arc<Model>,
     layout: Arc<Layout>,
-    /// Class of filter size of every part.
+    /// The sizes of filters, `[rows, cols]` in cells.
+    sizes: Vec<[usize; 2]>,
+    /// Which of them every part has.
     class_of_part: Vec<usize>,
     /// `[class][level]`: undistorted centre of every cell, row major, pixels; NaN where the lens
-    /// model has no answer.
-    cells: Vec<Vec<Vec<[f64; 2]>>>,
+    /// model has no answer. Made when it is first asked for: all together they take as long as some frames, and
+    /// people are found on few levels.
+    cells: Vec<Vec<OnceLock<Vec<[f64; 2]>>>>,
 }
 
 impl ViewPlan {
@@ -40,20 +43,13 @@ impl ViewPlan {
                 })
             })
             .collect();
-        let cells = sizes
-            .iter()
-            .map(|size| {
-                (0..layout.levels.len())
-                    .map(|level| undistorted_cells(&camera, &layout, level, *size))
-                    .collect()
-            })
-            .collect();
         Self {
+            cells: vec![vec![OnceLock::new(); layout.levels.len()]; sizes.len()],
             camera,
             model,
             layout,
+            sizes,
             class_of_part,
-            cells,
         }
     }
 
@@ -79,7 +75,9 @@ impl ViewPlan {
 
     /// Undistorted centres of a part at all cells of a level, row major, pixels.
     pub fn cells(&self, part: usize, level: usize) -> &[[f64; 2]] {
-        &self.cells[self.class_of_part[part]][level]
+        let class = self.class_of_part[part];
+        let make = || undistorted_cells(&self.camera, &self.layout, level, self.sizes[class]);
+        self.cells[class][level].get_or_init(make)
     }
 
     /// Undistorted centre of a part of a pose, pixels; NaN where the lens model has no answer.
