@@ -74,6 +74,9 @@ impl Watcher {
             }
             Event::Line { text, .. } => self.say(text),
             Event::Died { process, death } => self.say(&format!("{process} {death}")),
+            Event::Restarting { process, pause } if pause.is_zero() => {
+                self.say(&format!("{process} starts again"));
+            }
             Event::Restarting { process, pause } => {
                 self.say(&format!(
                     "{process} starts again in {} ms",

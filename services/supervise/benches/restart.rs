@@ -1,5 +1,5 @@
 //! From `kill -9` of a sender to the first message of its successor at a receiver that went on, with
-//! no pause before the restart (a deployment waits 100 ms).
+//! no pause before the restart, as for every process that has worked for a while.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench says what it measured")]
 

@@ -57,7 +57,9 @@ pub enum Role {
 /// How much patience there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Policy {
-    /// Pause before the first restart; it doubles with each further one in the window.
+    /// A process that has worked for so long is started again at once.
+    pub steady_after: Duration,
+    /// Pause before the restart of one that ended sooner; it doubles each time that it does so again.
     pub first_pause: Duration,
     /// Longest pause before a restart.
     pub longest_pause: Duration,
@@ -86,6 +88,7 @@ pub struct Policy {
 impl Default for Policy {
     fn default() -> Self {
         Self {
+            steady_after: Duration::from_secs(1),
             first_pause: Duration::from_millis(100),
             longest_pause: Duration::from_secs(5),
             max_restarts: 5,
@@ -105,11 +108,15 @@ impl Policy {
     /// The pause before the next restart, or none if the process is to be given up.
     ///
     /// * `recent`: restarts within the window.
-    pub(crate) fn pause(&self, recent: usize) -> Option<Duration> {
+    /// * `hasty`: how many of its last lives in a row ended before they were steady.
+    pub(crate) fn pause(&self, recent: usize, hasty: u32) -> Option<Duration> {
         if recent >= self.max_restarts {
             return None;
         }
-        let factor = 1_u32.checked_shl(recent as u32).unwrap_or(u32::MAX);
+        let Some(doublings) = hasty.checked_sub(1) else {
+            return Some(Duration::ZERO);
+        };
+        let factor = 1_u32.checked_shl(doublings).unwrap_or(u32::MAX);
         let pause = self.first_pause.saturating_mul(factor);
         Some(pause.min(self.longest_pause))
     }
@@ -122,17 +129,19 @@ mod tests {
     use super::Policy;
 
     #[test]
-    fn pauses_double_up_to_the_longest_and_then_end() {
+    fn who_worked_starts_at_once_and_pauses_of_others_double_up_to_the_longest_and_then_end() {
         let policy = Policy {
-            max_restarts: 8,
+            max_restarts: 9,
             ..Policy::default()
         };
-        let millis: Vec<_> = (0..9)
-            .map(|recent| policy.pause(recent).map(|it| it.as_millis()))
+        let millis: Vec<_> = (0..10)
+            .map(|nth| policy.pause(nth, nth as u32).map(|it| it.as_millis()))
             .collect();
-        let expected = [100, 200, 400, 800, 1600, 3200, 5000, 5000].map(Some);
-        assert_eq!(millis[..8], expected);
-        assert_eq!(millis[8], None);
+        let expected = [0, 100, 200, 400, 800, 1600, 3200, 5000, 5000].map(Some);
+        assert_eq!(millis[..9], expected);
+        assert_eq!(millis[9], None);
+        assert_eq!(policy.pause(8, 0), Some(Duration::ZERO));
+        assert_eq!(policy.pause(9, 0), None);
     }
 
     #[test]
@@ -141,8 +150,9 @@ mod tests {
             max_restarts: usize::MAX,
             ..Policy::default()
         };
-        for recent in [31, 32, 33, 1000] {
-            assert_eq!(policy.pause(recent), Some(Duration::from_secs(5)));
+        for hasty in [32, 33, 34, u32::MAX] {
+            let pause = policy.pause(usize::MAX - 1, hasty);
+            assert_eq!(pause, Some(Duration::from_secs(5)));
         }
     }
 }

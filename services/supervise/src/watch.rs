@@ -26,6 +26,10 @@ pub(crate) struct Watch {
     pub(crate) epoch: u32,
     /// When it was restarted, within the window.
     restarts: VecDeque<Instant>,
+    /// When the main loop of this life turned for the first time.
+    at_work_since: Option<Instant>,
+    /// How many lives in a row ended before they were steady, the last ones.
+    n_hasty: u32,
     output: VecDeque<String>,
     /// What earlier lives did.
     past: Counts,
@@ -101,6 +105,8 @@ impl Watch {
             life: Life::Due(now),
             epoch: 0,
             restarts: VecDeque::new(),
+            at_work_since: None,
+            n_hasty: 0,
             output: VecDeque::new(),
             past: Counts::default(),
             current: None,
@@ -116,6 +122,7 @@ impl Watch {
     pub(crate) fn begin(&mut self, child: Child, now: Instant) {
         self.life = Life::Running(child);
         self.output.clear();
+        self.at_work_since = None;
         self.signed = Change::new(now);
         self.turned = Change::new(now);
         self.received = Change::new(now);
@@ -153,6 +160,9 @@ impl Watch {
         }
         self.signed.note(health.at_nanos, now);
         self.turned.note(health.n_loops, now);
+        if self.turned.count > 0 {
+            self.at_work_since.get_or_insert(now);
+        }
         self.received.note(health.n_received, now);
         self.current = Some(*health);
         self.last = self.current;
@@ -211,7 +221,10 @@ impl Watch {
         {
             self.restarts.pop_front();
         }
-        let Some(pause) = policy.pause(self.restarts.len()) else {
+        let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
+        let is_steady = self.at_work_since.is_some_and(worked);
+        self.n_hasty = if is_steady { 0 } else { self.n_hasty + 1 };
+        let Some(pause) = policy.pause(self.restarts.len(), self.n_hasty) else {
             self.life = Life::GivenUp;
             return Sequel::GiveUp;
         };

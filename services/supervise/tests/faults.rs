@@ -141,7 +141,7 @@ fn a_stopped_process_looks_alive_but_is_found_out() {
         Delivery::Realtime,
         &[
             ("sink", "receive 0", Role::Essential),
-            ("source", "send 1000000 1 1", Role::Essential),
+            ("source", "send 1000000 20 1", Role::Essential),
         ],
     );
     // Nothing but the state of the process can tell.
@@ -190,6 +190,35 @@ fn who_computes_for_long_is_waited_for() {
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("thinker"), []);
     assert_eq!(state_of(&run, "thinker"), State::Finished);
+}
+
+#[test]
+fn who_has_worked_for_a_while_is_started_again_at_once() {
+    let processes = [
+        ("sink", "receive 0", Role::Essential),
+        ("source", "send 1000000 20 1", Role::Essential),
+    ];
+    let pauses_of = |steady_after| {
+        let mut case = Case::new(Delivery::Realtime, &processes);
+        case.plan.policy.steady_after = steady_after;
+        let sent = |event: &Seen| is_line(event, "source", "sent 64");
+        let mut kill = kill_once("source", "-9", sent);
+        let run = case.run(|event, stop| {
+            kill(event, stop);
+            if matches!(event, Seen::Restarting(..)) {
+                stop.request();
+            }
+        });
+        assert_eq!(run.deaths("source"), [KILLED]);
+        let pauses = run.seen.iter().filter_map(|event| match event {
+            Seen::Restarting(_, pause) => Some(*pause),
+            _ => None,
+        });
+        pauses.collect::<Vec<_>>()
+    };
+    assert_eq!(pauses_of(Duration::from_millis(100)), [Duration::ZERO]);
+    let first_pause = Duration::from_millis(20);
+    assert_eq!(pauses_of(Duration::from_mins(10)), [first_pause]);
 }
 
 #[test]
