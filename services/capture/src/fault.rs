@@ -24,10 +24,12 @@ pub enum FaultKind {
     Size,
     /// Pictures cannot be decoded.
     Damage,
+    /// The process computes for ever, and hears nothing any more.
+    Spin,
 }
 
 impl FaultKind {
-    const ALL: [(Self, &'static str); 8] = [
+    const ALL: [(Self, &'static str); 9] = [
         (Self::Unplug, "unplug"),
         (Self::Freeze, "freeze"),
         (Self::Repeat, "repeat"),
@@ -36,6 +38,7 @@ impl FaultKind {
         (Self::Slow, "slow"),
         (Self::Size, "size"),
         (Self::Damage, "damage"),
+        (Self::Spin, "spin"),
     ];
 
     /// Its name in settings.
@@ -89,6 +92,16 @@ impl Faults {
     pub fn at(&self, frame: u64) -> Option<Fault> {
         let is_now = |it: &&Fault| frame >= it.from && frame - it.from < it.count;
         self.0.iter().find(is_now).copied()
+    }
+
+    /// What goes wrong in a life of the process: it spins in its first one only, since the next may begin with the
+    /// same frame.
+    ///
+    /// * `epoch`: how often it had been restarted.
+    #[must_use]
+    pub fn of_life(&self, epoch: u32) -> Self {
+        let lasts = |it: &&Fault| epoch == 0 || it.kind != FaultKind::Spin;
+        Self(self.0.iter().filter(lasts).copied().collect())
     }
 }
 
@@ -173,6 +186,9 @@ mod tests {
             ]
         );
         assert_eq!(Faults::default().at(0), None);
+        let once: Faults = "spin@3+1, slow@4+9".parse().unwrap();
+        let in_life = |epoch| once.of_life(epoch).to_string();
+        assert_eq!([0, 1].map(in_life), ["spin@3+1, slow@4+9", "slow@4+9"]);
         let for_ever: Faults = format!("unplug@1+{}", u64::MAX).parse().unwrap();
         assert!(for_ever.at(u64::MAX).is_some());
     }
@@ -199,7 +215,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read(all in prop::collection::vec((0..8_usize, 0..u64::MAX, 1..u64::MAX), 0..4)) {
+        fn what_is_written_is_read(all in prop::collection::vec((0..FaultKind::ALL.len(), 0..u64::MAX, 1..u64::MAX), 0..4)) {
             let fault = |(kind, from, count): (usize, u64, u64)| Fault { kind: FaultKind::ALL[kind].0, from, count };
             let faults = Faults(all.into_iter().map(fault).collect());
             prop_assert_eq!(faults.to_string().parse::<Faults>().unwrap(), faults);

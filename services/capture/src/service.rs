@@ -49,7 +49,8 @@ const LEAD_NANOS: u64 = 2_000_000_000;
 /// [`ExitKind::Input`] if the footage cannot be opened, and what the transport says.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let is_live = job.pace == Pace::Realtime;
-    let supply = Supply::open(&job.source, &job.faults, is_live, job.frozen_after);
+    let faults = job.faults.of_life(service.epoch());
+    let supply = Supply::open(&job.source, &faults, is_live, job.frozen_after);
     let mut supply = supply.or_fail(ExitKind::Input)?;
     service.health().set_total(supply.info().n_frames);
     let mut camera = Camera::open(service, job, &supply)?;

@@ -167,6 +167,9 @@ impl Supply {
     /// What the camera gives; nothing while it is gone.
     fn read(&mut self, index: u64, now: u64) -> Result<Option<Given>, FootageError> {
         let fault = self.faults.at(index);
+        if fault.is_some_and(|it| it.kind == FaultKind::Spin) {
+            spin();
+        }
         if let Some(error) = fault.and_then(|it| self.failure(it)) {
             return Err(error);
         }
@@ -332,6 +335,14 @@ impl Supply {
         self.n_failures = self.n_failures.saturating_add(u32::from(!is_on_purpose));
         let is_too_often = !self.is_live && self.n_failures >= MOST_FAILURES;
         self.is_given_up |= is_too_often || matches!(error, FootageError::VideoTruncated { .. });
+    }
+}
+
+/// Never comes back, as a process that hangs in a computation.
+fn spin() -> ! {
+    tracing::warn!("computing for ever, on purpose");
+    loop {
+        core::hint::spin_loop();
     }
 }
 

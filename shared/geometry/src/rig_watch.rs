@@ -27,11 +27,13 @@ const MOST_DEGREES: f64 = 1.5;
 /// Follows how far apart the cameras see the same points, with each camera and without it.
 ///
 /// From four cameras on, every two others meet in a point of space, which is projected into the camera:
-/// the distance to what it sees itself counts. With three, the distance is that to the ray of one other
+/// the way from there to what it sees itself counts. With three, it is the way to the ray of one other
 /// camera (the epipolar distance), which a camera that is turned along its epipolar lines hardly shows.
-/// Of a frame the median over all points counts, of such a group of cameras the median over the last
-/// frames, and of a camera the median over all groups that it is in: one wrong camera spoils those, and
-/// none of the others. With two cameras nobody can tell which of them is wrong.
+/// Of a frame the median way over all points counts, in x and in y; of such a group of cameras the length
+/// of the median over the last frames: what is found wrongly goes now this way and now that, and what a
+/// camera that was moved sees always goes the same way. Of a camera it is the median over all groups that
+/// it is in: one wrong camera spoils those, and none of the others. With two cameras nobody can tell which
+/// of them is wrong.
 ///
 /// Not a calibration: it names a camera that was moved, and does not say where it stands.
 #[derive(Debug, Clone)]
@@ -45,8 +47,8 @@ pub struct RigWatch {
 struct Group {
     /// The camera into which is projected, and the two others, or twice the one other.
     views: [usize; 3],
-    /// Of the last frames, pixels.
-    px: VecDeque<f64>,
+    /// Of the last frames: the median way from where a point should be to where it was seen, pixels.
+    px: VecDeque<[f64; 2]>,
 }
 
 /// A camera that does not stand where the calibration says.
@@ -147,20 +149,21 @@ impl RigWatch {
 }
 
 impl Group {
-    /// Notes how far apart the points of a frame were seen.
-    fn note(&mut self, px: Vec<f64>) {
+    /// Notes the ways between where the points of a frame should be and were seen.
+    fn note(&mut self, px: Vec<[f64; 2]>) {
         if px.len() < LEAST_POINTS {
             return;
         }
-        self.px.extend(median(px));
+        self.px.extend(median_way(&px));
         if self.px.len() > WINDOW {
             self.px.pop_front();
         }
     }
 
     fn apart(&self) -> Option<f64> {
-        let is_enough = self.px.len() >= LEAST_FRAMES;
-        is_enough.then(|| median(self.px.iter().copied().collect()))?
+        let frames: Vec<_> = self.px.iter().copied().collect();
+        let way = median_way(&frames).filter(|_| frames.len() >= LEAST_FRAMES)?;
+        Some(way[0].hypot(way[1]))
     }
 }
 
@@ -178,21 +181,22 @@ impl Seen {
         Some(Self { at_px, ray })
     }
 
-    /// How far it is from the point in which two rays meet, pixels of its camera.
-    fn px_to_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<f64> {
+    /// The way to it from the point in which two rays meet, pixels of its camera.
+    fn px_to_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<[f64; 2]> {
         let [on_a, on_b] = closest(a, b)?;
         self.px_to_point(camera, &nalgebra::center(&on_a, &on_b))
     }
 
-    /// How far it is from a ray, pixels of its camera: from where the ray comes closest to its own.
-    fn px_to_ray(&self, camera: &Camera, ray: &Ray) -> Option<f64> {
+    /// The way to it from a ray, pixels of its camera: from where the ray comes closest to its own.
+    fn px_to_ray(&self, camera: &Camera, ray: &Ray) -> Option<[f64; 2]> {
         let [on_ray, _] = closest(ray, &self.ray)?;
         self.px_to_point(camera, &on_ray)
     }
 
-    fn px_to_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<f64> {
-        let px = nalgebra::distance(&camera.project(in_world)?, &self.at_px);
-        px.is_finite().then_some(px)
+    fn px_to_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<[f64; 2]> {
+        let way = self.at_px - camera.project(in_world)?;
+        let is_finite = way.iter().all(|it| it.is_finite());
+        is_finite.then_some([way.x, way.y])
     }
 }
 
@@ -214,6 +218,12 @@ fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
             b.origin + along_b * *b.direction,
         ]
     })
+}
+
+/// The median in x and in y; none of nothing.
+fn median_way(all: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let along = |axis: usize| median(all.iter().map(|it| it[axis]).collect());
+    Some([along(0)?, along(1)?])
 }
 
 /// The lower of the two in the middle; none of nothing.

@@ -12,6 +12,8 @@ pub(crate) enum Blow {
     Kill,
     /// It stands still from then on.
     Stop,
+    /// It computes for ever from then on, which its source makes it do.
+    Spin,
 }
 
 impl Blow {
@@ -20,6 +22,7 @@ impl Blow {
         match self {
             Self::Kill => runtime::kill(pid),
             Self::Stop => runtime::freeze(pid),
+            Self::Spin => Ok(()),
         }
     }
 
@@ -28,6 +31,7 @@ impl Blow {
         match self {
             Self::Kill => ["killing", "killed"],
             Self::Stop => ["stopping", "stopped"],
+            Self::Spin => ["letting spin", "sent spinning"],
         }
     }
 }
@@ -41,7 +45,7 @@ pub(crate) struct Strike {
     process: String,
     /// What people call it.
     called: String,
-    /// Once there is a result of this frame.
+    /// Once there is a result of this frame; of a process that is to spin, once it has sent it.
     at_frame: u64,
     /// While it runs.
     pid: Option<u32>,
@@ -121,7 +125,7 @@ impl Strike {
                 None
             }
             Event::Health { process, health } => match self.times.killed {
-                None if process == "triangulate" => self.strike(health, now, deal),
+                None if process == self.judge() => self.strike(health, now, deal),
                 Some(killed) if process == self.process => self.hear(health, now, killed),
                 _ => None,
             },
@@ -129,7 +133,16 @@ impl Strike {
         }
     }
 
-    /// * `health`: of the process that makes the results.
+    /// Whose signs of life tell that it is time: those of the process that makes the results, or, of one that will not
+    /// get beyond its frame, its own.
+    fn judge(&self) -> &str {
+        match self.blow {
+            Blow::Kill | Blow::Stop => "triangulate",
+            Blow::Spin => &self.process,
+        }
+    }
+
+    /// * `health`: of the process that tells when it is time.
     fn strike(
         &mut self,
         health: &Health,
@@ -298,6 +311,24 @@ mod tests {
             said.unwrap(),
             "triangulate works again, 300 ms after it was stopped"
         );
+    }
+
+    #[test]
+    fn who_spins_is_known_by_what_it_sent_itself() {
+        let mut strike = Strike::new(Blow::Spin, "capture-1", 3.0);
+        tell(&mut strike, &started("capture-1", 70, 0), 1);
+        for (process, frame, expected) in [
+            ("triangulate", 3, None),
+            ("capture-1", 2, None),
+            ("capture-1", 3, Some(70)),
+        ] {
+            let health = health(0, 4, frame);
+            let event = Event::Health {
+                process,
+                health: &health,
+            };
+            assert_eq!(tell(&mut strike, &event, 100).0, expected, "{process}");
+        }
     }
 
     #[test]

@@ -29,6 +29,7 @@ impl Scenario {
         let mut all = Vec::from(once(Blow::Kill));
         all.push(Self::Random);
         all.extend(once(Blow::Stop));
+        all.push(Self::Once(Blow::Spin, "capture"));
         all.push(Self::Supervisor);
         all.extend(CameraFault::ALL.map(Self::Camera));
         all.extend([Self::Moved, Self::Stall]);
@@ -46,6 +47,7 @@ impl Scenario {
         match self {
             Self::Once(Blow::Kill, service) => format!("kill-{service}"),
             Self::Once(Blow::Stop, service) => format!("hang-{service}"),
+            Self::Once(Blow::Spin, service) => format!("spin-{service}"),
             Self::Random => "kill-random".to_owned(),
             Self::Supervisor => "kill-supervisor".to_owned(),
             Self::Camera(it) => it.words()[0].to_owned(),
@@ -60,6 +62,11 @@ impl Scenario {
             Self::Once(Blow::Kill, service) => format!("a {service} process is killed (SIGKILL)"),
             Self::Once(Blow::Stop, service) => {
                 format!("a {service} process is stopped (SIGSTOP), as if it hung")
+            }
+            Self::Once(Blow::Spin, service) => {
+                format!(
+                    "a {service} process computes for ever, with signs of life but without work"
+                )
             }
             Self::Random => "a process chosen at random is killed every two seconds".to_owned(),
             Self::Supervisor => {
@@ -102,7 +109,7 @@ mod tests {
     #[test]
     fn every_scenario_is_found_by_its_name_and_no_two_share_one() {
         let all = Scenario::all();
-        assert_eq!(all.len(), 22);
+        assert_eq!(all.len(), 23);
         for it in all {
             assert_eq!(Scenario::by_name(&it.name()), Ok(it));
         }
