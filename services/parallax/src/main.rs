@@ -17,6 +17,7 @@ mod prepare;
 mod scheduling;
 mod search;
 mod sheet;
+mod spread;
 mod summary;
 mod taped;
 mod trial;

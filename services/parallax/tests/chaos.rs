@@ -33,12 +33,16 @@ fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
 #[test]
 fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
     let case = Case::new("chaos", &[80; 3], PACED);
-    let (ended, report) = chaos(&case, "kill-pose,kill-supervisor,stall-record", &PATIENT);
+    let (ended, report) = chaos(
+        &case,
+        "kill-pose,spin-capture,kill-supervisor,stall-record",
+        &PATIENT,
+    );
     assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
     let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(printed, report, "the same on standard output");
 
-    let [pose, supervisor, stall] = &report["scenarios"].as_array().unwrap()[..] else {
+    let [pose, spin, supervisor, stall] = &report["scenarios"].as_array().unwrap()[..] else {
         panic!("{report:#}")
     };
     assert_eq!(pose["scenario"], "kill-pose");
@@ -51,6 +55,12 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
     assert!(ms("noticed_ms") < ms("restarted_ms"), "{cost:#}");
     assert!(ms("restarted_ms") < ms("back_ms"), "{cost:#}");
     assert!(ms("longest_pause_ms") > 0.0, "{cost:#}");
+
+    let cost = &spin["measured"]["cost"];
+    assert!(cost["noticed_ms"].as_f64() > Some(1000.0), "{spin:#}");
+    assert!(cost["back_ms"].is_number(), "{spin:#}");
+    let restarts = spin["run"]["restarts"].as_array().unwrap();
+    assert_eq!(restarts.len(), 1, "{spin:#}");
 
     let measured = &supervisor["measured"];
     assert!(measured["files_left"].as_u64() > Some(10), "{measured:#}");

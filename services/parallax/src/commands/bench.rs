@@ -7,7 +7,6 @@ mod occasion;
 mod pictures;
 mod receiver;
 mod report;
-mod spread;
 mod transport;
 
 use std::path::PathBuf;

@@ -7,7 +7,9 @@ mod ground;
 mod judge;
 mod moved;
 mod orphans;
+mod random;
 mod scenario;
+mod series;
 mod stall;
 mod verdict;
 
@@ -24,10 +26,8 @@ use crate::cli::Globals;
 use crate::trial::cost::{Cost, Trace};
 use crate::trial::strike::{Blow, Strike};
 use crate::{inputs, output};
-use barrage::Barrage;
-use census::Census;
 use ground::Ground;
-use judge::{Asked, Barraged, Orphaned};
+use judge::{Asked, Orphaned};
 use scenario::{Scenario, service_of};
 use verdict::Verdict;
 
@@ -41,11 +41,13 @@ What must hold when a process is killed: its death is noticed within a second; i
 where others can go on without it, no pause between two results is longer than --max-pause-ms; what became of every \
 frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
 itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
-within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit. With \
+within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit; \
+one that computes for ever (spin-capture) gives signs of life but none of work, and is noticed when its main loop has stood \
+still for three seconds, which the scenario sets (supervise.hang_limit_s). With \
 kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
 a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
-a tenth, 32 MB and 8 files. With kill-supervisor its processes end by themselves within a second, and the next start \
-of the same deployment removes what was left, and works.
+a tenth, 32 MB and 8 files; a run of more than --part-seconds is also reported part by part. With kill-supervisor its \
+processes end by themselves within a second, and the next start of the same deployment removes what was left, and works.
 
 With camera-... a camera fails for a fifth of the footage (its source does what `fault` says in a deployment): frames \
 are called what is wrong with them, the others' results go on (--max-pause-ms), and the camera has a part in results again within \
@@ -65,7 +67,8 @@ wrong; 130 stopped by Ctrl-C.
 Examples:
     parallax chaos
     parallax chaos --scenario kill-pose,kill-supervisor
-    parallax chaos my.toml --scenario kill-random --seconds 600 --seed 7 --json";
+    parallax chaos my.toml --scenario kill-random --seconds 600 --seed 7 --json
+    parallax chaos --scenario kill-random --seconds 7200 --part-seconds 600      # endurance";
 
 /// What to try.
 #[derive(Debug, Args)]
@@ -85,6 +88,9 @@ pub(crate) struct Arguments {
     /// Footage of every run, seconds; a busy machine needs some of them to start.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
+    /// Seconds of a run in which one process after the other is killed that are reported together, for each such part by itself.
+    #[arg(long, value_name = "S", default_value_t = 600, value_parser = clap::value_parser!(u32).range(1..))]
+    part_seconds: u32,
     /// Folder for the report and the results.
     #[arg(long, value_name = "DIR", default_value = "out/chaos")]
     out: PathBuf,
@@ -99,11 +105,12 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The fault comes after this share of the frames; at random, from the first result up to the other share.
+/// The fault comes after this share of the frames.
 const STRIKE_AFTER: f64 = 0.4;
-const BARRAGE_UNTIL: f64 = 0.8;
-/// Nanoseconds between two kills.
-const BARRAGE_PERIOD: u64 = 2_000_000_000;
+
+/// How long the main loop of a process may stand still where one computes for ever: a sign of work is due each second,
+/// and three may be missed.
+const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
 /// Tries everything that is asked for, and judges it.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
@@ -161,7 +168,7 @@ fn chosen(asked: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Fai
 fn attempt(ground: &Ground, arguments: &Arguments, it: Scenario) -> Result<Verdict, Failure> {
     match it {
         Scenario::Once(blow, service) => once(ground, arguments, blow, service),
-        Scenario::Random => random(ground, arguments),
+        Scenario::Random => random::attempt(ground, arguments),
         Scenario::Supervisor => supervisor(ground, arguments),
         Scenario::Camera(fault) => camera::attempt(ground, arguments, fault),
         Scenario::Moved => moved::attempt(ground, arguments),
@@ -181,7 +188,12 @@ fn once(
     let victims = victims.into_iter().filter(|it| service_of(it) == service);
     let process = Rng::with_seed(arguments.seed).choice(victims.collect::<Vec<_>>());
     let process = process.unwrap_or(service).to_owned();
-    let mut strike = Strike::new(blow, &process, frame_at(&planned, STRIKE_AFTER));
+    let at_frame = frame_at(&planned, STRIKE_AFTER);
+    let planned = match blow {
+        Blow::Kill | Blow::Stop => planned,
+        Blow::Spin => spinning(ground, &scenario, &process, at_frame as u64)?,
+    };
+    let mut strike = Strike::new(blow, &process, at_frame);
     let ran = ground.watch(&planned, &mut |event| {
         strike.note(event, now_nanos(), Blow::deal)
     });
@@ -190,51 +202,17 @@ fn once(
     let struck = |it: &str| u32::from(it == process && times.killed.is_some());
     let after = ran.aftermath(struck);
     let policy = planned.plan().policy;
-    let hang_ms = policy.stopped_limit.as_millis() as f64;
+    let hang = match blow {
+        Blow::Kill | Blow::Stop => policy.stopped_limit,
+        Blow::Spin => policy.hang_limit,
+    };
+    let hang_ms = hang.as_millis() as f64;
     Ok(Verdict {
         scenario,
         measured: verdict::of_cost(&process, &cost, after.n_results),
+        more: Vec::new(),
         numbers: json!({ "process": process, "cost": cost }),
         limits: judge::once(&arguments.limits, blow, &process, hang_ms, (&cost, &after)),
-        run: ran.json(),
-    })
-}
-
-fn random(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
-    let scenario = Scenario::Random.name();
-    let planned = ground.plan(&scenario, &[])?;
-    let until = frame_at(&planned, BARRAGE_UNTIL) as u64;
-    let mut barrage = Barrage::new(arguments.seed, BARRAGE_PERIOD, until);
-    let mut census = Census::default();
-    let namespace = &planned.plan().namespace;
-    let ran = ground.watch(&planned, &mut |event| {
-        let now = now_nanos();
-        census.note(event, now, |pids| census::look(namespace, pids));
-        barrage.note(event, now, runtime::kill)
-    });
-    let kills = barrage.kills();
-    let struck = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
-    let after = ran.aftermath(struck);
-    let mut away_ms: Vec<f64> = kills.iter().filter_map(barrage::Kill::away_ms).collect();
-    away_ms.sort_by(f64::total_cmp);
-    let it = Barraged {
-        n_kills: kills.len(),
-        away_ms,
-        held: census.ends(),
-    };
-    let [p50, p99] = [0.5, 0.99].map(|share| it.away(share));
-    let each = kills
-        .iter()
-        .map(|it| json!({ "process": it.process, "back_ms": it.away_ms() }));
-    Ok(Verdict {
-        scenario,
-        measured: verdict::of_barrage(&it, after.n_results),
-        numbers: json!({
-            "kills": each.collect::<Vec<_>>(),
-            "back_ms": { "p50": p50, "p99": p99 },
-            "first_and_last": it.held,
-        }),
-        limits: judge::random(&arguments.limits, &it, &after),
         run: ran.json(),
     })
 }
@@ -255,9 +233,29 @@ fn supervisor(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure
     Ok(Verdict {
         scenario,
         measured: verdict::of_orphans(&it, after.n_results),
+        more: Vec::new(),
         numbers: json!({ "children_ended_ms": it.ended_ms, "files_left": it.files, "next_result_ms": it.result_ms }),
         limits: judge::supervisor(&arguments.limits, &it, &after),
         run: ran.json(),
+    })
+}
+
+/// Plans a run one process of which never finishes what it does after a frame.
+///
+/// * `process`: of a camera.
+fn spinning(
+    ground: &Ground,
+    scenario: &str,
+    process: &str,
+    after_frame: u64,
+) -> Result<Planned, Failure> {
+    ground.plan_with(scenario, &[SPIN_LIMIT], &|deployment| {
+        let frame = after_frame + deployment.capture.frame_step;
+        let view = process.rsplit_once('-').and_then(|it| it.1.parse().ok());
+        let camera = view.and_then(|it: usize| deployment.cameras.get_mut(it));
+        if let (Some(camera), Ok(fault)) = (camera, format!("spin@{frame}+1").parse()) {
+            camera.fault = fault;
+        }
     })
 }
 
@@ -297,7 +295,7 @@ mod tests {
     fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
         let processes = ["capture-0", "pose-0", "triangulate", "record"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
-        assert_eq!(all.len(), 17);
+        assert_eq!(all.len(), 18);
         let quality = Scenario::Once(Blow::Kill, "quality");
         assert!(!all.contains(&quality));
         let refused = chosen(&[all[0], quality], &processes).unwrap_err();

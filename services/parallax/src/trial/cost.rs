@@ -53,6 +53,13 @@ impl Trace {
             Self::Nowhere => None,
         }
     }
+
+    /// When a life sent the first of what a result owes to, milliseconds since the run was planned; none of
+    /// processes that results do not name.
+    pub(crate) fn began_ms(self, life: u32, moments: &[Moment]) -> Option<f64> {
+        let mut sent = moments.iter().filter_map(|it| self.life(it));
+        sent.find(|it| it.0 == life).map(|it| it.1)
+    }
 }
 
 impl Cost {
@@ -199,6 +206,11 @@ mod tests {
         assert_eq!(back(Trace::Pose(0)), Some(585.0));
         assert_eq!(back(Trace::Result), Some(590.0));
         assert_eq!(back(Trace::Nowhere), None, "it was not heard of");
+        let began = |trace: Trace, life| trace.began_ms(life, &moments);
+        assert_eq!(began(Trace::Camera(0), 1), Some(890.0));
+        assert_eq!(began(Trace::Pose(0), 0), Some(95.0));
+        assert_eq!(began(Trace::Result, 2), None);
+        assert_eq!(began(Trace::Nowhere, 1), None);
     }
 
     #[test]

@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 use super::load::Arguments;
 use super::pictures;
-use super::spread::Spread;
 use crate::cli::Globals;
 use crate::commands::run::Planned;
 use crate::deployment::{Deployment, Loaded};
 use crate::inputs;
+use crate::spread::Spread;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};

@@ -12,10 +12,10 @@ use serde_json::{Value, json};
 use super::course::{Case, Course, Measured};
 use super::occasion::Occasion;
 use super::report::Report;
-use super::spread::Spread;
 use super::{EXITS, Output};
 use crate::cli::Globals;
 use crate::output;
+use crate::spread::Spread;
 use crate::trial::limit;
 
 const HELP: &str = "\

@@ -9,8 +9,8 @@ use messages::{FrameHeader, Status, topic};
 use runtime::{Failure, Launch, Mapped, Sample, Service, Woken, mapped_at, now_nanos, run_service};
 use serde::{Deserialize, Serialize};
 
-use super::spread::Spread;
 use crate::output;
+use crate::spread::Spread;
 
 /// Messages before those that are measured: the first few of them are looked at closely.
 pub(super) const WARM_UP: u64 = 64;

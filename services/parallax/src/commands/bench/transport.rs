@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use super::hop::{self, Measured, Series};
 use super::occasion::Occasion;
 use super::report::Report;
-use super::spread::Spread;
 use super::{EXITS, Output};
 use crate::cli::Globals;
 use crate::output;
+use crate::spread::Spread;
 use crate::trial::limit;
 
 const HELP: &str = "\

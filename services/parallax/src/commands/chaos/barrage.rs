@@ -6,6 +6,8 @@ use std::io;
 use fastrand::Rng;
 use supervise::Event;
 
+use crate::trial::cost::Trace;
+use crate::trial::results::Moment;
 use crate::trial::strike::{Times, is_at_work};
 
 /// Processes that are killed one after the other.
@@ -36,10 +38,16 @@ pub(super) struct Kill {
 }
 
 impl Kill {
-    /// How long it was away, milliseconds.
-    pub(super) fn away_ms(&self) -> Option<f64> {
-        let [killed, heard] = [self.times.killed?, self.times.heard?];
-        Some(heard.saturating_sub(killed) as f64 / 1e6)
+    /// How long it was away, milliseconds: until it sent the first of what a result owes to, and of processes that
+    /// no result names until its first sign of having worked.
+    ///
+    /// * `session`: when the run was planned, `runtime::now_nanos`.
+    pub(super) fn away_ms(&self, trace: Trace, session: u64, moments: &[Moment]) -> Option<f64> {
+        let killed = self.times.killed?;
+        let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 / 1e6;
+        let sent = trace.began_ms(self.life, moments);
+        let sent = sent.map(|it| it - ms(session, killed));
+        sent.or_else(|| Some(ms(killed, self.times.heard?)))
     }
 }
 
@@ -235,7 +243,9 @@ mod tests {
         };
         tell(&mut barrage, &died, 2103);
         tell(&mut barrage, &started("pose-0", 75, 1), 2203);
-        assert_eq!(barrage.kills()[0].away_ms(), None);
+        let away =
+            |kill: &Kill, moments: &[Moment]| kill.away_ms(Trace::Result, 1000 * MS, moments);
+        assert_eq!(away(&barrage.kills()[0], &[]), None);
         say(&mut barrage, "pose-0", 1, 1, 2900);
         let expected = Times {
             killed: Some(2100 * MS),
@@ -247,7 +257,16 @@ mod tests {
             panic!("{:?}", barrage.kills())
         };
         assert_eq!((kill.process.as_str(), kill.times), ("pose-0", expected));
-        assert_eq!(kill.away_ms(), Some(800.0));
+        assert_eq!(away(kill, &[]), Some(800.0));
+        let of_life = |epoch, sent_ms| Moment {
+            frame: 1,
+            epoch,
+            sent_ms,
+            joints: Vec::new(),
+            views: Vec::new(),
+        };
+        let moments = [of_life(0, 1000.0), of_life(1, 1750.0), of_life(1, 1900.0)];
+        assert_eq!(away(kill, &moments), Some(650.0), "what it sent says more");
     }
 
     #[test]

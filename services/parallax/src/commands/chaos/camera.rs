@@ -217,6 +217,7 @@ pub(super) fn attempt(
     Ok(Verdict {
         scenario: scenario.to_owned(),
         measured: it.measured(after.n_results),
+        more: Vec::new(),
         numbers: json!(it),
         limits: it.judge(&arguments.limits, &after),
         run: ran.json(),

@@ -1,7 +1,9 @@
 //! What the processes of a run hold, second by second: memory, descriptors, files; and whether it grows.
 
+use core::ops::Range;
 use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 
 use runtime::Namespace;
@@ -18,7 +20,7 @@ const LEAST: usize = 9;
 /// What a run holds at a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub(super) struct Sample {
-    /// Physical memory of all processes but the supervisor, shared memory that they have mapped included, bytes.
+    /// Physical memory of all processes but the supervisor that is theirs alone: without files and shared memory, bytes.
     pub memory_bytes: u64,
     /// That of the supervisor, which is never restarted, bytes.
     pub supervisor_memory_bytes: u64,
@@ -26,6 +28,8 @@ pub(super) struct Sample {
     pub descriptors: u64,
     /// Files of the deployment, those in shared memory included.
     pub files: u64,
+    /// What its files in shared memory take of it, bytes.
+    pub shared_bytes: u64,
 }
 
 /// Takes samples whenever all processes are at work.
@@ -34,7 +38,8 @@ pub(super) struct Census {
     /// By name: number, how often it had been restarted, whether it is at work.
     processes: BTreeMap<String, (u32, u32, bool)>,
     taken_at: u64,
-    samples: Vec<Sample>,
+    /// And when they were taken.
+    samples: Vec<(u64, Sample)>,
 }
 
 impl Census {
@@ -73,7 +78,7 @@ impl Census {
         if is_due && !self.processes.is_empty() && self.processes.values().all(|it| it.2) {
             self.taken_at = now;
             let pids: Vec<u32> = self.processes.values().map(|it| it.0).collect();
-            self.samples.push(look(&pids));
+            self.samples.push((now, look(&pids)));
         }
     }
 
@@ -84,23 +89,32 @@ impl Census {
             return None;
         }
         let last = self.samples.len() - third;
-        Some([&self.samples[..third], &self.samples[last..]].map(median))
+        let of = |samples: &[(u64, Sample)]| median(samples.iter().map(|it| it.1));
+        Some([of(&self.samples[..third])?, of(&self.samples[last..])?])
+    }
+
+    /// What was held in a span of time, `runtime::now_nanos`: the median; none if there is no sample of it.
+    pub(super) fn within(&self, span: &Range<u64>) -> Option<Sample> {
+        let within = self.samples.iter().filter(|it| span.contains(&it.0));
+        median(within.map(|it| it.1))
     }
 }
 
-/// Of every number by itself.
-fn median(samples: &[Sample]) -> Sample {
+/// Of every number by itself; none of nothing.
+fn median(samples: impl Iterator<Item = Sample>) -> Option<Sample> {
+    let samples: Vec<Sample> = samples.collect();
     let of = |number: fn(&Sample) -> u64| {
         let mut all: Vec<u64> = samples.iter().map(number).collect();
         all.sort_unstable();
         all.get(all.len() / 2).copied().unwrap_or(0)
     };
-    Sample {
+    (!samples.is_empty()).then(|| Sample {
         memory_bytes: of(|it| it.memory_bytes),
         supervisor_memory_bytes: of(|it| it.supervisor_memory_bytes),
         descriptors: of(|it| it.descriptors),
         files: of(|it| it.files),
-    }
+        shared_bytes: of(|it| it.shared_bytes),
+    })
 }
 
 /// What processes of a deployment hold now, this one being their supervisor.
@@ -112,7 +126,14 @@ pub(super) fn look(namespace: &Namespace, pids: &[u32]) -> Sample {
         supervisor_memory_bytes: memory(own),
         descriptors: descriptors.sum(),
         files: n_files(namespace),
+        shared_bytes: left(namespace).iter().map(|it| shared(it)).sum(),
     }
+}
+
+/// What a file takes of shared memory, which is less than its size where nobody has written.
+fn shared(name: &str) -> u64 {
+    let found = fs::metadata(Path::new("/dev/shm").join(name));
+    found.map_or(0, |it| it.blocks() * 512)
 }
 
 /// Files of a deployment, those in shared memory included.
@@ -132,7 +153,7 @@ pub(super) fn left(namespace: &Namespace) -> Vec<String> {
 /// 0 for a process that has just ended.
 fn memory(pid: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
-    let line = status.lines().find_map(|it| it.strip_prefix("VmRSS:"));
+    let line = status.lines().find_map(|it| it.strip_prefix("RssAnon:"));
     let kib = line.and_then(|it| it.split_whitespace().next()?.parse::<u64>().ok());
     kib.unwrap_or(0) * 1024
 }
@@ -204,9 +225,12 @@ mod tests {
         let taken: Vec<_> = census
             .samples
             .iter()
-            .map(|it| (it.files, it.descriptors))
+            .map(|it| (it.1.files, it.1.descriptors))
             .collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
+        let within = |span: Range<u64>| census.within(&(span.start * PERIOD..span.end * PERIOD));
+        assert_eq!(within(3..6).map(|it| it.files), Some(5));
+        assert_eq!(within(3..5), None);
     }
 
     #[test]

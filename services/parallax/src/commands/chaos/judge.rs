@@ -78,7 +78,8 @@ impl Aftermath {
 
 /// Judges a run one process of which was struck once.
 ///
-/// * `hang_ms`: how long a stopped process may give no sign of life before the supervisor ends it.
+/// * `hang_ms`: how long a stopped process may give no sign of life, or a spinning one of work, before the supervisor
+///   ends it.
 pub(super) fn once(
     asked: &Asked,
     blow: Blow,
@@ -88,7 +89,7 @@ pub(super) fn once(
 ) -> Vec<Limit> {
     let (notice, patience) = match blow {
         Blow::Kill => (NOTICE_MS, 0.0),
-        Blow::Stop => (hang_ms + LATE_MS, hang_ms),
+        Blow::Stop | Blow::Spin => (hang_ms + LATE_MS, hang_ms),
     };
     let back = asked.max_return_ms + patience;
     let pause = match service_of(process) {
@@ -150,6 +151,12 @@ pub(super) fn random(asked: &Asked, it: &Barraged, after: &Aftermath) -> Vec<Lim
             grown(
                 "memory of the supervisor at last, MB",
                 |it| it.supervisor_memory_bytes,
+                MORE_BYTES,
+                1e6,
+            ),
+            grown(
+                "shared memory at last, MB",
+                |it| it.shared_bytes,
                 MORE_BYTES,
                 1e6,
             ),
@@ -297,6 +304,7 @@ mod tests {
             supervisor_memory_bytes: 10_000_000,
             descriptors: 100,
             files: 50,
+            shared_bytes: 5_000_000,
         };
         let mut last = first;
         let mut it = Barraged {
@@ -313,7 +321,7 @@ mod tests {
     fn every_limit_of_a_barrage_can_be_missed_alone() {
         type Change = fn(&mut Barraged, &mut Sample);
         let nothing: &[&str] = &[];
-        let changes: [(Change, &[&str]); 7] = [
+        let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
             (|it, _| it.n_kills = 4, &["came back"]),
             (|it, _| it.away_ms[2] = 8001.0, &["back after (p99), ms"]),
@@ -324,6 +332,10 @@ mod tests {
             (
                 |_, it| it.supervisor_memory_bytes = 44_000_000,
                 &["memory of the supervisor at last, MB"],
+            ),
+            (
+                |_, it| it.shared_bytes = 39_000_000,
+                &["shared memory at last, MB"],
             ),
             (|_, it| it.descriptors = 119, &["descriptors at last"]),
             (|_, it| it.files = 64, &["files at last"]),

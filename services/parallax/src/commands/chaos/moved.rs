@@ -69,6 +69,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     Ok(Verdict {
         scenario: NAME.to_owned(),
         measured,
+        more: Vec::new(),
         numbers: json!({ "camera": camera, "fits": fits }),
         limits,
         run: ran.json(),

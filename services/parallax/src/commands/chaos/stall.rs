@@ -173,6 +173,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
             ms(it.map(|it| it.stall_ms)),
             after.n_results
         ),
+        more: Vec::new(),
         numbers: json!(it),
         limits: judge(&arguments.limits, it.as_ref(), every_frame, &after),
         run: ran.json(),

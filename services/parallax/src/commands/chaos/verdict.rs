@@ -15,6 +15,8 @@ pub(super) struct Verdict {
     pub scenario: String,
     /// What was measured, for people.
     pub measured: String,
+    /// What else is to be read below it, line by line.
+    pub more: Vec<String>,
     /// The same for programs.
     pub numbers: Value,
     /// The verdicts.
@@ -60,6 +62,9 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
                 what, asked, got, ..
             } = limit;
             writeln!(text, "{:<8}{:<17}   {what}: {got} (asked: {asked})", "", "")?;
+        }
+        for line in &it.more {
+            writeln!(text, "{:<8}{line}", "")?;
         }
     }
     let n_held = verdicts.iter().filter(|it| it.is_held()).count();
@@ -128,6 +133,7 @@ mod tests {
         let verdict = |scenario: &str, got| Verdict {
             scenario: scenario.to_owned(),
             measured: "pose-1: noticed 3 ms".to_owned(),
+            more: vec!["from s".to_owned()],
             numbers: Value::Null,
             limits: vec![
                 at_most("back after, ms", 8000.0, got),
@@ -140,8 +146,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().skip(1).map(str::trim).collect();
         let expected = [
             "held    kill-pose         pose-1: noticed 3 ms",
+            "from s",
             "MISSED  hang-pose         pose-1: noticed 3 ms",
             "back after, ms: nothing (asked: at most 8000)",
+            "from s",
             "1 of 2 scenarios held",
         ];
         assert_eq!(lines, expected);

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Percentiles of measured values, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Spread {
+pub(crate) struct Spread {
     /// How many were measured.
     pub n: usize,
     /// Half are at most this.
@@ -19,7 +19,7 @@ pub(super) struct Spread {
 
 impl Spread {
     /// Of some values, by nearest rank; none of nothing.
-    pub(super) fn of(mut values: Vec<f64>) -> Option<Self> {
+    pub(crate) fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let n = values.len();
         let at = |share: f64| {
@@ -36,7 +36,7 @@ impl Spread {
     }
 
     /// Its four numbers for a table.
-    pub(super) fn cells(spread: Option<Self>, digits: usize) -> [String; 4] {
+    pub(crate) fn cells(spread: Option<Self>, digits: usize) -> [String; 4] {
         let Some(it) = spread else {
             return ["-"; 4].map(str::to_owned);
         };

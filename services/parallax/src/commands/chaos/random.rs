@@ -1,0 +1,64 @@
+//! One process after the other killed, chosen at random.
+
+use runtime::{Failure, now_nanos};
+use serde_json::json;
+
+use super::barrage::{Barrage, Kill};
+use super::census::{self, Census};
+use super::ground::Ground;
+use super::judge::{self, Barraged};
+use super::scenario::Scenario;
+use super::verdict::{self, Verdict};
+use super::{Arguments, frame_at, series, trace_of};
+
+/// Nobody is killed after this share of the frames.
+const UNTIL: f64 = 0.8;
+/// Nanoseconds between two kills.
+const PERIOD: u64 = 2_000_000_000;
+
+/// Kills one process after the other, chosen at random, and judges what became of the run.
+pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
+    let scenario = Scenario::Random.name();
+    let planned = ground.plan(&scenario, &[])?;
+    let until = frame_at(&planned, UNTIL) as u64;
+    let mut barrage = Barrage::new(arguments.seed, PERIOD, until);
+    let mut census = Census::default();
+    let namespace = &planned.plan().namespace;
+    let ran = ground.watch(&planned, &mut |event| {
+        let now = now_nanos();
+        census.note(event, now, |pids| census::look(namespace, pids));
+        barrage.note(event, now, runtime::kill)
+    });
+    let kills = barrage.kills();
+    let struck = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
+    let after = ran.aftermath(struck);
+    let session = planned.session();
+    let away_ms = |it: &Kill| it.away_ms(trace_of(&it.process), session, &ran.moments);
+    let each = kills
+        .iter()
+        .map(|it| json!({ "process": it.process, "back_ms": away_ms(it) }));
+    let each: Vec<_> = each.collect();
+    let mut away_ms: Vec<f64> = kills.iter().filter_map(away_ms).collect();
+    away_ms.sort_by(f64::total_cmp);
+    let it = Barraged {
+        n_kills: kills.len(),
+        away_ms,
+        held: census.ends(),
+    };
+    let length = u64::from(arguments.part_seconds) * 1_000_000_000;
+    let parts = series::parts(length, session, kills, &census, &ran.moments);
+    let [p50, p99] = [0.5, 0.99].map(|share| it.away(share));
+    Ok(Verdict {
+        scenario,
+        measured: verdict::of_barrage(&it, after.n_results),
+        numbers: json!({
+            "kills": each,
+            "back_ms": { "p50": p50, "p99": p99 },
+            "first_and_last": it.held,
+            "parts": parts,
+        }),
+        more: series::table(&parts),
+        limits: judge::random(&arguments.limits, &it, &after),
+        run: ran.json(),
+    })
+}
