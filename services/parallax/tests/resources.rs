@@ -1,13 +1,17 @@
-//! What a run does without: descriptors, a name of its own, and what belongs to somebody else.
+//! What a run does without: room in shared memory, descriptors, a name of its own, network ports; and what
+//! belongs to somebody else.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, chown};
 
-use common::{Case, Ended, PACED, PLAIN};
+use common::started::processes;
+use common::{Case, Ended, PACED, PLAIN, Started};
 use runtime::Namespace;
+use serde_json::{Value, json};
 
 /// Not the user who runs tests.
 const OTHER: u32 = 65_534;
@@ -17,6 +21,44 @@ fn assert_no_bus_error(ended: &Ended) {
     for words in ["signal 7", "SIGBUS", "signal 11", "panic"] {
         assert!(!ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
+}
+
+#[test]
+fn shared_memory_that_is_filled_during_a_run_costs_who_begins_and_nobody_else() {
+    let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
+    let case = Case::new("filled", &[300; 3], &more);
+    // The processes are children of the run; one of them is killed once there is no room for another.
+    let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
+        \"$PARALLAX\" run deployment.toml --json & run=$!\n\
+        while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
+          kill -0 $run; sleep 0.05\n\
+        done\n\
+        cat /dev/zero >/dev/shm/filler 2>/dev/null || true\n\
+        stat -f -c %a /dev/shm >free\n\
+        for dir in /proc/[0-9]*; do\n\
+          line=$(tr '\\0' ' ' <$dir/cmdline 2>/dev/null || true)\n\
+          case \"$line\" in *\"$PWD\"*\" --index 1\"*) case \"$line\" in\n\
+            *\" service pose \"*) kill -9 ${dir#/proc/};; esac;; esac\n\
+        done\n\
+        code=0; wait $run || code=$?; exit $code";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    assert_eq!(fs::read_to_string(case.path("free")).unwrap().trim(), "0");
+    assert_no_bus_error(&ended);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
+    let why = "process \"pose-1\" needs 1048 KB of shared memory for its queues";
+    assert!(ended.stderr.contains(why), "{}", ended.stderr);
+    for restarted in report["restarts"].as_array().unwrap() {
+        assert_eq!(restarted["process"], "pose-1", "{}", ended.stderr);
+    }
+    let summary = &report["recorded"]["summary"];
+    assert_eq!(summary["frames"], json!(300), "{}", ended.stderr);
+    assert_eq!(summary["views_present"]["a"], json!(300));
 }
 
 #[test]
@@ -67,4 +109,46 @@ fn the_leftovers_of_another_user_are_named_with_what_to_do() {
     for words in [&root, "belongs to user", "65534", "user root (0)", "rm -r"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
+}
+
+/// The sockets of a process, by inode.
+fn sockets(pid: u32) -> BTreeSet<String> {
+    let entries = fs::read_dir(format!("/proc/{pid}/fd"));
+    let links = entries.into_iter().flatten().flatten();
+    let links = links.filter_map(|it| fs::read_link(it.path()).ok());
+    let inode = |link: std::path::PathBuf| {
+        let text = link.to_str()?.strip_prefix("socket:[")?;
+        Some(text.strip_suffix(']')?.to_owned())
+    };
+    links.filter_map(inode).collect()
+}
+
+#[test]
+fn no_process_of_a_run_has_a_network_socket() {
+    let case = Case::new("network", &[60; 2], PACED);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
+    let all = processes(case.folder());
+    assert_eq!(all.len(), 7, "{all:?}");
+    let mut n_sockets = 0;
+    let run = u32::try_from(started.id()).unwrap();
+    for pid in all.iter().map(|it| it.0).chain([run]) {
+        let own = sockets(pid);
+        n_sockets += own.len();
+        for protocol in [
+            "tcp", "tcp6", "udp", "udp6", "raw", "raw6", "packet", "netlink",
+        ] {
+            let table = fs::read_to_string(format!("/proc/{pid}/net/{protocol}"));
+            let table = table.unwrap_or_default();
+            let words: BTreeSet<&str> = table.split_ascii_whitespace().collect();
+            let open: Vec<_> = own
+                .iter()
+                .filter(|it| words.contains(it.as_str()))
+                .collect();
+            assert!(open.is_empty(), "process {pid} has a {protocol} socket");
+        }
+    }
+    // Those of the wake-ups, which have names in the file system: the look did see sockets.
+    assert!(n_sockets > 10, "{n_sockets}");
+    assert_eq!(started.wait().status.code(), Some(0));
 }

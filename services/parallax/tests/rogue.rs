@@ -9,10 +9,10 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use common::started::signal;
-use common::{Case, Ended, PACED, Started};
+use common::{Case, Ended, PACED, Started, planted};
 use messages::{
     EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_VIEWS, PairPose,
-    Pose3d, Stamp, Status, Timing, ViewPose, topic,
+    Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
 };
 use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter, now_nanos};
 use serde_json::Value;
@@ -136,6 +136,35 @@ impl Rogue {
     }
 }
 
+/// Sends evidence with sizes that do not match.
+fn send_wrong_evidence(
+    evidence: &SlicePublisher<f32, EvidenceHeader>,
+    (stamp, timing): (Stamp, Timing),
+) {
+    let mut loan = evidence.loan(9).unwrap();
+    loan.payload_mut().fill(f32::NAN);
+    *loan.header_mut() = EvidenceHeader {
+        stamp,
+        timing,
+        width: planted::SIZE[0],
+        height: planted::SIZE[1],
+        n_levels: u32::MAX,
+        ..EvidenceHeader::default()
+    };
+    loan.send().unwrap();
+}
+
+/// One of the ways in which the content of a pose can be wrong, by its frame.
+fn with_wrong_content(mut pose: ViewPose) -> ViewPose {
+    let way = pose.stamp.frame % 4;
+    let candidate = &mut pose.candidates[0];
+    candidate.n_parts = if way == 0 { u16::MAX } else { 26 };
+    pose.n_candidates = if way == 1 { u32::MAX } else { 1 };
+    candidate.x[3] = if way == 2 { u16::MAX } else { 0 };
+    candidate.score = if way == 3 { f32::NAN } else { 0.0 };
+    pose
+}
+
 /// Waits until there is something.
 fn until<T>(mut look: impl FnMut() -> Option<T>) -> T {
     let begin = Instant::now();
@@ -207,6 +236,59 @@ fn who_is_no_part_of_a_deployment_can_neither_speak_another_type_nor_beside_the_
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["refused"], serde_json::json!({}));
     case.assert_nothing_left();
+}
+
+#[test]
+fn poses_and_evidence_of_nobody_are_refused() {
+    // Where nothing may be lost the views would wait for the frames that the rogue took away.
+    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let (case, mut started, rogue) = begun("poses", &live);
+    let poses: Publisher<ViewPose> = rogue.replace(&mut started, "pose --index 1", |bus| {
+        bus.publisher(&topic::view_pose(1))
+    });
+    let evidence: SlicePublisher<f32, EvidenceHeader> =
+        until(|| rogue.bus.slice_publisher(&topic::evidence(1)).ok());
+    let good = |frame: u64| {
+        let (stamp, timing) = rogue.stamp(1, frame);
+        ViewPose {
+            stamp,
+            timing,
+            n_candidates: 1,
+            width: planted::SIZE[0],
+            height: planted::SIZE[1],
+            searched: Searched(u32::MAX),
+            evidence_bytes: u64::MAX,
+            ..ViewPose::default()
+        }
+    };
+    assert_eq!(poses.wait_for_subscribers(3, WATCHDOG), 3);
+    assert_eq!(evidence.wait_for_subscribers(1, WATCHDOG), 1);
+    // Who keeps up with the clock may pass over what comes too fast.
+    let pause = || std::thread::sleep(Duration::from_millis(100));
+    for (stamp, timing) in rogue.wrong_stamps(1) {
+        let wrong = ViewPose {
+            stamp,
+            timing,
+            ..good(0)
+        };
+        poses.send(&wrong).unwrap();
+        send_wrong_evidence(&evidence, (stamp, timing));
+        pause();
+    }
+    // The right stamp of a frame that may be due, and nothing else right.
+    let next = case.lines("pose3d.jsonl").len() as u64;
+    for frame in next..next + 24 {
+        poses.send(&with_wrong_content(good(frame))).unwrap();
+        pause();
+    }
+    // Evidence is held until its frame is due, so there is one of a frame to come.
+    let to_come = rogue.stamp(1, case.lines("pose3d.jsonl").len() as u64 + 8);
+    send_wrong_evidence(&evidence, to_come);
+    drop((poses, evidence, rogue));
+    let refused = refused(&case, &started.wait());
+    let stamps = ["session", "sender", "time"];
+    assert_all(&refused, &["triangulate", "fuse-0", "record"], &stamps);
+    assert_all(&refused, &["triangulate"], &["size", "index", "number"]);
 }
 
 #[test]
