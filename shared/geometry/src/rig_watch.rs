@@ -18,9 +18,11 @@ const LEAST_POINTS: usize = 5;
 /// Sine of the angle between two rays below which their meeting point is too uncertain.
 const LEAST_SINE: f64 = 0.2;
 /// A camera is suspected if cameras disagree so many times more with it than without it, and by at least
-/// so many degrees.
+/// so many degrees, and pixels: where people stand in a grid of cells of four, half a cell may always be
+/// missing in the same direction.
 const FACTOR: f64 = 2.5;
 const LEAST_DEGREES: f64 = 0.5;
+const LEAST_PX: f64 = 4.0;
 /// Nothing is said where the others disagree by more among themselves.
 const MOST_DEGREES: f64 = 1.5;
 
@@ -135,8 +137,9 @@ impl RigWatch {
             let without_px = self.without_px(view)?;
             let it = &camera.intrinsics;
             let px = |degrees: f64| it.fx.min(it.fy).abs() * degrees.to_radians().tan();
-            let is_wrong = residual_px > px(LEAST_DEGREES).max(FACTOR * without_px)
-                && without_px < px(MOST_DEGREES);
+            let least_px = px(LEAST_DEGREES).max(LEAST_PX);
+            let is_wrong =
+                residual_px > least_px.max(FACTOR * without_px) && without_px < px(MOST_DEGREES);
             is_wrong.then_some(Suspect {
                 view,
                 residual_px,

@@ -114,6 +114,17 @@ fn of_three_cameras_one_that_is_tilted_is_named() {
 }
 
 #[test]
+fn what_is_off_by_half_a_cell_is_not_called_moved() {
+    let cameras = around(4);
+    let mut believed = cameras.clone();
+    // Two pixels, all of them in one direction.
+    believed[1].intrinsics.cx += 2.0;
+    let watch = watch(&cameras, believed, 0.0, 5, 30);
+    assert!(watch.residual_px(1) > watch.without_px(1).map(|it| FACTOR * it));
+    assert_eq!(suspected(&watch), []);
+}
+
+#[test]
 fn of_two_cameras_nobody_can_be_named() {
     let cameras = around(2);
     let believed = vec![cameras[0].clone(), turned(&cameras[1], Vector3::x(), 5.0)];
