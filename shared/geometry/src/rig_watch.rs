@@ -29,13 +29,14 @@ const MOST_DEGREES: f64 = 1.5;
 /// Follows how far apart the cameras see the same points, with each camera and without it.
 ///
 /// From four cameras on, every two others meet in a point of space, which is projected into the camera:
-/// the way from there to what it sees itself counts. With three, it is the way to the ray of one other
-/// camera (the epipolar distance), which a camera that is turned along its epipolar lines hardly shows.
-/// Of a frame the median way over all points counts, in x and in y; of such a group of cameras the length
-/// of the median over the last frames: what is found wrongly goes now this way and now that, and what a
-/// camera that was moved sees always goes the same way. Of a camera it is the median over all groups that
-/// it is in: one wrong camera spoils those, and none of the others. With two cameras nobody can tell which
-/// of them is wrong.
+/// the way from there to what it sees itself counts. Of a frame that is the median over all points, in x
+/// and in y; of such a group of cameras the length of the median over the last frames: what is found
+/// wrongly goes now this way and now that, and what a camera that was moved sees always goes the same way.
+/// Of a camera it is the median over all groups that it is in: one wrong camera spoils those, and none of
+/// the others. With three, the length of the way to the ray of one other camera counts (the epipolar
+/// distance), which a camera that is turned along its epipolar lines hardly shows; its direction does not,
+/// since the only two that are left without a camera may agree by chance. With two cameras nobody can tell
+/// which of them is wrong.
 ///
 /// Not a calibration: it names a camera that was moved, and does not say where it stands.
 #[derive(Debug, Clone)]
@@ -104,7 +105,8 @@ impl RigWatch {
             let px = points.filter_map(|((own, a), b)| {
                 let (own, a, b) = (own.as_ref()?, a.as_ref()?, b.as_ref()?);
                 if is_one {
-                    own.px_to_ray(camera, &a.ray)
+                    let way = own.px_to_ray(camera, &a.ray)?;
+                    Some([way[0].hypot(way[1]), 0.0])
                 } else {
                     own.px_to_meeting(camera, &a.ray, &b.ray)
                 }
