@@ -111,7 +111,8 @@ impl RigWatch {
                     own.px_to_meeting(camera, &a.ray, &b.ray)
                 }
             });
-            group.note(px.collect());
+            let px: Vec<[f64; 2]> = px.collect();
+            group.note(&px);
         }
     }
 
@@ -155,11 +156,11 @@ impl RigWatch {
 
 impl Group {
     /// Notes the ways between where the points of a frame should be and were seen.
-    fn note(&mut self, px: Vec<[f64; 2]>) {
+    fn note(&mut self, px: &[[f64; 2]]) {
         if px.len() < LEAST_POINTS {
             return;
         }
-        self.px.extend(median_way(&px));
+        self.px.extend(median_way(px));
         if self.px.len() > WINDOW {
             self.px.pop_front();
         }

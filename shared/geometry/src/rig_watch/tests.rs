@@ -160,7 +160,7 @@ fn a_camera_that_is_put_right_is_forgiven() {
     let groups = it.groups.iter_mut().zip(&right.groups);
     for (group, right) in groups {
         for px in &right.px {
-            group.note(vec![*px; LEAST_POINTS]);
+            group.note(&[*px; LEAST_POINTS]);
         }
     }
     assert_eq!(suspected(&it), []);
