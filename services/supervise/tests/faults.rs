@@ -141,7 +141,7 @@ fn a_stopped_process_looks_alive_but_is_found_out() {
         Delivery::Realtime,
         &[
             ("sink", "receive 0", Role::Essential),
-            ("source", "send 1000000 20 1", Role::Essential),
+            ("source", "send 1000000 1 1", Role::Essential),
         ],
     );
     // Nothing but the state of the process can tell.
