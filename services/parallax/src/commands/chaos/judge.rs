@@ -5,6 +5,7 @@ use runpage::Limit;
 
 use super::census::Sample;
 use super::scenario::service_of;
+use crate::spread::Spread;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 use crate::trial::strike::Blow;
@@ -115,18 +116,10 @@ pub(super) fn once(
 pub(super) struct Barraged {
     /// Kills.
     pub n_kills: usize,
-    /// How long those were away who came back, milliseconds, ascending.
-    pub away_ms: Vec<f64>,
+    /// How long those were away who came back, milliseconds; none if nobody did.
+    pub away_ms: Option<Spread>,
     /// What all held at first and at last, if the run was long enough to say.
     pub held: Option<[Sample; 2]>,
-}
-
-impl Barraged {
-    /// The time that a share of all who came back did not exceed.
-    pub(super) fn away(&self, share: f64) -> Option<f64> {
-        let nth = (share * self.away_ms.len() as f64).ceil() as usize;
-        self.away_ms.get(nth.saturating_sub(1)).copied()
-    }
 }
 
 /// Judges a run in which one process after the other was killed.
@@ -136,9 +129,13 @@ pub(super) fn random(asked: &Asked, it: &Barraged, after: &Aftermath) -> Vec<Lim
         at_least(
             "came back",
             it.n_kills as f64,
-            Some(it.away_ms.len() as f64),
+            Some(it.away_ms.map_or(0, |it| it.n) as f64),
         ),
-        at_most("back after (p99), ms", asked.max_return_ms, it.away(0.99)),
+        at_most(
+            "back after (p99), ms",
+            asked.max_return_ms,
+            it.away_ms.map(|it| it.p99),
+        ),
     ];
     limits.extend(after.judge(it.n_kills as u64));
     if let Some([first, last]) = &it.held {
@@ -309,7 +306,7 @@ mod tests {
         let mut last = first;
         let mut it = Barraged {
             n_kills: 3,
-            away_ms: vec![500.0, 700.0, 900.0],
+            away_ms: Spread::of(vec![500.0, 700.0, 900.0]),
             held: None,
         };
         change(&mut it, &mut last);
@@ -324,7 +321,10 @@ mod tests {
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
             (|it, _| it.n_kills = 4, &["came back"]),
-            (|it, _| it.away_ms[2] = 8001.0, &["back after (p99), ms"]),
+            (
+                |it, _| it.away_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
+                &["back after (p99), ms"],
+            ),
             (
                 |_, it| it.memory_bytes = 143_000_000,
                 &["memory at last, MB"],
@@ -350,19 +350,6 @@ mod tests {
             "frames whose end is not known",
         ];
         assert_eq!(missed(none), expected, "nobody was killed");
-    }
-
-    #[test]
-    fn percentiles_are_times_that_occurred() {
-        let it = Barraged {
-            away_ms: (1..=200).map(f64::from).collect(),
-            ..Barraged::default()
-        };
-        assert_eq!(
-            [0.5, 0.99, 1.0].map(|share| it.away(share)),
-            [100.0, 198.0, 200.0].map(Some)
-        );
-        assert_eq!(Barraged::default().away(0.5), None);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::judge::{self, Barraged};
 use super::scenario::Scenario;
 use super::verdict::{self, Verdict};
 use super::{Arguments, frame_at, series, trace_of};
+use crate::spread::Spread;
 
 /// Nobody is killed after this share of the frames.
 const UNTIL: f64 = 0.8;
@@ -38,22 +39,19 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
         .iter()
         .map(|it| json!({ "process": it.process, "back_ms": away_ms(it) }));
     let each: Vec<_> = each.collect();
-    let mut away_ms: Vec<f64> = kills.iter().filter_map(away_ms).collect();
-    away_ms.sort_by(f64::total_cmp);
     let it = Barraged {
         n_kills: kills.len(),
-        away_ms,
+        away_ms: Spread::of(kills.iter().filter_map(away_ms).collect()),
         held: census.ends(),
     };
     let length = u64::from(arguments.part_seconds) * 1_000_000_000;
     let parts = series::parts(length, session, kills, &census, &ran.moments);
-    let [p50, p99] = [0.5, 0.99].map(|share| it.away(share));
     Ok(Verdict {
         scenario,
         measured: verdict::of_barrage(&it, after.n_results),
         numbers: json!({
             "kills": each,
-            "back_ms": { "p50": p50, "p99": p99 },
+            "back_ms": it.away_ms,
             "first_and_last": it.held,
             "parts": parts,
         }),

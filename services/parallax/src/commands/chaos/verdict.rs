@@ -88,8 +88,8 @@ pub(super) fn of_barrage(it: &Barraged, n_results: usize) -> String {
     let mut text = format!(
         "{} kills; back p50 {}, p99 {}; {n_results} results",
         it.n_kills,
-        ms(it.away(0.5)),
-        ms(it.away(0.99)),
+        ms(it.away_ms.map(|it| it.p50)),
+        ms(it.away_ms.map(|it| it.p99)),
     );
     if let Some([first, last]) = &it.held {
         let mb = |bytes: u64| bytes as f64 / 1e6;
