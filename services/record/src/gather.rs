@@ -37,10 +37,10 @@ impl Gather {
         }
     }
 
-    /// Notes whether the processes that answer for a view are there.
-    pub(crate) fn is_there(&mut self, view: usize, is_there: bool) {
+    /// Notes who is there to answer for a view: the ports of its capture and of its pose process.
+    pub(crate) fn answerers(&mut self, view: usize, ports: [Vec<u128>; 2]) {
         if let Some(voice) = self.voices.get_mut(view) {
-            voice.is_there(is_there);
+            voice.answerers(ports);
         }
     }
 

@@ -31,13 +31,15 @@ impl Missing {
 }
 
 /// What is known of one view's processes.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Voice {
+    /// Those of its processes, as they were last seen.
+    ports: [Vec<u128>; 2],
     /// The latest life of its pose process that was heard.
     epoch: u32,
     /// The latest whose answer has a result.
     settled: u32,
-    /// Somebody was not there to answer, and there has been no answer since.
+    /// Somebody who was there to answer is gone, and there has been no answer since.
     is_absent: bool,
     last_frame: Option<u64>,
     /// Its first frame that does not exist.
@@ -63,9 +65,12 @@ impl Voice {
         self.last_frame = self.last_frame.max(Some(pose.stamp.frame));
     }
 
-    /// Notes whether the processes that answer are there.
-    pub(crate) fn is_there(&mut self, is_there: bool) {
-        self.is_absent |= !is_there && self.last_frame.is_some();
+    /// Notes who is there to answer. Who is replaced at once was gone all the same.
+    pub(crate) fn answerers(&mut self, ports: [Vec<u128>; 2]) {
+        let is_gone = |it: &u128| !ports.iter().flatten().any(|other| other == it);
+        let is_absent = self.ports.iter().flatten().any(is_gone);
+        self.is_absent |= is_absent && self.last_frame.is_some();
+        self.ports = ports;
     }
 
     /// Takes note of a result, and says why the view would have no part in it.
@@ -111,9 +116,15 @@ mod tests {
         }
     }
 
+    /// Of a capture, and of the pose process that is started as the `n`-th.
+    fn ports(n: u128) -> [Vec<u128>; 2] {
+        [vec![7], vec![n]]
+    }
+
     /// A view that has answered frames 0 and 1, of which there are results.
     fn voice() -> Voice {
         let mut voice = Voice::default();
+        voice.answerers(ports(1));
         for frame in 0..2 {
             let said = pose(frame, 0, Status::OK);
             voice.pose(&said);
@@ -148,9 +159,9 @@ mod tests {
     #[test]
     fn frames_between_two_lives_are_lost() {
         let mut voice = voice();
-        voice.is_there(false);
+        voice.answerers([vec![7], Vec::new()]);
         assert_eq!(voice.settle(2, None, false), Missing::Lost);
-        voice.is_there(true);
+        voice.answerers(ports(2));
         assert_eq!(voice.settle(3, None, false), Missing::Lost);
         let back = pose(5, 1, Status::OK);
         voice.pose(&back);
@@ -160,9 +171,19 @@ mod tests {
     }
 
     #[test]
+    fn who_is_replaced_before_anybody_looks_is_lost() {
+        let mut voice = voice();
+        voice.answerers(ports(1));
+        assert_eq!(voice.settle(2, None, false), Missing::Late);
+        voice.answerers(ports(2));
+        voice.answerers(ports(2));
+        assert_eq!(voice.settle(3, None, false), Missing::Lost);
+    }
+
+    #[test]
     fn who_has_never_been_there_is_late() {
         let mut voice = Voice::default();
-        voice.is_there(false);
+        voice.answerers([Vec::new(), Vec::new()]);
         assert_eq!(voice.settle(0, None, false), Missing::Late);
     }
 

@@ -172,8 +172,7 @@ impl Ports {
             }
         }
         for (view, poses) in self.poses.iter().enumerate() {
-            let is_there = poses.n_publishers() > 0 && self.frames[view].n_publishers() > 0;
-            gather.is_there(view, is_there);
+            gather.answerers(view, [self.frames[view].publishers(), poses.publishers()]);
             while let Some(pose) = poses.receive()? {
                 let check = |it: Expected| it.check(&pose.stamp, &pose.timing);
                 if is_ours(service, ("view-pose", view), check) {

@@ -76,6 +76,12 @@ impl<T: Message> Subscriber<T> {
     pub fn n_publishers(&self) -> usize {
         self.port.n_publishers()
     }
+
+    /// The names of the ports that may send, one of a dead process until it is cleaned away. Who
+    /// takes its place has another.
+    pub fn publishers(&self) -> Vec<u128> {
+        self.port.publishers()
+    }
 }
 
 /// Receives arrays where they lie.
@@ -122,6 +128,12 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
     /// Processes that may send, dead ones included until they are cleaned away.
     pub fn n_publishers(&self) -> usize {
         self.port.n_publishers()
+    }
+
+    /// The names of the ports that may send, one of a dead process until it is cleaned away. Who
+    /// takes its place has another.
+    pub fn publishers(&self) -> Vec<u128> {
+        self.port.publishers()
     }
 }
 
