@@ -118,7 +118,14 @@ impl Onlooker {
                     said: None,
                 })
             })
-            .collect::<Result<_, PortError>>()?;
+            .collect::<Result<_, PortError>>();
+        let seats = match seats {
+            // It has ended meanwhile, and its topics with it.
+            Err(PortError::NoSuchTopic { .. }) if supervisor_of(namespace) != Some(supervisor) => {
+                return Err(not_running());
+            }
+            seats => seats?,
+        };
         Ok(Self {
             seats,
             supervisor,

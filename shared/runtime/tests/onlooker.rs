@@ -4,6 +4,7 @@
 mod common;
 
 use core::time::Duration;
+use std::sync::mpsc;
 use std::thread::{Builder, sleep};
 use std::time::Instant;
 
@@ -75,8 +76,10 @@ fn who_looks_is_told_of_the_end_and_nothing_is_left() {
     let deployment = two();
     let namespace = deployment.namespace().clone();
     let where_to = namespace.clone();
+    let (sender, is_open) = mpsc::channel();
     let looks = Builder::new().name("onlooker".to_owned()).spawn(move || {
         let onlooker = Onlooker::open(&where_to).unwrap();
+        sender.send(()).unwrap();
         let begin = Instant::now();
         while !onlooker.is_over() && begin.elapsed() < Duration::from_mins(1) {
             sleep(Duration::from_millis(10));
@@ -84,9 +87,7 @@ fn who_looks_is_told_of_the_end_and_nothing_is_left() {
         onlooker.is_over()
     });
     let looks = looks.unwrap();
-    while deployment.alive().len() < 2 {
-        sleep(Duration::from_millis(5));
-    }
+    is_open.recv().unwrap();
     drop(deployment);
     assert!(looks.join().unwrap());
     assert_eq!(shared_memory(&namespace), Vec::<String>::new());
