@@ -49,8 +49,8 @@ pub struct Job {
 struct Seen<'a> {
     stamp: Stamp,
     answers: Vec<Option<Answer>>,
-    /// How many frames old the expected errors of every view are, plus 1; 0 for none.
-    sigma_ages: Vec<u16>,
+    /// How many frames old the expected errors of every view are.
+    sigma_ages: Vec<u64>,
     evidence: Vec<Option<EvidenceView<'a>>>,
 }
 
@@ -367,8 +367,16 @@ impl<'a> Worker<'a> {
             epoch: self.service.epoch(),
             ..seen.stamp
         };
-        let ages = message.views.map(|it| seen.sigma_ages[it as usize]);
-        message.sigma_age = ages;
+        for side in 0..2 {
+            let view = message.views[side] as usize;
+            let age = seen.sigma_ages[view];
+            if let Some(sigma_px) = seen.answers[view]
+                .as_ref()
+                .and_then(|it| it.sigma_px.as_ref())
+            {
+                wire::sigma_to_pair(&mut message, side, age, sigma_px).or_fail(ExitKind::Run)?;
+            }
+        }
         message.timing = Timing {
             received_at_nanos,
             sent_at_nanos: now_nanos(),
@@ -406,8 +414,8 @@ impl<'a> Worker<'a> {
             .collect()
     }
 
-    /// What every view says, and how many frames old its expected errors are, plus 1; 0 for none.
-    fn answers(&self, joined: &Joined<Word>) -> (Vec<Option<Answer>>, Vec<u16>) {
+    /// What every view says, and how many frames old its expected errors are.
+    fn answers(&self, joined: &Joined<Word>) -> (Vec<Option<Answer>>, Vec<u64>) {
         let mut ages = vec![0; self.poses.len()];
         let answers = (0..self.poses.len())
             .map(|view| {
@@ -422,10 +430,9 @@ impl<'a> Worker<'a> {
                     sigma_px: None,
                     tau_px: None,
                 };
-                if let Some((age, quality)) = self.quality_of(view, joined, &pose.stamp)
-                    && self.expect(&mut answer, view, quality).is_some()
-                {
-                    ages[view] = u16::try_from(age + 1).unwrap_or(u16::MAX);
+                if let Some((age, quality)) = self.quality_of(view, joined, &pose.stamp) {
+                    ages[view] = age;
+                    self.expect(&mut answer, view, quality);
                 }
                 Some(answer)
             })
@@ -450,12 +457,12 @@ impl<'a> Worker<'a> {
         last.map(|(age, quality)| (age, &**quality))
     }
 
-    /// Adds expected errors to an answer; `None` if there are none, or they cannot be read.
-    fn expect(&self, answer: &mut Answer, view: usize, quality: &ViewQuality) -> Option<()> {
+    /// Adds expected errors to an answer, if there are some that can be read.
+    fn expect(&self, answer: &mut Answer, view: usize, quality: &ViewQuality) {
         let n_parts = self.job.plans[view].model().n_parts();
-        let (sigma_px, tau_px) = expected_errors(quality, n_parts).ok()?;
-        (answer.sigma_px, answer.tau_px) = (sigma_px, tau_px);
-        answer.sigma_px.as_ref().map(|_| ())
+        if let Ok((sigma_px, tau_px)) = expected_errors(quality, n_parts) {
+            (answer.sigma_px, answer.tau_px) = (sigma_px, tau_px);
+        }
     }
 
     fn end(&self, waiter: &Waiter) -> Result<(), Failure> {

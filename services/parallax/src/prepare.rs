@@ -219,6 +219,7 @@ fn settings(
                 loss_px: deployment.triangulate.loss_px,
                 ..defaults.triangulation
             },
+            error_weight: deployment.triangulate.error_weight,
             combine: deployment.triangulate.combine.into(),
             facing: deployment.fuse.facing,
             ..defaults

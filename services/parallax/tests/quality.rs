@@ -8,7 +8,9 @@ use common::started::signal;
 use common::{Case, PLAIN, planted};
 use fmp::Scope;
 use kernels::Rgb8View;
-use pipeline::{ViewSettings, ViewStep};
+use multiview::ViewPlan;
+use nalgebra::Point3;
+use pipeline::{Answer, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep};
 use serde_json::{Value, json};
 use testkit::onnx::{Network, Side};
 use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
@@ -98,6 +100,66 @@ fn the_service_says_what_the_library_says() {
             assert_eq!(line["sigma_used"], json!(0), "{at}");
         }
     }
+}
+
+/// What every view of a planted rig says of a frame of its own.
+fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
+    let model = planted::model();
+    let [width, height] = planted::SIZE.map(|it| it as usize);
+    let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
+        let layout = Arc::new(plan.layout().clone());
+        let step = ViewStep::new(
+            Arc::clone(&model),
+            Arc::clone(&layout),
+            ViewSettings::default(),
+        );
+        let mut responses = vec![0.0; layout.n_responses()];
+        let picture = planted::picture(plan.camera(), *frame);
+        let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
+        let found = step.run(image, Scope::whole(&layout), &mut responses);
+        Some(Answer {
+            candidates: found.candidates,
+            sigma_px: None,
+            tau_px: None,
+        })
+    };
+    plans.iter().zip(frames).map(say).collect()
+}
+
+#[test]
+fn a_joint_is_where_the_views_see_it_that_are_expected_to_be_right() {
+    let (rig, model) = (planted::rig(4), planted::model());
+    let plans = rig.cameras().iter().map(|it| pipeline::plan(&model, it));
+    let plans: Vec<_> = plans.collect::<Result<_, _>>().unwrap();
+    let joints = |answers: &[Option<Answer>], error_weight: f64| -> Vec<Point3<f64>> {
+        let settings = SkeletonSettings {
+            error_weight,
+            facing: false,
+            ..SkeletonSettings::default()
+        };
+        let mut step = SkeletonStep::new(plans.clone(), None, settings);
+        let found = step.run(answers, &[]).joints.into_iter();
+        found.map(|it| it.unwrap().in_world).collect()
+    };
+    // The first view sees another frame than the others.
+    let mut answers = answers(&plans, &[7, 0, 0, 0]);
+    let unaware = joints(&answers, 1.0);
+    let first = answers[0].take();
+    let others = joints(&answers, 1.0);
+    answers[0] = first;
+    for (view, answer) in answers.iter_mut().flatten().enumerate() {
+        let sigma = if view == 0 { 1000.0 } else { 0.0 };
+        answer.sigma_px = Some(vec![sigma; N_PARTS]);
+    }
+    let aware = joints(&answers, 1.0);
+    let off = |of: &[Point3<f64>]| -> f64 {
+        let joints = of.iter().zip(&others);
+        joints.map(|(it, other)| (it - other).norm()).sum()
+    };
+    let (aware, without) = (off(&aware), off(&unaware));
+    assert!(without > 0.1, "{without} m: nothing to tell apart");
+    assert!(aware < 0.1 * without, "{aware} m, {without} m");
+    assert_eq!(joints(&answers, 0.0), unaware);
 }
 
 /// Lines about a view.

@@ -12,6 +12,9 @@ pub struct Config {
     pub combine: Combine,
     /// Reprojection error at which an observation begins to count less, pixels.
     pub loss_px: f64,
+    /// How much of a part's expected error makes its view uncertain about a joint, where a network predicts
+    /// it: 1 takes the prediction as it is, 0 leaves it to fusion alone.
+    pub error_weight: f64,
 }
 
 /// How a view's pose is made of those of its pairs.
@@ -40,6 +43,7 @@ impl Default for Config {
             joints: "parse14".to_owned(),
             combine: Combine::default(),
             loss_px: geometry::Settings::default().loss_px,
+            error_weight: pipeline::SkeletonSettings::default().error_weight,
         }
     }
 }

@@ -163,7 +163,12 @@ impl<'a> Stage<'a> {
             Views::Pairs => wire::check_views(message, &self.job.pairs)?,
             Views::All => wire::check_all_views(message, self.job.plans.len())?,
         }
-        wire::pair_from_message(message, &self.job.plans).map(drop)
+        wire::pair_from_message(message, &self.job.plans)?;
+        let n_parts = self.job.plans.first().map_or(0, |it| it.model().n_parts());
+        for side in 0..2 {
+            wire::sigma_from_pair(message, side, n_parts)?;
+        }
+        Ok(())
     }
 
     fn refuse(&self, error: &WireError, topic: &str) {
@@ -252,7 +257,8 @@ impl<'a> Stage<'a> {
     fn answers(&self, joined: &Joined<Word>) -> Vec<Option<Answer>> {
         let views = self.job.plans.iter().zip(&joined.items);
         views
-            .map(|(plan, item)| {
+            .enumerate()
+            .map(|(view, (plan, item))| {
                 let Some(Word::Pose(pose)) = item else {
                     return None;
                 };
@@ -261,7 +267,7 @@ impl<'a> Stage<'a> {
                     .filter(|it| !it.is_empty())?;
                 Some(Answer {
                     candidates,
-                    sigma_px: None,
+                    sigma_px: expected_errors(joined, view, plan.model().n_parts()),
                     tau_px: None,
                 })
             })
@@ -278,6 +284,19 @@ impl<'a> Stage<'a> {
         self.service.health().finished();
         waiter.linger(|| self.publisher.n_connected(), say)
     }
+}
+
+/// What fusion knew of a view's errors; the latest prediction where its workers knew different ones.
+fn expected_errors(joined: &Joined<Word>, view: usize, n_parts: usize) -> Option<Vec<f32>> {
+    let words = joined.items.iter().flatten();
+    let predicted = words.filter_map(|it| {
+        let Word::Pair(pair) = it else { return None };
+        let side = pair.views.iter().position(|it| *it as usize == view)?;
+        wire::sigma_from_pair(pair, side, n_parts).ok().flatten()
+    });
+    predicted
+        .min_by_key(|(age, _)| *age)
+        .map(|(_, sigma)| sigma)
 }
 
 /// What all views found at once, put together.

@@ -50,7 +50,7 @@ const _: () = {
     assert!(size_of::<LocalMessage>() == 12);
     assert!(size_of::<ViewPose>() == 1808);
     assert!(size_of::<ViewQuality>() == 344);
-    assert!(size_of::<PairPose>() == 808);
+    assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
     assert!(size_of::<Pose3d>() == 11600);

@@ -119,7 +119,7 @@ pub struct PairHypothesis {
 /// Where all views are solved at once, the part of their answer that is about one view and the first view that
 /// answered: the energies are those of all views, and `view` of the stamp is the view less 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("PairPose.v2")]
+#[type_name("PairPose.v3")]
 #[repr(C)]
 pub struct PairPose {
     /// Which frame; `view` is the index of the pair.
@@ -139,4 +139,7 @@ pub struct PairPose {
     /// Of either view: how many frames ago its expected errors were predicted, plus 1: 1 of this very
     /// frame; 0 where there were none, and every part counted as usable.
     pub sigma_age: [u16; 2],
+    /// Of either view: the expected distance of every part's centre from the truth, pixels of the frame,
+    /// as it was predicted; for as many parts as the poses have, and only where there is an age.
+    pub sigma_px: [[f32; MAX_PARTS]; 2],
 }

@@ -30,7 +30,7 @@ pub fn view_quality(view: usize) -> String {
 /// Answers of one fusion worker: [`PairPose`](crate::PairPose).
 #[must_use]
 pub fn pair_pose(worker: usize) -> String {
-    format!("pair-pose/v2/{worker}")
+    format!("pair-pose/v3/{worker}")
 }
 
 /// The result: [`Pose3d`](crate::Pose3d).

@@ -35,6 +35,9 @@ pub struct SkeletonSettings {
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, cells of the level it was found on.
     pub sigma_cells: f64,
+    /// How much of the expected errors of a joint's parts is added to that (as variances are), where they
+    /// were predicted; 0 for nothing.
+    pub error_weight: f64,
     /// How a view's pose is made of those of its pairs.
     pub combine: Combine,
     /// How the views come to agree on a part. Facing is always decided on poses that do: mixtures of
@@ -58,6 +61,7 @@ impl Default for SkeletonSettings {
             joint_map: None,
             triangulation: geometry::Settings::default(),
             sigma_cells: 1.0,
+            error_weight: 1.0,
             combine: Combine::default(),
             consensus: ConsensusSettings::default(),
             facing: true,
@@ -151,16 +155,45 @@ impl SkeletonStep {
             Combine::Consensus => self.agreed(&candidates, exchanged),
         };
         let n_joints = self.settings.joints.joints.len();
-        let joints = self.triangulate(&views, n_joints, |centres| match &self.settings.joint_map {
+        let expected_px = self.expected_errors(answers, exchanged);
+        let points = |centres: &[[f64; 2]]| match &self.settings.joint_map {
             Some(map) => map.from_parts(centres),
             None => self.settings.joints.from_parts(centres),
-        });
+        };
+        let joints = self.triangulate(&views, n_joints, points, &expected_px);
         Skeleton {
             joints,
             views,
             n_pairs: found.n_pairs(),
             facing_margin,
         }
+    }
+
+    /// Of every view: the expected errors of its joints, pixels of the frame, weighed; none where nothing was
+    /// predicted. That of a joint is the mean of those of its parts, of which none is further off than the
+    /// frame is large.
+    fn expected_errors(&self, answers: &[Option<Answer>], exchanged: Exchanges) -> Vec<Vec<f64>> {
+        let of_view = |(view, answer): (usize, &Option<Answer>)| {
+            let of_parts = answer.as_ref()?.sigma_px.as_ref()?.iter();
+            let [width, height] = self.plans[view].camera().intrinsics.size.map(f64::from);
+            let weighed = |it: &f32| {
+                let it = f64::from(*it).min(width.hypot(height));
+                it * self.settings.error_weight
+            };
+            // The second number is there for the sake of what is written for points.
+            let of_parts: Vec<[f64; 2]> = of_parts.map(|it| [weighed(it), 0.0]).collect();
+            let of_parts = anatomical(&of_parts, self.mirror(view, exchanged));
+            let of_joints = self.settings.joints.from_parts(&of_parts).into_iter();
+            Some(of_joints.map(|[it, _]| it).collect())
+        };
+        let views = answers.iter().enumerate();
+        views.map(|it| of_view(it).unwrap_or_default()).collect()
+    }
+
+    /// The mirror of the parts where a view sees the person from behind.
+    fn mirror(&self, view: usize, exchanged: Exchanges) -> Option<&[usize]> {
+        let mirror = self.plans[view].model().spec().mirror.as_deref();
+        mirror.filter(|_| is_exchanged(exchanged, view))
     }
 
     fn can_exchange(&self) -> bool {
@@ -181,7 +214,7 @@ impl SkeletonStep {
             .into_iter()
             .map(|(exchanges, energy)| {
                 let views = self.agreed(&self.candidates(answers, found, exchanges), exchanges);
-                let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec);
+                let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec, &[]);
                 let joints: Vec<Option<Point3<f64>>> = PARSE14
                     .joints
                     .iter()
@@ -239,9 +272,7 @@ impl SkeletonStep {
         let of_view = |view: usize| {
             let best = answers[view].as_ref()?.candidates.first()?;
             let plan = &self.plans[view];
-            let mirror = is_exchanged(exchanged, view)
-                .then(|| plan.model().spec().mirror.as_deref())
-                .flatten();
+            let mirror = self.mirror(view, exchanged);
             let candidate = |energy: f64, pose: &Pose| Candidate {
                 energy,
                 cell_px: plan.scale(usize::from(pose.level)),
@@ -302,11 +333,13 @@ impl SkeletonStep {
     /// Triangulates points of the fused poses.
     ///
     /// * `points`: from the part centres of a view to the `n_points` points wanted.
+    /// * `expected_px`: expected errors of these points in the views that have any.
     fn triangulate(
         &self,
         views: &[Option<FusedView>],
         n_points: usize,
         points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
+        expected_px: &[Vec<f64>],
     ) -> Vec<Result<Triangulated, TriangulateError>> {
         let seen = views.iter().enumerate();
         let seen: Vec<(usize, &FusedView, Vec<[f64; 2]>)> = seen
@@ -315,13 +348,18 @@ impl SkeletonStep {
                 Some((view, it, points(&it.pose.centres_px)))
             })
             .collect();
+        let expected_px = |view: usize, point: usize| {
+            let of_view = expected_px.get(view)?;
+            of_view.get(point).copied()
+        };
         let triangulate = |point: usize| {
             let observations: Vec<Observation<'_>> = seen
                 .iter()
                 .map(|(view, fused, points)| Observation {
                     camera: self.plans[*view].camera(),
                     point_px: Point2::from(points[point]),
-                    sigma_px: fused.cell_px * self.settings.sigma_cells,
+                    sigma_px: (fused.cell_px * self.settings.sigma_cells)
+                        .hypot(expected_px(*view, point).unwrap_or(0.0)),
                 })
                 .collect();
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;

@@ -22,7 +22,10 @@ pub use pose::{
     candidates_from_message, candidates_to_message, local_from_message, local_to_message,
     pose_from_message, pose_to_message,
 };
-pub use quality::{sigma_from_message, sigma_to_message, tau_from_message, tau_to_message};
+pub use quality::{
+    sigma_from_message, sigma_from_pair, sigma_to_message, sigma_to_pair, tau_from_message,
+    tau_to_message,
+};
 pub use skeleton::{check_pose3d, end_of_results, skeleton_to_message};
 pub use stamp::{Expected, check_frame};
 

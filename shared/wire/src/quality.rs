@@ -1,6 +1,6 @@
 //! Expected errors of a view.
 
-use messages::{MAX_PARTS, Status, ViewQuality};
+use messages::{MAX_PARTS, PairPose, Status, ViewQuality};
 
 use crate::WireError;
 use crate::error::{count, equal, finite};
@@ -86,6 +86,51 @@ pub fn tau_from_message(
         .map(Some)
 }
 
+/// Adds what was predicted of one of the two views of an answer.
+///
+/// * `side`: 0 for the first view, 1 for the second.
+/// * `age`: how many frames ago it was predicted.
+/// * `sigma_px`: expected error of every part, pixels of the frame.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`], or one is negative or not finite.
+pub fn sigma_to_pair(
+    message: &mut PairPose,
+    side: usize,
+    age: u64,
+    sigma_px: &[f32],
+) -> Result<(), WireError> {
+    count("n_parts", sigma_px.len(), MAX_PARTS)?;
+    for (part, &sigma) in sigma_px.iter().enumerate() {
+        message.sigma_px[side][part] = checked(part, sigma)?;
+    }
+    message.sigma_age[side] = u16::try_from(age + 1).unwrap_or(u16::MAX);
+    Ok(())
+}
+
+/// Reads what was predicted of one of the two views of an answer, and how many frames before it; `None` where
+/// nothing was.
+///
+/// * `side`: 0 for the first view, 1 for the second.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_PARTS`] parts, or a value is negative or not finite.
+pub fn sigma_from_pair(
+    message: &PairPose,
+    side: usize,
+    n_parts: usize,
+) -> Result<Option<(u16, Vec<f32>)>, WireError> {
+    let Some(age) = message.sigma_age[side].checked_sub(1) else {
+        return Ok(None);
+    };
+    count("n_parts", n_parts, MAX_PARTS)?;
+    let sigma = message.sigma_px[side][..n_parts].iter().enumerate();
+    let sigma: Result<_, _> = sigma.map(|(part, &it)| checked(part, it)).collect();
+    Ok(Some((age, sigma?)))
+}
+
 fn checked(part: usize, sigma: f32) -> Result<f32, WireError> {
     finite("sigma_px", part, f64::from(sigma))?;
     if sigma < 0.0 {
@@ -125,6 +170,37 @@ mod tests {
             for n in [3, n_parts as usize] {
                 if let Ok(Some(sigma)) = sigma_from_message(&message, n) {
                     prop_assert_eq!(sigma.len(), n);
+                    prop_assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_prediction_comes_back_from_a_pair_as_it_was_sent(
+            sigma in prop::collection::vec(0.0_f32..1e3, 1..=MAX_PARTS),
+            side in 0_usize..2,
+            age in 0_u64..70_000,
+        ) {
+            let mut message = PairPose::default();
+            sigma_to_pair(&mut message, side, age, &sigma).unwrap();
+            let got = sigma_from_pair(&message, side, sigma.len()).unwrap();
+            prop_assert_eq!(got, Some((age.min(65_534) as u16, sigma)));
+            prop_assert_eq!(sigma_from_pair(&message, 1 - side, 3).unwrap(), None);
+        }
+
+        #[test]
+        fn whatever_arrives_with_a_pair_is_refused_or_a_distance(
+            sigma_age in any::<[u16; 2]>(),
+            bits in prop::array::uniform32(any::<u32>()),
+            n_parts in 0_usize..40,
+        ) {
+            let sigma_px = [bits.map(f32::from_bits); 2];
+            let message = PairPose { sigma_age, sigma_px, ..PairPose::default() };
+            for side in 0..2 {
+                if let Ok(Some((_, sigma))) = sigma_from_pair(&message, side, n_parts) {
+                    prop_assert_eq!(sigma.len(), n_parts);
                     prop_assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
                 }
             }

@@ -293,7 +293,7 @@ fn pair_pose(input: &[u8]) -> PairPose {
     for it in Change::all(input) {
         let place = it.value.to_le_bytes()[7];
         let hypothesis = &mut message.hypotheses[usize::from(place & 1)];
-        match it.field % 14 {
+        match it.field % 15 {
             field @ 0..6 => {
                 change_pose(
                     &mut hypothesis.poses[usize::from(place >> 1 & 1)],
@@ -308,6 +308,11 @@ fn pair_pose(input: &[u8]) -> PairPose {
             10 => hypothesis.start[it.of(2)] = it.value as u8,
             11 => hypothesis.active_parts = it.value,
             12 => hypothesis.exchanged = it.value as u32 & 1,
+            13 => {
+                let side = usize::from(place & 1);
+                message.sigma_age[side] = it.value as u16;
+                message.sigma_px[side][it.of(MAX_PARTS)] = f32::from_bits((it.value >> 16) as u32);
+            }
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
     }
@@ -324,6 +329,11 @@ fn pair(input: &[u8]) {
     if let Ok(Some(answer)) = wire::pair_from_message(&message, plans) {
         assert!(answer.views[0] < answer.views[1] && answer.views[1] < plans.len());
         assert!(answer.hypotheses.iter().all(|it| it.energy.is_finite()));
+    }
+    for side in 0..2 {
+        if let Ok(Some((_, sigma))) = wire::sigma_from_pair(&message, side, 3) {
+            assert!(sigma.iter().all(|it| it.is_finite() && *it >= 0.0));
+        }
     }
 }
 
@@ -378,9 +388,10 @@ pub fn wire_fusion(input: &[u8]) {
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
     };
+    let expected = wire::sigma_from_pair(&pair_pose(pairs), 1, model.n_parts());
     let whole = Answer {
         candidates: vec![pose()],
-        sigma_px: None,
+        sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,
     };
     let answers = [Some(changed), Some(whole)];

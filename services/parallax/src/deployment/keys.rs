@@ -229,6 +229,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "triangulate.loss_px",
         "reprojection error at which an observation begins to count less",
     ),
+    (
+        "triangulate.error_weight",
+        "how much of its expected error makes a view uncertain about a joint, with [quality]; 0 none",
+    ),
     ("record.trc", "write pose3d.trc for OpenSim"),
     (
         "record.overlay_every",

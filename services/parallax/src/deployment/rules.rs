@@ -41,7 +41,14 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
         joints,
         &format!("one of {known}"),
     )?;
-    positive("triangulate.loss_px", it.triangulate.loss_px)
+    positive("triangulate.loss_px", it.triangulate.loss_px)?;
+    let weight = it.triangulate.error_weight;
+    demand(
+        weight.is_finite() && weight >= 0.0,
+        "triangulate.error_weight",
+        &weight.to_string(),
+        "a number of at least 0",
+    )
 }
 
 fn name(name: &str) -> Result<(), Complaint> {

@@ -269,6 +269,8 @@ impl Job {
                 joints: sequence.joints,
                 joint_map: learned.and_then(|it| it.joint_map(sequence.joints)),
                 facing: fuse.facing,
+                // The true errors only switch: they are no lengths in the frame.
+                error_weight: f64::from(u8::from(!self.oracle)),
                 ..SkeletonSettings::default()
             },
         };
