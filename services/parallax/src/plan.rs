@@ -196,6 +196,10 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
         processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
     }
     for it in &mut processes {
+        // Pairs are settled after few solutions or many, and what is written at the end is not alike; where nothing
+        // may be lost, nothing is hurried.
+        it.is_even = resolved.delivery() == Delivery::Realtime
+            && ["capture", "pose", "quality", "triangulate"].contains(&it.service.as_str());
         it.scheduling = resolved.deployment.runtime.of(&it.service, &it.name);
         stand_in(it, resolved);
     }
@@ -223,6 +227,7 @@ fn process(service: &str, index: Option<usize>, role: Role, file: &Path) -> Proc
         args,
         role,
         scheduling: Scheduling::default(),
+        is_even: false,
     }
 }
 

@@ -5,7 +5,7 @@ mod common;
 
 use common::started::signal;
 use common::{Case, Ended};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const LIVE: &str = "[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
                     [capture]\nupright = false\nmode = \"realtime\"\n";
@@ -115,4 +115,19 @@ fn a_slow_consumer_does_not_slow_its_producer() {
     assert!(told.view(1, "dropped") >= 5, "{:#}", told.report["views"]);
     let missing = &told.report["recorded"]["summary"]["views_missing"]["b"];
     assert!(missing["late"].as_u64() > Some(0), "{missing}");
+}
+
+#[test]
+fn a_process_that_computes_for_ever_is_found_out_by_the_work_of_its_frames() {
+    // The clock alone would leave it alone for ten minutes.
+    let patient = "[supervise]\nhang_limit_s = 600\n";
+    let case = Case::new("spins", &[160; 2], &format!("{LIVE}{PACED}{patient}"));
+    let spins = "name = \"b\"\nfault = \"spin@60+1\"";
+    case.edit("deployment.toml", "name = \"b\"", spins);
+    let ended = case.run();
+    let told = Told::new(&case, &ended);
+    let restarts = json!([{ "process": "capture-1", "restarts": 1 }]);
+    assert_eq!(told.report["restarts"], restarts, "{}", ended.stderr);
+    let last = told.lines.last().unwrap();
+    assert_eq!(last["views_present"], json!(["a", "b"]), "it is not back");
 }

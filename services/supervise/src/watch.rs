@@ -13,6 +13,8 @@ use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
 /// A main loop that turned since then is one that waits, not one that computes.
 const AWAKE: Duration = Duration::from_secs(1);
+/// How many times the processor time of its longest turn an even process may use for one.
+const MORE_WORK: u32 = 3;
 /// Lines of output that are kept to explain a death.
 const KEPT_LINES: usize = 40;
 
@@ -45,6 +47,7 @@ pub(crate) struct Watch {
     turned: Change,
     /// When it last took something in.
     received: Change,
+    work: Work,
 }
 
 /// Where a process is in its life.
@@ -75,6 +78,34 @@ impl Change {
     fn note(&mut self, count: u64, now: Instant) {
         if count != self.count {
             *self = Self { count, at: now };
+        }
+    }
+}
+
+/// The processor time that turns of a main loop take: other than time by the clock it does not depend on what
+/// else the machine does, and none of it passes while one waits.
+#[derive(Debug, Clone, Copy, Default)]
+struct Work {
+    /// All that the process had used at the first sign after its last turn, milliseconds modulo 2^32.
+    at_turn: u32,
+    /// What it has used since.
+    since_turn: Duration,
+    /// The most that any turn of this life has taken; those between two signs count as one.
+    longest: Duration,
+}
+
+impl Work {
+    /// * `turned`: whether the main loop has, since the sign before.
+    /// * `is_first`: whether it had not before.
+    fn note(&mut self, cpu_millis: u32, turned: bool, is_first: bool) {
+        let used = u64::from(cpu_millis.wrapping_sub(self.at_turn));
+        self.since_turn = Duration::from_millis(used);
+        if turned {
+            if !is_first {
+                self.longest = self.longest.max(self.since_turn);
+            }
+            self.at_turn = cpu_millis;
+            self.since_turn = Duration::ZERO;
         }
     }
 }
@@ -115,6 +146,7 @@ impl Watch {
             signed: Change::new(now),
             turned: Change::new(now),
             received: Change::new(now),
+            work: Work::default(),
         }
     }
 
@@ -126,6 +158,7 @@ impl Watch {
         self.signed = Change::new(now);
         self.turned = Change::new(now);
         self.received = Change::new(now);
+        self.work = Work::default();
     }
 
     pub(crate) fn child(&self) -> Option<&Child> {
@@ -159,6 +192,8 @@ impl Watch {
             return self.refuse(Refusal::Sender);
         }
         self.signed.note(health.at_nanos, now);
+        let (turned, is_first) = (health.n_loops != self.turned.count, self.turned.count == 0);
+        self.work.note(health.cpu_millis, turned, is_first);
         self.turned.note(health.n_loops, now);
         if self.turned.count > 0 {
             self.at_work_since.get_or_insert(now);
@@ -197,6 +232,8 @@ impl Watch {
             || (silent > policy.stopped_limit && child.is_stopped())
         {
             Some(Death::Silent { still: silent })
+        } else if self.computes_for_ever(policy, now) {
+            Some(Death::Hung { still })
         } else if still <= policy.hang_limit {
             None
         } else if silent > still / 2 {
@@ -205,6 +242,15 @@ impl Watch {
         } else {
             Some(Death::Hung { still })
         }
+    }
+
+    /// Whether it has worked on one thing far longer than on anything before.
+    fn computes_for_ever(&self, policy: &Policy, now: Instant) -> bool {
+        let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
+        let longest = policy.stopped_limit.max(MORE_WORK * self.work.longest);
+        self.spec.is_even
+            && self.at_work_since.is_some_and(worked)
+            && self.work.since_turn > longest
     }
 
     /// Ends a life, and says what is to follow.
@@ -308,5 +354,32 @@ pub(crate) fn death_of(status: ExitStatus) -> Option<Death> {
         (Some(status), _) => Some(Death::Exit { status }),
         (None, Some(number)) => Some(Death::Signal { number }),
         (None, None) => Some(Death::Exit { status: -1 }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_work_of_a_turn_is_what_was_used_until_the_next() {
+        let mut work = Work::default();
+        let millis = Duration::from_millis;
+        // The start is no turn, whatever it took.
+        work.note(900, true, true);
+        work.note(1000, false, false);
+        assert_eq!((work.since_turn, work.longest), (millis(100), millis(0)));
+        work.note(1080, true, false);
+        assert_eq!((work.since_turn, work.longest), (millis(0), millis(180)));
+        work.note(1100, true, false);
+        assert_eq!((work.since_turn, work.longest), (millis(0), millis(180)));
+    }
+
+    #[test]
+    fn the_clock_of_processor_time_may_run_over() {
+        let mut work = Work::default();
+        work.note(u32::MAX - 9, true, true);
+        work.note(20, false, false);
+        assert_eq!(work.since_turn, Duration::from_millis(30));
     }
 }

@@ -174,6 +174,32 @@ fn a_main_loop_that_stands_still_is_found_out() {
     assert_eq!(state_of(&run, "knot"), State::Finished);
 }
 
+/// How processes die that compute for a while, as they usually do, and then for long.
+fn deaths_of_one_that_computes(how: &str, is_even: bool) -> Vec<Death> {
+    let mut case = Case::new(Delivery::Realtime, &[("mill", how, Role::Essential)]);
+    case.plan.policy.hang_limit = Duration::from_mins(10);
+    case.plan.processes[0].is_even = is_even;
+    let run = case.run(|_, _| {});
+    assert_eq!(state_of(&run, "mill"), State::Finished);
+    run.deaths("mill")
+}
+
+#[test]
+fn who_computes_for_ever_is_found_out_by_the_work_it_did_before() {
+    let deaths = deaths_of_one_that_computes("compute 20 600000", true);
+    assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
+}
+
+#[test]
+fn who_computes_twice_as_long_as_before_is_left_alone() {
+    assert_eq!(deaths_of_one_that_computes("compute 300 600", true), []);
+}
+
+#[test]
+fn who_is_known_to_be_uneven_is_left_alone() {
+    assert_eq!(deaths_of_one_that_computes("compute 20 1500", false), []);
+}
+
 #[test]
 fn who_computes_for_long_is_waited_for() {
     let mut case = Case::new(

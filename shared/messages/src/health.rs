@@ -7,7 +7,7 @@ use crate::Refusal;
 
 /// Sent by every process a few times a second; a counter that stands still means a hang.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Health.v3")]
+#[type_name("Health.v4")]
 #[repr(C)]
 pub struct Health {
     /// Run of the deployment.
@@ -37,8 +37,9 @@ pub struct Health {
     pub peak_memory_bytes: u64,
     /// 1 once the process has seen the end of the footage and passed it on.
     pub finished: u32,
-    /// Keeps the layout free of padding.
-    pub reserved: u32,
+    /// Processor time that all threads of the process have used, milliseconds, modulo 2^32; 0 where the system
+    /// does not say.
+    pub cpu_millis: u32,
     /// Work that the process has before it, if it knows (capture: frames in the footage), else 0.
     pub n_total: u64,
     /// Messages that were refused, by cause: [`Refusal::ALL`].

@@ -44,7 +44,7 @@ pub fn pose3d() -> String {
 /// * `process`: its unique name in the deployment, for example `pose-2`.
 #[must_use]
 pub fn health(process: &str) -> String {
-    format!("health/v3/{process}")
+    format!("health/v4/{process}")
 }
 
 /// Times and counts of a process: [`Metrics`](crate::Metrics).

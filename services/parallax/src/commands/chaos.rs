@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use fastrand::Rng;
-use runtime::{ExitKind, Failure, now_nanos};
+use runtime::{Delivery, ExitKind, Failure, now_nanos};
 use serde_json::{Value, json};
 
 use super::run::Planned;
@@ -42,7 +42,8 @@ where others can go on without it, no pause between two results is longer than -
 frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
 itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
 within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit; \
-one that computes for ever (spin-capture) gives signs of life but none of work, and is noticed when its main loop has stood \
+one that computes for ever (spin-capture) gives signs of life but none of work, and is noticed as soon when it has used so much \
+processor time, and three times that of any frame before, for one; where nothing may be lost, when its main loop has stood \
 still for three seconds, which the scenario sets (supervise.hang_limit_s). With \
 kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
 a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
@@ -203,8 +204,8 @@ fn once(
     let after = ran.aftermath(struck);
     let policy = planned.plan().policy;
     let hang = match blow {
-        Blow::Kill | Blow::Stop => policy.stopped_limit,
-        Blow::Spin => policy.hang_limit,
+        Blow::Spin if planned.plan().delivery == Delivery::Lossless => policy.hang_limit,
+        Blow::Kill | Blow::Stop | Blow::Spin => policy.stopped_limit,
     };
     let hang_ms = hang.as_millis() as f64;
     Ok(Verdict {

@@ -252,7 +252,8 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "supervise.missed_beats",
-        "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed",
+        "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed, or that one \
+         that computes for ever may give (realtime)",
     ),
     (
         "supervise.max_restarts",

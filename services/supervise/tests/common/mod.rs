@@ -60,6 +60,7 @@ impl Case {
                 args: behaviour.split(' ').map(Into::into).collect(),
                 role,
                 scheduling: Scheduling::default(),
+                is_even: false,
             });
         let health = processes
             .iter()

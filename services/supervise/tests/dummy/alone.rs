@@ -29,6 +29,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         args: vec!["hang-once".into()],
         role: Role::Essential,
         scheduling: Scheduling::default(),
+        is_even: false,
     });
     let plan = Plan {
         executable: "/proc/self/exe".into(),

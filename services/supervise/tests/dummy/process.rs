@@ -6,6 +6,7 @@ use core::time::Duration;
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, ExitCode};
+use std::time::Instant;
 
 use messages::{FrameHeader, Status, ViewQuality};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, Woken, run_service};
@@ -40,6 +41,7 @@ fn serve() -> ExitCode {
         Some("die-in-loan") => die_in_loan(service),
         Some("think") => think(service, number(1)),
         Some("hang-once") => hang_once(service),
+        Some("compute") => compute(service, number(1), number(2)),
         Some("fail") => Err(failure(number(1))),
         #[expect(clippy::panic, reason = "it is what the test is about")]
         Some("panic") => panic!("on purpose"),
@@ -200,6 +202,25 @@ fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     std::thread::sleep(Duration::from_secs(seconds));
     if service.stop().is_requested() {
         return Ok(());
+    }
+    idle(service)
+}
+
+/// Computes for two seconds, `usual` milliseconds at a time; then once, in its first life, for `long` of them.
+fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
+    let burn = |millis: u64| {
+        let begin = Instant::now();
+        while begin.elapsed() < Duration::from_millis(millis) && !service.stop().is_requested() {
+            core::hint::spin_loop();
+        }
+        service.progress().tick();
+    };
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(2) {
+        burn(usual);
+    }
+    if service.epoch() == 0 {
+        burn(long);
     }
     idle(service)
 }
