@@ -76,7 +76,7 @@ fn who_looks_is_told_of_the_end_and_nothing_is_left() {
     let deployment = two();
     let namespace = deployment.namespace().clone();
     let where_to = namespace.clone();
-    let (sender, is_open) = mpsc::channel();
+    let (sender, is_open) = mpsc::sync_channel(1);
     let looks = Builder::new().name("onlooker".to_owned()).spawn(move || {
         let onlooker = Onlooker::open(&where_to).unwrap();
         sender.send(()).unwrap();
