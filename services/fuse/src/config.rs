@@ -119,6 +119,7 @@ impl Config {
             switch: match self.switch {
                 Switch::Either => SwitchBy::Either,
                 Switch::Support => SwitchBy::Support,
+                Switch::Worse => SwitchBy::Worse,
             },
             facing: self.facing,
             n_candidates,
@@ -166,6 +167,8 @@ pub enum Switch {
     Either,
     /// That of the view that supports the other.
     Support,
+    /// The same, where it is also the worse of the two.
+    Worse,
 }
 
 /// Thresholds of the expected error.

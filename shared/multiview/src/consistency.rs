@@ -225,21 +225,33 @@ fn active_parts(
     pair: &PairInput<'_>,
     counterpart: &[usize],
 ) -> [Vec<bool>; 2] {
-    let off = |view: usize, part: usize| {
+    // Without a prediction a part is expected to be right.
+    let expected = |view: usize, part: usize| {
         let expectation = pair.views[view].expectation(settings, part);
-        expectation.is_some_and(|[sigma, tau]| sigma > tau)
+        expectation.unwrap_or([0.0, 1.0])
     };
-    let by_part = |on: &dyn Fn(bool, bool) -> bool| -> Vec<bool> {
+    let by_part = |on: &dyn Fn([f32; 2], [f32; 2]) -> bool| -> Vec<bool> {
         let parts = counterpart.iter().enumerate();
         parts
-            .map(|(part, &other)| on(off(0, part), off(1, other)))
+            .map(|(part, &other)| on(expected(0, part), expected(1, other)))
             .collect()
     };
+    let usable = |[sigma, tau]: [f32; 2]| sigma <= tau;
+    // In thresholds, since a person may be larger in one view than in the other.
+    let no_worse =
+        |[sigma, tau]: [f32; 2], [other, other_tau]: [f32; 2]| sigma * other_tau <= other * tau;
     match settings.switch {
         SwitchBy::Either => {
-            let both = by_part(&|first, second| !first && !second);
+            let both = by_part(&|first, second| usable(first) && usable(second));
             [both.clone(), both]
         }
-        SwitchBy::Support => [by_part(&|_, second| !second), by_part(&|first, _| !first)],
+        SwitchBy::Support => [
+            by_part(&|_, second| usable(second)),
+            by_part(&|first, _| usable(first)),
+        ],
+        SwitchBy::Worse => [
+            by_part(&|first, second| usable(second) || no_worse(second, first)),
+            by_part(&|first, second| usable(first) || no_worse(first, second)),
+        ],
     }
 }

@@ -26,6 +26,10 @@ pub enum SwitchBy {
     /// cannot, and is not asked to follow it. Each view then has an energy of its own; that of a pair is
     /// their mean, and may fall on the way.
     Support,
+    /// That of the support, where it is also the worse of the two (each in its own thresholds): of two views
+    /// neither of which can tell, the better one goes on helping the other, so that errors that are expected
+    /// everywhere do not leave every view alone. Energies as with [`Self::Support`].
+    Worse,
 }
 
 /// The part-type tables of one pair of views.

@@ -198,7 +198,8 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "fuse.switch",
-        "whose expected error switches a part off: either view's (the paper), or the support's",
+        "whose expected error switches a part off: either view's (the paper), the support's, or the support's \
+         where it is the worse of the two",
     ),
     (
         "fuse.facing",

@@ -181,15 +181,21 @@ proptest! {
     fn where_the_support_alone_counts_the_view_that_cannot_tell_follows_the_one_that_can(
         seed: u64,
         blind in 0..2_usize,
+        (switch, sees) in prop::sample::select(vec![
+            (SwitchBy::Support, 1.0),
+            (SwitchBy::Worse, 1.0),
+            // Neither can tell, and one less than the other.
+            (SwitchBy::Worse, 8.5),
+        ]),
         start in starts(),
     ) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         scene.views[blind].sigma_px = Some(vec![9.0; N_PARTS]);
-        scene.views[1 - blind].sigma_px = Some(vec![1.0; N_PARTS]);
+        scene.views[1 - blind].sigma_px = Some(vec![sees; N_PARTS]);
         let all_on = Settings { tau_px: Vec::new(), ..settings(seed) };
         let settings = Settings {
             tau_px: vec![8.0; N_PARTS],
-            switch: SwitchBy::Support,
+            switch,
             ..all_on.clone()
         };
         let found = scene.fuse(&settings, [0, 1], start);
