@@ -51,4 +51,4 @@ fn the_model_that_ships_is_as_good_as_its_card_says() {
 }
 
 /// PCP by mean of ends and by both ends, as `configs/models/person.md` has them.
-const CARD: [f64; 2] = [71.7, 65.3];
+const CARD: [f64; 2] = [73.3, 67.4];

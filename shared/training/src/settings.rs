@@ -75,7 +75,7 @@ impl Default for Settings {
             mining_interval: 2,
             cost: 0.002,
             positive_weight: 2.0,
-            pose_weight: 0.0,
+            pose_weight: 0.3,
             pose_margin: 1.0,
             overlap: 0.6,
             tolerance: 0.05,
