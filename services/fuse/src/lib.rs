@@ -3,6 +3,7 @@
 
 mod config;
 mod evidence;
+mod seen;
 mod service;
 
 pub use config::{Compatibility, Config, Energy, Switch, Tau, TauFile, TauName, Views};

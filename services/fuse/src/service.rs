@@ -17,6 +17,7 @@ use runtime::{
 use wire::{EvidenceView, Expected, WireError};
 
 use crate::evidence::Evidence;
+use crate::seen::Seen;
 
 /// What one worker's process has to do.
 #[derive(Debug)]
@@ -43,23 +44,6 @@ pub struct Job {
     pub n_consumers: usize,
     /// How long a view may be silent.
     pub patience: Duration,
-}
-
-/// What all views say about a frame.
-struct Seen<'a> {
-    stamp: Stamp,
-    answers: Vec<Option<Answer>>,
-    /// How many frames old the expected errors of every view are.
-    sigma_ages: Vec<u64>,
-    evidence: Vec<Option<EvidenceView<'a>>>,
-}
-
-impl Seen<'_> {
-    /// Bit `v` is set if view `v` delivered a pose in time.
-    fn views_present(&self) -> u32 {
-        let present = (0..self.answers.len()).filter(|it| self.answers[*it].is_some());
-        present.fold(0, |mask, view| mask | 1_u32 << view)
-    }
 }
 
 /// What a view says about a frame.
@@ -367,16 +351,7 @@ impl<'a> Worker<'a> {
             epoch: self.service.epoch(),
             ..seen.stamp
         };
-        for side in 0..2 {
-            let view = message.views[side] as usize;
-            let age = seen.sigma_ages[view];
-            if let Some(sigma_px) = seen.answers[view]
-                .as_ref()
-                .and_then(|it| it.sigma_px.as_ref())
-            {
-                wire::sigma_to_pair(&mut message, side, age, sigma_px).or_fail(ExitKind::Run)?;
-            }
-        }
+        seen.expect(&mut message).or_fail(ExitKind::Run)?;
         message.timing = Timing {
             received_at_nanos,
             sent_at_nanos: now_nanos(),
