@@ -196,10 +196,11 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
         processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
     }
     for it in &mut processes {
-        // Pairs are settled after few solutions or many, and what is written at the end is not alike; where nothing
-        // may be lost, nothing is hurried.
+        // Pairs are settled after few solutions or many, what is written at the end is not alike, and threads that
+        // share the work of a frame use time while one of them gets none (five minutes of kills on a busy machine:
+        // 15 times three turns of a pose process). Where nothing may be lost, nothing is hurried.
         it.is_even = resolved.delivery() == Delivery::Realtime
-            && ["capture", "pose", "quality", "triangulate"].contains(&it.service.as_str());
+            && ["capture", "triangulate"].contains(&it.service.as_str());
         it.scheduling = resolved.deployment.runtime.of(&it.service, &it.name);
         stand_in(it, resolved);
     }

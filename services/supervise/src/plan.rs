@@ -42,7 +42,7 @@ pub struct ProcessSpec {
     /// What it asks of the system's scheduler.
     pub scheduling: Scheduling,
     /// Whether all turns of its main loop are about as much work. Of one whose are, a turn that has taken three
-    /// times the processor time of any before it is no work any more.
+    /// times the processor time of any before it, some messages after the first, is no work any more.
     pub is_even: bool,
 }
 

@@ -15,6 +15,8 @@ use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 const AWAKE: Duration = Duration::from_secs(1);
 /// How many times the processor time of its longest turn an even process may use for one.
 const MORE_WORK: u32 = 3;
+/// Messages that it has sent before: the first ones are more work than the others.
+const TRIED: u64 = 8;
 /// Lines of output that are kept to explain a death.
 const KEPT_LINES: usize = 40;
 
@@ -249,6 +251,7 @@ impl Watch {
         let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
         let longest = policy.stopped_limit.max(MORE_WORK * self.work.longest);
         self.spec.is_even
+            && self.current.is_some_and(|it| it.n_sent >= TRIED)
             && self.at_work_since.is_some_and(worked)
             && self.work.since_turn > longest
     }

@@ -206,7 +206,7 @@ fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for two seconds, `usual` milliseconds at a time; then once, in its first life, for `long` of them.
+/// Computes for three seconds, `usual` milliseconds at a time; then once, in its first life, for `long` of them.
 fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
     let burn = |millis: u64| {
         let begin = Instant::now();
@@ -216,8 +216,12 @@ fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
         service.progress().tick();
     };
     let begin = Instant::now();
-    while begin.elapsed() < Duration::from_secs(2) {
+    for frame in 0.. {
+        if begin.elapsed() > Duration::from_secs(3) {
+            break;
+        }
         burn(usual);
+        service.health().sent(frame);
     }
     if service.epoch() == 0 {
         burn(long);
