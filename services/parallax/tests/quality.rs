@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use common::started::signal;
 use common::{Case, PLAIN, planted};
-use fmp::Scope;
+use fmp::{Layout, Scope};
 use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
@@ -56,6 +56,17 @@ fn network(tau: f32) -> Network {
     net
 }
 
+/// The search of a view, and where it looks.
+fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
+    let layout = Arc::new(plan.layout().clone());
+    let step = ViewStep::new(
+        planted::model(),
+        Arc::clone(&layout),
+        ViewSettings::default(),
+    );
+    (step, layout)
+}
+
 #[test]
 fn the_service_says_what_the_library_says() {
     let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
@@ -71,13 +82,7 @@ fn the_service_says_what_the_library_says() {
     let (rig, model) = (planted::rig(2), planted::model());
     let [width, height] = planted::SIZE.map(|it| it as usize);
     for (view, camera) in rig.cameras().iter().enumerate() {
-        let plan = pipeline::plan(&model, camera).unwrap();
-        let layout = Arc::new(plan.layout().clone());
-        let step = ViewStep::new(
-            Arc::clone(&model),
-            Arc::clone(&layout),
-            ViewSettings::default(),
-        );
+        let (step, layout) = step_of(&pipeline::plan(&model, camera).unwrap());
         let mut responses = vec![0.0; layout.n_responses()];
         for frame in 0..8 {
             let picture = planted::picture(camera, frame);
@@ -105,15 +110,9 @@ fn the_service_says_what_the_library_says() {
 
 /// What every view of a planted rig says of a frame of its own.
 fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
-    let model = planted::model();
     let [width, height] = planted::SIZE.map(|it| it as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
-        let layout = Arc::new(plan.layout().clone());
-        let step = ViewStep::new(
-            Arc::clone(&model),
-            Arc::clone(&layout),
-            ViewSettings::default(),
-        );
+        let (step, layout) = step_of(plan);
         let mut responses = vec![0.0; layout.n_responses()];
         let picture = planted::picture(plan.camera(), *frame);
         let image = Rgb8View::new(width, height, picture.rgb()).unwrap();

@@ -85,7 +85,7 @@ impl Change {
 }
 
 /// The processor time that turns of a main loop take: other than time by the clock it does not depend on what
-/// else the machine does, and none of it passes while one waits.
+/// else the machine does, and little of it passes while one waits (one that waits without sleeping turns all the time).
 #[derive(Debug, Clone, Copy, Default)]
 struct Work {
     /// All that the process had used at the first sign after its last turn, milliseconds modulo 2^32.

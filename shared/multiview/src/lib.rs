@@ -31,8 +31,8 @@
 //! | + true errors, see below | 76.7 / 120 | 62.2 / 189 | | 76.7 / 126 | 67.5 / 171 | | 85.8 / 100 | 64.4 / 178 | 83.3 / 119 |
 //!
 //! So part types made up for a model that contradicted itself; with one that does not, distances do most of it. The weight of the third was chosen
-//! on 60 other instants. What follows is of the first model, whose weight was chosen on A and C. A lift of weight 0.02 reached 73.3 on A; of 0.1 and more it did harm on five instants held out. Every
-//! view alone is a baseline as good as it can be: left and right are decided over all views for it, too. Where they are not, A falls to 55.6 and
+//! on 60 other instants. What follows is of the first model, whose weight was chosen on A and C. A lift of weight 0.02 reached 73.3 on A; of
+//! 0.1 and more it did harm on five instants held out. Every view alone is a baseline as good as it can be: left and right are decided over all views for it, too. Where they are not, A falls to 55.6 and
 //! C to 45.8, and the gain of geometry looks like 13 to 27 points.
 //!
 //! What holds all versions back is facing: of the instants of B every tenth (views alone) to fifth (geometry) has left and right of the whole

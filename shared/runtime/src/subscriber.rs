@@ -125,11 +125,6 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
         sample.payload().to_vec()
     }
 
-    /// Processes that may send, dead ones included until they are cleaned away.
-    pub fn n_publishers(&self) -> usize {
-        self.port.n_publishers()
-    }
-
     /// The names of the ports that may send, one of a dead process until it is cleaned away. Who
     /// takes its place has another.
     pub fn publishers(&self) -> Vec<u128> {
