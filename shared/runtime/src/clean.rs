@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::collections::BTreeSet;
 use std::fs;
+use std::os::unix::fs::MetadataExt as _;
 
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
 
@@ -10,6 +11,9 @@ use crate::Bus;
 
 /// How long another process is given that cleans up the same.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// The mode of a file that its owner may write.
+const OWNER_WRITES: u32 = 0o200;
 
 /// Removes what dead processes left in shared memory: their slots in topics, their queues, and the
 /// hold that a dead subscriber has on a sender that waits for it.
@@ -25,21 +29,25 @@ pub struct Cleaner {
 impl Cleaner {
     /// Cleans up, and answers how many dead processes are gone for good.
     ///
-    /// A process killed while it registers a port leaves a file that iceoryx2 0.10 does not know,
-    /// and without which its node cannot be removed. Where clean-up has failed twice these files are
-    /// removed first.
-    pub fn clean(&mut self, bus: &Bus) -> u64 {
-        let mut cleaned = bus.node().blocking_cleanup_dead_nodes(PATIENCE).cleanups;
-        let dead = dead(bus);
-        let again: BTreeSet<u128> = dead.intersection(&self.stubborn).copied().collect();
+    /// A process killed while it registers a port leaves a file that iceoryx2 0.10 overlooks, so that its
+    /// node cannot be removed. Where clean-up has failed twice such files are removed first; those that
+    /// were finished stay, for they say what the process held.
+    pub fn clean(&mut self, bus: &Bus) -> usize {
+        // What iceoryx2 counts as cleaned may stay: it is looked at again.
+        let before = dead(bus);
+        bus.node().blocking_cleanup_dead_nodes(PATIENCE);
+        let mut after = dead(bus);
+        let again: Vec<u128> = after.intersection(&self.stubborn).copied().collect();
         if !again.is_empty() {
             for id in again {
-                remove_tags(bus, id);
+                remove_unfinished(bus, id);
             }
-            cleaned += bus.node().blocking_cleanup_dead_nodes(PATIENCE).cleanups;
+            bus.node().blocking_cleanup_dead_nodes(PATIENCE);
+            after = dead(bus);
         }
-        self.stubborn = dead;
-        cleaned
+        let n_gone = before.difference(&after).count();
+        self.stubborn = after;
+        n_gone
     }
 }
 
@@ -57,19 +65,25 @@ fn dead(bus: &Bus) -> BTreeSet<u128> {
     dead
 }
 
-/// Removes the files by which a dead node held ports and services.
-fn remove_tags(bus: &Bus, node: u128) {
+/// Removes what a dead node had begun to write of itself and not finished. iceoryx2 lets a file be written
+/// by its owner until it is complete, and registers the node or port of a tag only then: behind an unfinished tag there
+/// is nothing to give back. A finished one is the only trace of a slot; without it the slot is lost for good.
+fn remove_unfinished(bus: &Bus, node: u128) {
     let directory = bus.namespace().root().join("nodes").join(node.to_string());
     let Ok(entries) = fs::read_dir(&directory) else {
         return;
     };
-    for path in entries.flatten().map(|entry| entry.path()) {
-        let is_tag = path
-            .extension()
-            .is_some_and(|it| it == "port_tag" || it == "service_tag");
-        if is_tag && let Err(error) = fs::remove_file(&path) {
-            tracing::debug!(%error, ?path, "cannot remove a tag of a dead process");
+    for entry in entries.flatten() {
+        let is_unfinished = |it: fs::Metadata| it.is_file() && it.mode() & OWNER_WRITES != 0;
+        if !entry.metadata().is_ok_and(is_unfinished) {
+            continue;
+        }
+        let path = entry.path();
+        match fs::remove_file(&path) {
+            Ok(()) => tracing::debug!(?path, "removed what a dead process had not finished"),
+            Err(error) => {
+                tracing::debug!(%error, ?path, "cannot remove what a dead process had not finished");
+            }
         }
     }
-    tracing::debug!(?directory, "removed the tags of a dead process");
 }
