@@ -8,6 +8,8 @@
     reason = "a body takes on the instruction set of the function that it is inlined into"
 )]
 
+mod amx;
+mod bf16;
 mod correlate;
 mod dispatch;
 mod envelope;
@@ -27,6 +29,8 @@ const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }
 }
 
+pub use amx::{Amx, NoAmx};
+pub use bf16::{Bf16Bank, Bf16Level, Bf16Map};
 pub use correlate::{CorrelateWorkspace, FeatureMap, FilterBank, Level, Template, correlate_f64};
 pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, MIRRORED_CHANNEL, N_CHANNELS, hog, hog_f64};

@@ -54,6 +54,8 @@ pub(crate) trait Simd: Copy {
     fn store(self, value: Self::V, to: &mut [f32]);
     /// Writes all of `to` or its first `LANES` values, whichever is less.
     fn store_some(self, value: Self::V, to: &mut [f32]);
+    /// Writes the lanes whose bit is set side by side; `to` has room for these and no others.
+    fn store_those(self, value: Self::V, lanes: u32, to: &mut [f32]);
     /// `a * b + c`, rounded once.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `a + b`.
@@ -126,6 +128,36 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Stores every choice of lanes, or many of them.
+    struct Those;
+
+    impl Kernel for Those {
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) {
+            let row: [f32; ROW] = std::array::from_fn(|it| it as f32);
+            for lanes in (0..1_u32 << S::LANES).step_by(if S::LANES > 8 { 37 } else { 1 }) {
+                let want: Vec<_> = (0..S::LANES)
+                    .filter(|it| lanes >> it & 1 == 1)
+                    .map(|it| it as f32)
+                    .collect();
+                let mut to = vec![-1.0; want.len()];
+                simd.store_those(simd.load(&row), lanes, &mut to);
+                assert_eq!(to, want, "{lanes:b}");
+            }
+            let all = u32::MAX >> (32 - S::LANES);
+            let mut to = vec![-1.0; S::LANES];
+            simd.store_those(simd.load(&row), all, &mut to);
+            assert_eq!(to, row[..S::LANES]);
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_stores_chosen_lanes() {
+        for isa in Isa::available() {
+            isa.run(Those);
         }
     }
 

@@ -1,0 +1,27 @@
+//! Systems on which nobody has tried: there is no AMX.
+
+use super::{Amx, NoAmx};
+use crate::bf16::{Block, Sums};
+
+pub(super) const PRODUCTS_OF_ROUND: usize = 0;
+
+pub(super) fn permitted() -> Result<(), NoAmx> {
+    Err(NoAmx::System)
+}
+
+/// Cannot be had, since there is no [`Amx`].
+pub(crate) struct Tiles(std::convert::Infallible);
+
+impl Tiles {
+    pub(crate) fn new(_: Amx) -> Self {
+        unreachable!("nobody has an `Amx` here")
+    }
+
+    pub(super) fn exercise(&self, _: usize) {
+        match self.0 {}
+    }
+
+    pub(crate) fn sums(&self, _: &Sums<'_>, _: &mut Block) {
+        match self.0 {}
+    }
+}
