@@ -3,10 +3,25 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use kernels::{CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template};
+use kernels::{
+    Amx, Bf16Bank, Bf16Level, CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template,
+};
 
 use crate::features::{Features, Source};
 use crate::{Layout, Model, Scope};
+
+/// How exactly responses are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// In single precision, to within the bound of [`FilterBank::correlate`]: the same bits on every
+    /// machine.
+    #[default]
+    F32,
+    /// Features and weights rounded to bfloat16, sums in single precision, to within the bound of
+    /// [`Bf16Bank::correlate`]: faster, less exact, and only on machines that multiply tiles. Scores
+    /// move by about a thousandth.
+    Bf16(Amx),
+}
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
 /// are used again from frame to frame.
@@ -14,10 +29,17 @@ use crate::{Layout, Model, Scope};
 pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
-    bank: FilterBank,
+    bank: Bank,
     workspaces: Mutex<Vec<Features>>,
     /// One for each thread.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
+}
+
+/// The filters in one of the precisions.
+#[derive(Debug)]
+enum Bank {
+    F32(FilterBank),
+    Bf16(Bf16Bank),
 }
 
 impl Extractor {
@@ -28,16 +50,34 @@ impl Extractor {
 
     /// As [`Self::new`], for a given instruction set; the responses are the same on all.
     pub fn on(isa: Isa, model: Arc<Model>) -> Self {
-        Self::with(FilterBank::new, isa, model)
+        Self::with(|it| Bank::F32(FilterBank::new(isa, it)), isa, model)
+    }
+
+    /// As [`Self::new`], in a given precision.
+    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Self {
+        match precision {
+            Precision::F32 => Self::new(model),
+            Precision::Bf16(amx) => {
+                let pack = |it: &[Template<'_>]| Bank::Bf16(Bf16Bank::new(amx, it));
+                Self::with(pack, Isa::best(), model)
+            }
+        }
+    }
+
+    /// The bits of [`Precision::Bf16`] on any machine, by plain loops: far slower than
+    /// [`Precision::F32`], and there to compare with.
+    pub fn bf16_readable(model: Arc<Model>) -> Self {
+        Self::with(|it| Bank::Bf16(Bf16Bank::readable(it)), Isa::best(), model)
     }
 
     /// As [`Self::new`], but every response is the plain sum of its products: slower, and there to
     /// compare with. See [`FilterBank::correlate`] for how far apart they can be.
     pub fn direct(model: Arc<Model>) -> Self {
-        Self::with(FilterBank::direct, Isa::best(), model)
+        let isa = Isa::best();
+        Self::with(|it| Bank::F32(FilterBank::direct(isa, it)), isa, model)
     }
 
-    fn with(pack: fn(Isa, &[Template<'_>]) -> FilterBank, isa: Isa, model: Arc<Model>) -> Self {
+    fn with(pack: impl FnOnce(&[Template<'_>]) -> Bank, isa: Isa, model: Arc<Model>) -> Self {
         let filters = model.spec().filters.iter();
         let templates: Vec<_> = filters
             .map(|it| Template {
@@ -46,7 +86,7 @@ impl Extractor {
                 weights: &it.weights,
             })
             .collect();
-        let bank = pack(isa, &templates);
+        let bank = pack(&templates);
         Self {
             model,
             isa,
@@ -113,6 +153,7 @@ impl Extractor {
             scope,
             interval: spec.interval,
             cell_px: spec.cell_px,
+            rounded: matches!(self.bank, Bank::Bf16(_)),
         };
         let mut features = lock(&self.workspaces).pop().unwrap_or_default();
         let n_threads = if in_pool() {
@@ -121,17 +162,10 @@ impl Extractor {
             1
         };
         features.begin(&source, n_threads);
-        let cols = layout.levels.iter().map(|it| it.cols).max().unwrap_or(0);
-        let mut buffers = lock(&self.buffers);
-        let n_buffers = buffers.len().max(n_threads);
-        buffers.resize_with(n_buffers, CorrelateWorkspace::default);
-        for buffer in buffers.iter_mut() {
-            self.bank.reserve(cols, buffer);
-        }
-        drop(buffers);
+        self.reserve(layout, n_threads);
         let everything = Part {
             levels: usize::from(scope.levels().start)..usize::from(scope.levels().end),
-            panels: 0..self.bank.n_panels(),
+            panels: 0..self.n_panels(),
         };
         let share = if in_pool() {
             self.work(&source, &everything) / (SHARES * n_threads)
@@ -141,6 +175,32 @@ impl Extractor {
         let out = &mut out[..n_values];
         self.correlate((&source, &features), everything, share, out);
         lock(&self.workspaces).push(features);
+    }
+
+    /// Makes room for every thread.
+    fn reserve(&self, layout: &Layout, n_threads: usize) {
+        let Bank::F32(bank) = &self.bank else { return };
+        let cols = layout.levels.iter().map(|it| it.cols).max().unwrap_or(0);
+        let mut buffers = lock(&self.buffers);
+        let n_buffers = buffers.len().max(n_threads);
+        buffers.resize_with(n_buffers, CorrelateWorkspace::default);
+        for buffer in buffers.iter_mut() {
+            bank.reserve(cols, buffer);
+        }
+    }
+
+    fn n_panels(&self) -> usize {
+        match &self.bank {
+            Bank::F32(it) => it.n_panels(),
+            Bank::Bf16(it) => it.n_panels(),
+        }
+    }
+
+    fn filters(&self, panels: Range<usize>) -> Range<usize> {
+        match &self.bank {
+            Bank::F32(it) => it.filters(panels),
+            Bank::Bf16(it) => it.filters(panels),
+        }
     }
 
     /// Computes the responses of a part, in smaller ones side by side while it is more than a
@@ -164,16 +224,28 @@ impl Extractor {
             );
             return;
         }
-        let levels = part.levels.map(|level| {
+        let size = |level| {
             let window = source.layout.window(source.scope, level);
-            Level {
-                map: features.of_level(source, level),
-                size: [window.rows, window.cols],
+            [window.rows, window.cols]
+        };
+        match &self.bank {
+            Bank::F32(bank) => {
+                let levels = part.levels.map(|level| Level {
+                    map: features.of_level(source, level),
+                    size: size(level),
+                });
+                let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
+                bank.correlate(part.panels, levels, out, &mut buffers);
+                lock(&self.buffers).push(buffers);
             }
-        });
-        let mut buffers = lock(&self.buffers).pop().unwrap_or_default();
-        self.bank.correlate(part.panels, levels, out, &mut buffers);
-        lock(&self.buffers).push(buffers);
+            Bank::Bf16(bank) => {
+                let levels = part.levels.map(|level| Bf16Level {
+                    map: features.rounded(source, level),
+                    size: size(level),
+                });
+                bank.correlate(part.panels, levels, out);
+            }
+        }
     }
 
     /// Number of responses.
@@ -181,7 +253,7 @@ impl Extractor {
         let windows = part.levels.clone();
         let windows = windows.map(|level| source.layout.window(source.scope, level));
         let area: usize = windows.map(|it| it.rows * it.cols).sum();
-        area * self.bank.filters(part.panels.clone()).len()
+        area * self.filters(part.panels.clone()).len()
     }
 
     /// Levels that have about half the work, and the others; of one level, the panels.

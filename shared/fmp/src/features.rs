@@ -3,8 +3,8 @@
 use std::sync::{Mutex, OnceLock};
 
 use kernels::{
-    FeatureMap, HogShape, HogWorkspace, Isa, PartOfResized, Planes, Rgb8View, ShrinkWorkspace, hog,
-    reduce, resize_part,
+    Bf16Map, FeatureMap, HogShape, HogWorkspace, Isa, PartOfResized, Planes, Rgb8View,
+    ShrinkWorkspace, hog, reduce, resize_part,
 };
 
 use crate::cuts::{Cut, cuts};
@@ -21,6 +21,8 @@ pub(crate) struct Source<'a> {
     /// Levels per octave.
     pub(crate) interval: usize,
     pub(crate) cell_px: usize,
+    /// Whether features are kept in bfloat16, or else in single precision.
+    pub(crate) rounded: bool,
 }
 
 impl Source<'_> {
@@ -57,13 +59,18 @@ pub(crate) struct Features {
 
 #[derive(Debug, Default)]
 struct Chain {
-    /// Features of every level of the chain, padded where the image ends; empty outside of the scope.
+    /// Padded where the image ends; empty outside of the scope.
     maps: OnceLock<Maps>,
     /// What they are made in.
     spare: Mutex<Maps>,
 }
 
-type Maps = Vec<Vec<f32>>;
+/// Features of every level of a chain, in the one or the other precision.
+#[derive(Debug, Default)]
+struct Maps {
+    exact: Vec<Vec<f32>>,
+    rounded: Vec<Bf16Map>,
+}
 
 /// What is needed while a chain is computed.
 #[derive(Debug, Default)]
@@ -75,6 +82,8 @@ struct Arena {
     cuts: Vec<Cut>,
     /// Features of a cut image with the padding that it would have if it were whole.
     padded: Vec<f32>,
+    /// Features of a level before they are rounded.
+    exact: Vec<f32>,
 }
 
 impl Features {
@@ -97,24 +106,32 @@ impl Features {
     }
 
     /// The features of a level of the scope of `source`, the same one for all levels since
-    /// [`Self::begin`].
+    /// [`Self::begin`]; for a source that is not rounded.
     pub(crate) fn of_level(&self, source: &Source<'_>, level: usize) -> FeatureMap<'_> {
+        let [rows, cols] = source.map_size(level);
+        FeatureMap {
+            rows,
+            cols,
+            cells: &self.chain(source, level).exact[level / source.interval],
+        }
+    }
+
+    /// The same for a source that is rounded.
+    pub(crate) fn rounded(&self, source: &Source<'_>, level: usize) -> &Bf16Map {
+        &self.chain(source, level).rounded[level / source.interval]
+    }
+
+    fn chain(&self, source: &Source<'_>, level: usize) -> &Maps {
         let first = level % source.interval;
         let chain = &self.chains[first];
-        let maps = chain.maps.get_or_init(|| {
+        chain.maps.get_or_init(|| {
             let mut maps = std::mem::take(&mut *lock(&chain.spare));
             let arena = lock(&self.arenas).pop();
             let mut arena = arena.unwrap_or_default();
             arena.fill(source, first, &mut maps);
             lock(&self.arenas).push(arena);
             maps
-        });
-        let [rows, cols] = source.map_size(level);
-        FeatureMap {
-            rows,
-            cols,
-            cells: &maps[level / source.interval],
-        }
+        })
     }
 }
 
@@ -128,17 +145,25 @@ impl Arena {
         self.hog.reserve(width, height, source.shape());
         self.cuts.clear();
         self.cuts.reserve(source.layout.levels.len());
+        let [rows, cols] = source.shape().map_size(width, height);
         if *source.scope != Scope::whole(source.layout) {
-            let [rows, cols] = source.shape().map_size(width, height);
             self.padded.clear();
             self.padded.reserve(rows * cols * N_CHANNELS);
+        }
+        if source.rounded {
+            self.exact.clear();
+            self.exact.reserve(rows * cols * N_CHANNELS);
         }
     }
 
     /// Features of the levels `first`, `first + interval` and so on, as far as the scope goes.
     fn fill(&mut self, source: &Source<'_>, first: usize, maps: &mut Maps) {
         let levels = (first..source.layout.levels.len()).step_by(source.interval);
-        maps.resize_with(levels.len(), Vec::new);
+        if source.rounded {
+            maps.rounded.resize_with(levels.len(), Bf16Map::default);
+        } else {
+            maps.exact.resize_with(levels.len(), Vec::new);
+        }
         cuts(source, first, &mut self.cuts);
         // Images take turns in the two buffers, which keep their places for the next chain.
         let Self {
@@ -146,10 +171,11 @@ impl Arena {
             hog,
             padded,
             cuts,
+            exact,
             ..
         } = self;
         let (mut image, mut other) = (&mut self.image, &mut self.halved);
-        for (octave, ((level, map), cut)) in levels.zip(maps).zip(&*cuts).enumerate() {
+        for (octave, (level, cut)) in levels.zip(&*cuts).enumerate() {
             if octave == 0 {
                 let part = PartOfResized {
                     size: source.layout.levels[level].image_size,
@@ -161,7 +187,22 @@ impl Arena {
                 reduce(source.isa, image, shrink, other);
                 std::mem::swap(&mut image, &mut other);
             }
-            if source.scope.levels().contains(&(level as u16)) {
+            if !source.scope.levels().contains(&(level as u16)) {
+                continue;
+            }
+            if source.rounded {
+                describe(source, (level, cut), image, (hog, padded), exact);
+                let [rows, cols] = source.map_size(level);
+                maps.rounded[octave].round(
+                    source.isa,
+                    FeatureMap {
+                        rows,
+                        cols,
+                        cells: exact,
+                    },
+                );
+            } else {
+                let map = &mut maps.exact[octave];
                 describe(source, (level, cut), image, (hog, padded), map);
             }
         }

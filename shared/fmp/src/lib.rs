@@ -23,7 +23,7 @@ mod scope;
 mod solve;
 mod track;
 
-pub use extract::Extractor;
+pub use extract::{Extractor, Precision};
 pub use layout::{ImageTooSmall, Layout, LevelLayout};
 pub use local::{LocalScore, local_scores};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};

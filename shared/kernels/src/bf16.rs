@@ -64,12 +64,6 @@ pub struct Bf16Map {
 }
 
 impl Bf16Map {
-    /// Makes room for maps of up to `cells` cells: [`Self::round`] allocates nothing from then on.
-    pub fn reserve(&mut self, cells: usize) {
-        let n = cells + BLOCK;
-        self.cells.reserve(n.saturating_sub(self.cells.len()));
-    }
-
     /// Takes over a map, every value rounded to the nearest bfloat16, ties to the even one.
     ///
     /// # Panics

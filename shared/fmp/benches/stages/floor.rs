@@ -1,9 +1,10 @@
 //! What every stage would take if it did nothing but its arithmetic, at the machine's peak.
 
-use fmp::{LevelLayout, N_CHANNELS, Springs};
-use kernels::{Isa, Peak};
+use fmp::{LevelLayout, N_CHANNELS, Precision, Springs};
+use kernels::Peak;
 use serde::Serialize;
 
+use crate::arithmetic::Arithmetic;
 use crate::clock::Clock;
 use crate::readable::Ranges;
 use crate::stages::Apart;
@@ -22,24 +23,41 @@ pub(crate) struct Peaks {
     pub(crate) isa: &'static str,
     pub(crate) multiply_add: f64,
     pub(crate) max_plus: f64,
+    /// Products that are added in tiles of bfloat16, where they are the filters'.
+    pub(crate) tiles: Option<f64>,
 }
 
 impl Floors {
     /// Counts operations, and measures the peaks beside the stages.
-    pub(crate) fn new(workload: &Workload, ranges: &Ranges, isa: Isa, quick: bool) -> Self {
+    pub(crate) fn new(
+        workload: &Workload,
+        ranges: &Ranges,
+        arithmetic: Arithmetic,
+        quick: bool,
+    ) -> Self {
+        let Arithmetic { isa, precision } = arithmetic;
+        let n = if quick { 300 } else { 3000 };
         let [multiply_add, max_plus] =
-            [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(it, isa, quick));
-        let peaks = Peaks {
-            isa: isa.name(),
-            multiply_add: multiply_add * 1e-6,
-            max_plus: max_plus * 1e-6,
+            [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(quick, || it.run(isa, n)));
+        let tiles = match precision {
+            Precision::F32 => None,
+            Precision::Bf16(amx) => Some(per_ms(quick, || amx.peak(n))),
         };
+        let filters = tiles.map_or_else(
+            || products(workload, &[8, 10]) / multiply_add,
+            |it| products(workload, &[]) / it,
+        );
         Self {
-            peaks,
+            peaks: Peaks {
+                isa: arithmetic.name(),
+                multiply_add: multiply_add * 1e-6,
+                max_plus: max_plus * 1e-6,
+                tiles: tiles.map(|it| it * 1e-6),
+            },
             ms: Apart {
                 shrink: shrinking(workload) / multiply_add,
                 hog: describing(workload) / multiply_add,
-                filters: products(workload) / multiply_add,
+                filters,
                 votes: candidates(workload, ranges) / max_plus,
             },
         }
@@ -47,10 +65,10 @@ impl Floors {
 }
 
 /// Single values that one thread computes in a millisecond.
-fn per_ms(peak: Peak, isa: Isa, quick: bool) -> f64 {
+fn per_ms(quick: bool, run: impl Fn() -> u64) -> f64 {
     let clock = Clock::new(1, quick);
     let mut n = 0;
-    let times = clock.measure(|| n = peak.run(isa, if quick { 300 } else { 3000 }));
+    let times = clock.measure(|| n = run());
     n as f64 / times.min
 }
 
@@ -86,11 +104,13 @@ fn describing(workload: &Workload) -> f64 {
         .sum()
 }
 
-/// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of 8 or 10
+/// Multiply-adds of the filters in the cheapest known form: the definition, or tiles of some
 /// cells a side multiplied point by point (without the transforms).
-fn products(workload: &Workload) -> f64 {
+///
+/// * `tiles`: sides of the tiles that are offered, cells.
+fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     let per_cell = |side: usize| {
-        let tiled = [8, 10].into_iter().filter(|tile| *tile > side);
+        let tiled = tiles.iter().copied().filter(|tile| *tile > side);
         let tiled = tiled.map(|tile| (tile as f64 / (tile + 1 - side) as f64).powi(2));
         tiled.fold((side * side) as f64, f64::min) * N_CHANNELS as f64
     };

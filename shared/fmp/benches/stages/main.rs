@@ -7,6 +7,7 @@
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench says what it measured")]
 
+mod arithmetic;
 mod clock;
 mod floor;
 mod options;
@@ -17,8 +18,7 @@ mod workload;
 
 use std::process::ExitCode;
 
-use kernels::Isa;
-
+use self::arithmetic::Arithmetic;
 use self::clock::Clock;
 use self::floor::Floors;
 use self::options::Options;
@@ -44,17 +44,17 @@ fn main() -> ExitCode {
             continue;
         }
         let readable = Readable::measure(&workload);
-        for isa in Isa::available() {
-            if !options.wants_isa(isa) {
+        for arithmetic in Arithmetic::available() {
+            if !options.wants_arithmetic(arithmetic) {
                 continue;
             }
-            let floors = Floors::new(&workload, &readable.ranges, isa, options.quick);
+            let floors = Floors::new(&workload, &readable.ranges, arithmetic, options.quick);
             table.peaks.push(floors.peaks.clone());
             for &threads in &options.threads {
                 let clock = Clock::new(threads, options.quick);
-                let bench = Bench::new(&workload, isa, threads);
+                let bench = Bench::new(&workload, arithmetic, threads);
                 for (stage, times) in bench.run(&clock, &options) {
-                    let row = Row::new(&workload, (stage, isa, threads), times);
+                    let row = Row::new(&workload, (stage, arithmetic, threads), times);
                     let row = row.compared(&floors, &readable);
                     if !options.json {
                         println!("{row}");

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use fmp::{
-    Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Region as Rectangle, Scope,
+    Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Precision,
+    Region as Rectangle, Scope,
 };
-use kernels::Rgb8View;
+use kernels::{Amx, Rgb8View};
 
 use crate::allocations;
 
@@ -36,10 +37,10 @@ fn model() -> Arc<Model> {
 }
 
 /// Allocations and reallocations of frames that come after the first.
-fn of_frames(n_frames: usize) -> usize {
+fn of_frames(new: fn(Arc<Model>) -> Extractor, n_frames: usize) -> usize {
     let model = model();
     let layout = Layout::new(&model, SIZE[0], SIZE[1]).unwrap();
-    let extractor = Extractor::new(model);
+    let extractor = new(model);
     let frames: Vec<Vec<u8>> = (0..=n_frames)
         .map(|seed| {
             (0..3 * SIZE[0] * SIZE[1])
@@ -62,11 +63,16 @@ fn of_frames(n_frames: usize) -> usize {
     allocations(|| frames[1..].iter().for_each(|it| respond(it)))
 }
 
+/// In every precision that the machine has; in bfloat16 by plain loops where it has no other.
 pub(crate) fn takes_no_memory() {
-    assert_eq!(of_frames(3), 0, "on one thread");
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(3)
-        .build()
-        .unwrap();
-    assert_eq!(pool.install(|| of_frames(3)), 0, "in a pool");
+    let rounded = |model| match Amx::detect() {
+        Ok(amx) => Extractor::in_precision(Precision::Bf16(amx), model),
+        Err(_) => Extractor::bf16_readable(model),
+    };
+    for new in [Extractor::new, rounded] {
+        assert_eq!(of_frames(new, 3), 0, "on one thread");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3);
+        let pool = pool.build().unwrap();
+        assert_eq!(pool.install(|| of_frames(new, 3)), 0, "in a pool");
+    }
 }

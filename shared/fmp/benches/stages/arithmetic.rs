@@ -1,0 +1,32 @@
+//! What computes, and how exactly.
+
+use fmp::Precision;
+use kernels::{Amx, Isa};
+
+/// An instruction set, and the precision of the filters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Arithmetic {
+    pub(crate) isa: Isa,
+    pub(crate) precision: Precision,
+}
+
+impl Arithmetic {
+    /// All that this machine has, slowest first.
+    pub(crate) fn available() -> Vec<Self> {
+        let all = Isa::available().into_iter();
+        let exact = all.map(|isa| (isa, Precision::F32));
+        let rounded = Amx::detect().map(|amx| (Isa::best(), Precision::Bf16(amx)));
+        exact
+            .chain(rounded)
+            .map(|(isa, precision)| Self { isa, precision })
+            .collect()
+    }
+
+    /// What the column says.
+    pub(crate) fn name(self) -> &'static str {
+        match self.precision {
+            Precision::F32 => self.isa.name(),
+            Precision::Bf16(_) => "bf16",
+        }
+    }
+}
