@@ -11,6 +11,7 @@
 
 mod annotations;
 mod balancing;
+mod bf16;
 mod calibration;
 mod footage;
 mod iterations;

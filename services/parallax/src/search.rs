@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use fmp::{Extractor, Layout, Model, Responses, Solver};
-use kernels::Rgb8View;
+use fmp::{Extractor, Layout, Model, Precision, Responses, Solver};
+use kernels::{NoAmx, Rgb8View};
 
 /// A model, ready to search images.
 #[derive(Debug)]
@@ -23,6 +23,14 @@ impl Search {
             solver: Solver::new(Arc::clone(&model)),
             model,
         }
+    }
+
+    /// The same, in a given precision.
+    pub(crate) fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
+        Ok(Self {
+            extractor: Extractor::in_precision(precision, Arc::clone(&model))?,
+            ..Self::new(model)
+        })
     }
 
     /// Runs `look` on what the filters answer to an image, on all levels.

@@ -64,7 +64,7 @@ fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
         Arc::clone(&layout),
         ViewSettings::default(),
     );
-    (step, layout)
+    (step.unwrap(), layout)
 }
 
 #[test]

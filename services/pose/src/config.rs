@@ -1,6 +1,6 @@
 //! Section `[pose]` of a deployment file.
 
-use fmp::Track;
+use fmp::{Precision, Track};
 use pipeline::{EvidenceWindow, ViewSettings};
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,8 @@ pub struct Config {
     pub min_separation: f64,
     /// Threads of one pose process.
     pub threads: usize,
+    /// How exactly the filters are evaluated.
+    pub precision: Precision,
     /// Whether every frame is searched in full, or only near the last pose.
     pub search: Search,
     /// Tracked: levels either side of the last pose's that are searched.
@@ -53,6 +55,7 @@ impl Default for Config {
             candidates: step.n_candidates,
             min_separation: step.min_separation,
             threads: 1,
+            precision: step.precision,
             search: Search::default(),
             tracked_levels: track.levels,
             tracked_margin: track.margin,
@@ -73,6 +76,7 @@ impl Config {
             },
             n_candidates: self.candidates,
             min_separation: self.min_separation,
+            precision: self.precision,
             track: (self.search == Search::Tracked).then_some(Track {
                 levels: self.tracked_levels,
                 margin: self.tracked_margin,
@@ -109,6 +113,14 @@ mod tests {
     #[test]
     fn the_defaults_are_those_of_the_step() {
         assert_eq!(Config::default().settings(), ViewSettings::default());
+    }
+
+    #[test]
+    fn less_precision_is_had_by_its_name_only() {
+        let of = |text: &str| toml::from_str::<Config>(text).map(|it| it.settings().precision);
+        assert_eq!(of("search = \"tracked\""), Ok(Precision::F32));
+        assert_eq!(of("precision = \"bf16\""), Ok(Precision::Bf16));
+        assert!(of("precision = \"f16\"").is_err());
     }
 
     #[test]

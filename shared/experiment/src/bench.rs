@@ -109,7 +109,7 @@ impl Bench {
     ///
     /// # Errors
     ///
-    /// [`EstimatorError::TooSmall`].
+    /// [`EstimatorError`].
     pub fn new(
         setup: Setup,
         cameras: &[Camera],
@@ -124,7 +124,7 @@ impl Bench {
                 let layout = Arc::new(it.layout().clone());
                 ViewStep::new(Arc::clone(&setup.model), layout, setup.view)
             })
-            .collect();
+            .collect::<Result<_, _>>()?;
         let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
         let fuse = setup.trials.iter().map(|it| {
             let model = Arc::clone(&setup.model);

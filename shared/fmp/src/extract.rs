@@ -4,24 +4,11 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use kernels::{
-    Amx, Bf16Bank, Bf16Level, CorrelateWorkspace, FilterBank, Isa, Level, Rgb8View, Template,
+    Amx, Bf16Bank, Bf16Level, CorrelateWorkspace, FilterBank, Isa, Level, NoAmx, Rgb8View, Template,
 };
 
 use crate::features::{Features, Source};
-use crate::{Layout, Model, Scope};
-
-/// How exactly responses are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Precision {
-    /// In single precision, to within the bound of [`FilterBank::correlate`]: the same bits on every
-    /// machine.
-    #[default]
-    F32,
-    /// Features and weights rounded to bfloat16, sums in single precision, to within the bound of
-    /// [`Bf16Bank::correlate`]: faster, less exact, and only on machines that multiply tiles. Scores
-    /// move by about a thousandth.
-    Bf16(Amx),
-}
+use crate::{Layout, Model, Precision, Scope};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
 /// are used again from frame to frame.
@@ -54,12 +41,17 @@ impl Extractor {
     }
 
     /// As [`Self::new`], in a given precision.
-    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// What the machine lacks for it.
+    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
         match precision {
-            Precision::F32 => Self::new(model),
-            Precision::Bf16(amx) => {
+            Precision::F32 => Ok(Self::new(model)),
+            Precision::Bf16 => {
+                let amx = Amx::detect()?;
                 let pack = |it: &[Template<'_>]| Bank::Bf16(Bf16Bank::new(amx, it));
-                Self::with(pack, Isa::best(), model)
+                Ok(Self::with(pack, Isa::best(), model))
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fmp::{ImageTooSmall, Layout, Model, Responses, Scope, Tracker};
 use geometry::Camera;
-use kernels::Rgb8View;
+use kernels::{NoAmx, Rgb8View};
 use multiview::{Settings, ViewPlan};
 use nalgebra::UnitVector3;
 use rayon::prelude::*;
@@ -25,6 +25,9 @@ pub enum EstimatorError {
         /// How small.
         source: ImageTooSmall,
     },
+    /// The machine lacks what the precision needs.
+    #[error("precision")]
+    Precision(#[from] NoAmx),
 }
 
 /// What one set of images gave.
@@ -67,7 +70,7 @@ impl Estimator {
     ///
     /// # Errors
     ///
-    /// [`EstimatorError::TooSmall`].
+    /// [`EstimatorError`].
     pub fn new(
         model: &Arc<Model>,
         cameras: &[Camera],
@@ -84,7 +87,7 @@ impl Estimator {
                 let layout = Arc::new(it.layout().clone());
                 ViewStep::new(Arc::clone(model), layout, settings.view)
             })
-            .collect();
+            .collect::<Result<_, _>>()?;
         Ok(Self {
             responses: vec![Vec::new(); steps.len()],
             trackers: steps.iter().map(ViewStep::tracker).collect(),

@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use fmp::{
-    Bounds, Extractor, Layout, LocalScore, Model, Pose, Responses, Scope, Solver, Track, Tracker,
-    local_scores,
+    Bounds, Extractor, Layout, LocalScore, Model, Pose, Precision, Responses, Scope, Solver, Track,
+    Tracker, local_scores,
 };
-use kernels::Rgb8View;
+use kernels::{NoAmx, Rgb8View};
 
 /// Which levels of the pyramid a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,6 +42,8 @@ pub struct ViewSettings {
     pub n_candidates: usize,
     /// Least mean distance between the part centres of two candidates, box sides.
     pub min_separation: f64,
+    /// How exactly responses are computed.
+    pub precision: Precision,
     /// How poses are followed from frame to frame; every frame is searched in full without it.
     pub track: Option<Track>,
 }
@@ -52,6 +54,7 @@ impl Default for ViewSettings {
             window: EvidenceWindow::All,
             n_candidates: 8,
             min_separation: 1.0,
+            precision: Precision::F32,
             track: None,
         }
     }
@@ -83,13 +86,21 @@ pub struct ViewStep {
 
 impl ViewStep {
     /// Prepares the step.
-    pub fn new(model: Arc<Model>, layout: Arc<Layout>, settings: ViewSettings) -> Self {
-        Self {
-            extractor: Extractor::new(Arc::clone(&model)),
+    ///
+    /// # Errors
+    ///
+    /// What the machine lacks for the precision.
+    pub fn new(
+        model: Arc<Model>,
+        layout: Arc<Layout>,
+        settings: ViewSettings,
+    ) -> Result<Self, NoAmx> {
+        Ok(Self {
+            extractor: Extractor::in_precision(settings.precision, Arc::clone(&model))?,
             solver: Solver::new(model),
             layout,
             settings,
-        }
+        })
     }
 
     /// The pyramid of the frames.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use fmp::{CandidateSettings, Layout, Pose};
+use fmp::{CandidateSettings, Layout, Pose, Precision};
 use footage::{ACCENT, Canvas, FAINT, Size, Source, SourceSpec};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -58,6 +58,22 @@ pub(crate) struct Arguments {
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
+    /// How exactly the filters are evaluated: f32, or bf16, which is faster, moves scores by about a thousandth
+    /// and needs a processor with AMX.
+    #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
+    precision: Precision,
+}
+
+/// A precision that this machine has.
+fn precision(name: &str) -> Result<Precision, String> {
+    let precision = match name {
+        "f32" => Precision::F32,
+        "bf16" => Precision::Bf16,
+        _ => return Err("expected f32 or bf16".to_owned()),
+    };
+    let fits = precision.check();
+    fits.map_err(|why| format!("{why}; leave --precision out"))?;
+    Ok(precision)
 }
 
 /// Detects.
@@ -69,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             overlap: arguments.overlap,
             max: arguments.max,
         },
-        search: Search::new(model),
+        search: Search::in_precision(arguments.precision, model).or_fail(ExitKind::Usage)?,
     };
     if let Some(folder) = &arguments.overlay {
         std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;

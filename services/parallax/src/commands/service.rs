@@ -131,9 +131,10 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let audience = Audience::new(resolved, &dealing);
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
+    let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
     let job = pose::Job {
         view,
-        step: ViewStep::new(prepared.model, layout, prepared.settings.view),
+        step: step.or_fail(ExitKind::Config)?,
         n_pose_consumers: audience.of_poses(),
         n_evidence_consumers: audience.of_evidence(view),
         start_frame: resolved.deployment.capture.start_frame,

@@ -101,6 +101,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     ("pose.threads", "threads of one pose process"),
     (
+        "pose.precision",
+        "f32: the same bits everywhere; bf16: faster and less exact, needs a processor with AMX",
+    ),
+    (
         "pose.search",
         "full: every frame everywhere; tracked: near the last pose, faster and approximate",
     ),

@@ -51,7 +51,8 @@ impl Loaded {
             })?;
         }
         deployment.resolve(&base(file));
-        rules::check(&deployment).map_err(|complaint| ConfigError::Value {
+        let checked = rules::check(&deployment).and_then(|()| rules::fits_machine(&deployment));
+        checked.map_err(|complaint| ConfigError::Value {
             place: place(file, text, span_of(text, &complaint.key)),
             key: complaint.key,
             got: complaint.got,
@@ -332,6 +333,23 @@ workers = 2
             assert!(got.contains(expected), "{got}");
             read(&text, &["fuse.views=pairs", set]).unwrap();
         }
+    }
+
+    #[test]
+    fn a_precision_that_the_machine_lacks_is_refused_with_what_it_lacks() {
+        let set = ["pose.precision=bf16"];
+        match kernels::Amx::detect() {
+            Ok(_) => {
+                let pose = read(SHORT, &set).unwrap().deployment.pose;
+                assert_eq!(pose.precision, fmp::Precision::Bf16);
+            }
+            Err(why) => {
+                let got = refused(SHORT, &set);
+                assert!(got.contains("`pose.precision` is \"bf16\""), "{got}");
+                assert!(got.contains(&why.to_string()), "{got}");
+            }
+        }
+        assert!(refused(SHORT, &["pose.precision=f16"]).contains("`bf16`"));
     }
 
     #[test]

@@ -51,6 +51,15 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     )
 }
 
+/// Checks what depends on the machine that the deployment shall run on.
+pub(super) fn fits_machine(it: &Deployment) -> Result<(), Complaint> {
+    it.pose.precision.check().map_err(|why| Complaint {
+        key: "pose.precision".to_owned(),
+        got: "\"bf16\"".to_owned(),
+        expected: format!("\"f32\", or nothing: {why}"),
+    })
+}
+
 fn name(name: &str) -> Result<(), Complaint> {
     let good = |it: char| it.is_ascii_lowercase() || it.is_ascii_digit() || it == '-';
     demand(

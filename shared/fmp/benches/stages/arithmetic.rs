@@ -1,7 +1,7 @@
 //! What computes, and how exactly.
 
 use fmp::Precision;
-use kernels::{Amx, Isa};
+use kernels::Isa;
 
 /// An instruction set, and the precision of the filters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,8 @@ impl Arithmetic {
     pub(crate) fn available() -> Vec<Self> {
         let all = Isa::available().into_iter();
         let exact = all.map(|isa| (isa, Precision::F32));
-        let rounded = Amx::detect().map(|amx| (Isa::best(), Precision::Bf16(amx)));
+        let rounded = Precision::Bf16;
+        let rounded = rounded.check().map(|()| (Isa::best(), rounded));
         exact
             .chain(rounded)
             .map(|(isa, precision)| Self { isa, precision })
@@ -26,7 +27,7 @@ impl Arithmetic {
     pub(crate) fn name(self) -> &'static str {
         match self.precision {
             Precision::F32 => self.isa.name(),
-            Precision::Bf16(_) => "bf16",
+            Precision::Bf16 => "bf16",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What every stage would take if it did nothing but its arithmetic, at the machine's peak.
 
 use fmp::{LevelLayout, N_CHANNELS, Precision, Springs};
-use kernels::Peak;
+use kernels::{Amx, Peak};
 use serde::Serialize;
 
 use crate::arithmetic::Arithmetic;
@@ -41,7 +41,7 @@ impl Floors {
             [Peak::MultiplyAdd, Peak::MaxPlus].map(|it| per_ms(quick, || it.run(isa, n)));
         let tiles = match precision {
             Precision::F32 => None,
-            Precision::Bf16(amx) => Some(per_ms(quick, || amx.peak(n))),
+            Precision::Bf16 => Amx::detect().ok().map(|amx| per_ms(quick, || amx.peak(n))),
         };
         let filters = tiles.map_or_else(
             || products(workload, &[8, 10]) / multiply_add,

@@ -114,7 +114,7 @@ impl<'a> Bench<'a> {
         Self {
             extractor: match precision {
                 Precision::F32 => Extractor::on(isa, model),
-                Precision::Bf16(_) => Extractor::in_precision(precision, model),
+                Precision::Bf16 => Extractor::in_precision(precision, model).unwrap(),
             },
             solver: Solver::on(isa, Arc::clone(&workload.model)),
             levels: (0..workload.layout.levels.len() as u16).collect(),

@@ -6,7 +6,7 @@ use fmp::{
     Extractor, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Precision,
     Region as Rectangle, Scope,
 };
-use kernels::{Amx, Rgb8View};
+use kernels::Rgb8View;
 
 use crate::allocations;
 
@@ -65,9 +65,9 @@ fn of_frames(new: fn(Arc<Model>) -> Extractor, n_frames: usize) -> usize {
 
 /// In every precision that the machine has; in bfloat16 by plain loops where it has no other.
 pub(crate) fn takes_no_memory() {
-    let rounded = |model| match Amx::detect() {
-        Ok(amx) => Extractor::in_precision(Precision::Bf16(amx), model),
-        Err(_) => Extractor::bf16_readable(model),
+    let rounded = |model: Arc<Model>| {
+        Extractor::in_precision(Precision::Bf16, Arc::clone(&model))
+            .unwrap_or_else(|_| Extractor::bf16_readable(model))
     };
     for new in [Extractor::new, rounded] {
         assert_eq!(of_frames(new, 3), 0, "on one thread");

@@ -17,6 +17,9 @@ pub(super) enum NoSample {
     /// The picture is too small for the model.
     #[error(transparent)]
     Small(#[from] fmp::ImageTooSmall),
+    /// The machine lacks what the search needs.
+    #[error(transparent)]
+    Machine(#[from] kernels::NoAmx),
     /// The search found nobody.
     #[error("nobody was found")]
     Nobody,
@@ -105,7 +108,7 @@ impl Observer {
         }
         let layout = Layout::new(&self.model, size[0], size[1])?;
         let settings = ViewSettings::default();
-        let step = ViewStep::new(Arc::clone(&self.model), Arc::new(layout), settings);
+        let step = ViewStep::new(Arc::clone(&self.model), Arc::new(layout), settings)?;
         let step = Arc::new(step);
         // Pictures of a data set are of many sizes: those searches are not kept.
         if steps.len() < 8 {

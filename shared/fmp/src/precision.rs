@@ -1,0 +1,33 @@
+//! How exactly responses are computed.
+
+use kernels::{Amx, NoAmx};
+use serde::{Deserialize, Serialize};
+
+/// How exactly responses are computed; they are single precision numbers in either case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// In single precision, to within the bound of [`kernels::FilterBank::correlate`]: the same bits
+    /// on every machine.
+    #[default]
+    F32,
+    /// Features and weights rounded to bfloat16, sums in single precision, to within the bound of
+    /// [`kernels::Bf16Bank::correlate`]: faster, less exact, and only on machines that multiply tiles
+    /// (AMX). Scores move by about a thousandth. What is computed so and what is not should not be
+    /// compared by score, nor fused.
+    Bf16,
+}
+
+impl Precision {
+    /// Whether this machine has it.
+    ///
+    /// # Errors
+    ///
+    /// What is missing.
+    pub fn check(self) -> Result<(), NoAmx> {
+        match self {
+            Self::F32 => Ok(()),
+            Self::Bf16 => Amx::detect().map(|_| ()),
+        }
+    }
+}
