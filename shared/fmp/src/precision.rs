@@ -13,7 +13,7 @@ pub enum Precision {
     F32,
     /// Features and weights rounded to bfloat16, sums in single precision, to within the bound of
     /// [`kernels::Bf16Bank::correlate`]: faster, less exact, and only on machines that multiply tiles
-    /// (AMX). Scores move by about a thousandth. What is computed so and what is not should not be
+    /// (AMX). Scores move by some thousandths. What is computed so and what is not should not be
     /// compared by score, nor fused.
     Bf16,
 }

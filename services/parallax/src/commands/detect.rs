@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
-    /// How exactly the filters are evaluated: f32, or bf16, which is faster, moves scores by about a thousandth
+    /// How exactly the filters are evaluated: f32, or bf16, which is faster, moves scores by some thousandths
     /// and needs a processor with AMX.
     #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
     precision: Precision,

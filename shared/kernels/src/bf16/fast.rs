@@ -67,9 +67,10 @@ impl Kernel for Answer<'_> {
                         filter: panel.filter,
                         weights: &panel.weights,
                     };
-                    self.tiles.sums(&job, &mut sums);
                     let there = Placements::of(first..end.min(first + BLOCK), self.map.cols, cols);
                     let to = (maps + there.at, rows * cols, panel.filters.len());
+                    expect(simd, there.inside, to, self.out);
+                    self.tiles.sums(&job, &mut sums);
                     put(simd, &sums, there.inside, to, self.out);
                 }
                 maps += panel.filters.len() * rows * cols;
@@ -105,6 +106,27 @@ impl Placements {
         Self {
             inside,
             at: y * cols + x.min(cols),
+        }
+    }
+}
+
+/// Has the lines of the cache brought that the sums of a block will be written to, while these are computed.
+#[inline(always)]
+fn expect<S: Simd>(
+    simd: S,
+    inside: u32,
+    (at, plane, n_filters): (usize, usize, usize),
+    out: &[f32],
+) {
+    let n = inside.count_ones() as usize;
+    if n == 0 {
+        return;
+    }
+    for map in 0..n_filters {
+        let there = &out[at + map * plane..][..n];
+        // Two lines or three: 32 values at most.
+        for it in [0, n / 2, n - 1] {
+            simd.expect(&there[it]);
         }
     }
 }
