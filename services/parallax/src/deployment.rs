@@ -67,7 +67,8 @@ pub(crate) struct Supervision {
     /// not given.
     pub hang_limit_s: Option<u64>,
     /// How many signs of life, one every 150 ms, a process may miss that stands still because a signal
-    /// stopped it.
+    /// stopped it; where the latest frame wins also for how many a turn of any process but `record` and `tape` may
+    /// compute, however short those before it were.
     pub missed_beats: u32,
     /// Most restarts of one process within the window before it is given up.
     pub max_restarts: u32,

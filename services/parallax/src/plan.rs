@@ -42,6 +42,11 @@ pub(crate) const SERVICES: [&str; 6] = [
     "record",
 ];
 
+/// How many times the work of any frame before it a frame may be, where frames are alike.
+const EVEN: u32 = 3;
+/// Solutions after which the mean pair is settled at the earliest: six to seven (`multiview::estimate_all_views`).
+const SETTLED: u32 = 4;
+
 impl Resolved {
     /// Looks at the footage of a deployment.
     pub(crate) fn new(deployment: &Deployment) -> Result<Self, Failure> {
@@ -196,15 +201,25 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
         processes.extend((0..count).map(|it| process(service, Some(it), role, file)));
     }
     for it in &mut processes {
-        // Pairs are settled after few solutions or many, what is written at the end is not alike, and threads that
-        // share the work of a frame use time while one of them gets none (five minutes of kills on a busy machine:
-        // 15 times three turns of a pose process). Where nothing may be lost, nothing is hurried.
-        it.is_even = resolved.delivery() == Delivery::Realtime
-            && ["capture", "triangulate"].contains(&it.service.as_str());
+        it.most_work = most_work(resolved, &it.service);
         it.scheduling = resolved.deployment.runtime.of(&it.service, &it.name);
         stand_in(it, resolved);
     }
     processes
+}
+
+/// How many times the work of any turn before it a turn of a service may be; none if that is not known, as of what is
+/// written at the end, or where nothing may be lost and so nothing is hurried.
+fn most_work(resolved: &Resolved, service: &str) -> Option<u32> {
+    if resolved.delivery() == Delivery::Lossless {
+        return None;
+    }
+    match service {
+        "capture" | "pose" | "quality" | "triangulate" => Some(EVEN),
+        // A turn is a pair, or all views: settled after few solutions, or after as many as there may be.
+        "fuse" => Some(EVEN.max(resolved.deployment.fuse.max_iterations as u32 / SETTLED)),
+        _ => None,
+    }
 }
 
 /// Makes a process that does not run one that sends what was recorded of it.
@@ -214,6 +229,7 @@ fn stand_in(it: &mut ProcessSpec, resolved: &Resolved) {
         it.args
             .extend(["--stage".into(), it.service.clone().into()]);
         "replay".clone_into(&mut it.service);
+        it.most_work = None;
     }
 }
 
@@ -228,7 +244,7 @@ fn process(service: &str, index: Option<usize>, role: Role, file: &Path) -> Proc
         args,
         role,
         scheduling: Scheduling::default(),
-        is_even: false,
+        most_work: None,
     }
 }
 

@@ -57,7 +57,7 @@ mod tests {
             args: Vec::new(),
             role: Role::Optional,
             scheduling: scheduling.parse().unwrap(),
-            is_even: false,
+            most_work: None,
         }
     }
 

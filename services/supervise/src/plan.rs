@@ -41,9 +41,9 @@ pub struct ProcessSpec {
     pub role: Role,
     /// What it asks of the system's scheduler.
     pub scheduling: Scheduling,
-    /// Whether all turns of its main loop are about as much work. Of one whose are, a turn that has taken three
-    /// times the processor time of any before it, some messages after the first, is no work any more.
-    pub is_even: bool,
+    /// How many times the processor time of any turn before it a turn of its main loop may take, some messages after
+    /// the first; one that has taken more is no work any more. None if turns say nothing about each other.
+    pub most_work: Option<u32>,
 }
 
 /// What becomes of the run when a process has been given up.
@@ -73,7 +73,7 @@ pub struct Policy {
     /// How long a process may take until its main loop turns for the first time.
     pub startup_limit: Duration,
     /// How long a process that the system calls stopped may give no sign of life; and the processor time that
-    /// any turn of the main loop of an even process may take ([`ProcessSpec::is_even`]).
+    /// any turn of a main loop may take, however little those before it took ([`ProcessSpec::most_work`]).
     pub stopped_limit: Duration,
     /// How long any process may give no sign of life: they come from a thread of its own, whatever it
     /// computes, so one that is silent is stopped, or gets no processor.

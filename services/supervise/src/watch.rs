@@ -13,8 +13,6 @@ use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
 /// A main loop that turned since then is one that waits, not one that computes.
 const AWAKE: Duration = Duration::from_secs(1);
-/// How many times the processor time of its longest turn an even process may use for one.
-const MORE_WORK: u32 = 3;
 /// Messages that it has sent before: the first ones are more work than the others.
 const TRIED: u64 = 8;
 /// Lines of output that are kept to explain a death.
@@ -249,11 +247,13 @@ impl Watch {
     /// Whether it has worked on one thing far longer than on anything before.
     fn computes_for_ever(&self, policy: &Policy, now: Instant) -> bool {
         let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
-        let longest = policy.stopped_limit.max(MORE_WORK * self.work.longest);
-        self.spec.is_even
+        let is_too_much = |factor| {
+            let most = policy.stopped_limit.max(factor * self.work.longest);
+            self.work.since_turn >= most
+        };
+        self.spec.most_work.is_some_and(is_too_much)
             && self.current.is_some_and(|it| it.n_sent >= TRIED)
             && self.at_work_since.is_some_and(worked)
-            && self.work.since_turn > longest
     }
 
     /// Ends a life, and says what is to follow.

@@ -175,10 +175,10 @@ fn a_main_loop_that_stands_still_is_found_out() {
 }
 
 /// How processes die that compute for a while, as they usually do, and then for long.
-fn deaths_of_one_that_computes(how: &str, is_even: bool) -> Vec<Death> {
+fn deaths_of_one_that_computes(how: &str, most_work: Option<u32>) -> Vec<Death> {
     let mut case = Case::new(Delivery::Realtime, &[("mill", how, Role::Essential)]);
     case.plan.policy.hang_limit = Duration::from_mins(10);
-    case.plan.processes[0].is_even = is_even;
+    case.plan.processes[0].most_work = most_work;
     let run = case.run(|_, _| {});
     assert_eq!(state_of(&run, "mill"), State::Finished);
     run.deaths("mill")
@@ -186,18 +186,28 @@ fn deaths_of_one_that_computes(how: &str, is_even: bool) -> Vec<Death> {
 
 #[test]
 fn who_computes_for_ever_is_found_out_by_the_work_it_did_before() {
-    let deaths = deaths_of_one_that_computes("compute 20 600000", true);
+    let deaths = deaths_of_one_that_computes("compute 20 600000", Some(3));
     assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
 }
 
 #[test]
 fn who_computes_twice_as_long_as_before_is_left_alone() {
-    assert_eq!(deaths_of_one_that_computes("compute 300 600", true), []);
+    assert_eq!(deaths_of_one_that_computes("compute 300 600", Some(3)), []);
 }
 
 #[test]
 fn who_is_known_to_be_uneven_is_left_alone() {
-    assert_eq!(deaths_of_one_that_computes("compute 20 1500", false), []);
+    assert_eq!(deaths_of_one_that_computes("compute 20 1500", None), []);
+}
+
+#[test]
+fn who_always_finds_more_to_do_and_never_waits_is_at_work() {
+    let mut case = Case::new(
+        Delivery::Realtime,
+        &[("mill", "compute 20 0", Role::Essential)],
+    );
+    case.plan.policy.hang_limit = Duration::from_secs(2);
+    assert_eq!(case.run(|_, _| {}).deaths("mill"), []);
 }
 
 #[test]

@@ -117,10 +117,11 @@ impl Health {
         self.counts.n_received.fetch_add(n, Ordering::Relaxed);
     }
 
-    /// Counts a message sent out.
+    /// Counts a message sent out, which is a turn of the main loop: who always finds more to do never waits.
     pub fn sent(&self, frame: u64) {
         self.counts.n_sent.fetch_add(1, Ordering::Relaxed);
         self.counts.last_frame.store(frame, Ordering::Relaxed);
+        self.counts.progress.tick();
     }
 
     /// Counts messages or frames that were lost.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Counts turns of a process's main loop; clones share the count.
 ///
-/// Waiting for messages and waiting for a slow receiver count by themselves. A computation that may
+/// Waiting for messages, waiting for a slow receiver and sending count by themselves. A computation that may
 /// take seconds calls [`tick`](Self::tick) in between, or the supervisor will think that it hangs.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {

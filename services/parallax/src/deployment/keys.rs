@@ -257,8 +257,8 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "supervise.missed_beats",
-        "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed, or that one \
-         that computes for ever may give (realtime)",
+        "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed; realtime: and \
+         for how many of them a turn of any but record and tape may compute, however short those before it were",
     ),
     (
         "supervise.max_restarts",

@@ -60,7 +60,7 @@ impl Case {
                 args: behaviour.split(' ').map(Into::into).collect(),
                 role,
                 scheduling: Scheduling::default(),
-                is_even: false,
+                most_work: None,
             });
         let health = processes
             .iter()

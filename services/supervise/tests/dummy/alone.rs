@@ -29,7 +29,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         args: vec!["hang-once".into()],
         role: Role::Essential,
         scheduling: Scheduling::default(),
-        is_even: false,
+        most_work: None,
     });
     let plan = Plan {
         executable: "/proc/self/exe".into(),

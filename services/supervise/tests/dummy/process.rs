@@ -206,15 +206,16 @@ fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for three seconds, `usual` milliseconds at a time; then once, in its first life, for `long` of them.
+/// Computes for three seconds, `usual` milliseconds at a time, and never waits; then once, in its first life, for `long`
+/// of them.
 fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
     let burn = |millis: u64| {
         let begin = Instant::now();
         while begin.elapsed() < Duration::from_millis(millis) && !service.stop().is_requested() {
             core::hint::spin_loop();
         }
-        service.progress().tick();
     };
+    service.progress().tick();
     let begin = Instant::now();
     for frame in 0.. {
         if begin.elapsed() > Duration::from_secs(3) {
