@@ -82,6 +82,23 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
 }
 
 #[test]
+fn where_the_latest_wins_who_computes_for_ever_is_found_out_by_the_work_of_its_frames() {
+    // The clock alone would leave it alone for ten minutes.
+    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
+    let case = Case::new("chaos-spin", &[240; 3], &patient);
+    let (ended, report) = chaos(&case, "spin-pose,spin-fuse,spin-triangulate", &PATIENT);
+    let scenarios = report["scenarios"].as_array().unwrap();
+    assert_eq!(scenarios.len(), 3, "{}", ended.stderr);
+    for it in scenarios {
+        let measured = &it["measured"];
+        let expected = json!([{ "process": measured["process"], "restarts": 1 }]);
+        assert_eq!(it["run"]["restarts"], expected, "{it:#}");
+        assert!(measured["cost"]["back_ms"].is_number(), "{it:#}");
+    }
+}
+
+#[test]
 fn a_failing_camera_is_named_counted_and_back_and_a_stalled_recorder_holds_nobody_up() {
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
     let case = Case::new("chaos-camera", &[160; 3], &live);

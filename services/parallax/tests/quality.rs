@@ -223,3 +223,23 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     let stderr = said(&file[..file.len() / 2]);
     assert!(stderr.contains("cut off or no ONNX file"), "{stderr}");
 }
+
+#[test]
+fn a_prediction_that_never_ends_is_found_out_by_the_work_of_those_before() {
+    // The clock alone would leave it alone for ten minutes.
+    let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
+                frame_rate_hz = 20\n[record]\noverlay_every = 0\n\
+                [quality]\nnetwork = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
+    let case = Case::new("endless", &[240; 2], more);
+    case.write("q.onnx", network(0.02).file());
+    let chaos = ["chaos", "deployment.toml", "--scenario", "spin-quality"];
+    let named = ["--out", "chaos", "--name", &case.name, "--json"];
+    let ended = case.start(&[&chaos[..], &named].concat()).wait();
+    case.assert_nothing_left();
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let spun = &report["scenarios"][0];
+    let process = &spun["measured"]["process"];
+    let expected = json!([{ "process": process, "restarts": 1 }]);
+    assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
+    assert!(spun["measured"]["cost"]["back_ms"].is_number(), "{spun:#}");
+}

@@ -51,6 +51,8 @@ struct Counts {
     finished: AtomicU32,
     refused: [AtomicU64; Refusal::N],
     ended: AtomicBool,
+    /// The first message beyond this frame is the last.
+    spins_after: AtomicU64,
     began_at_nanos: u64,
     meter: Mutex<Meter>,
 }
@@ -73,6 +75,7 @@ impl Health {
             finished: AtomicU32::new(0),
             refused: [const { AtomicU64::new(0) }; Refusal::N],
             ended: AtomicBool::new(false),
+            spins_after: AtomicU64::new(u64::MAX),
             began_at_nanos: now_nanos(),
             meter: Mutex::default(),
         });
@@ -122,6 +125,14 @@ impl Health {
         self.counts.n_sent.fetch_add(1, Ordering::Relaxed);
         self.counts.last_frame.store(frame, Ordering::Relaxed);
         self.counts.progress.tick();
+        if frame > self.counts.spins_after.load(Ordering::Relaxed) {
+            spin();
+        }
+    }
+
+    /// Has the caller of [`Self::sent`] compute for ever on purpose, once it has sent something of a later frame.
+    pub fn spin_after(&self, frame: u64) {
+        self.counts.spins_after.store(frame, Ordering::Relaxed);
     }
 
     /// Counts messages or frames that were lost.
@@ -292,6 +303,13 @@ impl Counts {
 
     fn meter<T>(&self, use_it: impl FnOnce(&mut Meter) -> T) -> T {
         use_it(&mut self.meter.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+fn spin() -> ! {
+    tracing::warn!("computing for ever, on purpose");
+    loop {
+        core::hint::spin_loop();
     }
 }
 

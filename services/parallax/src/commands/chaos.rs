@@ -42,8 +42,8 @@ where others can go on without it, no pause between two results is longer than -
 frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
 itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
 within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit; \
-one that computes for ever (spin-capture) gives signs of life but none of work, and is noticed as soon when it has used so much \
-processor time, and three times that of any frame before, for one; where nothing may be lost, when its main loop has stood \
+one that computes for ever (spin-...) gives signs of life but none of work, and is noticed as soon when it has used so much \
+processor time, and three times that of any frame before for one; where nothing may be lost, when its main loop has stood \
 still for three seconds, which the scenario sets (supervise.hang_limit_s). With \
 kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
 a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
@@ -109,8 +109,8 @@ pub(crate) struct Arguments {
 /// The fault comes after this share of the frames.
 const STRIKE_AFTER: f64 = 0.4;
 
-/// How long the main loop of a process may stand still where one computes for ever: a sign of work is due each second,
-/// and three may be missed.
+/// How long the main loop of a process may stand still where one computes for ever and nothing may be lost: a sign of
+/// work is due each second, and three may be missed. Where the latest wins its work alone is to tell.
 const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
 /// Tries everything that is asked for, and judges it.
@@ -241,23 +241,19 @@ fn supervisor(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure
     })
 }
 
-/// Plans a run one process of which never finishes what it does after a frame.
-///
-/// * `process`: of a camera.
+/// Plans a run one process of which never finishes what it does after it has sent something of a later frame.
 fn spinning(
     ground: &Ground,
     scenario: &str,
     process: &str,
     after_frame: u64,
 ) -> Result<Planned, Failure> {
-    ground.plan_with(scenario, &[SPIN_LIMIT], &|deployment| {
-        let frame = after_frame + deployment.capture.frame_step;
-        let view = process.rsplit_once('-').and_then(|it| it.1.parse().ok());
-        let camera = view.and_then(|it: usize| deployment.cameras.get_mut(it));
-        if let (Some(camera), Ok(fault)) = (camera, format!("spin@{frame}+1").parse()) {
-            camera.fault = fault;
-        }
-    })
+    let mut planned = ground.plan(scenario, &[])?;
+    if planned.plan().delivery == Delivery::Lossless {
+        planned = ground.plan(scenario, &[SPIN_LIMIT])?;
+    }
+    planned.spin(process, after_frame);
+    Ok(planned)
 }
 
 /// The frame after a share of all of them.
@@ -296,7 +292,7 @@ mod tests {
     fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
         let processes = ["capture-0", "pose-0", "triangulate", "record"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
-        assert_eq!(all.len(), 18);
+        assert_eq!(all.len(), 20);
         let quality = Scenario::Once(Blow::Kill, "quality");
         assert!(!all.contains(&quality));
         let refused = chosen(&[all[0], quality], &processes).unwrap_err();

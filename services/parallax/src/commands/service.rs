@@ -63,6 +63,9 @@ struct Own {
     /// What a recording stands in for.
     #[arg(long)]
     stage: Option<Stage>,
+    /// Compute for ever in the first life, once something of a later frame has been sent.
+    #[arg(long)]
+    spin_after: Option<u64>,
 }
 
 /// Becomes the process.
@@ -86,6 +89,9 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
     if per_view {
         let camera = &resolved.deployment.cameras[own.index].name;
         service.health().belongs_to(own.index, camera);
+    }
+    if let Some(frame) = own.spin_after.filter(|_| service.epoch() == 0) {
+        service.health().spin_after(frame);
     }
     let n_threads = if name == Name::Pose {
         resolved.deployment.pose.threads
