@@ -259,9 +259,9 @@ impl<'a> Worker<'a> {
         }
         let seen = Seen {
             stamp,
+            evidence: self.evidence_of(joined.frame, &answers),
             answers,
             sigma_ages,
-            evidence: self.evidence_of(joined.frame),
         };
         match self.job.views {
             Views::Pairs => self.pairs(&seen)?,
@@ -381,11 +381,25 @@ impl<'a> Worker<'a> {
         })
     }
 
-    /// The evidence of a frame, by view.
-    fn evidence_of(&self, frame: u64) -> Vec<Option<EvidenceView<'_>>> {
-        let views = self.evidence.iter().zip(&self.job.plans);
+    /// The evidence of a frame, by view; what says nothing about the view's poses is refused.
+    fn evidence_of(&self, frame: u64, answers: &[Option<Answer>]) -> Vec<Option<EvidenceView<'_>>> {
+        let fits = |view: usize, it: &EvidenceView<'_>| {
+            let answer = answers[view].as_ref();
+            let is_within = answer.is_none_or(|answer| answer.is_within(&it.responses()));
+            let refused = (!is_within).then_some(WireError::Mismatch {
+                field: "poses within the evidence",
+                got: 0,
+                expected: 1,
+            });
+            refused.iter().for_each(|it| self.refuse(it, "evidence"));
+            is_within
+        };
+        let views = self.evidence.iter().zip(&self.job.plans).enumerate();
         views
-            .map(|(evidence, plan)| evidence.as_ref()?.of(frame, plan))
+            .map(|(view, (evidence, plan))| {
+                let read = evidence.as_ref()?.of(frame, plan);
+                read.filter(|it| fits(view, it))
+            })
             .collect()
     }
 

@@ -20,6 +20,14 @@ pub struct Answer {
     pub tau_px: Option<Vec<f32>>,
 }
 
+impl Answer {
+    /// Whether all its poses lie where there is evidence. Those of one frame may not: a process that was restarted
+    /// answers it again, and searches elsewhere than the life whose evidence came before.
+    pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
+        self.candidates.iter().all(|it| evidence.covers(it))
+    }
+}
+
 /// The part-type tables of a rig.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PairTables {
@@ -157,7 +165,8 @@ impl FuseStep {
 
     /// Solves one pair from the joint start.
     ///
-    /// * Returns `None` if either view gave no answer.
+    /// * Returns `None` if either view gave no answer, or one whose poses its evidence does not
+    ///   [cover](Responses::covers).
     pub fn pair(
         &self,
         views: [usize; 2],
@@ -166,6 +175,11 @@ impl FuseStep {
         start: &[Option<(usize, bool)>],
     ) -> Option<PairAnswer> {
         let [first, second] = views;
+        for (view, evidence) in views.into_iter().zip(evidence) {
+            if !answers[view].as_ref()?.is_within(evidence) {
+                return None;
+            }
+        }
         let each = [
             self.view_answer(first, answers[first].as_ref()?),
             self.view_answer(second, answers[second].as_ref()?),
@@ -211,14 +225,17 @@ impl FuseStep {
     /// person from behind.
     ///
     /// * `evidence`: of the views that answered; best with their bounds.
-    /// * Returns `None` if fewer than two views have an answer and evidence.
+    /// * Returns `None` if fewer than two views have an answer, and evidence that [covers](Responses::covers) its poses.
     pub fn all_views(
         &self,
         answers: &[Option<Answer>],
         evidence: &[Option<Responses<'_>>],
         support: Support,
     ) -> Option<AllViewsAnswer> {
-        let present = |it: &usize| answers[*it].is_some() && evidence[*it].is_some();
+        let present = |it: &usize| {
+            let both = answers[*it].as_ref().zip(evidence[*it].as_ref());
+            both.is_some_and(|(answer, evidence)| answer.is_within(evidence))
+        };
         let present: Vec<usize> = (0..answers.len()).filter(present).collect();
         if present.len() < 2 {
             return None;
