@@ -18,8 +18,10 @@ const OWNER_WRITES: u32 = 0o200;
 /// Removes what dead processes left in shared memory: their slots in topics, their queues, and the
 /// hold that a dead subscriber has on a sender that waits for it.
 ///
-/// Nobody does this by itself while all processes are busy, so the supervisor does: at every death,
-/// and from time to time.
+/// Nobody does this by itself, so the supervisor does: at every death, and from time to time. It is the only one
+/// that does: iceoryx2 0.10 takes a port's tag away before it frees the port's place in its topic, and leaves the place
+/// taken for ever if the tag was gone, be it that the one who cleaned up before was killed between the two, or that
+/// two did it at once. Who was to take the place could then never begin.
 #[derive(Debug, Default)]
 pub struct Cleaner {
     /// Nodes that were dead and stayed so.

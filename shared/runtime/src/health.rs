@@ -121,10 +121,14 @@ impl Health {
     }
 
     /// Counts a message sent out, which is a turn of the main loop: who always finds more to do never waits.
+    /// The first is told at once, so that it is soon known that the process works.
     pub fn sent(&self, frame: u64) {
-        self.counts.n_sent.fetch_add(1, Ordering::Relaxed);
         self.counts.last_frame.store(frame, Ordering::Relaxed);
         self.counts.progress.tick();
+        let n_before = self.counts.n_sent.fetch_add(1, Ordering::Relaxed);
+        if let Some(thread) = self.thread.as_ref().filter(|_| n_before == 0) {
+            thread.thread().unpark();
+        }
         if frame > self.counts.spins_after.load(Ordering::Relaxed) {
             spin();
         }

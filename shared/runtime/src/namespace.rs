@@ -173,9 +173,10 @@ impl Namespace {
             .ok()
             .ok_or_else(refused)?;
         config.global.set_root_path(&root);
-        // A process cleans up when it begins, and the supervisor when one dies; at every one of a
-        // hundred ports it would only cost time.
+        // The supervisor cleans up when a process dies, and nobody else ([`crate::Cleaner`]).
         config.global.service.cleanup_dead_nodes_on_open = false;
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
         Ok(config)
     }
 }
@@ -187,4 +188,18 @@ fn fingerprint(user: u32, root: &str) -> u32 {
         hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     }
     (hash ^ (hash >> 32)) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_begins_or_ends_leaves_the_dead_to_the_supervisor() {
+        let config = Namespace::new("alone").unwrap().config().unwrap();
+        let (node, service) = (&config.global.node, &config.global.service);
+        assert!(!node.cleanup_dead_nodes_on_creation);
+        assert!(!node.cleanup_dead_nodes_on_destruction);
+        assert!(!service.cleanup_dead_nodes_on_open);
+    }
 }
