@@ -4,7 +4,8 @@
 //! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
 //! which finds the best tree of parts exactly, and [`Pose`], its answer; [`Again`] solves the same
 //! evidence under changing terms with less work. A [`Scope`] is a part of the pyramid that is searched
-//! instead of all of it, and [`Tracker`] decides which.
+//! instead of all of it, and [`Tracker`] decides which. Responses are single precision and the same
+//! bits on every machine, unless another [`Precision`] is asked for by name.
 #![forbid(unsafe_code)]
 
 pub mod files;

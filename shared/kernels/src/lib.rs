@@ -1,4 +1,7 @@
 //! Grids, images and the hot loops, each loop written twice: once to be read, once to be fast.
+//!
+//! Both give the same bits, on every instruction set. [`Bf16Bank`] is the one that is less exact than
+//! the others, and has to be asked for: with [`Amx`], or in plain loops to compare with.
 #![expect(
     unsafe_code,
     reason = "SIMD dispatch, loads and stores; every block states why it is sound"
