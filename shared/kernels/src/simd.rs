@@ -56,9 +56,9 @@ pub(crate) trait Simd: Copy {
     fn store_some(self, value: Self::V, to: &mut [f32]);
     /// Writes the lanes whose bit is set side by side; `to` has room for these and no others.
     fn store_those(self, value: Self::V, lanes: u32, to: &mut [f32]);
-    /// Asks for the line of the cache that a value lies in, which will be written soon: a hint.
+    /// Asks for the line of the cache that the first value lies in, which will be written soon: a hint.
     #[inline(always)]
-    fn expect(self, _value: &f32) {}
+    fn expect(self, _there: &[f32]) {}
     /// `a * b + c`, rounded once.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `a + b`.

@@ -105,6 +105,7 @@ impl Tiles {
     }
 
     /// Products of tiles that are held already.
+    #[expect(clippy::unused_self, reason = "who has it has tiles with shapes")]
     pub(super) fn exercise(&self, rounds: usize) {
         let products = rounds * PRODUCTS_OF_ROUND / 4;
         if products == 0 {
@@ -137,6 +138,7 @@ impl Tiles {
     /// # Panics
     ///
     /// If cells or weights end too early.
+    #[expect(clippy::unused_self, reason = "who has it has tiles with shapes")]
     pub(crate) fn sums(&self, job: &Sums<'_>, out: &mut Block) {
         let [rows, cols] = job.filter;
         assert!(rows > 0 && cols > 0, "a filter has cells");

@@ -30,7 +30,7 @@ pub(super) fn correlate<'a>(
                         map,
                         filter,
                         cols: size[1],
-                        plane,
+                        responses: plane,
                     },
                 );
             }
@@ -44,13 +44,13 @@ struct Plane<'a> {
     /// A panel, and which filter of it.
     filter: (&'a Panel, usize),
     cols: usize,
-    plane: &'a mut [f32],
+    responses: &'a mut [f32],
 }
 
 impl Body for Plane<'_> {
     #[inline(always)]
     fn run(self) {
-        for (at, response) in self.plane.iter_mut().enumerate() {
+        for (at, response) in self.responses.iter_mut().enumerate() {
             let place = [at / self.cols, at % self.cols];
             *response = sum(self.map, place, self.filter);
         }

@@ -200,9 +200,9 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn expect(self, value: &f32) {
+    fn expect(self, there: &[f32]) {
         // SAFETY: a hint about an address, which reads and writes nothing.
-        unsafe { _mm_prefetch::<_MM_HINT_ET0>(std::ptr::from_ref(value).cast()) };
+        unsafe { _mm_prefetch::<_MM_HINT_ET0>(there.as_ptr().cast()) };
     }
 
     #[inline(always)]
