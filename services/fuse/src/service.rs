@@ -386,12 +386,14 @@ impl<'a> Worker<'a> {
         let fits = |view: usize, it: &EvidenceView<'_>| {
             let answer = answers[view].as_ref();
             let is_within = answer.is_none_or(|answer| answer.is_within(&it.responses()));
-            let refused = (!is_within).then_some(WireError::Mismatch {
-                field: "poses within the evidence",
-                got: 0,
-                expected: 1,
-            });
-            refused.iter().for_each(|it| self.refuse(it, "evidence"));
+            if !is_within {
+                let refused = WireError::Mismatch {
+                    field: "poses within the evidence",
+                    got: 0,
+                    expected: 1,
+                };
+                self.refuse(&refused, "evidence");
+            }
             is_within
         };
         let views = self.evidence.iter().zip(&self.job.plans).enumerate();
