@@ -138,9 +138,10 @@ impl Planned {
     /// Has a process compute for ever in its first life, once it has sent something of a later frame.
     pub(crate) fn spin(&mut self, process: &str, after_frame: u64) {
         let spec = self.plan.processes.iter_mut().find(|it| it.name == process);
-        let args = ["--spin-after".to_owned(), after_frame.to_string()];
-        spec.into_iter()
-            .for_each(|it| it.args.extend(args.clone().map(Into::into)));
+        if let Some(it) = spec {
+            let args = ["--spin-after".to_owned(), after_frame.to_string()];
+            it.args.extend(args.map(Into::into));
+        }
     }
 
     /// Runs it, shows its progress, and says what became of it.
