@@ -18,23 +18,26 @@ use messages::ViewQuality;
 use runtime::{Bus, Cleaner, Delivery, Limits, Namespace, Stop, TopicPlan};
 use rustix::fs::{FlockOperation, fcntl_lock};
 
-const ROLE: &str = "PARALLAX_TEST_ROLE";
 const TOPIC: &str = "small";
 
 fn main() {
-    match std::env::var(ROLE).as_deref() {
-        Ok("sender") => sender(),
-        Ok("cleaner") => cleaner(),
-        Ok("in-vain") => a_slot_is_free_again_however_often_its_clean_up_was_in_vain(),
-        Ok("unfinished") => a_slot_is_free_again_although_its_owner_left_something_unfinished(),
+    match std::env::args().nth(1).as_deref() {
+        Some("role:sender") => sender(),
+        Some("role:cleaner") => cleaner(),
+        Some("role:in-vain") => a_slot_is_free_again_however_often_its_clean_up_was_in_vain(),
+        Some("role:unfinished") => {
+            a_slot_is_free_again_although_its_owner_left_something_unfinished();
+        }
         // One process cleans up in one deployment only, as a supervisor does.
-        _ => ["in-vain", "unfinished"].into_iter().for_each(passes),
+        _ => ["role:in-vain", "role:unfinished"]
+            .into_iter()
+            .for_each(passes),
     }
 }
 
 fn passes(test: &str) {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    let status = command.env(ROLE, test).status().unwrap();
+    let status = command.arg(test).status().unwrap();
     assert!(status.success(), "{test}: {status}");
 }
 
@@ -46,7 +49,7 @@ fn a_slot_is_free_again_however_often_its_clean_up_was_in_vain() {
         deployment.namespace().prefix(),
         node.file_name().unwrap().display()
     ));
-    let mut other = child("cleaner", &[&lock]);
+    let mut other = child("role:cleaner", &[&lock]);
     let mut cleaner = Cleaner::default();
     for _ in 0..3 {
         assert_eq!(cleaner.clean(&bus), 0, "another process is at it");
@@ -86,7 +89,10 @@ fn killed_sender(deployment: &Deployment) -> PathBuf {
     let namespace = deployment.namespace();
     let nodes = namespace.root().join("nodes");
     let before = folders(&nodes);
-    let mut sender = child("sender", &[namespace.base(), Path::new(namespace.name())]);
+    let mut sender = child(
+        "role:sender",
+        &[namespace.base(), Path::new(namespace.name())],
+    );
     let mut new = folders(&nodes);
     new.retain(|it| !before.contains(it));
     kill(&mut sender);
@@ -103,8 +109,8 @@ fn folders(nodes: &Path) -> Vec<PathBuf> {
 /// Starts this executable as another process, and waits until that holds what it is to hold.
 fn child(role: &str, arguments: &[&Path]) -> Child {
     let mut child = Command::new(std::env::current_exe().unwrap())
+        .arg(role)
         .args(arguments)
-        .env(ROLE, role)
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
@@ -121,7 +127,7 @@ fn kill(child: &mut Child) {
 }
 
 fn sender() {
-    let mut arguments = std::env::args_os().skip(1);
+    let mut arguments = std::env::args_os().skip(2);
     let base = PathBuf::from(arguments.next().unwrap());
     let name = arguments.next().unwrap();
     let namespace = Namespace::below(name.to_str().unwrap(), &base).unwrap();
@@ -132,7 +138,7 @@ fn sender() {
 
 /// Holds the lock that iceoryx2 takes on a dead node that it cleans up.
 fn cleaner() {
-    let path = std::env::args_os().nth(1).unwrap();
+    let path = std::env::args_os().nth(2).unwrap();
     let file = File::options().read(true).write(true).open(path).unwrap();
     fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive).unwrap();
     wait_to_be_killed();
@@ -142,5 +148,5 @@ fn cleaner() {
 fn wait_to_be_killed() {
     println!("ready");
     // Longer than the test takes; nobody is left behind if that fails.
-    sleep(Duration::from_secs(60));
+    sleep(Duration::from_mins(1));
 }
