@@ -50,10 +50,14 @@ impl Problem {
         let mut noise = noise(!seed);
         let mut factor = || 2.0_f64.powi((noise.next().unwrap() * f64::from(n)) as i32);
         for (_, weights) in &mut self.filters {
-            weights.iter_mut().for_each(|it| *it *= factor());
+            for it in weights {
+                *it *= factor();
+            }
         }
         for (.., cells) in &mut self.maps {
-            cells.iter_mut().for_each(|it| *it *= factor() as f32);
+            for it in cells {
+                *it *= factor() as f32;
+            }
         }
         self
     }
@@ -97,6 +101,7 @@ impl Problem {
 }
 
 /// The machine's own, or none, which is said.
+#[expect(clippy::print_stdout, reason = "what was not checked is said")]
 fn amx() -> Option<Amx> {
     let amx = Amx::detect();
     if let Err(why) = amx {
