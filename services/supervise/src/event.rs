@@ -23,6 +23,13 @@ pub enum Death {
         /// For how long.
         still: Duration,
     },
+    /// It was killed because one turn of its main loop took far more work than any before it.
+    Spun {
+        /// Processor time of that turn.
+        worked: Duration,
+        /// That of the longest before it.
+        longest: Duration,
+    },
     /// It was killed because it gave no sign of life.
     Silent {
         /// For how long.
@@ -43,6 +50,13 @@ impl fmt::Display for Death {
             Self::Exit { status } => write!(f, "ended with status {status}"),
             Self::Signal { number } => write!(f, "ended by signal {number}"),
             Self::Hung { still } => write!(f, "hung for {:.1} s", still.as_secs_f64()),
+            Self::Spun { worked, longest } => {
+                let [worked, longest] = [worked, longest].map(Duration::as_millis);
+                write!(
+                    f,
+                    "worked for {worked} ms on one thing, where none took more than {longest} ms before"
+                )
+            }
             Self::Silent { still } => {
                 write!(f, "gave no sign of life for {:.1} s", still.as_secs_f64())
             }

@@ -233,7 +233,10 @@ impl Watch {
         {
             Some(Death::Silent { still: silent })
         } else if self.computes_for_ever(policy, now) {
-            Some(Death::Hung { still })
+            Some(Death::Spun {
+                worked: self.work.since_turn,
+                longest: self.work.longest,
+            })
         } else if still <= policy.hang_limit {
             None
         } else if silent > still / 2 {

@@ -187,7 +187,7 @@ fn deaths_of_one_that_computes(how: &str, most_work: Option<u32>) -> Vec<Death> 
 #[test]
 fn who_computes_for_ever_is_found_out_by_the_work_it_did_before() {
     let deaths = deaths_of_one_that_computes("compute 20 600000", Some(3));
-    assert!(matches!(deaths[..], [Death::Hung { .. }]), "{deaths:?}");
+    assert!(matches!(deaths[..], [Death::Spun { .. }]), "{deaths:?}");
 }
 
 #[test]
