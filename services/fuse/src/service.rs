@@ -29,7 +29,7 @@ pub struct Job {
     /// Its pairs: their index in the deployment, and their views. All views at once read the views of these.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
-    pub step: FuseStep,
+    pub step: Arc<FuseStep>,
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.
@@ -61,6 +61,9 @@ enum Word {
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let mut worker = Worker::open(service, job, &mut waiter)?;
+    // A pair may be settled at once or after many solutions; levels are alike.
+    let step = Arc::clone(&job.step);
+    service.progress().follow(move || step.n_sweeps());
     let n = worker
         .publisher
         .wait_for_subscribers(job.n_consumers, service.patience_at_start(job.patience));

@@ -42,10 +42,8 @@ pub(crate) const SERVICES: [&str; 6] = [
     "record",
 ];
 
-/// How many times the work of any frame before it a frame may be, where frames are alike.
+/// How many times the work of any turn before it a turn may be, where turns are alike: frames, or levels of a pair.
 const EVEN: u32 = 3;
-/// Solutions after which the mean pair is settled at the earliest: six to seven (`multiview::estimate_all_views`).
-const SETTLED: u32 = 4;
 
 impl Resolved {
     /// Looks at the footage of a deployment.
@@ -215,9 +213,7 @@ fn most_work(resolved: &Resolved, service: &str) -> Option<u32> {
         return None;
     }
     match service {
-        "capture" | "pose" | "quality" | "triangulate" => Some(EVEN),
-        // A turn is a pair, or all views: settled after few solutions, or after as many as there may be.
-        "fuse" => Some(EVEN.max(resolved.deployment.fuse.max_iterations as u32 / SETTLED)),
+        "capture" | "pose" | "quality" | "fuse" | "triangulate" => Some(EVEN),
         _ => None,
     }
 }

@@ -8,6 +8,7 @@ mod suppress;
 mod sweep;
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use kernels::{Isa, VoteRule};
@@ -81,6 +82,7 @@ pub struct Solver {
     /// One list of part scores for every caller of [`Self::score`].
     scores: Mutex<Vec<Vec<f32>>>,
     tally: Tally,
+    n_sweeps: AtomicU64,
 }
 
 /// A placement of the root and the score of the best tree that hangs on it.
@@ -117,6 +119,7 @@ impl Solver {
             workspaces: Mutex::default(),
             scores: Mutex::default(),
             tally: Tally::default(),
+            n_sweeps: AtomicU64::new(0),
         }
     }
 
@@ -211,6 +214,12 @@ impl Solver {
     /// What repeated solutions have taken so far.
     pub fn effort(&self) -> Effort {
         self.tally.sums()
+    }
+
+    /// Levels on which votes have been cast so far, in solutions of any kind, those not yet done included: what moves
+    /// on as long as a long computation does. May be asked from another thread.
+    pub fn n_sweeps(&self) -> u64 {
+        self.n_sweeps.load(Ordering::Relaxed)
     }
 
     /// The planes of a part.

@@ -132,6 +132,11 @@ impl FuseStep {
         }
     }
 
+    /// Levels that were solved so far ([`Solver::n_sweeps`]); another thread may watch it.
+    pub fn n_sweeps(&self) -> u64 {
+        self.solver.n_sweeps()
+    }
+
     /// The joint start of a frame; `None` for the views that gave no answer.
     ///
     /// Every fusion worker computes it for all views, from their (small) answers alone, so that all

@@ -1,16 +1,21 @@
 //! A counter that moves as long as a process does.
 
-use std::sync::Arc;
+use core::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Counts turns of a process's main loop; clones share the count.
 ///
 /// Waiting for messages, waiting for a slow receiver and sending count by themselves. A computation that may
-/// take seconds calls [`tick`](Self::tick) in between, or the supervisor will think that it hangs.
-#[derive(Debug, Clone, Default)]
+/// take seconds calls [`tick`](Self::tick) in between, or is [followed](Self::follow) where it counts its steps
+/// itself; else the supervisor will think that it hangs.
+#[derive(Clone, Default)]
 pub struct Progress {
     count: Arc<AtomicU64>,
+    steps: Arc<OnceLock<Steps>>,
 }
+
+type Steps = Box<dyn Fn() -> u64 + Send + Sync>;
 
 impl Progress {
     /// Counts one turn.
@@ -18,8 +23,42 @@ impl Progress {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// Counts every step of a computation as a turn.
+    ///
+    /// * `n_steps`: how many there have been; asked from another thread, once per sign of life.
+    /// * Returns whether it will be asked: one computation is followed, the first.
+    pub fn follow(&self, n_steps: impl Fn() -> u64 + Send + Sync + 'static) -> bool {
+        self.steps.set(Box::new(n_steps)).is_ok()
+    }
+
     /// How many there have been.
     pub fn count(&self) -> u64 {
-        self.count.load(Ordering::Relaxed)
+        let n_steps = self.steps.get().map_or(0, |it| it());
+        self.count.load(Ordering::Relaxed).wrapping_add(n_steps)
+    }
+}
+
+impl fmt::Debug for Progress {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        to.debug_tuple("Progress").field(&self.count()).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_steps_of_a_computation_are_turns_too() {
+        let (progress, steps) = (Progress::default(), Arc::new(AtomicU64::new(5)));
+        progress.tick();
+        let counted = Arc::clone(&steps);
+        assert!(progress.follow(move || counted.load(Ordering::Relaxed)));
+        let seen_elsewhere = progress.clone();
+        assert_eq!(seen_elsewhere.count(), 6);
+        steps.fetch_add(2, Ordering::Relaxed);
+        assert_eq!(seen_elsewhere.count(), 8);
+        assert!(!progress.follow(|| 1000), "one is followed");
+        assert_eq!(seen_elsewhere.count(), 8);
     }
 }

@@ -1,5 +1,7 @@
 //! All votes on one level, from the leaves to the root, and the way back.
 
+use std::sync::atomic::Ordering;
+
 use kernels::{ChildScores, Grid, OwnScores, ScoreBuffer, Span, VoteWorkspace};
 
 use super::{Extra, Root, Solver};
@@ -164,6 +166,7 @@ impl<'a> Sweep<'a> {
     /// Casts all votes, but for those that the workspace still holds.
     pub(super) fn run(problem: &Problem<'a>, workspace: &'a mut Workspace) -> Self {
         let (solver, grid) = (problem.solver, problem.grid);
+        solver.n_sweeps.fetch_add(1, Ordering::Relaxed);
         workspace.prepare(problem);
         for part in (0..solver.model.n_parts()).rev() {
             workspace.begin(problem, part);

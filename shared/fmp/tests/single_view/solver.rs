@@ -226,3 +226,22 @@ fn only_levels_that_are_offered_and_asked_for_are_searched() {
     assert_eq!(solver.best_on(&view, &[0], None), None);
     assert!(solver.root_scores(&view, 0, None).is_empty());
 }
+
+#[test]
+fn who_watches_a_solver_sees_every_level_that_it_looks_at() {
+    let mut noise = Noise(7);
+    let model = tree(&mut noise, 3);
+    let evidence = Evidence::new(&mut noise, &model, &[[8, 9], [6, 5]]);
+    let evidence = evidence.view();
+    let solver = Solver::new(model);
+    let mut seen = vec![solver.n_sweeps()];
+    solver.best(&evidence, None);
+    seen.push(solver.n_sweeps());
+    let bounds = solver.bounds(&evidence);
+    seen.push(solver.n_sweeps());
+    assert_eq!(seen, [0, 2, 4]);
+    let evidence = evidence.with_bounds(&bounds);
+    // Without a guess at least one level has to be looked at.
+    solver.again(&evidence).best(&OtherView(7), None);
+    assert!(solver.n_sweeps() > 4);
+}
