@@ -10,6 +10,7 @@ use clap::{Args, Parser, ValueEnum};
 use geometry::files::ReadOptions;
 use messages::topic;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
+use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
 use viewquality::Forecaster;
 
@@ -98,10 +99,7 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
     } else {
         1
     };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads)
-        .build_global()
-        .or_fail(ExitKind::Run)?;
+    pool(n_threads).build_global().or_fail(ExitKind::Run)?;
     match name {
         Name::Capture => capture(service, &resolved, own.index),
         Name::Pose => pose(service, &resolved, own.index),
@@ -111,6 +109,17 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
         Name::Record => record(service, &resolved),
         Name::Tape => tape(service, &resolved),
         Name::Replay => replay(service, &resolved, own),
+    }
+}
+
+/// Threads of a process. Where there are several the caller, who does the work, is one of them: from outside a pool
+/// levels are not spread over it.
+fn pool(n_threads: usize) -> ThreadPoolBuilder {
+    let pool = ThreadPoolBuilder::new().num_threads(n_threads);
+    if n_threads > 1 {
+        pool.use_current_thread()
+    } else {
+        pool
     }
 }
 
@@ -189,12 +198,12 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         worker,
         views: prepared.settings.views,
         pairs: dealing.of(worker),
-        step: FuseStep::new(
+        step: Arc::new(FuseStep::new(
             prepared.model,
             prepared.settings.fuse,
             plans.clone(),
             prepared.settings.tables,
-        ),
+        )),
         plans,
         has_quality: resolved.has_quality(),
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
@@ -307,4 +316,23 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
         patience: resolved.patience(),
     };
     replay::run(service, &job)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_may_use_several_threads_works_inside_their_pool() {
+        let threads_of = |n| {
+            let inside = move || {
+                let _pool = pool(n).build();
+                rayon::current_thread_index().map(|_| rayon::current_num_threads())
+            };
+            let thread = std::thread::Builder::new().name("caller".to_owned());
+            let caller = thread.spawn(inside).ok()?;
+            caller.join().ok().flatten()
+        };
+        assert_eq!([threads_of(1), threads_of(2)], [None, Some(2)]);
+    }
 }
