@@ -9,7 +9,7 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
 
 use crate::Bus;
 
-/// How long another process is given that cleans up the same.
+/// How long another supervisor is given that cleans up the same: that of a run which is ending.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// The mode of a file that its owner may write.
