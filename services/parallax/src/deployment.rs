@@ -129,10 +129,12 @@ impl Deployment {
             };
         }
         let quality = &mut self.quality;
-        for file in [&mut quality.table, &mut quality.network]
-            .into_iter()
-            .flatten()
-        {
+        let files = [
+            &mut quality.table,
+            &mut quality.network,
+            &mut quality.onnx_runtime,
+        ];
+        for file in files.into_iter().flatten() {
             *file = base.join(&file);
         }
         if let Some(file) = &mut self.fuse.consistency {

@@ -15,7 +15,7 @@ use multiview::{Compatibility, TypeTables};
 use pipeline::PairTables;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
-use viewquality::{Network, Table, Tau};
+use viewquality::{Network, NetworkError, Table, Tau};
 
 use crate::deployment::Deployment;
 
@@ -202,11 +202,60 @@ pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failur
 /// Reads a network that predicts errors.
 pub(crate) fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
     let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
-    Network::parse(bytes, n_parts).map_err(|error| {
-        let cause = std::error::Error::source(&error).map(|it| format!(": {it}"));
-        let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
-        Failure::new(ExitKind::Input, message)
-    })
+    Network::parse(bytes, n_parts).map_err(|error| refused(file, &error))
+}
+
+/// Reads the network of a deployment, if it has one.
+pub(crate) fn own_network(
+    config: &quality::Config,
+    n_parts: usize,
+) -> Result<Option<Network>, Failure> {
+    let Some(file) = &config.network else {
+        return Ok(None);
+    };
+    let network = match &config.onnx_runtime {
+        None => network(file, n_parts),
+        Some(library) => by_onnx_runtime(library, config.device, file, n_parts),
+    };
+    network.map(Some)
+}
+
+#[cfg(feature = "ort")]
+fn by_onnx_runtime(
+    library: &Path,
+    device: quality::Device,
+    file: &Path,
+    n_parts: usize,
+) -> Result<Network, Failure> {
+    let device = match device {
+        quality::Device::Cpu => viewquality::Device::Cpu,
+        quality::Device::Cuda => viewquality::Device::Cuda,
+    };
+    let runtime = viewquality::OnnxRuntime::load(library, device);
+    let runtime = runtime.map_err(|error| refused(library, &error))?;
+    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    Network::parse_with(&runtime, &bytes, n_parts).map_err(|error| refused(file, &error))
+}
+
+#[cfg(not(feature = "ort"))]
+fn by_onnx_runtime(
+    library: &Path,
+    _device: quality::Device,
+    _file: &Path,
+    _n_parts: usize,
+) -> Result<Network, Failure> {
+    let message = format!(
+        "`quality.onnx_runtime` names {}, but this Parallax was built without it: build it with --features ort",
+        library.display()
+    );
+    Err(Failure::new(ExitKind::Config, message))
+}
+
+/// A network that is refused, with the library's own words.
+fn refused(file: &Path, error: &NetworkError) -> Failure {
+    let cause = std::error::Error::source(error).map(|it| format!(": {it}"));
+    let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
+    Failure::new(ExitKind::Input, message)
 }
 
 /// Reads thresholds of the expected errors.

@@ -89,9 +89,7 @@ impl Prepared {
     /// Sees that the network, if there is one, can be run; and that the table of expected errors, if there
     /// is one, speaks of every view; warns where it speaks of none of the frames.
     pub(crate) fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
-        if let Some(file) = &resolved.deployment.quality.network {
-            inputs::network(file, self.model.n_parts())?;
-        }
+        inputs::own_network(&resolved.deployment.quality, self.model.n_parts())?;
         let capture = &resolved.deployment.capture;
         for (view, footage) in resolved.footage.iter().enumerate() {
             let Some(predictor) = self.predictor(resolved, view)? else {

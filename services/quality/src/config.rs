@@ -12,6 +12,11 @@ use viewquality::Selection;
 pub struct Config {
     /// Network that predicts the errors, an ONNX file; in place of a table.
     pub network: Option<PathBuf>,
+    /// ONNX Runtime, a library (`libonnxruntime.so`) that runs the network in place of the one built in; needs a
+    /// Parallax that was built with the feature `ort`.
+    pub onnx_runtime: Option<PathBuf>,
+    /// What ONNX Runtime runs it on.
+    pub device: Device,
     /// How long a frame waits for its expected errors where the latest wins, milliseconds.
     pub deadline_ms: u64,
     /// How old the last expected errors of a view may be to be used instead, milliseconds.
@@ -31,11 +36,24 @@ pub struct Config {
     pub frame_step: u32,
 }
 
+/// What a network runs on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Device {
+    /// One thread of the processor.
+    #[default]
+    Cpu,
+    /// The first GPU of NVIDIA's.
+    Cuda,
+}
+
 impl Default for Config {
     fn default() -> Self {
         let selection = Selection::default();
         Self {
             network: None,
+            onnx_runtime: None,
+            device: Device::Cpu,
             deadline_ms: 50,
             max_age_ms: 500,
             table: None,

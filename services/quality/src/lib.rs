@@ -5,6 +5,6 @@ mod config;
 mod frames;
 mod service;
 
-pub use config::Config;
+pub use config::{Config, Device};
 pub use frames::HELD_REALTIME;
 pub use service::{Job, Looking, Source, run};

@@ -21,6 +21,8 @@ pub use evidence::{
     evidence_name, n_evidence,
 };
 pub use forecast::{Forecast, ForecastError, Forecaster, Seen};
+#[cfg(feature = "ort")]
+pub use network::{Device, OnnxRuntime};
 pub use network::{Network, NetworkError};
 pub use predictor::{NoPredictions, Predictor, Selection};
 pub use table::{Table, TableError};

@@ -1,13 +1,16 @@
-//! A network that predicts errors, read from an ONNX file and run by the `rten` library.
+//! A network that predicts errors, read from an ONNX file and run by the `rten` library, or by ONNX Runtime.
 
 mod frame;
 
-use std::sync::Arc;
+mod engine;
+#[cfg(feature = "ort")]
+mod onnx_runtime;
+mod rten_engine;
 
-use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView};
-use rten_tensor::prelude::*;
-use rten_tensor::{NdTensorView, TensorView};
-
+use self::engine::{Description, Engine, Input, Side};
+#[cfg(feature = "ort")]
+pub use self::onnx_runtime::{Device, OnnxRuntime};
+use self::rten_engine::Rten;
 use crate::{Card, CardError, TileShape, n_evidence};
 
 /// Names of the inputs and of the output.
@@ -18,15 +21,13 @@ const SIGMA: &str = "sigma";
 /// A network, known to take what there is and to give one number per part.
 #[derive(Debug)]
 pub struct Network {
-    model: Model,
-    tile: Option<NodeId>,
-    evidence: Option<NodeId>,
-    sigma: NodeId,
+    engine: Box<dyn Engine>,
+    takes_tile: bool,
+    takes_evidence: bool,
     card: Card,
     shape: TileShape,
     n_parts: usize,
     fingerprint: u32,
-    threads: Arc<ThreadPool>,
 }
 
 /// Why a file is no network that predicts errors.
@@ -35,6 +36,10 @@ pub enum NetworkError {
     /// The library cannot read it: no ONNX file, cut off, or of operations that it does not know.
     #[error("the file is no network that can be run")]
     Load(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// The library that is to run it cannot be used.
+    #[cfg(feature = "ort")]
+    #[error("ONNX Runtime cannot be used")]
+    Library(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// It says something of itself that cannot be.
     #[error(transparent)]
     Card(#[from] CardError),
@@ -85,22 +90,49 @@ impl Network {
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
         let fingerprint = fnv1a(&file);
         frame::check(&file).map_err(|it| NetworkError::Load(Box::new(it)))?;
-        let model = Model::load(file).map_err(|it| NetworkError::Load(Box::new(it)))?;
-        let card = Card::parse(model.metadata().fields(), n_parts)?;
-        let [mut tile, mut evidence] = [None, None];
-        for &id in model.input_ids() {
-            match name(&model, id) {
-                TILE => tile = Some(id),
-                EVIDENCE => evidence = Some(id),
-                _ => return Err(names("inputs", &model, model.input_ids())),
-            }
+        let (engine, description) = Rten::load(file)?;
+        Self::new(Box::new(engine), &description, fingerprint, n_parts)
+    }
+
+    /// As [`Self::parse`], run by ONNX Runtime.
+    ///
+    /// # Errors
+    ///
+    /// [`NetworkError`], with the names and shapes found and expected.
+    #[cfg(feature = "ort")]
+    pub fn parse_with(
+        runtime: &OnnxRuntime,
+        file: &[u8],
+        n_parts: usize,
+    ) -> Result<Self, NetworkError> {
+        frame::check(file).map_err(|it| NetworkError::Load(Box::new(it)))?;
+        let (engine, description) = runtime.load_network(file)?;
+        Self::new(Box::new(engine), &description, fnv1a(file), n_parts)
+    }
+
+    fn new(
+        engine: Box<dyn Engine>,
+        description: &Description,
+        fingerprint: u32,
+        n_parts: usize,
+    ) -> Result<Self, NetworkError> {
+        let entries = description.metadata.iter();
+        let entries = entries.map(|(name, value)| (name.as_str(), value.as_str()));
+        let card = Card::parse(entries, n_parts)?;
+        let Description {
+            inputs, outputs, ..
+        } = description;
+        let takes = |wanted: &str| inputs.iter().find(|it| it.name == wanted);
+        let (tile, evidence) = (takes(TILE), takes(EVIDENCE));
+        let n_known = [tile, evidence].into_iter().flatten().count();
+        if n_known == 0 || n_known < inputs.len() {
+            let found: Vec<&str> = inputs.iter().map(|it| it.name.as_str()).collect();
+            return Err(names("inputs", &found));
         }
-        if tile.is_none() && evidence.is_none() {
-            return Err(names("inputs", &model, model.input_ids()));
+        if !outputs.iter().any(|it| it == SIGMA) {
+            let found: Vec<&str> = outputs.iter().map(String::as_str).collect();
+            return Err(names("outputs", &found));
         }
-        let sigma = model.output_ids().iter().copied();
-        let sigma = sigma.filter(|it| name(&model, *it) == SIGMA).last();
-        let sigma = sigma.ok_or_else(|| names("outputs", &model, model.output_ids()))?;
         if evidence.is_some() != card.evidence.is_some() {
             let [takes, says] = if evidence.is_some() {
                 ["takes", "does not say"]
@@ -110,22 +142,20 @@ impl Network {
             return Err(NetworkError::EvidenceVersion { takes, says });
         }
         let shape = match tile {
-            Some(id) => tile_shape(&model, id, &card)?,
+            Some(it) => tile_shape(&it.sides, &card)?,
             None => card.tile.unwrap_or(TileShape::SMALL),
         };
-        if let Some(id) = evidence {
-            check_evidence(&model, id, n_parts)?;
+        if let Some(it) = evidence {
+            check_evidence(&it.sides, n_parts)?;
         }
         let network = Self {
-            model,
-            tile,
-            evidence,
-            sigma,
+            engine,
+            takes_tile: tile.is_some(),
+            takes_evidence: evidence.is_some(),
             card,
             shape,
             n_parts,
             fingerprint,
-            threads: Arc::new(ThreadPool::with_num_threads(1)),
         };
         let tile = vec![0.0; shape.n_values()];
         network.run(&tile, &vec![0.0; n_evidence(n_parts)])?;
@@ -149,12 +179,12 @@ impl Network {
 
     /// Whether it looks at the tile.
     pub fn takes_tile(&self) -> bool {
-        self.tile.is_some()
+        self.takes_tile
     }
 
     /// Whether it takes [`evidence`](crate::evidence()).
     pub fn takes_evidence(&self) -> bool {
-        self.evidence.is_some()
+        self.takes_evidence
     }
 
     /// Runs it on one thread; the output as it is, in its own [unit](crate::Unit).
@@ -167,30 +197,34 @@ impl Network {
     /// [`NetworkError::Shape`] if a slice or the output has another length, [`NetworkError::Run`] if the
     /// library says so.
     pub fn run(&self, tile: &[f32], evidence: &[f32]) -> Result<Vec<f32>, NetworkError> {
-        let mut inputs: Vec<(NodeId, ValueOrView<'_>)> = Vec::with_capacity(2);
-        if let Some(id) = self.tile {
+        let mut inputs = Vec::with_capacity(2);
+        if self.takes_tile {
             let TileShape { height, width } = self.shape;
             length(TILE, tile, self.shape.n_values())?;
-            let view = NdTensorView::from_data([1, 3, height, width], tile);
-            inputs.push((id, view.into()));
+            inputs.push(Input {
+                name: TILE,
+                shape: vec![1, 3, height, width],
+                values: tile,
+            });
         }
-        if let Some(id) = self.evidence {
+        if self.takes_evidence {
             let n = n_evidence(self.n_parts);
             length(EVIDENCE, evidence, n)?;
-            inputs.push((id, NdTensorView::from_data([1, n], evidence).into()));
+            inputs.push(Input {
+                name: EVIDENCE,
+                shape: vec![1, n],
+                values: evidence,
+            });
         }
-        let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
-        let run = self.model.run(inputs, &[self.sigma], Some(options));
-        let outputs = run.map_err(|it| NetworkError::Run(Box::new(it)))?;
         let expected = || format!("f32 [1, {}]", self.n_parts);
-        let sigma: Option<TensorView<'_, f32>> = outputs.first().and_then(Value::as_tensor_view);
-        let Some(sigma) = sigma else {
+        let run = self.engine.run(&inputs, SIGMA).map_err(NetworkError::Run)?;
+        let Some((sides, sigma)) = run else {
             return Err(shape(SIGMA, "of another type".to_owned(), expected()));
         };
-        if sigma.shape() != [1, self.n_parts] {
-            return Err(shape(SIGMA, format!("f32 {:?}", sigma.shape()), expected()));
+        if sides != [1, self.n_parts] {
+            return Err(shape(SIGMA, format!("f32 {sides:?}"), expected()));
         }
-        Ok(sigma.iter().copied().collect())
+        Ok(sigma)
     }
 }
 
@@ -200,16 +234,8 @@ fn fnv1a(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, step)
 }
 
-fn name(model: &Model, id: NodeId) -> &str {
-    let info = model.node_info(id);
-    info.and_then(|it| it.name()).unwrap_or_default()
-}
-
-fn names(what: &'static str, model: &Model, ids: &[NodeId]) -> NetworkError {
-    let found: Vec<String> = ids
-        .iter()
-        .map(|it| format!("`{}`", name(model, *it)))
-        .collect();
+fn names(what: &'static str, found: &[&str]) -> NetworkError {
+    let found: Vec<String> = found.iter().map(|it| format!("`{it}`")).collect();
     let expected = match what {
         "inputs" => "`tile` f32 [n, 3, H, W], `evidence` f32 [n, K], or both",
         _ => "`sigma` f32 [n, parts]",
@@ -237,46 +263,30 @@ fn length(name: &'static str, values: &[f32], expected: usize) -> Result<(), Net
     Ok(())
 }
 
-/// The sides of an input, and how they are written; no sides where the file does not say.
-fn sides(model: &Model, id: NodeId) -> (Vec<Dimension>, String) {
-    let sides = model.node_info(id).and_then(|it| it.shape());
-    let sides = sides.unwrap_or_default();
-    let words: Vec<String> = sides
-        .iter()
-        .map(|it| match it {
-            Dimension::Fixed(n) => n.to_string(),
-            Dimension::Symbolic(name) => name.clone(),
-        })
-        .collect();
-    let text = format!("[{}]", words.join(", "));
-    (sides, text)
-}
-
-/// Whether a side may have a size.
-fn may_be(side: &Dimension, size: usize) -> bool {
-    match side {
-        Dimension::Fixed(n) => *n == size,
-        Dimension::Symbolic(_) => true,
-    }
+/// How the sides of an input are written.
+fn written(sides: &[Side]) -> String {
+    let words: Vec<String> = sides.iter().map(ToString::to_string).collect();
+    format!("[{}]", words.join(", "))
 }
 
 /// Height and width of the tile: what the file says of itself, else what its input says.
-fn tile_shape(model: &Model, id: NodeId, card: &Card) -> Result<TileShape, NetworkError> {
-    let (sides, got) = sides(model, id);
+///
+/// * `sides`: of the input; none where the file does not say.
+fn tile_shape(sides: &[Side], card: &Card) -> Result<TileShape, NetworkError> {
     let expected = match card.tile {
         Some(TileShape { height, width }) => format!("[n, 3, {height}, {width}]"),
         None => "[n, 3, H, W] of known height and width, or `parallax.tile`".to_owned(),
     };
-    let refused = || shape(TILE, got.clone(), expected.clone());
-    let [n, channels, height, width] = sides.as_slice() else {
+    let refused = || shape(TILE, written(sides), expected.clone());
+    let [n, channels, height, width] = sides else {
         return Err(refused());
     };
-    if !may_be(n, 1) || !may_be(channels, 3) {
+    if !n.may_be(1) || !channels.may_be(3) {
         return Err(refused());
     }
     match (card.tile, height, width) {
-        (Some(tile), _, _) if may_be(height, tile.height) && may_be(width, tile.width) => Ok(tile),
-        (None, &Dimension::Fixed(height), &Dimension::Fixed(width))
+        (Some(tile), _, _) if height.may_be(tile.height) && width.may_be(tile.width) => Ok(tile),
+        (None, &Side::Fixed(height), &Side::Fixed(width))
             if (1..=crate::card::MAX_SIDE).contains(&height)
                 && (1..=crate::card::MAX_SIDE).contains(&width) =>
         {
@@ -286,12 +296,11 @@ fn tile_shape(model: &Model, id: NodeId, card: &Card) -> Result<TileShape, Netwo
     }
 }
 
-fn check_evidence(model: &Model, id: NodeId, n_parts: usize) -> Result<(), NetworkError> {
-    let (sides, got) = sides(model, id);
+fn check_evidence(sides: &[Side], n_parts: usize) -> Result<(), NetworkError> {
     let k = n_evidence(n_parts);
-    match sides.as_slice() {
-        [n, numbers] if may_be(n, 1) && may_be(numbers, k) => Ok(()),
-        _ => Err(shape(EVIDENCE, got, format!("[n, {k}]"))),
+    match sides {
+        [n, numbers] if n.may_be(1) && numbers.may_be(k) => Ok(()),
+        _ => Err(shape(EVIDENCE, written(sides), format!("[n, {k}]"))),
     }
 }
 

@@ -161,15 +161,13 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let source = match &resolved.deployment.quality.network {
-        Some(file) => {
-            let network = inputs::network(file, prepared.model.n_parts())?;
-            quality::Source::Network(Box::new(quality::Looking {
-                forecaster: Forecaster::new(network),
-                model: Arc::clone(&prepared.model),
-                layout: Arc::new(prepared.views[view].plan.layout().clone()),
-            }))
-        }
+    let network = inputs::own_network(&resolved.deployment.quality, prepared.model.n_parts())?;
+    let source = match network {
+        Some(network) => quality::Source::Network(Box::new(quality::Looking {
+            forecaster: Forecaster::new(network),
+            model: Arc::clone(&prepared.model),
+            layout: Arc::new(prepared.views[view].plan.layout().clone()),
+        })),
         None => quality::Source::Table(
             prepared
                 .predictor(resolved, view)?

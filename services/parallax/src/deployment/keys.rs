@@ -133,6 +133,14 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "network that predicts the errors of every view, an ONNX file; in place of a table",
     ),
     (
+        "quality.onnx_runtime",
+        "libonnxruntime.so, to run the network in place of what is built in; needs --features ort",
+    ),
+    (
+        "quality.device",
+        "what that library runs it on, \"cpu\" or \"cuda\"",
+    ),
+    (
         "quality.deadline_ms",
         "realtime: how long a frame waits for expected errors",
     ),

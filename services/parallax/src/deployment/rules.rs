@@ -137,6 +137,18 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
         "given besides `quality.table`",
         "one of the two",
     )?;
+    demand(
+        it.onnx_runtime.is_none() || it.network.is_some(),
+        "quality.onnx_runtime",
+        "given",
+        "none without `quality.network`",
+    )?;
+    demand(
+        it.device == quality::Device::Cpu || it.onnx_runtime.is_some(),
+        "quality.device",
+        "\"cuda\"",
+        "\"cpu\" without `quality.onnx_runtime`",
+    )?;
     demand(it.frame_step > 0, "quality.frame_step", "0", "at least 1")
 }
 

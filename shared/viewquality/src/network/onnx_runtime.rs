@@ -1,0 +1,157 @@
+//! ONNX Runtime, a library that the user has: for networks that `rten` cannot run, and for GPUs.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use ort::environment::Environment;
+use ort::session::{Session, SessionInputValue};
+use ort::value::{TensorRef, ValueType};
+
+use super::NetworkError;
+use super::engine::{Description, Engine, Input, Output, Port, Side, Wrong};
+
+/// What a network runs on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Device {
+    /// One thread of the processor.
+    #[default]
+    Cpu,
+    /// The first GPU of NVIDIA's, which the library must have been built for.
+    Cuda,
+}
+
+/// The library that this process has loaded: there can be one, and it stays.
+static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
+
+/// The library, loaded, and what networks are to run on.
+#[derive(Debug)]
+pub struct OnnxRuntime {
+    environment: Environment,
+    device: Device,
+}
+
+impl OnnxRuntime {
+    /// Loads the library, once in a process.
+    ///
+    /// * `library`: its file, for example `/usr/lib/libonnxruntime.so`; ONNX Runtime 1.17 or newer.
+    ///
+    /// # Errors
+    ///
+    /// [`NetworkError::Library`] if it cannot be loaded or is too old, or if another one has been loaded before.
+    pub fn load(library: &Path, device: Device) -> Result<Self, NetworkError> {
+        let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+        let environment = match &*loaded {
+            Some((file, environment)) if file == library => environment.clone(),
+            Some((file, _)) => {
+                let [wanted, has] = [library, file].map(Path::display);
+                let message = format!("{wanted} is not the one that is in use already, {has}");
+                return Err(NetworkError::Library(message.into()));
+            }
+            None => {
+                let environment = begin(library).map_err(NetworkError::Library)?;
+                *loaded = Some((library.to_owned(), environment.clone()));
+                environment
+            }
+        };
+        Ok(Self {
+            environment,
+            device,
+        })
+    }
+
+    pub(super) fn load_network(&self, file: &[u8]) -> Result<(Loaded, Description), NetworkError> {
+        let session = self.session(file).map_err(NetworkError::Load)?;
+        let description = described(&session).map_err(NetworkError::Load)?;
+        Ok((Loaded(Mutex::new(session)), description))
+    }
+
+    fn session(&self, file: &[u8]) -> Result<Session, Wrong> {
+        let builder = Session::builder(&self.environment)?;
+        let builder = builder.with_intra_threads(1).map_err(|it| plain(&it))?;
+        let builder = builder.with_inter_threads(1).map_err(|it| plain(&it))?;
+        let mut builder = match self.device {
+            Device::Cpu => builder,
+            Device::Cuda => {
+                let cuda = ort::ep::CUDA::default().build().error_on_failure();
+                builder
+                    .with_execution_providers([cuda])
+                    .map_err(|it| plain(&it))?
+            }
+        };
+        Ok(builder.commit_from_memory(file)?)
+    }
+}
+
+fn begin(library: &Path) -> Result<Environment, Wrong> {
+    let builder = ort::init_from(library).map_err(|it| it.to_string())?;
+    Ok(builder.with_telemetry(false).build()?)
+}
+
+/// An error without what it would be tried again with.
+fn plain<T>(error: &ort::Error<T>) -> Wrong {
+    error.to_string().into()
+}
+
+fn described(session: &Session) -> Result<Description, Wrong> {
+    let metadata = session.metadata()?;
+    let keys = metadata.custom_keys()?.into_iter();
+    let entries = keys.filter_map(|key| {
+        let value = metadata.custom(&key)?;
+        Some((key, value))
+    });
+    let port = |it: &ort::value::Outlet| Port {
+        name: it.name().to_owned(),
+        sides: sides(it.dtype()),
+    };
+    Ok(Description {
+        metadata: entries.collect(),
+        inputs: session.inputs().iter().map(port).collect(),
+        outputs: session
+            .outputs()
+            .iter()
+            .map(|it| it.name().to_owned())
+            .collect(),
+    })
+}
+
+fn sides(of: &ValueType) -> Vec<Side> {
+    let ValueType::Tensor {
+        shape,
+        dimension_symbols,
+        ..
+    } = of
+    else {
+        return Vec::new();
+    };
+    let side = |(&size, name): (&i64, &String)| {
+        usize::try_from(size).map_or_else(|_| Side::Named(name.clone()), Side::Fixed)
+    };
+    shape
+        .iter()
+        .zip(dimension_symbols.iter())
+        .map(side)
+        .collect()
+}
+
+/// A network in the hands of the library, which runs it for one caller at a time.
+#[derive(Debug)]
+pub(super) struct Loaded(Mutex<Session>);
+
+impl Engine for Loaded {
+    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, Wrong> {
+        let mut given: Vec<(&str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
+        for it in inputs {
+            let tensor = TensorRef::from_array_view((it.shape.clone(), it.values))?;
+            given.push((it.name, tensor.into()));
+        }
+        let mut session = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let outputs = session.run(given)?;
+        let value = outputs.get(output);
+        let value = value.ok_or_else(|| format!("it gave no `{output}`"))?;
+        let Ok((shape, values)) = value.try_extract_tensor::<f32>() else {
+            return Ok(None);
+        };
+        let sides = shape.iter().map(|&it| usize::try_from(it));
+        Ok(Some((sides.collect::<Result<_, _>>()?, values.to_vec())))
+    }
+}
