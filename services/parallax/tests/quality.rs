@@ -225,6 +225,30 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
 }
 
 #[test]
+fn who_asks_for_onnx_runtime_is_told_what_is_missing_before_anything_starts() {
+    let said = |name: &str, more: &str, status: i32| {
+        let section = format!("[quality]\nnetwork = \"q.onnx\"\n{more}\n");
+        let case = Case::new(name, &[2; 2], &(PLAIN.to_owned() + &section));
+        case.write("q.onnx", network(0.02).file());
+        let ended = case.start(&["config", "check", "deployment.toml"]).wait();
+        assert_eq!(ended.status.code(), Some(status), "{}", ended.stderr);
+        ended.stderr
+    };
+    let (status, missing) = if cfg!(feature = "ort") {
+        (4, "nowhere.so: ONNX Runtime cannot be used")
+    } else {
+        (3, "build it with --features ort")
+    };
+    let stderr = said("no-library", "onnx_runtime = \"nowhere.so\"", status);
+    assert!(
+        stderr.contains(missing) && stderr.contains("nowhere.so"),
+        "{stderr}"
+    );
+    let stderr = said("no-gpu", "device = \"cuda\"", 3);
+    assert!(stderr.contains("`quality.device`"), "{stderr}");
+}
+
+#[test]
 fn a_prediction_that_never_ends_is_found_out_by_the_work_of_those_before() {
     // The clock alone would leave it alone for ten minutes.
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
