@@ -1,7 +1,7 @@
 //! ONNX Runtime in place of `rten`: the same words and the same numbers.
 //!
-//! The library is the user's, so what needs it runs where it is named:
-//! `ONNX_RUNTIME=/usr/lib/libonnxruntime.so cargo test -p viewquality --features ort -- --include-ignored`
+//! The library is the user's, so this runs where there is one (its build without CUDA):
+//! `ONNX_RUNTIME=/usr/lib/libonnxruntime.so cargo test -p viewquality --features ort-here`
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::{Path, PathBuf};
@@ -51,7 +51,6 @@ fn a_library_that_is_not_there_is_named() {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime"]
 fn the_shipped_network_says_the_same() {
     let by_rten = Network::parse(SHIPPED.to_vec(), N_PARTS).unwrap();
     let network = Network::parse_with(&runtime(), SHIPPED, N_PARTS).unwrap();
@@ -70,7 +69,6 @@ fn the_shipped_network_says_the_same() {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime"]
 fn what_does_not_fit_is_refused_in_the_same_words() {
     let runtime = runtime();
     let said = |net: &onnx::Network, n_parts| {
@@ -92,7 +90,6 @@ fn what_does_not_fit_is_refused_in_the_same_words() {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime"]
 fn operations_that_nobody_knows_and_files_cut_off_are_refused() {
     let runtime = runtime();
     let mut net = of_colours([4, 3]);
@@ -108,7 +105,6 @@ fn operations_that_nobody_knows_and_files_cut_off_are_refused() {
 }
 
 #[test]
-#[ignore = "needs ONNX Runtime without CUDA"]
 fn a_device_that_the_library_cannot_use_is_refused() {
     let runtime = OnnxRuntime::load(&library(), Device::Cuda).unwrap();
     let error = Network::parse_with(&runtime, SHIPPED, N_PARTS).unwrap_err();
