@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use testkit::onnx::{self, Side};
+use testkit::onnx::{self, of_colours};
 use viewquality::{Device, Network, NetworkError, OnnxRuntime, TileShape, n_evidence};
 
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.quality.onnx");
@@ -19,26 +19,6 @@ fn library() -> PathBuf {
 
 fn runtime() -> OnnxRuntime {
     OnnxRuntime::load(&library(), Device::Cpu).unwrap()
-}
-
-/// Two numbers from the mean of each colour.
-fn of_colours(sides: [usize; 2]) -> onnx::Network {
-    let mut net = onnx::Network::default();
-    let tile = [
-        Side::Named("n"),
-        Side::Fixed(3),
-        Side::Fixed(sides[0]),
-        Side::Fixed(sides[1]),
-    ];
-    net.inputs.push(("tile".to_owned(), tile.to_vec()));
-    net.outputs
-        .push(("sigma".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
-    net.weigh("w", &[3, 2], vec![1.0, 2.0, 10.0, 20.0, 100.0, 200.0]);
-    net.weigh("b", &[2], vec![0.5, 0.25]);
-    net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
-    net.node("Flatten", &["mean"], "flat", vec![]);
-    net.node("Gemm", &["flat", "w", "b"], "sigma", vec![]);
-    net
 }
 
 #[test]
@@ -78,12 +58,12 @@ fn what_does_not_fit_is_refused_in_the_same_words() {
         by_rten
     };
     let expected = "`sigma` of the network is f32 [1, 2], expected f32 [1, 26]";
-    assert_eq!(said(&of_colours([4, 3]), 26), expected);
-    let mut net = of_colours([4, 3]);
+    assert_eq!(said(&of_colours(), 26), expected);
+    let mut net = of_colours();
     net.metadata
         .push(("parallax.tile".to_owned(), "160x64".to_owned()));
     said(&net, 2);
-    let mut net = of_colours([4, 3]);
+    let mut net = of_colours();
     net.inputs[0].0 = "image".to_owned();
     net.nodes[0].inputs[0] = "image".to_owned();
     said(&net, 2);
@@ -92,12 +72,12 @@ fn what_does_not_fit_is_refused_in_the_same_words() {
 #[test]
 fn operations_that_nobody_knows_and_files_cut_off_are_refused() {
     let runtime = runtime();
-    let mut net = of_colours([4, 3]);
+    let mut net = of_colours();
     net.nodes[1].op = "Guess".to_owned();
     let error = Network::parse_with(&runtime, &net.file(), 2).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(cause.contains("Guess"), "{cause}");
-    let file = of_colours([4, 3]).file();
+    let file = of_colours().file();
     for cut in [0, 1, 10, file.len() / 2, file.len() - 40] {
         let cut_off = Network::parse_with(&runtime, &file[..cut], 2);
         assert!(cut_off.is_err(), "{cut}");

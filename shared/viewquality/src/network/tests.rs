@@ -1,7 +1,7 @@
 //! Networks whose answers are known by hand give them, and what is no such network is refused.
 
 use proptest::prelude::*;
-use testkit::onnx::{self, Side};
+use testkit::onnx::{self, Side, of_colours};
 
 use super::*;
 use crate::Unit;
@@ -11,26 +11,6 @@ const SHAPE: TileShape = TileShape {
     height: 4,
     width: 3,
 };
-
-/// `sigma = means of the three colours x [[1, 2], [10, 20], [100, 200]] + [0.5, 0.25]`.
-fn of_colours() -> onnx::Network {
-    let mut net = onnx::Network::default();
-    let sides = [
-        Side::Named("n"),
-        Side::Fixed(3),
-        Side::Fixed(4),
-        Side::Fixed(3),
-    ];
-    net.inputs.push(("tile".to_owned(), sides.to_vec()));
-    net.outputs
-        .push(("sigma".to_owned(), vec![Side::Named("n"), Side::Fixed(2)]));
-    net.weigh("w", &[3, 2], vec![1.0, 2.0, 10.0, 20.0, 100.0, 200.0]);
-    net.weigh("b", &[2], vec![0.5, 0.25]);
-    net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
-    net.node("Flatten", &["mean"], "flat", vec![]);
-    net.node("Gemm", &["flat", "w", "b"], "sigma", vec![]);
-    net
-}
 
 /// `sigma = the first two numbers of the evidence`.
 fn of_evidence() -> onnx::Network {
