@@ -15,6 +15,7 @@ pub(crate) use error::ConfigError;
 pub(crate) use keys::Entry;
 pub(crate) use load::Loaded;
 pub(crate) use processes::Runtime;
+pub(crate) use rules::fuse_numbers;
 
 /// Everything a user may say about a run. Defaults are those of the services' `Config`s.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -198,12 +198,14 @@ fn footage_that_ends_before_the_truth_is_told() {
 fn what_cannot_be_done_is_refused() {
     let case = case(1, 1);
     case.write("wrong.toml", "alhpa = 1\n");
+    case.write("beyond.toml", "alpha = -1\n");
     for (more, code, words) in [
         (&["--versions", "adaptive"][..], 2, "--oracle"),
         (&["--versions", "fnp"], 2, "fnp"),
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
         (&["--share", "1-0.5"], 2, "nothing lies between"),
         (&["--fuse", "wrong.toml"], 3, "alhpa"),
+        (&["--fuse", "beyond.toml"], 3, "alpha is -1"),
         (&["--fuse", "none.toml"], 4, "none.toml"),
         (&["walk.toml"], 2, "twice"),
         (&["nowhere"], 4, "nowhere"),

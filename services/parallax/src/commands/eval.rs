@@ -19,6 +19,7 @@ use viewquality::Forecaster;
 
 use super::judge::selection;
 use crate::cli::Globals;
+use crate::deployment::fuse_numbers;
 use crate::inputs;
 use job::Job;
 
@@ -293,6 +294,16 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
     let text = inputs::text(file)?;
     let mut config: Config = toml::from_str(&text).map_err(|error| {
         let message = format!("{}: {error}", file.display());
+        Failure::new(ExitKind::Config, message)
+    })?;
+    fuse_numbers(&config).map_err(|wrong| {
+        let message = format!(
+            "{}: {} is {}, expected {}",
+            file.display(),
+            wrong.key,
+            wrong.got,
+            wrong.expected
+        );
         Failure::new(ExitKind::Config, message)
     })?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);

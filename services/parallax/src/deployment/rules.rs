@@ -10,7 +10,7 @@ const MOST_AT_ONCE: usize = 8;
 
 /// A value that cannot be.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Complaint {
+pub(crate) struct Complaint {
     /// The key, with its section.
     pub key: String,
     /// Its value.
@@ -152,12 +152,25 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
     demand(it.frame_step > 0, "quality.frame_step", "0", "at least 1")
 }
 
-fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
-    let it = &deployment.fuse;
+/// Checks the numbers of a section `[fuse]`, which stands in files of its own, too.
+pub(crate) fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
     within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
     within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
     not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
     not_negative("fuse.beta", it.beta.unwrap_or(0.0))?;
+    not_negative("fuse.epsilon_px", it.epsilon_px)?;
+    if let Some(cells) = it.max_distance_cells {
+        positive("fuse.max_distance_cells", cells)?;
+    }
+    for tau in it.tau.px() {
+        not_negative("fuse.tau", f64::from(tau))?;
+    }
+    Ok(())
+}
+
+fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.fuse;
+    fuse_numbers(it)?;
     all_views(deployment)?;
     let needs_file = it.tau == fuse::Tau::Named(fuse::TauName::Learned);
     demand(
@@ -166,13 +179,6 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
         "\"learned\"",
         "thresholds, or `fuse.consistency` to name the file that has them",
     )?;
-    not_negative("fuse.epsilon_px", it.epsilon_px)?;
-    if let Some(cells) = it.max_distance_cells {
-        positive("fuse.max_distance_cells", cells)?;
-    }
-    for tau in it.tau.px() {
-        not_negative("fuse.tau", f64::from(tau))?;
-    }
     let tables = it
         .compatibility
         .iter()
