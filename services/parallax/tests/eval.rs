@@ -205,7 +205,7 @@ fn what_cannot_be_done_is_refused() {
         (&["--size", "12"], 2, "WIDTHxHEIGHT"),
         (&["--share", "1-0.5"], 2, "nothing lies between"),
         (&["--fuse", "wrong.toml"], 3, "alhpa"),
-        (&["--fuse", "beyond.toml"], 3, "alpha is -1"),
+        (&["--fuse", "beyond.toml"], 3, "`fuse.alpha` is -1"),
         (&["--fuse", "none.toml"], 4, "none.toml"),
         (&["walk.toml"], 2, "twice"),
         (&["nowhere"], 4, "nowhere"),

@@ -296,16 +296,9 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
         let message = format!("{}: {error}", file.display());
         Failure::new(ExitKind::Config, message)
     })?;
-    fuse_numbers(&config).map_err(|wrong| {
-        let message = format!(
-            "{}: {} is {}, expected {}",
-            file.display(),
-            wrong.key,
-            wrong.got,
-            wrong.expected
-        );
-        Failure::new(ExitKind::Config, message)
-    })?;
+    fuse_numbers(&config)
+        .map_err(|it| it.at(file.display().to_string()))
+        .or_fail(ExitKind::Config)?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
     if let Some(file) = &mut config.consistency {
         *file = folder.join(&file);

@@ -52,11 +52,9 @@ impl Loaded {
         }
         deployment.resolve(&base(file));
         let checked = rules::check(&deployment).and_then(|()| rules::fits_machine(&deployment));
-        checked.map_err(|complaint| ConfigError::Value {
-            place: place(file, text, span_of(text, &complaint.key)),
-            key: complaint.key,
-            got: complaint.got,
-            expected: complaint.expected,
+        checked.map_err(|it| {
+            let at = place(file, text, span_of(text, &it.key));
+            it.at(at)
         })?;
         Ok(Self {
             deployment,
@@ -93,12 +91,7 @@ impl Loaded {
         let read: Result<Deployment, toml::de::Error> = table.try_into();
         let mut deployment = read.map_err(|error| explain(error.message()))?;
         deployment.resolve(&base(Path::new("")));
-        rules::check(&deployment).map_err(|complaint| ConfigError::Value {
-            place: "--set".to_owned(),
-            key: complaint.key,
-            got: complaint.got,
-            expected: complaint.expected,
-        })?;
+        rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
         Ok(Self {
             deployment,
             in_file,

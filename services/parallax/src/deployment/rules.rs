@@ -3,7 +3,7 @@
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
 use runtime::MAX_CORES;
 
-use super::Deployment;
+use super::{ConfigError, Deployment};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
 const MOST_AT_ONCE: usize = 8;
@@ -17,6 +17,18 @@ pub(crate) struct Complaint {
     pub got: String,
     /// What would do.
     pub expected: String,
+}
+
+impl Complaint {
+    /// The same with its place: file and line, or the option of the command line.
+    pub(crate) fn at(self, place: String) -> ConfigError {
+        ConfigError::Value {
+            place,
+            key: self.key,
+            got: self.got,
+            expected: self.expected,
+        }
+    }
 }
 
 /// Checks the values that the types alone do not.
