@@ -1,7 +1,7 @@
 //! What is wrong with an input is said with its file and its field, and nothing is left behind.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 

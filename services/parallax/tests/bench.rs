@@ -1,7 +1,7 @@
 //! Benches with real processes: what they report, their exit codes, and that pixels are never copied.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 

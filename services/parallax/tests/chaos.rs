@@ -1,6 +1,6 @@
 //! Chaos on a short deployment: real processes, real kills, the verdicts and the exit codes.
 
-mod common;
+use crate::common;
 
 use std::fs;
 

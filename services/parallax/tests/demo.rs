@@ -1,7 +1,7 @@
 //! The demo, as a new user starts it, but shorter: real processes, a real kill, the report.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::sync::{Mutex, PoisonError};

@@ -1,7 +1,7 @@
 //! `parallax eval`, and `parallax train consistency` before it, as a user starts them: what they leave behind, go on with, and refuse.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::path::PathBuf;

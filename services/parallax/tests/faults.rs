@@ -1,7 +1,7 @@
 //! What is left of a run of real processes when one of them is stopped or killed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::collections::BTreeSet;
 

@@ -1,7 +1,7 @@
 //! Runs on a disk, and in a shared memory, that are too small.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 

@@ -1,7 +1,7 @@
 //! A deployment that runs, as `status` and `top` show it, and runs that have to be fast enough.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::started::signal;
 use common::{Case, Ended, PACED, PLAIN};

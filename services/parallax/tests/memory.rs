@@ -1,7 +1,7 @@
 //! What a pose process holds at most, with images and a model of the size that people use.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::{Case, planted};
 use fmp::{Filter, Model, ModelSpec, N_CHANNELS};

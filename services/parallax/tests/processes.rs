@@ -1,7 +1,7 @@
 //! Whole deployments of real processes, and what faults leave of them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::started::signal;
 use common::{Case, PACED, PLAIN};

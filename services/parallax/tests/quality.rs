@@ -1,7 +1,7 @@
 //! Deployments whose expected errors a network predicts from the frames.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Runs in which the latest frame wins: what is too slow loses frames, and every one is counted.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::started::signal;
 use common::{Case, Ended};

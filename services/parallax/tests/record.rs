@@ -1,7 +1,7 @@
 //! Runs that are recorded and replayed: the later stages say the same once more, bit for bit.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! What runs is shown, and what a killed run leaves behind is removed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::started::signal;
 use common::{Case, PACED};

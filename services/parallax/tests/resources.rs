@@ -2,7 +2,7 @@
 //! belongs to somebody else.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
-mod common;
+use crate::common;
 
 use std::collections::BTreeSet;
 use std::fs;

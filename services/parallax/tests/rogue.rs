@@ -2,7 +2,7 @@
 //! by cause, and the run goes on.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use core::time::Duration;
 use std::collections::BTreeSet;

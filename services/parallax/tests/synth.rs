@@ -1,7 +1,7 @@
 //! Sequences of people who do not exist, from the command to the last process of a deployment.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,7 +1,7 @@
 //! `parallax train fmp` as real processes, on figures that are drawn here.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fmt::Write as _;
 use std::fs;

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
-mod common;
+use crate::common;
 
 use core::time::Duration;
 use std::cell::Cell;

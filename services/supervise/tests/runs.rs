@@ -1,7 +1,7 @@
 //! Deployments whose processes behave.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use core::time::Duration;
 use std::time::Instant;

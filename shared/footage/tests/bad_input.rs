@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod clip;
+use crate::clip;
 
 use std::fs;
 use std::path::Path;

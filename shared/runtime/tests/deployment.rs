@@ -1,7 +1,7 @@
 //! All ports of a whole deployment at once.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::os::unix::fs::MetadataExt as _;
 

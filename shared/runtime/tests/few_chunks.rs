@@ -1,7 +1,7 @@
 //! Topics of large arrays that make do with few chunks.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
 //! A deployment runs once at a time, and leaves nothing behind.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 

@@ -1,7 +1,7 @@
 //! Those who look at a deployment see all of its processes, and are in nobody's way.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use core::time::Duration;
 use std::sync::mpsc;

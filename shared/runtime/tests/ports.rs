@@ -1,7 +1,7 @@
 //! Ports of two or more participants in one process; faults need real processes, see `supervise`.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::os::unix::fs::MetadataExt as _;
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 //! A receiver that looks without pause hears the same, and costs its sender no wake-up.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use core::time::Duration;
 use std::sync::atomic::{AtomicBool, Ordering};

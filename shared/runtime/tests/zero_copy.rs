@@ -1,7 +1,7 @@
 //! Arrays are read where they were written, and what is copied is counted.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use common::Deployment;
 use messages::{FrameHeader, PairPose};

@@ -1,0 +1,24 @@
+//! The one executable, run as a user would: one binary, because linking takes longer than most tests.
+
+mod common;
+
+mod bad_input;
+mod bench;
+mod chaos;
+mod demo;
+mod eval;
+mod faults;
+mod full;
+mod live;
+mod memory;
+mod parity;
+mod processes;
+mod quality;
+mod realtime;
+mod record;
+mod remains;
+mod resources;
+mod rogue;
+mod scheduling;
+mod synth;
+mod train;
