@@ -1,6 +1,6 @@
 //! What can be wrong with footage.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::Size;
 
@@ -9,9 +9,31 @@ use crate::Size;
 #[non_exhaustive]
 pub enum FootageError {
     /// There is no file, folder or match of that name.
-    #[error("no such footage: {path}")]
+    #[error("no such footage: {path}{}", what_is_missing(path))]
     NotFound {
         /// As the user wrote it.
+        path: String,
+    },
+    /// A camera, a stream or a device.
+    #[error("{path} is {what}, and live sources are not supported by this version: {instead}")]
+    Live {
+        /// As the user wrote it.
+        path: String,
+        /// What it is.
+        what: &'static str,
+        /// What to do in place of it.
+        instead: String,
+    },
+    /// Nothing was named.
+    #[error("the footage has no name: it is \"\"")]
+    NoName,
+    /// A name whose bytes are no UTF-8, which was changed on the way.
+    #[error(
+        "no such footage: {path}; its name, or that of a folder above it, is not UTF-8 (the odd bytes are shown as \
+         \u{fffd}): rename it"
+    )]
+    NotUtf8 {
+        /// With the odd bytes replaced.
         path: String,
     },
     /// A glob that cannot be parsed.
@@ -128,4 +150,22 @@ pub enum FootageError {
         /// What the decoder says.
         message: String,
     },
+}
+
+/// Words for the folder that is missing, where it is one and not the file alone; for the number of a webcam, too.
+fn what_is_missing(path: &str) -> String {
+    let path = Path::new(path);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if !name.is_empty() && name.bytes().all(|it| it.is_ascii_digit()) {
+        return "; if that is the number of a webcam: live sources are not supported by this version, record it to a \
+                file first (`ffmpeg -f v4l2 -i /dev/video0 -t 60 left.mp4`)"
+            .to_owned();
+    }
+    let absent = path
+        .ancestors()
+        .skip(1)
+        .take_while(|it| !it.as_os_str().is_empty() && !it.exists());
+    absent.last().map_or_else(String::new, |it| {
+        format!("; there is no folder {}", it.display())
+    })
 }

@@ -23,6 +23,6 @@ pub use overlay::{
 };
 pub use pacer::Pacer;
 pub use size::Size;
-pub use source::{FrameView, Source, SourceInfo, SourceKind, read_image};
+pub use source::{FrameView, Source, SourceInfo, SourceKind, is_live, read_image};
 pub use spec::SourceSpec;
 pub use warp::{Affine, Fill, Warp, WarpError, resize_map};

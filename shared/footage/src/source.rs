@@ -3,6 +3,7 @@
 mod decode;
 mod images;
 mod listing;
+mod live;
 mod log;
 mod probe;
 mod video;
@@ -12,6 +13,7 @@ use std::path::Path;
 pub use images::read_image;
 use images::{Images, Still, is_image};
 use listing::Listing;
+pub use live::is_live;
 use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};

@@ -2,8 +2,11 @@
 
 use std::cmp::Ordering;
 use std::ffi::OsStr;
+use std::fs::Metadata;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use super::live;
 use crate::FootageError;
 
 /// What a path turns out to be.
@@ -17,20 +20,31 @@ pub(super) enum Listing {
 
 /// Finds the files of `path`: what exists under that name, else a numbered pattern, else a glob.
 pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
+    if path.is_empty() {
+        return Err(FootageError::NoName);
+    }
     let as_is = Path::new(path);
-    if as_is.is_file() {
+    let found = look(as_is)?;
+    if found.as_ref().is_some_and(Metadata::is_file) {
         return Ok(Listing::File(as_is.to_path_buf()));
     }
-    let images = if as_is.is_dir() {
+    let images = if found.as_ref().is_some_and(Metadata::is_dir) {
         files_of(as_is, is_image_name)?
+    } else if let Some(what) = found
+        .map(|it| live::kind(it.file_type()))
+        .or_else(|| live::what(path))
+    {
+        return Err(FootageError::Live {
+            path: path.to_owned(),
+            what,
+            instead: live::instead(path),
+        });
     } else if let Some(numbered) = Numbered::parse(as_is) {
         numbered.files()?
     } else if path.contains(['*', '?', '[']) {
         matches_of(path)?
     } else {
-        return Err(FootageError::NotFound {
-            path: path.to_owned(),
-        });
+        return Err(absent(path));
     };
     if images.is_empty() {
         return Err(FootageError::NoImages {
@@ -38,6 +52,33 @@ pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
         });
     }
     Ok(Listing::Images(images))
+}
+
+/// What lies there; none if nothing does.
+fn look(path: &Path) -> Result<Option<Metadata>, FootageError> {
+    match std::fs::metadata(path) {
+        Ok(it) => Ok(Some(it)),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(FootageError::Io {
+            path: path.to_path_buf(),
+            source: error,
+        }),
+        Err(_absent) => Ok(None),
+    }
+}
+
+fn absent(path: &str) -> FootageError {
+    let path = path.to_owned();
+    if path.contains(char::REPLACEMENT_CHARACTER) {
+        FootageError::NotUtf8 { path }
+    } else if path.starts_with("/dev/") {
+        FootageError::Live {
+            instead: live::instead(&path),
+            path,
+            what: "a device that is not there",
+        }
+    } else {
+        FootageError::NotFound { path }
+    }
 }
 
 /// The wanted files of a folder, in natural order of their names.

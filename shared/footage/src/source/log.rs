@@ -124,10 +124,19 @@ pub(super) fn summary(log: &[u8]) -> String {
     let text = String::from_utf8_lossy(log);
     let lines: Vec<&str> = text
         .lines()
-        .map(str::trim)
+        .map(|it| without_address(it.trim()))
         .filter(|it| !it.is_empty())
         .collect();
     lines[lines.len().saturating_sub(3)..].join("; ")
+}
+
+/// A line without `[mov,mp4 @ 0x55d1]`: who speaks in ffmpeg, and where in its memory that is.
+fn without_address(line: &str) -> &str {
+    let Some((head, rest)) = line.split_once("] ") else {
+        return line;
+    };
+    let is_speaker = head.starts_with('[') && head.contains(" @ 0x");
+    if is_speaker { rest } else { line }
 }
 
 #[cfg(test)]
@@ -168,5 +177,11 @@ mod tests {
     #[test]
     fn an_empty_log_has_an_empty_summary() {
         assert_eq!(summary(b"\n  \n"), "");
+    }
+
+    #[test]
+    fn addresses_in_memory_tell_nobody_anything() {
+        let log = b"[mov,mp4,m4a @ 0x56362d165d40] moov atom not found\n[a] b\n";
+        assert_eq!(summary(log), "moov atom not found; [a] b");
     }
 }
