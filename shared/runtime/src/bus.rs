@@ -81,7 +81,10 @@ pub enum BusError {
         source: PublishSubscribeCreateError,
     },
     /// The wake-up of a topic cannot be created.
-    #[error("cannot create wake-up of topic {topic:?}: {source:?}")]
+    #[error(
+        "cannot create wake-up of topic {topic:?}: {}",
+        crate::words::said(source)
+    )]
     CreateWakeUp {
         /// Name of the topic.
         topic: String,

@@ -5,6 +5,8 @@ use core::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use crate::words::in_words;
+
 /// Exit statuses, the same for the command and for all its services.
 ///
 /// | status | meaning |
@@ -108,6 +110,17 @@ impl Failure {
         self
     }
 
+    /// Adds something else that the user may try, or know.
+    #[must_use]
+    pub fn with_another_hint(self, hint: impl Into<String>) -> Self {
+        let hint = hint.into();
+        let both = match &self.hint {
+            Some(first) => format!("{first}\n  hint: {hint}"),
+            None => hint,
+        };
+        self.with_hint(both)
+    }
+
     /// Its kind.
     pub fn kind(&self) -> ExitKind {
         self.kind
@@ -124,10 +137,14 @@ impl Failure {
     ///
     /// Those of `out`.
     pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "error: {}", self.source)?;
+        writeln!(
+            out,
+            "error: {}",
+            in_words(&self.source.to_string()).trim_end()
+        )?;
         let mut cause = self.source.source();
         while let Some(error) = cause {
-            writeln!(out, "  cause: {error}")?;
+            writeln!(out, "  cause: {}", in_words(&error.to_string()).trim_end())?;
             cause = error.source();
         }
         if let Some(hint) = &self.hint {
@@ -242,12 +259,13 @@ mod tests {
             ExitKind::Input,
             Outer(std::io::Error::other("no such disk")),
         )
-        .with_hint("look elsewhere");
+        .with_hint("look elsewhere")
+        .with_another_hint("or ask");
         let mut text = Vec::new();
         failure.report(&mut text).unwrap();
         assert_eq!(
             String::from_utf8(text).unwrap(),
-            "error: cannot read model.bin\n  cause: no such disk\n  hint: look elsewhere\n"
+            "error: cannot read model.bin\n  cause: no such disk\n  hint: look elsewhere\n  hint: or ask\n"
         );
     }
 

@@ -56,7 +56,16 @@ pub enum MemoryError {
 ///
 /// There is none.
 pub fn free_shared_memory() -> io::Result<u64> {
-    let status = statvfs(SHARED_MEMORY)?;
+    free_space(Path::new(SHARED_MEMORY))
+}
+
+/// Bytes that are free in the file system of a file or folder that is there.
+///
+/// # Errors
+///
+/// There is nothing of that name.
+pub fn free_space(path: &Path) -> io::Result<u64> {
+    let status = statvfs(path)?;
     Ok(status.f_bavail * status.f_frsize)
 }
 

@@ -24,7 +24,10 @@ pub enum OnlookerError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// What it consists of cannot be found out.
-    #[error("cannot list the topics of deployment {name:?}: {source:?}")]
+    #[error(
+        "cannot list the topics of deployment {name:?}: {}",
+        crate::words::said(source)
+    )]
     List {
         /// Its name.
         name: String,

@@ -334,9 +334,8 @@ impl<E: Message, H: Header> Port<E, H> {
         }
         let topic = || Arc::clone(&self.topic);
         sent.map_err(|source| match source {
-            IoxSendError::UnableToDeliver if self.stop.is_requested() => {
-                SendError::Stopped { topic: topic() }
-            }
+            // A signal ends what iceoryx2 waits for, too, which it calls an internal error.
+            _ if self.stop.is_requested() => SendError::Stopped { topic: topic() },
             IoxSendError::UnableToDeliver => SendError::Stuck {
                 topic: topic(),
                 waited: begin.elapsed(),

@@ -164,6 +164,11 @@ impl TopicPlan {
         self.usual_chunks.map_or(chunks, |it| it.min(chunks))
     }
 
+    /// Bytes of one message, where it is an array of the longest.
+    pub fn message_bytes(&self) -> u64 {
+        self.chunk_bytes as u64
+    }
+
     /// Shared memory that all publishers of the topic take together, bytes.
     pub fn pool_bytes(&self) -> u64 {
         (self.limits.publishers * self.chunks()) as u64 * self.chunk_bytes as u64
