@@ -28,6 +28,26 @@ pub enum LensModel {
     },
 }
 
+impl std::fmt::Display for LensModel {
+    /// For people: its name, and the coefficients that are not 0.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let listed = |name: &str, values: &[f64]| {
+            let numbered = values.iter().enumerate().filter(|it| *it.1 != 0.0);
+            let said: Vec<String> = numbered
+                .map(|(nth, it)| format!(", {name}{} {it}", nth + 1))
+                .collect();
+            said.concat()
+        };
+        match self {
+            Self::Pinhole => write!(out, "pinhole, no distortion"),
+            Self::BrownConrady { k, p } => {
+                write!(out, "Brown-Conrady{}{}", listed("k", k), listed("p", p))
+            }
+            Self::KannalaBrandt { k } => write!(out, "fisheye (Kannala-Brandt){}", listed("k", k)),
+        }
+    }
+}
+
 /// A lens: its model and the part of the image in which that model can be inverted.
 ///
 /// Distortion polynomials turn back on themselves somewhere outside the image they were fitted to.

@@ -177,7 +177,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             centre.y,
             centre.z,
         ))?;
-        output::line(format_args!("             {:?}", inside.lens.model()))?;
+        output::line(format_args!("             lens {}", inside.lens.model()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -189,7 +189,7 @@ fn describe(camera: &Camera, rig: &Rig) -> Value {
         "size_px": inside.size,
         "focal_px": [inside.fx, inside.fy],
         "principal_point_px": [inside.cx, inside.cy],
-        "lens": format!("{:?}", inside.lens.model()),
+        "lens": inside.lens.model().to_string(),
         "centre_m": <[f64; 3]>::from(camera.centre_in_world().coords),
         "axis": <[f64; 3]>::from(camera.axis_in_world().into_inner()),
         "roll_to_upright_degrees": upright_roll(camera, rig).map(f64::to_degrees),

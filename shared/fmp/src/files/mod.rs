@@ -27,8 +27,8 @@ use crate::{Model, ModelError, ModelSpec};
 pub enum ModelFileError {
     /// There is no such file.
     #[error(
-        "there is no model file {}: Parallax ships none yet; `parallax model import` makes one from \
-         Yang & Ramanan's released .mat models or from the paper authors' .txt models",
+        "there is no model file {}: leave the model out to use the one that ships with Parallax; `parallax model \
+         import` makes one from Yang & Ramanan's released .mat models or from the paper authors' .txt models",
         path.display()
     )]
     Absent {
@@ -45,9 +45,15 @@ pub enum ModelFileError {
         /// What the operating system says.
         source: io::Error,
     },
+    /// The file holds nothing.
+    #[error("the model file {} is empty (0 bytes)", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file begins like none of the formats.
     #[error(
-        "{} is not a model: it begins with {beginning:?}, expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
+        "{} is not a model: it begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
          (Yang & Ramanan) or `partsNbr` (the authors' text)",
         path.display()
     )]
@@ -163,11 +169,24 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {
         let text = String::from_utf8_lossy(bytes);
         text::parse(&text).map_err(|source| ModelFileError::Text { path, source })?
     } else {
-        let beginning = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]).into_owned();
+        if bytes.is_empty() {
+            return Err(ModelFileError::Empty { path });
+        }
+        let beginning = beginning(bytes);
         return Err(ModelFileError::NotAModel { path, beginning });
     };
     spec.name = stem.unwrap_or_default();
     Ok(spec)
+}
+
+/// The first characters, those that cannot be shown as dots.
+fn beginning(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(16)]);
+    let shown = |it: char| {
+        let is_odd = it.is_control() || it == char::REPLACEMENT_CHARACTER;
+        if is_odd { '.' } else { it }
+    };
+    text.chars().map(shown).collect()
 }
 
 #[cfg(test)]
@@ -199,13 +218,10 @@ mod tests {
 
     #[test]
     fn what_is_no_model_is_refused_by_name() {
-        let expected = "dir/m is not a model: it begins with \"\\u{89}PNG\", expected `PLXMODEL` (Parallax), \
+        let expected = "dir/m is not a model: it begins with \".PNG.\", expected `PLXMODEL` (Parallax), \
                         `MATLAB 5.0` (Yang & Ramanan) or `partsNbr` (the authors' text)";
-        assert_eq!(
-            said_of("m", b"\x89PNG").replace('\u{fffd}', "\\u{89}"),
-            expected
-        );
-        assert!(said_of("m", b"").contains("it begins with \"\""));
+        assert_eq!(said_of("m", b"\x89PNG\n"), expected);
+        assert_eq!(said_of("m", b""), "the model file dir/m is empty (0 bytes)");
     }
 
     #[test]
@@ -218,6 +234,11 @@ mod tests {
                 .starts_with("there is no model file no/such.plx: ")
         );
         assert!(error.to_string().contains("parallax model import"));
+        assert!(
+            error
+                .to_string()
+                .contains("the one that ships with Parallax")
+        );
     }
 
     #[test]

@@ -69,7 +69,7 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
             p: [p1, p2],
         } => [k1, k2, p1, p2, k3],
         ref lens => {
-            let (camera, lens) = (camera.name.clone(), format!("{lens:?}"));
+            let (camera, lens) = (camera.name.clone(), lens.to_string());
             return Err(UnwritableRig::Lens {
                 camera,
                 format: "HumanEva",

@@ -100,8 +100,14 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         (
             "energy",
             format!(
-                "{:?}, alpha {}, beta {}, distances up to {} cells",
-                job.config.energy, settings.alpha, settings.beta, settings.max_distance_cells
+                "{}, alpha {}, beta {}, distances up to {} cells",
+                match job.config.energy {
+                    fuse::Energy::Paper => "the paper's",
+                    fuse::Energy::Released => "that of the released program",
+                },
+                settings.alpha,
+                settings.beta,
+                settings.max_distance_cells
             ),
         ),
         (
