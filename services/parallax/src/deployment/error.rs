@@ -1,12 +1,13 @@
 //! Why a deployment file was refused: always with the place, and with what would do.
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 /// Why a deployment file was refused.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ConfigError {
     /// The file could not be read.
-    #[error("cannot read the deployment file {}", file.display())]
+    #[error("cannot read the deployment file {}{}", file.display(), why_not(file, source))]
     Read {
         /// The file.
         file: PathBuf,
@@ -48,9 +49,11 @@ pub(crate) enum ConfigError {
 impl ConfigError {
     /// Explains what the TOML reader said.
     ///
-    /// Serde says `unknown field`, the name, then what it knows, each in backticks; nothing else of
-    /// its wording is relied on.
-    pub(super) fn explain(place: String, message: &str) -> Self {
+    /// Serde says `unknown field`, the name, then what it knows, each in backticks; of its other words see
+    /// [`runtime::in_words`].
+    ///
+    /// * `key`: of the value that is wrong, with its section, where it is known.
+    pub(super) fn explain(place: String, message: &str, key: Option<&str>) -> Self {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         if let Some((key, known)) = names.split_first()
             && message.starts_with("unknown field")
@@ -62,11 +65,53 @@ impl ConfigError {
                 hint,
             };
         }
-        let message = message
-            .replace("missing field", "missing key")
-            .replace("unknown variant", "unknown value");
-        let message = message.trim_end().replace('\n', ", ");
+        let said = runtime::in_words(message.trim_end()).replace('\n', ", ");
+        let message = match (key, names.first()) {
+            (Some(key), _) if message.starts_with("duplicate key") => {
+                format!("`{key}` is given twice{}", of_cameras(key))
+            }
+            (Some(key), _) if !said.starts_with("missing key") => {
+                format!("`{key}`: {said}{}", of_cameras(key))
+            }
+            (_, Some(&missing)) if said.starts_with("missing key") => {
+                format!("{said}{}", of_what_is_missing(missing))
+            }
+            _ => said,
+        };
         Self::Malformed { place, message }
+    }
+}
+
+/// What the file is instead, where the words of the system do not tell.
+fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
+    if error.kind() == ErrorKind::InvalidData {
+        ": it is no text (not UTF-8)"
+    } else if file.is_dir() {
+        ": it is a folder; name the .toml file in it"
+    } else {
+        ""
+    }
+}
+
+/// The most common slip of a file that has one camera too many for its brackets.
+fn of_cameras(key: &str) -> &'static str {
+    if key == "camera" {
+        "; every camera begins with [[camera]], in double brackets"
+    } else {
+        ""
+    }
+}
+
+/// What a deployment or a camera needs at least.
+fn of_what_is_missing(key: &str) -> &'static str {
+    match key {
+        "rig" | "output" | "camera" | "name" => {
+            "; a deployment file needs `name`, `rig`, `output`, and a [[camera]] with `name` and `source` for each camera"
+        }
+        "source" => {
+            "; every [[camera]] needs `name`, as the rig calls it, and `source`, its footage"
+        }
+        _ => "",
     }
 }
 
@@ -90,14 +135,48 @@ mod tests {
     #[test]
     fn a_slip_gets_the_nearest_name() {
         let message = "unknown field `modle`, expected one of `name`, `model`, `rig`";
-        let got = ConfigError::explain("a.toml:3".to_owned(), message).to_string();
+        let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
         assert_eq!(got, "a.toml:3: unknown key `modle`, did you mean `model`?");
+    }
+
+    #[test]
+    fn no_word_of_the_program_is_left_of_what_its_types_say() {
+        #[derive(Debug, serde::Deserialize)]
+        #[expect(dead_code, reason = "only read")]
+        struct All {
+            a: Option<u64>,
+            b: Option<[usize; 2]>,
+            c: Option<bool>,
+            d: Option<PathBuf>,
+            e: Option<Vec<f32>>,
+        }
+        let words = [
+            "u64", "usize", "f32", "boolean", "integer", "sequence", "map", "length", "string",
+        ];
+        let mut n_refused = 0;
+        for key in ["a", "b", "c", "d", "e"] {
+            for value in ["\"x\"", "-1", "1.5", "true", "[\"x\"]", "{ x = 1 }"] {
+                let Err(error) = toml::from_str::<All>(&format!("{key} = {value}")) else {
+                    continue;
+                };
+                n_refused += 1;
+                let error = ConfigError::explain("a.toml:1".to_owned(), error.message(), Some(key));
+                let said = error.to_string();
+                assert!(
+                    said.starts_with(&format!("a.toml:1: `{key}`: expected ")),
+                    "{said}"
+                );
+                let word = words.iter().find(|it| said.contains(**it));
+                assert_eq!(word, None, "{key} = {value}: {said}");
+            }
+        }
+        assert!(n_refused > 20, "{n_refused}");
     }
 
     #[test]
     fn a_name_like_no_other_gets_the_list() {
         let message = "unknown field `quux`, expected `name` or `rig`";
-        let got = ConfigError::explain("a.toml:3".to_owned(), message).to_string();
+        let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
         assert_eq!(got, "a.toml:3: unknown key `quux`, known here: name, rig");
     }
 }

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 use toml::{Table, Value};
 
+use super::lists::fits;
+use super::places::{malformed, of_set};
 use super::{ConfigError, Deployment, rules};
 
 /// A deployment, and what of it was said by whom.
@@ -36,20 +38,19 @@ impl Loaded {
     ///
     /// * `file`: where it stands.
     fn parse(text: &str, file: &Path, set: &[String]) -> Result<Self, ConfigError> {
-        let malformed = |error: &toml::de::Error| {
-            let place = place(file, text, error.span());
-            ConfigError::explain(place, error.message())
-        };
+        let malformed = |error: &toml::de::Error| malformed(file, text, error);
         let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
         let in_file: Table = toml::from_str(text).map_err(|it| malformed(&it))?;
         let on_command_line = overrides(set)?;
         if !on_command_line.is_empty() {
             let mut table = in_file.clone();
             merge(&mut table, on_command_line.clone());
-            deployment = table.try_into().map_err(|error: toml::de::Error| {
-                ConfigError::explain("--set".to_owned(), error.message())
-            })?;
+            deployment = table.try_into().map_err(|error| of_set(&error))?;
         }
+        fits(&deployment, &[&in_file, &on_command_line]).map_err(|it| {
+            let at = place(file, text, span_of(text, &it.key));
+            it.at(at)
+        })?;
         deployment.resolve(&base(file));
         let checked = rules::check(&deployment).and_then(|()| rules::fits_machine(&deployment));
         checked.map_err(|it| {
@@ -83,13 +84,13 @@ impl Loaded {
                 return Err(ConfigError::Malformed { place, message });
             }
         }
-        let explain = |message: &str| ConfigError::explain("--set".to_owned(), message);
-        let in_file = Table::try_from(deployment);
-        let in_file = in_file.map_err(|error| explain(&error.to_string()))?;
+        let in_file = Table::try_from(deployment)
+            .map_err(|error| ConfigError::explain("--set".to_owned(), &error.to_string(), None))?;
         let mut table = in_file.clone();
         merge(&mut table, on_command_line.clone());
         let read: Result<Deployment, toml::de::Error> = table.try_into();
-        let mut deployment = read.map_err(|error| explain(error.message()))?;
+        let mut deployment = read.map_err(|error| of_set(&error))?;
+        fits(&deployment, &[&on_command_line]).map_err(|it| it.at("--set".to_owned()))?;
         deployment.resolve(&base(Path::new("")));
         rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
         Ok(Self {
@@ -108,8 +109,7 @@ impl Loaded {
     pub(crate) fn defaults(set: &[String]) -> Result<Self, ConfigError> {
         let mut table = Table::new();
         let on_command_line = overrides(set)?;
-        let explain =
-            |error: toml::de::Error| ConfigError::explain("--set".to_owned(), error.message());
+        let explain = |error: toml::de::Error| of_set(&error);
         merge(&mut table, NO_FILE.parse().map_err(explain)?);
         merge(&mut table, on_command_line.clone());
         Ok(Self {
@@ -132,7 +132,7 @@ fn base(file: &Path) -> PathBuf {
 }
 
 /// `file:line` of a span; the file alone where there is none.
-fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
+pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
     let Some(before) = span.and_then(|it| text.get(..it.start)) else {
         return file.display().to_string();
     };

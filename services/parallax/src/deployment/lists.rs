@@ -1,0 +1,44 @@
+//! Lists that are longer than what they are taken for.
+
+use toml::{Table, Value};
+
+use super::Deployment;
+use super::rules::Complaint;
+
+/// Sees that no list is longer than what was taken of it: readers of TOML pass over what is too much.
+pub(super) fn fits(deployment: &Deployment, said: &[&Table]) -> Result<(), Complaint> {
+    let Ok(taken) = Table::try_from(deployment) else {
+        return Ok(());
+    };
+    let wrong = said.iter().find_map(|it| {
+        too_long(
+            &Value::Table((*it).clone()),
+            &Value::Table(taken.clone()),
+            "",
+        )
+    });
+    wrong.map_or(Ok(()), Err)
+}
+
+fn too_long(said: &Value, taken: &Value, key: &str) -> Option<Complaint> {
+    match (said, taken) {
+        (Value::Table(said), Value::Table(taken)) => said.iter().find_map(|(name, value)| {
+            let key = if key.is_empty() {
+                name.clone()
+            } else {
+                format!("{key}.{name}")
+            };
+            too_long(value, taken.get(name)?, &key)
+        }),
+        (Value::Array(said), Value::Array(taken)) if said.len() > taken.len() => Some(Complaint {
+            key: key.to_owned(),
+            got: format!("a list of {} values", said.len()),
+            expected: format!("{}", taken.len()),
+        }),
+        (Value::Array(said), Value::Array(taken)) => said
+            .iter()
+            .zip(taken)
+            .find_map(|(said, taken)| too_long(said, taken, key)),
+        _ => None,
+    }
+}

@@ -1,0 +1,89 @@
+//! Which key of a deployment file a complaint of the TOML reader is about.
+
+use std::ops::Range;
+use std::path::Path;
+
+use toml::de::{DeTable, DeValue};
+
+use super::ConfigError;
+use super::load::place;
+
+/// What is wrong with the text of a file, with its line and its key.
+pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {
+    let place = place(file, text, error.span());
+    let is_rig = text
+        .lines()
+        .any(|it| it.starts_with("format = \"parallax-rig\""));
+    if is_rig {
+        let message = "this is a rig file: name the deployment file, whose `rig` it is".to_owned();
+        return ConfigError::Malformed { place, message };
+    }
+    let at = error.span();
+    let key = match &at {
+        // The document cannot be read then: the slice is the key itself.
+        Some(span) if error.message().starts_with("duplicate key") => {
+            text.get(span.clone()).map(str::to_owned)
+        }
+        Some(span) => key_at(text, span),
+        None => None,
+    };
+    ConfigError::explain(place, error.message(), key.as_deref())
+}
+
+/// What is wrong with an option `--set`, with its key.
+pub(super) fn of_set(error: &toml::de::Error) -> ConfigError {
+    let said = error.to_string();
+    let key = said
+        .split("in `")
+        .nth(1)
+        .and_then(|it| it.split('`').next());
+    ConfigError::explain("--set".to_owned(), error.message(), key)
+}
+
+/// The dotted key whose value holds a span.
+fn key_at(text: &str, span: &Range<usize>) -> Option<String> {
+    within(DeTable::parse(text).ok()?.get_ref(), span)
+}
+
+/// The same in a table; what stands further in goes first, for the span of a table is that of its head alone.
+fn within(table: &DeTable<'_>, span: &Range<usize>) -> Option<String> {
+    table.iter().find_map(|(name, value)| {
+        let inner = match value.get_ref() {
+            DeValue::Table(it) => within(it, span),
+            DeValue::Array(entries) => entries
+                .iter()
+                .find_map(|it| within(it.get_ref().as_table()?, span)),
+            _ => None,
+        };
+        let name = name.get_ref();
+        if let Some(inner) = inner {
+            return Some(format!("{name}.{inner}"));
+        }
+        let holds = |it: Range<usize>| it.start <= span.start && span.end <= it.end;
+        holds(value.span()).then(|| name.clone().into_owned())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "name = 'a'\nsize = { w = 1 }\n[[camera]]\nname = 'x'\n[[camera]]\nname = 'y'\n\n\
+                        [capture]\nscale = 5\nof = [1, 22]\n[fuse.tau]\nfile = 3\n";
+
+    #[test]
+    fn a_value_is_called_by_its_whole_key_wherever_it_stands() {
+        for (value, key) in [
+            ("'a'", "name"),
+            ("1 }", "size.w"),
+            ("'y'", "camera.name"),
+            ("5", "capture.scale"),
+            ("22", "capture.of"),
+            ("3", "fuse.tau.file"),
+        ] {
+            let start = TEXT.find(value).unwrap();
+            assert_eq!(key_at(TEXT, &(start..start + 1)).as_deref(), Some(key));
+        }
+        assert_eq!(key_at("a = [", &(0..1)), None, "no document");
+    }
+}
