@@ -42,6 +42,12 @@ pub(crate) struct Voice {
     /// Somebody who was there to answer is gone, and there has been no answer since.
     is_absent: bool,
     last_frame: Option<u64>,
+    /// The life of its camera's process that was heard last, and the last frame of it.
+    shot: Option<(u32, u64)>,
+    /// That process is gone, and nothing has been heard of the next.
+    is_blind: bool,
+    /// The last frame before that process was replaced, and the first after it.
+    gap: Option<[u64; 2]>,
     /// Its first frame that does not exist.
     end: Option<u64>,
 }
@@ -49,8 +55,16 @@ pub(crate) struct Voice {
 impl Voice {
     /// Hears of a frame, or that there are no more.
     pub(crate) fn frame(&mut self, header: &FrameHeader) {
+        let (life, frame) = (header.stamp.epoch, header.stamp.frame);
+        if let Some((before, last)) = self.shot
+            && life > before
+        {
+            self.gap = Some([last, frame]);
+            self.is_blind = false;
+        }
+        self.shot = self.shot.max(Some((life, frame)));
         if header.status == Status::END {
-            self.end = Some(header.stamp.frame);
+            self.end = Some(frame);
         }
     }
 
@@ -70,6 +84,8 @@ impl Voice {
         let is_gone = |it: &u128| !ports.iter().flatten().any(|other| other == it);
         let is_absent = self.ports.iter().flatten().any(is_gone);
         self.is_absent |= is_absent && self.last_frame.is_some();
+        // An answer to what the camera sent before its death says nothing of the camera.
+        self.is_blind |= self.ports[0].iter().any(is_gone) && self.shot.is_some();
         self.ports = ports;
     }
 
@@ -87,7 +103,8 @@ impl Voice {
         if let Some(pose) = pose {
             self.settled = self.settled.max(pose.stamp.epoch);
         }
-        let was_lost = is_first || (pose.is_none() && (self.is_absent || is_new));
+        let was_lost = is_first
+            || (pose.is_none() && (self.is_absent || is_new || self.has_no_shot_of(frame)));
         match pose {
             Some(pose) if pose.status != Status::OK => Missing::Empty(pose.status),
             None if self.end.is_some_and(|end| end <= frame) => Missing::Ended,
@@ -95,6 +112,15 @@ impl Voice {
             None if self.last_frame > Some(frame) => Missing::Dropped,
             _ => Missing::Late,
         }
+    }
+
+    /// Whether the process of its camera was not there to send a frame.
+    fn has_no_shot_of(&self, frame: u64) -> bool {
+        let is_later = self.shot.is_some_and(|(_, last)| last < frame);
+        let is_between = self
+            .gap
+            .is_some_and(|[last, first]| last < frame && frame < first);
+        self.is_blind && is_later || is_between
     }
 }
 
@@ -168,6 +194,48 @@ mod tests {
         assert_eq!(voice.settle(4, None, false), Missing::Lost);
         voice.settle(5, Some(&back), false);
         assert_eq!(voice.settle(6, None, false), Missing::Late);
+    }
+
+    /// A frame of a life of the camera's process.
+    fn shot(frame: u64, epoch: u32) -> FrameHeader {
+        FrameHeader {
+            stamp: Stamp {
+                frame,
+                epoch,
+                ..Stamp::default()
+            },
+            ..FrameHeader::default()
+        }
+    }
+
+    #[test]
+    fn frames_of_a_killed_camera_are_lost_though_its_last_one_is_answered_after_its_death() {
+        let mut voice = voice();
+        voice.frame(&shot(2, 0));
+        voice.answerers([Vec::new(), vec![1]]);
+        let said = pose(2, 0, Status::OK);
+        voice.pose(&said);
+        assert_eq!(voice.settle(2, Some(&said), false), Missing::Late);
+        assert_eq!(voice.settle(3, None, false), Missing::Lost);
+        voice.answerers([vec![8], vec![1]]);
+        assert_eq!(voice.settle(4, None, false), Missing::Lost);
+        voice.frame(&shot(7, 1));
+        assert_eq!(voice.settle(5, None, false), Missing::Lost);
+        voice.pose(&pose(7, 0, Status::OK));
+        assert_eq!(voice.settle(6, None, false), Missing::Lost);
+        voice.frame(&shot(8, 1));
+        assert_eq!(voice.settle(8, None, false), Missing::Late);
+    }
+
+    #[test]
+    fn a_frame_that_the_camera_sent_before_its_death_was_late() {
+        let mut voice = voice();
+        voice.frame(&shot(2, 0));
+        voice.frame(&shot(3, 0));
+        voice.answerers([Vec::new(), vec![1]]);
+        voice.pose(&pose(2, 0, Status::OK));
+        assert_eq!(voice.settle(3, None, false), Missing::Late);
+        assert_eq!(voice.settle(4, None, false), Missing::Lost);
     }
 
     #[test]
