@@ -111,7 +111,13 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     } else {
         ExitKind::Run
     };
-    let file = create(&file_of_life(&job.file, epoch)).or_fail(kind)?;
+    let name = file_of_life(&job.file, epoch);
+    let file = create(&name).map_err(|error| {
+        Failure::new(
+            kind,
+            format!("cannot make the recording {}: {error}", name.display()),
+        )
+    })?;
     let channels = job.topics.channels(job.about.without);
     let (inlet, outlet) = queue(channels.len(), job.queue_bytes);
     let mut tape = Tape::open(service, &channels, job.about.without, &inlet, &mut waiter)?;

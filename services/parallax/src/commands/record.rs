@@ -1,5 +1,7 @@
 //! `parallax record`: a run, and every message of it in one file.
 
+mod room;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -12,6 +14,7 @@ use crate::commands::run::Planned;
 use crate::deployment::Loaded;
 use crate::plan::Resolved;
 use crate::{output, taped};
+use room::{Forecast, Growth, PerFrame};
 
 /// Lives of the recording process that are looked for.
 const MOST_LIVES: u32 = 64;
@@ -26,6 +29,9 @@ Where nothing may be lost (capture.mode = \"lossless\") a slow disk makes the ru
 it never does: what does not fit into the queue is left out, counted by topic in the file, and told at the end.
 A file whose end was never written, because of a full disk or a crash, holds all up to there; a recording
 process that had to be restarted goes on in FILE.1.mcap. With anything lost the exit code is 7.
+
+Before it begins it says how much a frame and a second will take at most, and how much is free; it does not begin
+where there is no room for ten frames (or for all, if they are fewer).
 
 Examples:
     parallax record my.toml --out run.mcap
@@ -83,9 +89,15 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         ..Resolved::new(&loaded.deployment)?
     };
     let planned = Planned::of(resolved, globals.level())?;
+    let forecast = forecast(&planned, &file, arguments)?;
+    forecast.check(&file)?;
     make_way(&file, arguments.force)?;
+    if !globals.quiet {
+        output::message(forecast.text(&file));
+    }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
+    let mut growth = Growth::new(&file, &forecast);
+    let report = planned.carry_out(globals, &stop, &mut |_| growth.note())?;
     let recording = taped::open(&file)?;
     let later = (1..MOST_LIVES).map(|it| tape::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
@@ -107,10 +119,34 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
+/// How much room the recording will take.
+fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<Forecast, Failure> {
+    let resolved = planned.resolved();
+    let replaced = if arguments.force {
+        std::fs::metadata(file).map_or(0, |it| it.len())
+    } else {
+        0
+    };
+    Ok(Forecast {
+        per_frame: PerFrame::new(&planned.plan().topics),
+        without: [Bulk::Pixels, Bulk::Evidence].map(|it| arguments.without.contains(&it)),
+        n_frames: resolved.n_frames(),
+        rate_hz: resolved.footage.iter().find_map(|it| it.frame_rate_hz),
+        free_bytes: room::free_beside(file)? + replaced,
+    })
+}
+
 /// Sees that no file is in the way.
 fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
     let lives = (0..MOST_LIVES).map(|it| tape::file_of_life(file, it));
     for file in lives.filter(|it| it.exists()) {
+        if file.is_dir() {
+            let message = format!("{} is a folder", file.display());
+            let failure = Failure::new(ExitKind::Usage, message);
+            return Err(
+                failure.with_hint("name the file that the recording goes to, such as run.mcap")
+            );
+        }
         if !force {
             let message = format!("{} is there already", file.display());
             let failure = Failure::new(ExitKind::Usage, message);

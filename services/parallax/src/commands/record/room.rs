@@ -1,0 +1,272 @@
+//! How much room a recording will take, and how much there is.
+
+use core::fmt::Write as _;
+use core::time::Duration;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use recording::Kind;
+use runtime::{ExitKind, Failure, OrFail as _, TopicPlan, free_space};
+
+/// A recording of fewer frames is not begun.
+const FEWEST_FRAMES: u64 = 10;
+/// Pause between two words about how large it has become.
+const PERIOD: Duration = Duration::from_secs(10);
+
+/// Bytes that one frame of all views takes in the file, at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct PerFrame {
+    pub pixels: u64,
+    pub evidence: u64,
+    /// Everything else.
+    pub rest: u64,
+}
+
+impl PerFrame {
+    /// Of the topics of a deployment.
+    pub(super) fn new(topics: &[TopicPlan]) -> Self {
+        let mut sum = Self::default();
+        for it in topics {
+            let bytes = it.message_bytes();
+            match Kind::of_topic(it.topic()) {
+                Some(Kind::Frame) => sum.pixels += bytes,
+                Some(Kind::Evidence) => sum.evidence += bytes,
+                // Signs of life are few, and small.
+                None | Some(Kind::Health) => {}
+                Some(_) => sum.rest += bytes,
+            }
+        }
+        sum
+    }
+
+    /// Without what is left out.
+    fn kept(self, without: [bool; 2]) -> u64 {
+        let [pixels, evidence] = without;
+        let pixels = if pixels { 0 } else { self.pixels };
+        let evidence = if evidence { 0 } else { self.evidence };
+        pixels + evidence + self.rest
+    }
+}
+
+/// What is known before a recording begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Forecast {
+    pub per_frame: PerFrame,
+    /// Whether pixels and evidence are left out.
+    pub without: [bool; 2],
+    pub n_frames: u64,
+    /// Frames a second of the footage that are used, where that is known.
+    pub rate_hz: Option<f64>,
+    pub free_bytes: u64,
+}
+
+impl Forecast {
+    /// Bytes of a frame.
+    fn frame(&self) -> u64 {
+        self.per_frame.kept(self.without)
+    }
+
+    /// Frames for which there is room.
+    fn n_that_fit(&self) -> u64 {
+        self.free_bytes / self.frame().max(1)
+    }
+
+    /// For people, before it begins.
+    pub(super) fn text(&self, file: &Path) -> String {
+        let mut text = format!(
+            "recording {}: up to {} a frame",
+            file.display(),
+            size(self.frame())
+        );
+        // Writing to a string cannot fail.
+        let _infallible = self.write(&mut text);
+        text
+    }
+
+    fn write(&self, text: &mut String) -> core::fmt::Result {
+        if let Some(rate) = self.rate_hz {
+            let second = (self.frame() as f64 * rate) as u64;
+            write!(text, ", {} for a second of {rate:.0} frames", size(second))?;
+        }
+        let all = size(self.frame().saturating_mul(self.n_frames));
+        write!(
+            text,
+            ", {all} for all {} frames; {} are free",
+            self.n_frames,
+            size(self.free_bytes)
+        )?;
+        if self.n_that_fit() < self.n_frames {
+            write!(
+                text,
+                ", which may be full after {} frames",
+                self.n_that_fit()
+            )?;
+        }
+        self.write_smaller(text)
+    }
+
+    /// What would take less.
+    fn write_smaller(&self, text: &mut String) -> core::fmt::Result {
+        let [pixels, evidence] = self.without;
+        if !evidence {
+            let left = self.per_frame.kept([pixels, true]);
+            write!(text, "\n  --without evidence: {} a frame", size(left))?;
+        }
+        if !evidence && !pixels {
+            let left = self.per_frame.kept([true, true]);
+            write!(text, "; and --without pixels: {}", size(left))?;
+        } else if !pixels {
+            let left = self.per_frame.kept([true, true]);
+            write!(text, "\n  --without pixels too: {} a frame", size(left))?;
+        }
+        Ok(())
+    }
+
+    /// Sees that there is room for a few frames.
+    pub(super) fn check(&self, file: &Path) -> Result<(), Failure> {
+        let n = FEWEST_FRAMES.min(self.n_frames);
+        if self.n_that_fit() >= n {
+            return Ok(());
+        }
+        let message = format!(
+            "there is no room for {}: {n} frames of {} take {}, {} are free",
+            file.display(),
+            size(self.frame()),
+            size(self.frame().saturating_mul(n)),
+            size(self.free_bytes)
+        );
+        let mut hint = "make room, or name a file on another disk".to_owned();
+        // Writing to a string cannot fail.
+        let _infallible = self.write_smaller(&mut hint);
+        Err(Failure::new(ExitKind::Input, message).with_hint(hint))
+    }
+}
+
+/// The folder of a file that shall be written, and what is free there.
+pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
+    let folder = file.parent().unwrap_or(Path::new("/"));
+    if !folder.is_dir() {
+        let message = format!(
+            "{} cannot be written: there is no folder {}",
+            file.display(),
+            folder.display()
+        );
+        let failure = Failure::new(ExitKind::Input, message);
+        return Err(failure.with_hint("make the folder first, or name another file"));
+    }
+    free_space(folder).or_fail(ExitKind::Input)
+}
+
+/// Says from time to time how large the file has become.
+#[derive(Debug)]
+pub(super) struct Growth {
+    file: PathBuf,
+    frame_bytes: u64,
+    said_at: Instant,
+}
+
+impl Growth {
+    pub(super) fn new(file: &Path, forecast: &Forecast) -> Self {
+        Self {
+            file: file.to_owned(),
+            frame_bytes: forecast.frame().max(1),
+            said_at: Instant::now(),
+        }
+    }
+
+    /// Whenever something happens.
+    pub(super) fn note(&mut self) -> Option<String> {
+        if self.said_at.elapsed() < PERIOD {
+            return None;
+        }
+        self.said_at = Instant::now();
+        let bytes = std::fs::metadata(&self.file).ok()?.len();
+        let free = free_space(&self.file).ok()?;
+        let n = free / self.frame_bytes;
+        Some(format!(
+            "recorded {}; {} are free, for {n} frames or more",
+            size(bytes),
+            size(free)
+        ))
+    }
+}
+
+/// Bytes in decimal units.
+fn size(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
+    let unit = units.into_iter().find(|it| bytes >= it.0);
+    unit.map_or_else(
+        || format!("{bytes:.0} bytes"),
+        |(of, name)| format!("{:.1} {name}", bytes / of),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn forecast(free_bytes: u64, without: [bool; 2]) -> Forecast {
+        Forecast {
+            per_frame: PerFrame {
+                pixels: 4_000_000,
+                evidence: 168_000_000,
+                rest: 400_000,
+            },
+            without,
+            n_frames: 100,
+            rate_hz: Some(60.0),
+            free_bytes,
+        }
+    }
+
+    #[test]
+    fn what_it_will_take_is_said_with_what_would_take_less() {
+        let text = forecast(70_000_000_000, [false; 2]).text(Path::new("run.mcap"));
+        assert_eq!(
+            text,
+            "recording run.mcap: up to 172.4 MB a frame, 10.3 GB for a second of 60 frames, 17.2 GB for all 100 frames; \
+             70.0 GB are free\n  --without evidence: 4.4 MB a frame; and --without pixels: 400.0 kB"
+        );
+        let text = forecast(70_000_000_000, [false, true]).text(Path::new("run.mcap"));
+        assert!(
+            text.ends_with("\n  --without pixels too: 400.0 kB a frame"),
+            "{text}"
+        );
+        let text = forecast(70_000_000_000, [true; 2]).text(Path::new("run.mcap"));
+        assert!(!text.contains("--without"), "{text}");
+    }
+
+    #[test]
+    fn a_disk_that_will_be_full_is_told_before() {
+        let small = forecast(5_000_000_000, [false; 2]);
+        assert!(
+            small
+                .text(Path::new("a"))
+                .contains("5.0 GB are free, which may be full after 29 frames")
+        );
+        small.check(Path::new("a")).unwrap();
+    }
+
+    #[test]
+    fn less_room_than_for_a_few_frames_is_refused() {
+        let refused = forecast(1_723_999_999, [false; 2])
+            .check(Path::new("a"))
+            .unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "there is no room for a: 10 frames of 172.4 MB take 1.7 GB, 1.7 GB are free"
+        );
+        forecast(1_724_000_000, [false; 2])
+            .check(Path::new("a"))
+            .unwrap();
+        forecast(1_723_999_999, [false, true])
+            .check(Path::new("a"))
+            .unwrap();
+        let few = Forecast {
+            n_frames: 2,
+            ..forecast(400_000_000, [false; 2])
+        };
+        few.check(Path::new("a")).unwrap();
+    }
+}
