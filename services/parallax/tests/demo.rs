@@ -77,6 +77,56 @@ fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
         assert!(page.contains(words), "{words}");
     }
     assert!(page.len() < 4_000_000, "{} bytes", page.len());
+    counts_are_those_of_the_results(&case, &report, &page);
+    a_killed_camera_was_lost_and_not_late(&case, killed);
+}
+
+/// The lines of a file of the demo's results.
+fn lines(case: &Case, name: &str) -> Vec<Value> {
+    let text = fs::read_to_string(case.path("demo/run").join(name)).unwrap();
+    let lines = text.lines().map(serde_json::from_str);
+    lines.map(Result::unwrap).collect()
+}
+
+fn counts_are_those_of_the_results(case: &Case, report: &Value, page: &str) {
+    let is_found = |joint: &Value| joint["position_m"].is_array();
+    let is_posed = |it: &&Value| {
+        it["joints"]
+            .as_object()
+            .is_some_and(|it| it.values().any(is_found))
+    };
+    let is_whole = |it: &&Value| it["views_missing"] == json!({});
+    let poses = lines(case, "pose3d.jsonl");
+    let posed = poses.iter().filter(is_posed);
+    let whole = posed.clone().filter(is_whole).count();
+    let (posed, results) = (posed.count(), &report["frames_with_result"]);
+    assert_eq!(report["frames_with_skeleton"], json!(posed));
+    let said = format!(
+        "result{}: {posed} with a skeleton in space, {whole} of these by every camera",
+        if *results == 1 { "" } else { "s" }
+    );
+    assert!(
+        page.contains(&format!("gave {results} {said}")),
+        "{said}: {page:.4000}"
+    );
+}
+
+fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
+    let number = |key: &str| killed[key].as_f64().unwrap();
+    let [last, first] = [number("last_frame"), number("first_frame")];
+    let restarted_ms = number("killed_at_ms") + number("restarted_ms");
+    let times = lines(case, "times.jsonl");
+    for it in lines(case, "pose3d.jsonl") {
+        let frame = it["frame"].as_f64().unwrap();
+        let sent = times.iter().find(|time| time["frame"] == it["frame"]);
+        let sent_ms = sent.and_then(|it| it["sent_ms"].as_f64()).unwrap_or(0.0);
+        if last < frame && frame < first && sent_ms > restarted_ms {
+            assert_eq!(
+                it["views_missing"]["c3"], "process lost",
+                "frame {frame}: {it}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -32,9 +32,10 @@ pub fn html(model: &Model, examples: Option<&Examples>) -> String {
     let figure = Figure::new(model);
     let mut page = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
     page.push_str("<meta charset=\"utf-8\"/>\n");
+    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n");
     put(
         &mut page,
-        format_args!("<title>{title}</title>\n<style>{STYLE}</style>\n"),
+        format_args!("<title>{title}</title>\n<style>{LOOK}{STYLE}</style>\n"),
     );
     put(
         &mut page,
@@ -58,21 +59,20 @@ pub fn html(model: &Model, examples: Option<&Examples>) -> String {
 /// How much of the score a part loses on the ellipse that is drawn for its spring.
 pub const SPRING_COST: f64 = 0.05;
 
+/// How all pages of Parallax look; `runpage` has it for those that may depend on it.
+const LOOK: &str = include_str!("../../runpage/src/page.css");
 const STYLE: &str = "
-:root { color-scheme: light; }
-body { font: 14px/1.45 system-ui, sans-serif; color: #1d2430; background: #f6f7f9; margin: 2em auto; max-width: 84em; padding: 0 1.5em; }
-h1 { font-size: 1.6em; margin: 0 0 .6em; }
-h2 { font-size: 1.2em; margin: 1.6em 0 .6em; }
-h3 { font-size: 1em; margin: 0 0 .5em; }
-h3 small { font-weight: normal; color: #69707d; margin-left: .6em; }
+body { max-width: 84em; }
+h3 { margin: 0 0 .5em; }
+h3 small { font-weight: normal; margin-left: .6em; }
 .numbers { display: flex; flex-wrap: wrap; gap: .6em; margin: 0; padding: 0; list-style: none; }
-.numbers li { background: #fff; border: 1px solid #dfe3e8; border-radius: 6px; padding: .35em .8em; }
+.numbers li { background: var(--card); border: 1px solid var(--line); border-radius: 6px; padding: .35em .8em; }
 .numbers b { display: block; font-size: 1.15em; }
-.numbers span, figcaption, .legend { color: #69707d; font-size: .86em; }
+.numbers span, figcaption, .legend { color: var(--quiet); font-size: .86em; }
 .legend { max-width: 62em; }
 .row { display: flex; flex-wrap: wrap; gap: 1.2em; align-items: flex-start; }
-.card { background: #fff; border: 1px solid #dfe3e8; border-radius: 8px; padding: .9em 1.1em; margin: 0 0 .9em; break-inside: avoid; }
-figure { margin: 0; }
+.card { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: .9em 1.1em; margin: 0 0 .9em; break-inside: avoid; }
+figure { margin: 0; max-width: 100%; overflow-x: auto; }
 .examples { display: grid; grid-template-columns: repeat(2, 42px); gap: 2px; margin-top: .3em; }
 figcaption { margin-top: .25em; text-align: center; }
 svg { display: block; }
@@ -80,9 +80,8 @@ svg { display: block; }
 .dark { background: #0d1117; border-radius: 5px; }
 .light { background: #fff; border: 1px solid #e6e9ee; border-radius: 5px; }
 .key { display: inline-block; width: .75em; height: .75em; border-radius: 50%; margin-right: .3em; }
-table.biases { border-collapse: collapse; }
-table.biases td { min-width: 2.7em; height: 1.75em; padding: 0 .2em; text-align: center; font-size: .72em; border: 1px solid #fff; }
-table.biases th { font-size: .72em; font-weight: normal; color: #69707d; padding: 0 .35em; }
+table.biases td { min-width: 2.7em; height: 1.75em; padding: 0 .2em; text-align: center; font-size: .72em; border: 1px solid var(--card); }
+table.biases th { font-size: .72em; font-weight: normal; color: var(--quiet); padding: 0 .35em; border: 0; }
 ";
 
 const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the filter wants there, the brighter the larger its weight \

@@ -9,6 +9,6 @@ mod space;
 mod text;
 mod timeline;
 
-pub use page::{Limit, Page, Picture, Strip, Table, html};
+pub use page::{Limit, Page, Picture, STYLE, Strip, Table, html};
 pub use space::{Eye, Moment, Point, Space};
 pub use timeline::Mark;

@@ -4,6 +4,8 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const element = (name) => document.getElementById(name);
 const canvas = element("space");
 const pen = canvas.getContext("2d");
+// Pixels of the screen for each of the page.
+let sharp = 1;
 const metres = (mm) => mm && mm.map((it) => it / 1000);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -25,7 +27,7 @@ const floor = among(up, 0.01);
 const middle = [[east, among(east, 0.5)], [north, among(north, 0.5)], [up, floor + 0.9]]
   .reduce((sum, [axis, at]) => add(sum, axis, at), [0, 0, 0]);
 
-const view = { yaw: 0.6, pitch: 0.35, far: 8 };
+const view = { yaw: 0.6, pitch: 0.3, far: 5 };
 let nth = 0;
 let playing = true;
 
@@ -37,7 +39,7 @@ function project(point) {
   const [side, away] = [c * x + s * y, c * y - s * x];
   const [cp, sp] = [Math.cos(view.pitch), Math.sin(view.pitch)];
   const depth = view.far + cp * away - sp * z;
-  const focal = 1.15 * canvas.height;
+  const focal = 1.15 * Math.min(canvas.height, 1.2 * canvas.width);
   return depth < 0.2 ? null : [canvas.width / 2 + (focal * side) / depth, canvas.height / 2 - (focal * (cp * z + sp * away)) / depth];
 }
 
@@ -45,7 +47,7 @@ function line(from, to, colour, width) {
   const [a, b] = [project(from), project(to)];
   if (!a || !b) return;
   pen.strokeStyle = colour;
-  pen.lineWidth = width;
+  pen.lineWidth = width * sharp;
   pen.beginPath();
   pen.moveTo(...a);
   pen.lineTo(...b);
@@ -72,7 +74,7 @@ function drawStage(moment) {
     const at = project(add(eye.at, up, 0.25));
     if (!at) return;
     pen.fillStyle = colour;
-    pen.font = "13px system-ui, sans-serif";
+    pen.font = `${13 * sharp}px system-ui, sans-serif`;
     pen.fillText(eye.name, ...at);
   });
 }
@@ -138,5 +140,13 @@ canvas.onwheel = (it) => {
   view.far = Math.min(20, Math.max(2, view.far * Math.exp(0.001 * it.deltaY)));
   draw();
 };
-draw();
+// As many pixels as the screen has for it.
+function fit() {
+  sharp = window.devicePixelRatio || 1;
+  canvas.width = Math.max(1, Math.round(sharp * canvas.clientWidth));
+  canvas.height = Math.max(1, Math.round(sharp * canvas.clientHeight));
+  draw();
+}
+window.addEventListener("resize", fit);
+fit();
 requestAnimationFrame(turn);

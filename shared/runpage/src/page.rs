@@ -48,7 +48,7 @@ pub struct Table {
     pub heading: String,
     /// A sentence under it; may be empty.
     pub note: String,
-    /// The heads of its columns.
+    /// The heads of its columns; all empty if there is nothing to say.
     pub columns: Vec<String>,
     /// Its rows.
     pub rows: Vec<Vec<String>>,
@@ -74,7 +74,8 @@ pub struct Picture {
 
 const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-const STYLE: &str = include_str!("page.css");
+/// How all pages of Parallax look: light or dark as the reader has it, and no wider than a telephone.
+pub const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
 /// One page that needs no other file and asks for none.
@@ -84,14 +85,15 @@ pub fn html(page: &Page) -> String {
         &mut out,
         format_args!(
             "<meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-             <meta name=\"viewport\" content=\"width=device-width\">\n<title>{0}</title>\n<style>\n{STYLE}</style>\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}</title>\n<style>\n{STYLE}</style>\n\
              <h1>{0}</h1>\n<p class=\"lead\">{1}</p>\n",
             escaped(&page.title),
             escaped(&page.lead)
         ),
     );
-    limits(&mut out, &page.limits);
+    verdict(&mut out, &page.limits);
     space(&mut out, page);
+    limits(&mut out, &page.limits);
     for table in &page.tables {
         tabulate(&mut out, table);
     }
@@ -106,7 +108,7 @@ pub fn html(page: &Page) -> String {
     out
 }
 
-fn limits(out: &mut String, limits: &[Limit]) {
+fn verdict(out: &mut String, limits: &[Limit]) {
     let n_missed = limits.iter().filter(|it| !it.held).count();
     let (class, verdict) = match n_missed {
         0 => ("held", format!("All {} limits held", limits.len())),
@@ -116,7 +118,12 @@ fn limits(out: &mut String, limits: &[Limit]) {
         out,
         format_args!("<p class=\"verdict {class}\">{verdict}</p>\n"),
     );
-    out.push_str("<table>\n<tr><th>limit<th>asked<th>measured<th></tr>\n");
+}
+
+fn limits(out: &mut String, limits: &[Limit]) {
+    out.push_str(
+        "<h2>Limits</h2>\n<div class=\"scroll\"><table>\n<tr><th>limit<th>asked<th>measured<th>verdict</tr>\n",
+    );
     for it in limits {
         let (class, word) = if it.held {
             ("held", "held")
@@ -133,13 +140,13 @@ fn limits(out: &mut String, limits: &[Limit]) {
             ),
         );
     }
-    out.push_str("</table>\n");
+    out.push_str("</table></div>\n");
 }
 
 fn space(out: &mut String, page: &Page) {
     out.push_str(
-        "<h2>In space</h2>\n<canvas id=\"space\" width=\"900\" height=\"520\"></canvas>\n\
-         <p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
+        "<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
+         aria-label=\"the skeleton in space, beside the truth\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
          <label><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
          <p class=\"note\">Drag to turn, wheel to come nearer. Colours: <b class=\"right\">right</b>, \
          <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found; grey: where it is. \
@@ -160,11 +167,14 @@ fn tabulate(out: &mut String, table: &Table) {
             format_args!("<p class=\"note\">{}</p>\n", escaped(&table.note)),
         );
     }
-    out.push_str("<div class=\"scroll\"><table>\n<tr>");
-    for column in &table.columns {
-        put(out, format_args!("<th>{}", escaped(column)));
+    out.push_str("<div class=\"scroll\"><table>\n");
+    if table.columns.iter().any(|it| !it.is_empty()) {
+        out.push_str("<tr>");
+        for column in &table.columns {
+            put(out, format_args!("<th>{}", escaped(column)));
+        }
+        out.push_str("</tr>\n");
     }
-    out.push_str("</tr>\n");
     for row in &table.rows {
         out.push_str("<tr>");
         for cell in row {

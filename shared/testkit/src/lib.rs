@@ -1,6 +1,7 @@
 //! What only tests need.
 #![forbid(unsafe_code)]
 
+pub mod browser;
 pub mod c3d;
 pub mod mat;
 pub mod npy;

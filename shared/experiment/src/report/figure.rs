@@ -5,9 +5,9 @@ use evaluation::SEGMENT_NAMES;
 use super::escape;
 use crate::{ChangesOf, Group};
 
-/// One colour for each version, told apart without red and green alone.
+/// One colour for each version, told apart without red and green alone, on light and on dark.
 const COLOURS: [&str; 8] = [
-    "#b2182b", "#2166ac", "#1b7837", "#762a83", "#e08214", "#35978f", "#c51b7d", "#525252",
+    "#d9503f", "#3a86c8", "#2f9e5b", "#9a6bd0", "#d98a00", "#1f9c95", "#d0568f", "#808894",
 ];
 
 pub(super) fn colour(version: usize) -> &'static str {
@@ -21,7 +21,7 @@ struct Plot {
 }
 
 const HEIGHT: f64 = 220.0;
-const LEFT: f64 = 34.0;
+const LEFT: f64 = 44.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 8.0;
 const BOTTOM: f64 = 34.0;
@@ -34,8 +34,8 @@ impl Plot {
         put(
             &mut out,
             format_args!(
-                "<svg viewBox=\"0 0 {} {}\" width=\"{}\" role=\"img\">",
-                total[0], total[1], total[0]
+                "<svg class=\"chart\" viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\">",
+                total[0], total[1], total[0], total[1]
             ),
         );
         for nth in 0..=4 {
@@ -45,11 +45,11 @@ impl Plot {
                 &mut out,
                 format_args!(
                     "<line x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" class=\"grid\"/>\
-                 <text x=\"{}\" y=\"{:.1}\" class=\"end\">{:.0}{unit}</text>",
+                 <text x=\"{}\" y=\"{:.1}\" class=\"end\">{}{unit}</text>",
                     LEFT + width,
                     LEFT - 4.0,
                     y + 4.0,
-                    share * most
+                    tick(share * most)
                 ),
             );
         }
@@ -86,6 +86,28 @@ impl Plot {
     }
 }
 
+/// A number beside an axis: with as many digits after the point as it takes to be true, two at most.
+pub(super) fn tick(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    if short == "-0" {
+        "0".to_owned()
+    } else {
+        short.to_owned()
+    }
+}
+
+/// The least value at the top of an axis with four steps that can be written so.
+pub(super) fn top(most: f64) -> f64 {
+    let tenth = 10_f64.powf(most.max(0.01).log10().floor());
+    let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+    let fits = steps
+        .into_iter()
+        .map(|it| it * tenth)
+        .find(|it| *it >= most - 1e-9);
+    fits.unwrap_or(10.0 * tenth)
+}
+
 /// PCP3D of every part, a bar for each version.
 pub(super) fn bars(group: &Group, titles: &[String]) -> String {
     let n = SEGMENT_NAMES.len() as f64;
@@ -110,8 +132,10 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> String {
 /// PCP3D over the threshold, a curve for each version.
 pub(super) fn curves(group: &Group, titles: &[String]) -> String {
     let mut plot = Plot::new(420.0, 100.0, "%");
+    let ends = group.versions.iter().filter_map(|it| it.curve.last());
+    let most = ends.map(|it| it[0]).fold(0.0, f64::max);
+    let most = if most > 0.0 { most } else { 1.0 };
     for (version, (title, it)) in titles.iter().zip(&group.versions).enumerate() {
-        let most = it.curve.last().map_or(1.0, |it| it[0]);
         let point = |[gamma, percent]: &[f64; 2]| {
             let x = LEFT + plot.width * gamma / most;
             let y = TOP + HEIGHT * (1.0 - percent / 100.0);
@@ -129,9 +153,8 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
         );
     }
     for nth in 0..=4 {
-        let gamma = f64::from(nth) / 4.0;
-        let x = LEFT + plot.width * gamma;
-        plot.word(x, &format!("{gamma}"));
+        let share = f64::from(nth) / 4.0;
+        plot.word(LEFT + plot.width * share, &tick(share * most));
     }
     plot.end()
 }
@@ -143,13 +166,13 @@ pub(super) fn histogram(changes: &ChangesOf) -> String {
         .bins
         .iter()
         .filter(|it| it[0] != 0.0 && (it[0] + width(changes)).abs() > 1e-9);
-    let most = far.map(|it| it[1]).fold(1.0, f64::max).ceil();
+    let most = top(far.map(|it| it[1]).fold(1.0, f64::max));
     let mut plot = Plot::new(420.0, most, "%");
     let n = changes.bins.len().max(1) as f64;
     let slot = plot.width / n;
     for (nth, [edge, percent]) in changes.bins.iter().enumerate() {
         let x = LEFT + slot * nth as f64;
-        let colour = if *edge < 0.0 { "#b2182b" } else { "#1b7837" };
+        let colour = if *edge < 0.0 { COLOURS[0] } else { COLOURS[2] };
         let title = format!("{edge} to {} px: {percent:.2} %", edge + width(changes));
         plot.bar([x, x + slot - 1.0], percent / most, colour, &title);
     }
@@ -157,7 +180,7 @@ pub(super) fn histogram(changes: &ChangesOf) -> String {
         let share = f64::from(nth) / 4.0;
         let reach = changes.bins.first().map_or(0.0, |it| it[0].abs());
         let at = reach * (2.0 * share - 1.0);
-        plot.word(LEFT + plot.width * share, &format!("{at:.0} px"));
+        plot.word(LEFT + plot.width * share, &format!("{} px", tick(at)));
     }
     plot.end()
 }

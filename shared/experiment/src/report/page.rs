@@ -4,6 +4,7 @@ use super::figure::{bars, colour, curves, histogram};
 use super::table::overall;
 use super::{escape, number};
 use crate::{Group, Numbers, Summary, Version, published};
+use runpage::STYLE;
 
 /// What the page says besides the numbers.
 #[derive(Debug, Clone)]
@@ -16,26 +17,17 @@ pub struct Page<'a> {
     pub about: &'a [(String, String)],
 }
 
-pub(super) const STYLE: &str = "body{font:14px/1.45 system-ui,sans-serif;margin:2em auto;max-width:1100px;padding:0 1em;color:#222}\
-table{border-collapse:collapse;margin:1em 0}td,th{padding:.25em .7em;text-align:right;border-bottom:1px solid #ddd}\
-td:first-child,th:first-child,.name{text-align:left}small{color:#666}svg text{font:11px system-ui,sans-serif;fill:#444}\
-.grid{stroke:#ddd}.mid{text-anchor:middle}.end{text-anchor:end}.scroll{overflow-x:auto}\
-.key span{display:inline-block;width:.9em;height:.9em;margin:0 .4em 0 1.2em;vertical-align:-1px}";
-
 /// One page that needs no other file.
 pub fn html(page: &Page<'_>) -> String {
     let titles: Vec<String> = page.versions.iter().map(|it| it.title()).collect();
-    let mut out = String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    out.push_str("<meta name=\"viewport\" content=\"width=device-width\">\n<title>Evaluation</title>\n<style>");
-    out.push_str(STYLE);
-    out.push_str("</style>\n<h1>Evaluation</h1>\n");
+    let mut out = head();
     about_table(&mut out, page.about);
     out.push_str("<p class=\"key\">");
     for (version, title) in titles.iter().enumerate() {
         put(
             &mut out,
             format_args!(
-                "<span style=\"background:{}\"></span>{}",
+                "<b><span style=\"background:{}\"></span>{}</b>",
                 colour(version),
                 escape(title)
             ),
@@ -61,9 +53,19 @@ pub fn html(page: &Page<'_>) -> String {
     out
 }
 
+/// The beginning of a page, up to its heading.
+pub(super) fn head() -> String {
+    let mut out = String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
+    out.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
+    out.push_str("<title>Parallax: evaluation</title>\n<style>\n");
+    out.push_str(STYLE);
+    out.push_str("</style>\n<h1>Parallax: evaluation</h1>\n");
+    out
+}
+
 /// What was run: key and value.
 pub(super) fn about_table(out: &mut String, about: &[(String, String)]) {
-    out.push_str("<table>\n");
+    out.push_str("<div class=\"scroll\"><table>\n");
     for (key, value) in about {
         put(
             out,
@@ -74,7 +76,7 @@ pub(super) fn about_table(out: &mut String, about: &[(String, String)]) {
             ),
         );
     }
-    out.push_str("</table>\n");
+    out.push_str("</table></div>\n");
 }
 
 /// The paper's main tables: PCP3D by group, and what was published.

@@ -2,7 +2,7 @@
 
 use evaluation::Bootstrap;
 
-use super::page::{STYLE, about_table, put};
+use super::page::{about_table, head, put};
 use super::table::{begin, end, escape as escape_latex, line};
 use super::{escape, number};
 use crate::Pictures;
@@ -16,15 +16,15 @@ pub fn pictures_html(
     about: &[(String, String)],
     bootstrap: &Bootstrap,
 ) -> String {
-    let mut out = String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
-    out.push_str("<meta name=\"viewport\" content=\"width=device-width\">\n<title>Evaluation</title>\n<style>");
-    out.push_str(STYLE);
-    out.push_str("</style>\n<h1>Evaluation</h1>\n");
+    let mut out = head();
     about_table(&mut out, about);
     for table in sets.iter().flat_map(|it| tables(it, bootstrap)) {
         put(
             &mut out,
-            format_args!("<h2>{}</h2>\n<table>\n<tr><th>", escape(&table.title)),
+            format_args!(
+                "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<tr><th>",
+                escape(&table.title)
+            ),
         );
         for column in &table.columns {
             put(&mut out, format_args!("<th>{}", escape(column)));
@@ -43,7 +43,7 @@ pub fn pictures_html(
             let [low, high] = ends.map(|it| number(it, 1));
             put(&mut out, format_args!("<td>{low} to {high}</tr>\n"));
         }
-        out.push_str("</table>\n");
+        out.push_str("</table></div>\n");
     }
     out.push_str("</html>\n");
     out

@@ -1,7 +1,10 @@
 //! The report of made-up numbers.
 
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+
 use evaluation::{Bootstrap, SEGMENT_NAMES};
 
+use super::figure::{tick, top};
 use super::{Page, escape, html, latex};
 use crate::{FrameScore, Measured, Summary, Version, summarise};
 
@@ -79,4 +82,50 @@ fn text_means_itself() {
         escape("<a href=\"x\">&"),
         "&lt;a href=&quot;x&quot;&gt;&amp;"
     );
+}
+
+#[test]
+fn what_stands_beside_an_axis_is_what_it_means() {
+    for (value, text) in [
+        (0.75, "0.75"),
+        (2.25, "2.25"),
+        (-12.5, "-12.5"),
+        (-0.0, "0"),
+        (100.0, "100"),
+        (0.3, "0.3"),
+    ] {
+        assert_eq!(tick(value), text);
+    }
+    for most in 20..2000 {
+        let top = top(0.05 * f64::from(most));
+        assert!(
+            top >= 0.05 * f64::from(most) - 1e-9 && top <= 0.1 * f64::from(most) + 1e-9,
+            "{most}: {top}"
+        );
+        for nth in 0..=4 {
+            let value = top * f64::from(nth) / 4.0;
+            let said: f64 = tick(value).parse().unwrap();
+            assert!((said - value).abs() < 1e-9, "{value} is called {said}");
+        }
+    }
+}
+
+#[test]
+fn the_page_looks_like_that_of_a_run_and_is_no_wider_than_a_telephone() {
+    let (summary, versions) = made_up();
+    let about = [(
+        "sequences".to_owned(),
+        "/a/folder/with/a/name/that/is/long".repeat(9),
+    )];
+    let page = html(&Page {
+        summary: &summary,
+        versions: &versions,
+        about: &about,
+    });
+    assert!(page.contains(runpage::STYLE));
+    let folder = tempfile::tempdir().unwrap();
+    match testkit::browser::too_wide(&page, folder.path(), 420).unwrap() {
+        Some(wide) => assert_eq!(wide, Vec::<String>::new()),
+        None => eprintln!("skipped: no browser is installed"),
+    }
 }

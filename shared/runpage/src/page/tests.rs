@@ -1,5 +1,7 @@
 //! What the page says where, and that it asks for nothing.
 
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+
 use serde_json::Value;
 
 use super::*;
@@ -118,5 +120,66 @@ fn the_script_finds_every_element_that_it_asks_for() {
     let names = asked.map(|it| it.split('"').next().unwrap());
     for name in names {
         assert!(html.contains(&format!("id=\"{name}\"")), "{name}");
+    }
+}
+
+#[test]
+fn what_happened_is_seen_before_what_was_asked_and_no_row_is_empty() {
+    let html = html(&page());
+    let at = |what: &str| html.find(what).unwrap();
+    assert!(at("class=\"verdict") < at("<canvas") && at("<canvas") < at("<h2>Limits"));
+    assert!(at("class=\"time\"") < at("<h2>Limits"));
+    let mut bare = page();
+    bare.tables[0].columns = vec![String::new(); 2];
+    let bare = super::html(&bare);
+    let table = &bare[bare.find("<h2>Latency").unwrap()..];
+    assert!(!table.contains("<th>"), "a row without a word");
+}
+
+#[test]
+fn the_page_is_dark_where_its_reader_wants_that_and_scrolls_what_is_wide() {
+    let dark = STYLE.split("prefers-color-scheme: dark").nth(1).unwrap();
+    let dark = &dark[..dark.find("}\n}").unwrap()];
+    for colour in STYLE[..STYLE.find('}').unwrap()].split("--").skip(1) {
+        let name = colour.split(':').next().unwrap();
+        assert!(
+            dark.contains(&format!("--{name}:")),
+            "{name} has no dark tone"
+        );
+    }
+    // No colour of the page is fixed but that of the stage, which is dark in both.
+    let rules = STYLE.split("}\n}\n").nth(1).unwrap();
+    assert_eq!(
+        rules.matches('#').count(),
+        rules.matches("#space").count() + rules.matches("#said").count() + 1
+    );
+    let html = html(&page());
+    for table in html.match_indices("<table>") {
+        assert!(
+            html[..table.0].ends_with("<div class=\"scroll\">"),
+            "a table that cannot be scrolled"
+        );
+    }
+    assert!(html.contains("width=device-width"));
+}
+
+#[test]
+fn nothing_is_wider_than_a_telephone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut page = page();
+    page.lead = "capture-0, ".repeat(40) + &"x".repeat(200);
+    page.tables[0].columns = vec!["a column of some width".to_owned(); 9];
+    page.strips[0].pictures.extend(vec![
+        Picture {
+            caption: "c3".to_owned(),
+            jpeg: Err("process lost".to_owned()),
+        };
+        3
+    ]);
+    for width in [320, 420] {
+        match testkit::browser::too_wide(&html(&page), folder.path(), width).unwrap() {
+            Some(wide) => assert_eq!(wide, Vec::<String>::new(), "beyond {width} pixels"),
+            None => eprintln!("skipped: no browser is installed"),
+        }
     }
 }

@@ -21,6 +21,7 @@ const JPEG_QUALITY: u8 = 88;
 /// * `folder`: results of the run, with the pictures.
 pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path) -> Page {
     let clock = Clock::new(run);
+    let posed = || run.moments.iter().filter(|it| it.is_posed());
     let mut tables = Vec::new();
     if let Some(cost) = &report.cost {
         tables.push(of_cost(cost, &run.cameras[VICTIM]));
@@ -29,14 +30,15 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
     Page {
         title: "Parallax: the demo".to_owned(),
         lead: format!(
-            "{} cameras saw a person who does not exist, {} frames at {} a second; {} processes ({}) and their \
-             supervisor made skeletons in space of it, {} of them.",
+            "{} cameras saw a person who does not exist, {} frames at {} a second. {} processes and their supervisor \
+             gave {}: {} with a skeleton in space, {} of these by every camera.",
             run.cameras.len(),
             run.n_frames,
             run.rate_hz,
             run.processes.len(),
-            run.processes.join(", "),
-            run.moments.len(),
+            plural(run.moments.len(), "result"),
+            posed().count(),
+            posed().filter(|it| it.views.iter().all(|it| it.missing.is_none())).count(),
         ),
         limits: report.limits.clone(),
         space: space(run, stage),
@@ -47,6 +49,10 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
             .to_owned(),
         strips: strips(run, report.cost.as_ref(), folder),
     }
+}
+
+fn plural(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// From the clock of the run to seconds since the first frame.

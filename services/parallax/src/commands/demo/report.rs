@@ -85,6 +85,7 @@ impl Report {
             "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
             "frames": run.n_frames,
             "frames_with_result": run.moments.len(),
+            "frames_with_skeleton": run.moments.iter().filter(|it| it.is_posed()).count(),
             "frame_rate_hz": run.rate_hz,
             "processes": run.processes,
             "gamma": GAMMA,
