@@ -2,7 +2,9 @@
 
 mod error;
 mod keys;
+mod lists;
 mod load;
+mod places;
 mod processes;
 mod rules;
 
@@ -17,6 +19,8 @@ pub(crate) use load::Loaded;
 pub(crate) use processes::Runtime;
 pub(crate) use rules::fuse_numbers;
 
+use crate::shipped;
+
 /// Everything a user may say about a run. Defaults are those of the services' `Config`s.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -29,6 +33,8 @@ pub(crate) struct Deployment {
     pub model: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
+    /// Where the footage comes from, and how to get it: said where a file is missing.
+    pub data: Option<String>,
     /// The cameras, in the order in which views are numbered.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
@@ -120,26 +126,19 @@ impl Deployment {
             *path = base.join(&path);
         }
         if let Some(model) = &mut self.model {
-            *model = base.join(&model);
+            *model = shipped::relative_to(model, base);
         }
         for camera in &mut self.cameras {
-            camera.source = if Address::is_one(&camera.source) {
-                Address::relative_to(&camera.source, base)
-            } else {
-                base.join(&camera.source).to_string_lossy().into_owned()
-            };
+            camera.source = source(&camera.source, base);
         }
         let quality = &mut self.quality;
-        let files = [
-            &mut quality.table,
-            &mut quality.network,
-            &mut quality.onnx_runtime,
-        ];
+        let files = [&mut quality.table, &mut quality.onnx_runtime];
         for file in files.into_iter().flatten() {
             *file = base.join(&file);
         }
-        if let Some(file) = &mut self.fuse.consistency {
-            *file = base.join(&file);
+        let may_ship = [&mut quality.network, &mut self.fuse.consistency];
+        for file in may_ship.into_iter().flatten() {
+            *file = shipped::relative_to(file, base);
         }
         if let fuse::Tau::File(tau) = &mut self.fuse.tau {
             tau.file = base.join(&tau.file);
@@ -150,4 +149,16 @@ impl Deployment {
             }
         }
     }
+}
+
+/// Footage as it is named in a file of the folder `base`; what is no file stays as it is, and is refused later.
+fn source(named: &str, base: &Path) -> String {
+    if Address::is_one(named) {
+        return Address::relative_to(named, base);
+    }
+    let on_disk = base.join(named);
+    if named.is_empty() || (footage::is_live(named) && !on_disk.exists()) {
+        return named.to_owned();
+    }
+    on_disk.to_string_lossy().into_owned()
 }

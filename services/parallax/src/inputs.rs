@@ -1,7 +1,10 @@
 //! The files that a deployment names: read before anything is started.
 
+mod advice;
+
 use std::borrow::Cow;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,31 +21,31 @@ use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
 use crate::deployment::Deployment;
-
-/// The model that ships with Parallax (`configs/models/person.md` is its card).
-const PERSON: &[u8] = include_bytes!("../../../configs/models/person.fmp");
+use crate::shipped::{self, Shipped};
 
 /// The named model, or the one that ships with Parallax.
 pub(crate) fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
-    path.map_or_else(shipped, model)
+    path.map_or_else(shipped_model, model)
 }
 
 /// The bytes of the named model file, or of the model that ships with Parallax.
 pub(crate) fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
-    let Some(path) = path else {
-        return Ok(Cow::Borrowed(PERSON));
-    };
-    let bytes = fs::read(path).map_err(|error| in_file(path, &error))?;
-    Ok(Cow::Owned(bytes))
+    path.map_or_else(
+        || Ok(Cow::Borrowed(Shipped::Model.bytes())),
+        |path| Shipped::Model.read(path),
+    )
 }
 
-fn shipped() -> Result<Arc<Model>, Failure> {
-    let spec = fmp::files::own::decode(PERSON).or_fail(ExitKind::Input)?;
+fn shipped_model() -> Result<Arc<Model>, Failure> {
+    let spec = fmp::files::own::decode(Shipped::Model.bytes()).or_fail(ExitKind::Input)?;
     Model::new(spec).map(Arc::new).or_fail(ExitKind::Input)
 }
 
 /// Reads the model, of whichever format.
 pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
+    if shipped::is_one(path) {
+        return shipped_model();
+    }
     fmp::files::read(path)
         .map(Arc::new)
         .or_fail(ExitKind::Input)
@@ -53,13 +56,17 @@ pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
 /// * `paths`: several if every camera has its own file.
 pub(crate) fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
     let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
-    geometry::files::read_many(&paths, options).map_err(|error| match error {
-        RigFileError::Read { .. } | RigFileError::NoFiles => Failure::new(ExitKind::Input, error)
-            .with_hint(
-                "a rig file says where the cameras stand; `parallax calib convert` makes one of \
-                 other programs' calibrations",
-            ),
-        _ => Failure::new(ExitKind::Calibration, error),
+    geometry::files::read_many(&paths, options).map_err(|error| {
+        let kind = match error {
+            RigFileError::Read { .. } | RigFileError::NoFiles => ExitKind::Input,
+            _ => ExitKind::Calibration,
+        };
+        let hint = advice::on_rig(&error);
+        let failure = Failure::new(kind, error);
+        match hint {
+            Some(hint) => failure.with_hint(hint),
+            None => failure,
+        }
     })
 }
 
@@ -92,12 +99,9 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
         .iter()
         .map(|camera| {
             let seen = Feed::look(&source(camera, &deployment.capture));
-            let info = seen.or_fail(ExitKind::Input).map_err(|failure| {
-                failure.with_hint(format!(
-                    "the `source` of camera {:?} is a video, an image, a folder of images, a glob or a scene (synth://...); \
-                     relative paths are relative to the deployment file",
-                    camera.name
-                ))
+            let info = seen.map_err(|error| {
+                let hint = advice::on_footage(&error, &camera.name);
+                Failure::new(ExitKind::Input, error).with_hint(hint)
             })?;
             Ok(Footage {
                 size: [info.size.width as u32, info.size.height as u32],
@@ -134,7 +138,9 @@ pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learn
     let Some(file) = file else {
         return Ok(None);
     };
-    let learned = Learned::parse(&text(file)?).map_err(|error| in_file(file, &error))?;
+    let bytes = Shipped::Consistency.read(file)?;
+    let text = core::str::from_utf8(&bytes).map_err(|_odd| no_text(file))?;
+    let learned = Learned::parse(text).map_err(|error| in_file(file, &error))?;
     let checked = learned.check_model(&shape(model));
     checked.map_err(|error| in_file(file, &error))?;
     Ok(Some(learned))
@@ -201,7 +207,7 @@ pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failur
 
 /// Reads a network that predicts errors.
 pub(crate) fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
-    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    let bytes = Shipped::Network.read(file)?.into_owned();
     Network::parse(bytes, n_parts).map_err(|error| refused(file, &error))
 }
 
@@ -233,7 +239,7 @@ fn by_onnx_runtime(
     };
     let runtime = viewquality::OnnxRuntime::load(library, device);
     let runtime = runtime.map_err(|error| refused(library, &error))?;
-    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    let bytes = Shipped::Network.read(file)?;
     Network::parse_with(&runtime, &bytes, n_parts).map_err(|error| refused(file, &error))
 }
 
@@ -264,9 +270,33 @@ pub(crate) fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
     Ok(tau.px().to_vec())
 }
 
+/// Makes a folder for results.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, error))
+}
+
+/// A failure to read what a deployment names, with what its file says of where that comes from.
+pub(crate) fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
+    match &deployment.data {
+        Some(data) if failure.kind() == ExitKind::Input => {
+            failure.with_another_hint(format!("where its data come from: {data}"))
+        }
+        _ => failure,
+    }
+}
+
 /// Reads a text file, and names it if that fails.
 pub(crate) fn text(file: &Path) -> Result<String, Failure> {
-    fs::read_to_string(file).map_err(|error| in_file(file, &error))
+    fs::read_to_string(file).map_err(|error| match error.kind() {
+        ErrorKind::InvalidData => no_text(file),
+        _ => in_file(file, &error),
+    })
+}
+
+/// A file that should be text.
+fn no_text(file: &Path) -> Failure {
+    let message = format!("{} is no text: it is not UTF-8", file.display());
+    Failure::new(ExitKind::Input, message)
 }
 
 /// An input that is wrong: the file, then what is wrong with it.
@@ -313,6 +343,9 @@ pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
     let resolved = crate::plan::Resolved::new(deployment)?;
     let prepared = crate::prepare::Prepared::new(&resolved)?;
     prepared.check_predictions(&resolved)?;
+    if let Some(padding) = &prepared.padding {
+        tracing::warn!("{padding}");
+    }
     let n_frames = resolved.n_frames();
     let solved_in = match prepared.settings.views {
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),

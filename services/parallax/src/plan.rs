@@ -49,7 +49,8 @@ impl Resolved {
     /// Looks at the footage of a deployment.
     pub(crate) fn new(deployment: &Deployment) -> Result<Self, Failure> {
         Ok(Self {
-            footage: inputs::footage(deployment)?,
+            footage: inputs::footage(deployment)
+                .map_err(|it| inputs::of_deployment(it, deployment))?,
             deployment: deployment.clone(),
             tape: None,
             replay: None,

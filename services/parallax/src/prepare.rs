@@ -14,6 +14,7 @@ use viewquality::Predictor;
 
 use crate::deployment::Deployment;
 use crate::inputs;
+use crate::padding;
 use crate::plan::Resolved;
 
 /// One view, ready.
@@ -41,17 +42,25 @@ pub(crate) struct Prepared {
     pub up_in_world: Option<UnitVector3<f64>>,
     /// The settings of all steps.
     pub settings: EstimatorSettings,
+    /// What of the frames' size is worth a word.
+    pub padding: Option<String>,
 }
 
 impl Prepared {
     /// Reads model and rig, and prepares the views.
     pub(crate) fn new(resolved: &Resolved) -> Result<Self, Failure> {
+        let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
+        Self::read(resolved).map_err(told)
+    }
+
+    fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let model = inputs::model_or_shipped(deployment.model.as_deref())?;
         let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
-        let mut views = Vec::new();
+        let (mut views, mut sizes) = (Vec::new(), Vec::new());
         for (index, camera) in deployment.cameras.iter().enumerate() {
             let framing = framing(resolved, &rig, index)?;
+            sizes.extend(rig.camera(&camera.name).map(|it| it.intrinsics.size));
             let plan = pipeline::plan(&model, framing.camera()).or_fail(ExitKind::Input)?;
             views.push(View {
                 name: camera.name.clone(),
@@ -63,6 +72,7 @@ impl Prepared {
         Ok(Self {
             pairs: pairs(deployment),
             up_in_world: rig.up_in_world(),
+            padding: padding::warning(deployment, &views, &sizes),
             model,
             views,
             settings,
@@ -89,6 +99,11 @@ impl Prepared {
     /// Sees that the network, if there is one, can be run; and that the table of expected errors, if there
     /// is one, speaks of every view; warns where it speaks of none of the frames.
     pub(crate) fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
+        let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
+        self.predict(resolved).map_err(told)
+    }
+
+    fn predict(&self, resolved: &Resolved) -> Result<(), Failure> {
         inputs::own_network(&resolved.deployment.quality, self.model.n_parts())?;
         let capture = &resolved.deployment.capture;
         for (view, footage) in resolved.footage.iter().enumerate() {

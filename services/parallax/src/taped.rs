@@ -15,6 +15,7 @@ use crate::audience::Tape;
 use crate::deployment::Deployment;
 use crate::inputs;
 use crate::plan::Resolved;
+use crate::shipped::{self, Shipped};
 
 /// The settings of a run, as they stand in its recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -49,17 +50,27 @@ pub(crate) fn about(resolved: &Resolved, tape: &Tape) -> Result<About, Failure> 
 
 /// Fingerprints of the files that a deployment names, but for its footage.
 pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, u64>, Failure> {
-    let named = [
-        Some(&deployment.rig),
-        deployment.model.as_ref(),
-        deployment.quality.table.as_ref(),
-        deployment.quality.network.as_ref(),
-        deployment.fuse.consistency.as_ref(),
-    ];
     let mut files = BTreeMap::new();
-    for file in named.into_iter().flatten() {
+    for file in [Some(&deployment.rig), deployment.quality.table.as_ref()]
+        .into_iter()
+        .flatten()
+    {
         let bytes = std::fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
         files.insert(file.clone(), inputs::fingerprint(&bytes));
+    }
+    for (kind, file) in [
+        (Shipped::Model, &deployment.model),
+        (Shipped::Network, &deployment.quality.network),
+        (Shipped::Consistency, &deployment.fuse.consistency),
+    ] {
+        let Some(file) = file else { continue };
+        // Files that ship may be several, and have one name.
+        let name = if shipped::is_one(file) {
+            kind.name()
+        } else {
+            file.clone()
+        };
+        files.insert(name, inputs::fingerprint(&kind.read(file)?));
     }
     Ok(files)
 }

@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         search: Search::in_precision(arguments.precision, model).or_fail(ExitKind::Usage)?,
     };
     if let Some(folder) = &arguments.overlay {
-        std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+        inputs::make_folder(folder)?;
     }
     let images = inputs::images(&arguments.images)?;
     let mut sheet = arguments

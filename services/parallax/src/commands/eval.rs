@@ -21,6 +21,7 @@ use super::judge::selection;
 use crate::cli::Globals;
 use crate::deployment::fuse_numbers;
 use crate::inputs;
+use crate::shipped::{self, Shipped};
 use job::Job;
 
 pub(super) use job::no_film;
@@ -80,13 +81,13 @@ pub(crate) struct Arguments {
     /// Settings of fusion.
     #[arg(long, value_name = "FILE")]
     fuse: Option<PathBuf>,
-    /// What was learned about several views (`train consistency`), instead of what FILE says.
+    /// What was learned about several views (`train consistency`), instead of what --fuse says; "shipped": what ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
     /// Table of expected errors, as the authors released it.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
-    /// Network that predicts the errors, an ONNX file.
+    /// Network that predicts the errors, an ONNX file; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
     /// Expect the true errors: a part is off beyond a tenth of the person's size.
@@ -178,7 +179,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         None => None,
     };
     let poses = arguments.out.join("poses");
-    fs::create_dir_all(&poses).map_err(|error| inputs::in_file(&poses, &error))?;
+    inputs::make_folder(&poses)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
@@ -301,7 +302,7 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
         .or_fail(ExitKind::Config)?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
     if let Some(file) = &mut config.consistency {
-        *file = folder.join(&file);
+        *file = shipped::relative_to(file, &folder);
     }
     for table in &mut config.compatibility {
         table.files = table.files.each_ref().map(|it| folder.join(it));
@@ -342,14 +343,23 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
         Ok::<_, Failure>(inputs::fingerprint(&bytes))
     };
+    let of =
+        |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(inputs::fingerprint(&kind.read(file)?));
     let model = inputs::fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
-    let network = arguments.network.as_ref().map(digest).transpose()?;
+    let network = arguments
+        .network
+        .as_ref()
+        .map(|it| of(Shipped::Network, it))
+        .transpose()?;
     let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
     let mut tables = Vec::new();
     let files = config.compatibility.iter().flat_map(|it| &it.files);
-    for file in files.chain(&config.consistency) {
+    for file in files {
         tables.push(digest(file)?);
+    }
+    if let Some(file) = &config.consistency {
+        tables.push(of(Shipped::Consistency, file)?);
     }
     let fuse = toml::to_string(config).or_fail(ExitKind::Run)?;
     let (size, scale) = (arguments.size, arguments.scale);

@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     /// Which energy.
     #[arg(long, value_enum, default_value_t = Energy::Paper)]
     energy: Energy,
-    /// What was learned about several views: part-type tables, weights, thresholds, joints.
+    /// What was learned about several views: part-type tables, weights, thresholds, joints; "shipped": what ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
     /// Weight of the geometric term; as learned, else by energy, if not given.

@@ -12,6 +12,7 @@ use crate::cli::Globals;
 use crate::commands::run::Planned;
 use crate::deployment::Loaded;
 use crate::plan::Resolved;
+use crate::shipped::Shipped;
 use crate::taped::{self, Settings};
 use crate::{inputs, output};
 
@@ -144,8 +145,13 @@ fn refused(key: &str, from: Stage) -> Option<String> {
 /// Says which files are not what they were.
 fn warn_of_other_files(settings: &Settings) {
     for (file, recorded) in &settings.files {
-        let now = std::fs::read(file).map(|bytes| inputs::fingerprint(&bytes));
-        if now.ok() != Some(*recorded) {
+        let now = match Shipped::of_name(file) {
+            Some(it) => Some(inputs::fingerprint(it.bytes())),
+            None => std::fs::read(file)
+                .ok()
+                .map(|bytes| inputs::fingerprint(&bytes)),
+        };
+        if now != Some(*recorded) {
             let file = file.display();
             output::message(format_args!("{file} is not the file of the recorded run"));
         }

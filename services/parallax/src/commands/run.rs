@@ -108,6 +108,9 @@ impl Planned {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
         let file = file_of(&resolved.deployment);
+        if let Some(padding) = &prepared.padding {
+            tracing::warn!("{padding}");
+        }
         let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
         for warning in scheduling::permit(&mut plan.processes, Scheduling::rehearse) {
             tracing::warn!("{warning}");
@@ -156,7 +159,7 @@ impl Planned {
     ) -> Result<Report, Failure> {
         let deployment = &self.resolved.deployment;
         let folder = &deployment.output;
-        std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+        inputs::make_folder(folder)?;
         self.resolved.write(&file_of(deployment))?;
         let begin = Instant::now();
         let mut watcher = Watcher::new(&self.resolved, globals.quiet);

@@ -53,6 +53,10 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     ("output", "folder for the results"),
     (
+        "data",
+        "where the footage comes from, and how to get it: said where a file that is named here is missing",
+    ),
+    (
         "camera",
         "name in the rig, source (video, image, folder, glob, synth://...), source_offset_px of a cropped source, fault = \"freeze@30+20\" for a test",
     ),
@@ -130,7 +134,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "quality.network",
-        "network that predicts the errors of every view, an ONNX file; in place of a table",
+        "network that predicts the errors of every view, an ONNX file, or \"shipped\", the one that ships; in place of a table",
     ),
     (
         "quality.onnx_runtime",
@@ -182,7 +186,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "fuse.consistency",
-        "what `parallax train consistency` learned: part-type tables, weights, thresholds, joints",
+        "what `parallax train consistency` learned, or \"shipped\": part-type tables, weights, thresholds, joints",
     ),
     (
         "fuse.consistency_rig",

@@ -59,7 +59,7 @@ impl Stage {
     ///
     /// * `folder`: absolute.
     pub(crate) fn new(cast: &Cast<'_>, folder: PathBuf) -> Result<Self, Failure> {
-        std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        inputs::make_folder(&folder)?;
         let ring = RigChoice::Ring {
             n: cast.n_cameras,
             radius: RADIUS,

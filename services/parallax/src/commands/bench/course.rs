@@ -141,7 +141,7 @@ impl Course {
         stop: &Stop,
     ) -> Result<Option<Self>, Failure> {
         let folder = stage::absolute(&arguments.out)?;
-        fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        inputs::make_folder(&folder)?;
         let name = toml::Value::from(arguments.name.clone());
         let mut set = arguments.set.clone();
         set.extend([format!("name={name}"), "record.overlay_every=0".to_owned()]);

@@ -59,7 +59,7 @@ fn draw_view(
     if folder.exists() {
         std::fs::remove_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
     }
-    std::fs::create_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
+    inputs::make_folder(folder)?;
     let size = view.size();
     let mut rgb = vec![0; size.rgb_bytes()];
     for frame in 0..n_frames {

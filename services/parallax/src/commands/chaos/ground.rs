@@ -52,7 +52,7 @@ impl Ground {
     /// Looks at the deployment, or makes the one with cameras that do not exist.
     pub(super) fn new(arguments: &Arguments, globals: Globals) -> Result<Self, Failure> {
         let folder = stage::absolute(&arguments.out)?;
-        std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+        inputs::make_folder(&folder)?;
         let mut ground = Self {
             file: PathBuf::new(),
             folder,

@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
     let file = file.map_or_else(|| "the model".to_owned(), |it| it.display().to_string());
     judged::check(&model, &file)?;
     let poses = arguments.out.join("poses");
-    fs::create_dir_all(&poses).map_err(|error| inputs::in_file(&poses, &error))?;
+    inputs::make_folder(&poses)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()

@@ -57,7 +57,7 @@ impl<'a> Sequence<'a> {
             }
         }
         for folder in folders {
-            std::fs::create_dir_all(&folder).map_err(|error| inputs::in_file(&folder, &error))?;
+            inputs::make_folder(&folder)?;
         }
         Ok(it)
     }

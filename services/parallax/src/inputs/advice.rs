@@ -1,0 +1,101 @@
+//! What to try when a file cannot be used.
+
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use capture::FeedError;
+use footage::FootageError;
+use geometry::files::RigFileError;
+use runtime::{ExitKind, Failure};
+
+/// * `camera`: whose footage it is.
+pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
+    let camera = format!("camera {camera:?}");
+    match error {
+        FeedError::Footage(FootageError::Live { .. }) => {
+            format!(
+                "this is the `source` of {camera}; recorded files and synth:// scenes can be its footage"
+            )
+        }
+        FeedError::Footage(FootageError::Io { source, .. })
+            if source.kind() == ErrorKind::PermissionDenied =>
+        {
+            format!(
+                "this is the `source` of {camera}: whoever runs Parallax needs to read it, and to enter (x) every folder above it"
+            )
+        }
+        FeedError::Footage(
+            FootageError::ZeroCount
+            | FootageError::ZeroStep
+            | FootageError::BadRate { .. }
+            | FootageError::StartBeyondEnd { .. },
+        ) => format!(
+            "`capture.start_frame`, `frame_step`, `n_frames` and `frame_rate_hz` say which frames are used; this is of {camera}"
+        ),
+        FeedError::Footage(
+            FootageError::FfmpegMissing { .. }
+            | FootageError::Video { .. }
+            | FootageError::Image { .. }
+            | FootageError::Empty { .. },
+        ) => format!(
+            "this is the `source` of {camera}; a player, or `ffprobe FILE`, shows whether the file is whole"
+        ),
+        _ => format!(
+            "the `source` of {camera} is a video, an image, a folder of images, a glob or a scene (synth://...); \
+             relative paths are relative to the deployment file"
+        ),
+    }
+}
+
+/// None where the message says it all.
+pub(super) fn on_rig(error: &RigFileError) -> Option<String> {
+    let path = match error {
+        RigFileError::Read { path, source } if source.kind() == ErrorKind::PermissionDenied => {
+            return Some(format!(
+                "whoever runs Parallax needs to read {}",
+                path.display()
+            ));
+        }
+        RigFileError::Read { path, .. } if path.is_dir() => {
+            return Some("a rig is one file: name it, not the folder that it lies in".to_owned());
+        }
+        RigFileError::Read { .. } | RigFileError::NoFiles => {
+            return Some(
+                "a rig file says where the cameras stand; `parallax calib convert` makes one of other programs' calibrations"
+                    .to_owned(),
+            );
+        }
+        RigFileError::Parse { path, .. } | RigFileError::UnknownFormat { path } => path,
+        _ => return None,
+    };
+    let text = fs::read_to_string(path).unwrap_or_default();
+    if text.trim().is_empty() {
+        return Some(format!("{} is empty", path.display()));
+    }
+    let begins = |key: &str| text.lines().any(|it| it.starts_with(key));
+    if begins("rig =") && begins("[[camera]]") {
+        return Some(
+            "this is a deployment file; the rig is the file that its `rig` names".to_owned(),
+        );
+    }
+    None
+}
+
+/// A folder for results that cannot be made.
+pub(super) fn on_folder(folder: &Path, error: io::Error) -> Failure {
+    let in_the_way = folder
+        .ancestors()
+        .find(|it| it.exists())
+        .filter(|it| !it.is_dir());
+    let message = match in_the_way {
+        Some(file) => format!(
+            "cannot make the folder {}: {} is a file",
+            folder.display(),
+            file.display()
+        ),
+        None => format!("cannot make the folder {}: {error}", folder.display()),
+    };
+    Failure::new(ExitKind::Input, message)
+        .with_hint("results go to the folder `output` of the deployment file, or to --out: name one that can be written")
+}

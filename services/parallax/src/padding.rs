@@ -1,0 +1,79 @@
+//! How much of the frames is padding, because their size has another aspect than the camera's image.
+
+use crate::deployment::Deployment;
+use crate::prepare::View;
+
+/// Shares of padding below this are not worth a word.
+const WORTH_A_WORD: f64 = 0.1;
+
+/// A warning about the cameras of whose frames much is padding; none if there are none.
+pub(crate) fn warning(
+    deployment: &Deployment,
+    views: &[View],
+    sizes: &[[u32; 2]],
+) -> Option<String> {
+    let frame = deployment.capture.size?;
+    let padded = views
+        .iter()
+        .zip(sizes)
+        .filter(|it| share(*it.1, frame) > WORTH_A_WORD);
+    let padded: Vec<(&View, [u32; 2])> = padded.map(|it| (it.0, *it.1)).collect();
+    let (_, image) = *padded.first()?;
+    let names: Vec<&str> = padded
+        .iter()
+        .filter(|it| it.1 == image)
+        .map(|it| it.0.name.as_str())
+        .collect();
+    let [width, height] = fitting(image, frame);
+    Some(format!(
+        "{:.0} % of every {}x{} frame of {} is padding, for the camera's image is {}x{}: searched in vain, and the person \
+         is small. Try capture.size = [{width}, {height}], or capture.scale = {:.3} in place of it",
+        100.0 * share(image, frame),
+        frame[0],
+        frame[1],
+        names.join(", "),
+        image[0],
+        image[1],
+        f64::from(width) / f64::from(image[0])
+    ))
+}
+
+/// How much larger an image becomes that just fits into a frame.
+fn scale(image: [u32; 2], frame: [usize; 2]) -> f64 {
+    let side = |it: usize| frame[it] as f64 / f64::from(image[it].max(1));
+    side(0).min(side(1))
+}
+
+/// The share of a frame that an image in its own aspect does not fill.
+fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
+    let scale = scale(image, frame);
+    let area = f64::from(image[0]) * f64::from(image[1]) * scale * scale;
+    1.0 - area / (frame[0] as f64 * frame[1] as f64)
+}
+
+/// The size of the image in the frame.
+fn fitting(image: [u32; 2], frame: [usize; 2]) -> [u32; 2] {
+    let scale = scale(image, frame);
+    image.map(|it| (f64::from(it) * scale).round().max(1.0) as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_portrait_in_a_landscape_is_mostly_padding() {
+        let image = [1088, 1920];
+        assert!((share(image, [640, 480]) - 0.575).abs() < 1e-3);
+        assert_eq!(fitting(image, [640, 480]), [272, 480]);
+        assert!(share(image, [272, 480]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_same_aspect_needs_none_whatever_the_size() {
+        for frame in [[640, 480], [320, 240], [1280, 960]] {
+            assert!(share([640, 480], frame).abs() < 1e-9, "{frame:?}");
+            assert_eq!(fitting([640, 480], frame), frame.map(|it| it as u32));
+        }
+    }
+}
