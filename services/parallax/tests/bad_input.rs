@@ -3,6 +3,10 @@
 
 use crate::common;
 
+mod mistakes;
+mod settings;
+mod told;
+
 use std::fs;
 
 use common::{Case, Ended, PLAIN, planted};

@@ -67,3 +67,27 @@ fn too_little_shared_memory_is_refused_with_the_numbers() {
     }
     assert_eq!(ended.stdout, "");
 }
+
+#[test]
+fn a_recording_for_which_there_is_no_room_is_not_begun() {
+    let case = Case::new("no-room", &[2; 2], PLAIN);
+    fs::create_dir(case.path("disk")).unwrap();
+    let script = "mount -t tmpfs -o size=64k tmpfs disk\n\
+                  exec \"$PARALLAX\" record deployment.toml --out disk/run.mcap";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    for words in [
+        "there is no room for",
+        "2 frames of",
+        "kB are free",
+        "--without evidence",
+    ] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    assert!(!case.path("out").exists(), "nothing was begun");
+}

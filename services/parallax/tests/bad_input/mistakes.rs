@@ -1,0 +1,330 @@
+//! What newcomers do wrong, and what they are told: what it is, where, and what to try.
+
+use std::fs;
+use std::os::unix::ffi::OsStrExt as _;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
+
+use crate::common::{Case, Ended, PLAIN};
+
+/// Words of the program and of its libraries that no user should have to read.
+const NEVER: &[&str] = &[
+    "u64",
+    "usize",
+    "f64",
+    "PathBuf",
+    "invalid type",
+    "invalid value:",
+    "Error {",
+    "Error::",
+    "ships none",
+    "stream did not contain",
+];
+
+/// One mistake, made in a good deployment of two views of two frames, `a` and `b`.
+pub(crate) struct Mistake {
+    pub(crate) what: &'static str,
+    pub(crate) made: fn(&Case),
+    /// What the shell runs after the program's name.
+    pub(crate) command: &'static str,
+    pub(crate) code: i32,
+    /// What is wrong, and where.
+    pub(crate) says: &'static [&'static str],
+    /// What to try.
+    pub(crate) tries: &'static [&'static str],
+}
+
+pub(crate) const CHECK: &str = "config check deployment.toml";
+pub(crate) const DRY: &str = "run deployment.toml --dry-run";
+pub(crate) const NOTHING: fn(&Case) = |_| {};
+
+pub(crate) fn source(case: &Case, named: &str) {
+    case.edit(
+        "deployment.toml",
+        "source = \"b\"",
+        &format!("source = {named:?}"),
+    );
+}
+
+pub(crate) fn capture(case: &Case, line: &str) {
+    case.edit(
+        "deployment.toml",
+        "upright = false",
+        &format!("upright = false\n{line}"),
+    );
+}
+
+pub(crate) fn section(case: &Case, text: &str) {
+    case.edit("deployment.toml", "[record]", &format!("{text}\n[record]"));
+}
+
+fn forbid(case: &Case, name: &str) {
+    fs::set_permissions(case.path(name), fs::Permissions::from_mode(0)).unwrap();
+}
+
+/// So that the folder can be removed.
+fn permit(case: &Case) {
+    for name in ["b", "films"] {
+        if case.path(name).exists() {
+            fs::set_permissions(case.path(name), fs::Permissions::from_mode(0o700)).unwrap();
+        }
+    }
+}
+
+/// A script; what does not name the program is what comes after its name.
+fn in_shell(command: &str) -> String {
+    if command.contains("$PARALLAX") {
+        return command.to_owned();
+    }
+    format!("exec \"$PARALLAX\" {command}")
+}
+
+/// Makes every mistake of a table, and sees what is said.
+pub(crate) fn check(table: &[Mistake]) {
+    let mut wrong = Vec::new();
+    for it in table {
+        let case = Case::new("oops", &[2; 2], PLAIN);
+        (it.made)(&case);
+        let Ended { status, stderr, .. } = case.start_in_shell(&in_shell(it.command)).wait();
+        case.assert_nothing_left();
+        permit(&case);
+        let words = it.says.iter().chain(it.tries);
+        let lacks: Vec<&&str> = words.filter(|word| !stderr.contains(**word)).collect();
+        let has: Vec<&&str> = NEVER
+            .iter()
+            .filter(|word| stderr.contains(**word))
+            .collect();
+        if status.code() != Some(it.code) || !lacks.is_empty() || !has.is_empty() {
+            wrong.push(format!(
+                "{}: {status}, expected {}; lacks {lacks:?}, has {has:?}\n{stderr}",
+                it.what, it.code
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn sources_that_are_no_files() {
+    let live: fn(&'static str, fn(&Case), &'static [&'static str]) -> Mistake =
+        |what, made, tries| Mistake {
+            what,
+            made,
+            command: CHECK,
+            code: 4,
+            says: &[
+                "live sources are not supported by this version",
+                "camera \"b\"",
+            ],
+            tries,
+        };
+    check(&[
+        live(
+            "RTSP",
+            |it| source(it, "rtsp://10.0.0.5/live"),
+            &["ffmpeg -i rtsp://10.0.0.5/live"],
+        ),
+        live(
+            "HTTP",
+            |it| source(it, "http://cam/b.mp4"),
+            &["ffmpeg -i http://cam/b.mp4", "name that file"],
+        ),
+        live(
+            "UDP",
+            |it| source(it, "udp://@:5000"),
+            &["record it first", "ffmpeg -i udp://@:5000"],
+        ),
+        live(
+            "V4L2",
+            |it| source(it, "v4l2:/dev/video0"),
+            &["ffmpeg -f v4l2 -i /dev/video0"],
+        ),
+        live(
+            "device",
+            |it| source(it, "/dev/video97"),
+            &["record it first", "/dev/video97"],
+        ),
+        live(
+            "number of a webcam",
+            |it| source(it, "0"),
+            &["number of a webcam", "record it to a file first"],
+        ),
+        live(
+            "file:// address",
+            |it| source(it, "file:///tmp/b.mp4"),
+            &["without file://: /tmp/b.mp4"],
+        ),
+        Mistake {
+            what: "number of a webcam without quotes",
+            made: |it| it.edit("deployment.toml", "source = \"b\"", "source = 0"),
+            command: CHECK,
+            code: 3,
+            says: &["deployment.toml:12", "`camera.source`", "found 0"],
+            tries: &["text in quotes"],
+        },
+        Mistake {
+            what: "scene of an unknown rig",
+            made: |it| source(it, "synth://humanevaa?camera=C1"),
+            command: CHECK,
+            code: 4,
+            says: &["synth://humanevaa", "is no rig"],
+            tries: &["expected humaneva, umpm, ring"],
+        },
+    ]);
+}
+
+#[test]
+fn footage_that_is_not_as_it_is_named() {
+    let footage = |what, made, says, tries| Mistake {
+        what,
+        made,
+        command: CHECK,
+        code: 4,
+        says,
+        tries,
+    };
+    check(&[
+        footage(
+            "absent video",
+            |it| source(it, "films/b.mp4"),
+            &["no such footage", "there is no folder", "camera \"b\""],
+            &["relative to the deployment file"],
+        ),
+        footage(
+            "no name",
+            |it| source(it, ""),
+            &["the footage has no name", "camera \"b\""],
+            &["is a video, an image"],
+        ),
+        footage(
+            "empty video",
+            |it| {
+                source(it, "b.mp4");
+                it.write("b.mp4", "");
+            },
+            &["b.mp4", "0 bytes"],
+            &["ffprobe"],
+        ),
+        footage(
+            "video whose copying was cut off",
+            |it| {
+                source(it, "b.mp4");
+                it.write("b.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
+            },
+            &["cannot decode the video", "b.mp4"],
+            &["ffprobe"],
+        ),
+        footage(
+            "text",
+            |it| source(it, "rig.toml"),
+            &["cannot decode", "rig.toml", "camera \"b\""],
+            &["shows whether the file is whole"],
+        ),
+        footage(
+            "pattern without a match",
+            |it| source(it, "b/%04d.jpg"),
+            &["no image", "b/%04d.jpg"],
+            &["a folder of images, a glob"],
+        ),
+        footage(
+            "later first frame than there are",
+            |it| capture(it, "start_frame = 9"),
+            &["first frame 9", "2 frames"],
+            &["`capture.start_frame`"],
+        ),
+        Mistake {
+            what: "no ffmpeg",
+            made: |it| {
+                source(it, "b.mp4");
+                it.write("b.mp4", "x");
+            },
+            command: "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
+            code: 4,
+            says: &["cannot run ffprobe", "b.mp4"],
+            tries: &["apt-get install ffmpeg"],
+        },
+        Mistake {
+            what: "name that is not UTF-8",
+            made: |it| {
+                fs::rename(
+                    it.path("b/0000.png"),
+                    it.folder()
+                        .join(Path::new(std::ffi::OsStr::from_bytes(b"\xff.png"))),
+                )
+                .unwrap()
+            },
+            command: "detect \"$(printf '\\377.png')\"",
+            code: 4,
+            says: &["no such footage: \u{fffd}.png", "not UTF-8"],
+            tries: &["rename it"],
+        },
+    ]);
+}
+
+#[test]
+fn what_may_not_be_read() {
+    // The superuser may read everything, but not from a user namespace of its own.
+    let is_root =
+        fs::metadata("/proc/self").is_ok_and(|it| std::os::unix::fs::MetadataExt::uid(&it) == 0);
+    let command = if is_root {
+        "exec unshare -U \"$PARALLAX\" config check deployment.toml"
+    } else {
+        CHECK
+    };
+    let probe = Case::new("oops-may", &[2; 2], PLAIN);
+    if is_root
+        && probe
+            .start_in_shell("exec unshare -U true")
+            .wait()
+            .status
+            .code()
+            != Some(0)
+    {
+        return; // Nothing is forbidden to this user.
+    }
+    let forbidden = |what, made, says, tries| Mistake {
+        what,
+        made,
+        command,
+        code: 4,
+        says,
+        tries,
+    };
+    check(&[
+        forbidden(
+            "folder of images",
+            |it| forbid(it, "b"),
+            &["cannot read", "/b", "Permission denied"],
+            &["camera \"b\"", "needs to read it"],
+        ),
+        forbidden(
+            "rig",
+            |it| forbid(it, "rig.toml"),
+            &["cannot read", "rig.toml", "Permission denied"],
+            &["needs to read"],
+        ),
+        forbidden(
+            "model",
+            |it| forbid(it, "model.plx"),
+            &["cannot read the model file", "model.plx"],
+            &["Permission denied"],
+        ),
+        forbidden(
+            "deployment",
+            |it| forbid(it, "deployment.toml"),
+            &["cannot read the deployment file deployment.toml"],
+            &["Permission denied"],
+        ),
+        forbidden(
+            "folder above the footage",
+            |it| {
+                fs::create_dir(it.path("films")).unwrap();
+                fs::rename(it.path("b"), it.path("films/b")).unwrap();
+                source(it, "films/b");
+                forbid(it, "films");
+            },
+            &["cannot read", "films/b", "Permission denied"],
+            &["enter (x) every folder above it"],
+        ),
+    ]);
+}

@@ -1,0 +1,146 @@
+//! What is told before a run begins, and where its data come from.
+
+use std::fs;
+use std::path::Path;
+
+use crate::common::{Case, PLAIN};
+use crate::mistakes::{section, source};
+
+#[test]
+fn a_file_says_where_its_data_come_from() {
+    let case = Case::new("oops-data", &[2; 2], PLAIN);
+    case.edit(
+        "deployment.toml",
+        "output = ",
+        "data = \"the room's archive, folder 7\"\noutput = ",
+    );
+    source(&case, "films/b.mp4");
+    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(
+        ended
+            .stderr
+            .contains("where its data come from: the room's archive, folder 7"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn the_files_that_ship_say_where_their_data_come_from() {
+    // In a folder of their own, as in a clone that has nothing beside it.
+    let case = Case::new("oops-clone", &[2; 2], PLAIN);
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+    fs::create_dir(case.path("configs")).unwrap();
+    for (name, words) in [
+        (
+            "pose2sim-balancing.toml",
+            ["Pose2Sim", "../shared beside the clone"],
+        ),
+        (
+            "humaneva-still.toml",
+            ["HumanEva-I", "../shared beside the clone"],
+        ),
+        ("umpm-still.toml", ["UMPM", "../shared beside the clone"]),
+    ] {
+        fs::copy(configs.join(name), case.path("configs").join(name)).unwrap();
+        let ended = case
+            .start(&["run", &format!("configs/{name}"), "--dry-run"])
+            .wait();
+        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        for word in [&words[..], &["where its data come from"]].concat() {
+            assert!(
+                ended.stderr.contains(word),
+                "{name} lacks {word}: {}",
+                ended.stderr
+            );
+        }
+    }
+}
+
+#[test]
+fn what_ships_works_wherever_the_program_is() {
+    let case = Case::new("oops-ships", &[2; 2], PLAIN);
+    case.edit("deployment.toml", "model = \"model.plx\"\n", "");
+    case.edit(
+        "deployment.toml",
+        "workers = 2",
+        "workers = 2\nconsistency = \"shipped\"\ntau = \"learned\"",
+    );
+    section(&case, "[quality]\nnetwork = \"shipped\"");
+    let ended = case.start(&["config", "check", "deployment.toml"]).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    // A path remains a path.
+    for (from, to) in [
+        ("network = \"shipped\"", "network = \"./shipped\""),
+        ("\"./shipped\"", "\"a/shipped\""),
+    ] {
+        case.edit("deployment.toml", from, to);
+        let ended = case.start(&["config", "check", "deployment.toml"]).wait();
+        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains("/shipped: No such file"),
+            "{}",
+            ended.stderr
+        );
+    }
+}
+
+#[test]
+fn padding_is_told_with_the_size_that_has_none() {
+    let case = Case::new("oops-pad", &[2; 2], PLAIN);
+    let said = |size: &str| {
+        let set = format!("capture.size={size}");
+        let ended = case
+            .start(&["config", "check", "deployment.toml", "--set", &set])
+            .wait();
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        ended.stderr
+    };
+    // The pictures are 96x128.
+    let landscape = said("[160, 120]");
+    for words in [
+        "44 % of every 160x120 frame of a, b is padding",
+        "capture.size = [90, 120]",
+        "96x128",
+    ] {
+        assert!(landscape.contains(words), "{words}: {landscape}");
+    }
+    assert!(!said("[90, 120]").contains("padding"));
+}
+
+#[test]
+fn a_recording_says_what_it_will_take_and_keeps_to_it() {
+    let case = Case::new("oops-room", &[4; 2], PLAIN);
+    let ended = case
+        .start(&["record", "deployment.toml", "--out", "run.mcap"])
+        .wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let line = ended
+        .stderr
+        .lines()
+        .find(|it| it.starts_with("recording "))
+        .unwrap();
+    assert!(
+        ended.stderr.contains("--without evidence: "),
+        "{}",
+        ended.stderr
+    );
+    assert!(line.contains(" for all 4 frames; "), "{line}");
+    // What it said is not less than what it took, and not many times as much.
+    let number = |before: &str| -> f64 {
+        let at = line.find(before).unwrap() + before.len();
+        let mut words = line[at..].split(' ');
+        let number: f64 = words.next().unwrap().parse().unwrap();
+        let unit = words.next().unwrap();
+        number * if unit.starts_with("MB") { 1e6 } else { 1e3 }
+    };
+    let said = number("up to ") * 4.0;
+    let took = fs::metadata(case.path("run.mcap")).unwrap().len() as f64;
+    // Signs of life, schemas and settings come on top: some hundred kilobytes.
+    assert!(
+        took < said + 1e6 && said < 4.0 * took,
+        "said {said}, took {took}: {line}"
+    );
+}
