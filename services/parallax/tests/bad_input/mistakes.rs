@@ -59,7 +59,7 @@ pub(crate) fn section(case: &Case, text: &str) {
 }
 
 fn forbid(case: &Case, name: &str) {
-    fs::set_permissions(case.path(name), fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(case.path(name), fs::Permissions::from_mode(0o0)).unwrap();
 }
 
 /// So that the folder can be removed.
@@ -104,227 +104,241 @@ pub(crate) fn check(table: &[Mistake]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-#[test]
-fn sources_that_are_no_files() {
-    let live: fn(&'static str, fn(&Case), &'static [&'static str]) -> Mistake =
-        |what, made, tries| Mistake {
-            what,
-            made,
-            command: CHECK,
-            code: 4,
-            says: &[
-                "live sources are not supported by this version",
-                "camera \"b\"",
-            ],
-            tries,
-        };
-    check(&[
-        live(
-            "RTSP",
-            |it| source(it, "rtsp://10.0.0.5/live"),
-            &["ffmpeg -i rtsp://10.0.0.5/live"],
-        ),
-        live(
-            "HTTP",
-            |it| source(it, "http://cam/b.mp4"),
-            &["ffmpeg -i http://cam/b.mp4", "name that file"],
-        ),
-        live(
-            "UDP",
-            |it| source(it, "udp://@:5000"),
-            &["record it first", "ffmpeg -i udp://@:5000"],
-        ),
-        live(
-            "V4L2",
-            |it| source(it, "v4l2:/dev/video0"),
-            &["ffmpeg -f v4l2 -i /dev/video0"],
-        ),
-        live(
-            "device",
-            |it| source(it, "/dev/video97"),
-            &["record it first", "/dev/video97"],
-        ),
-        live(
-            "number of a webcam",
-            |it| source(it, "0"),
-            &["number of a webcam", "record it to a file first"],
-        ),
-        live(
-            "file:// address",
-            |it| source(it, "file:///tmp/b.mp4"),
-            &["without file://: /tmp/b.mp4"],
-        ),
-        Mistake {
-            what: "number of a webcam without quotes",
-            made: |it| it.edit("deployment.toml", "source = \"b\"", "source = 0"),
-            command: CHECK,
-            code: 3,
-            says: &["deployment.toml:12", "`camera.source`", "found 0"],
-            tries: &["text in quotes"],
-        },
-        Mistake {
-            what: "scene of an unknown rig",
-            made: |it| source(it, "synth://humanevaa?camera=C1"),
-            command: CHECK,
-            code: 4,
-            says: &["synth://humanevaa", "is no rig"],
-            tries: &["expected humaneva, umpm, ring"],
-        },
-    ]);
+const fn live(what: &'static str, made: fn(&Case), tries: &'static [&'static str]) -> Mistake {
+    Mistake {
+        what,
+        made,
+        command: CHECK,
+        code: 4,
+        says: &[
+            "live sources are not supported by this version",
+            "camera \"b\"",
+        ],
+        tries,
+    }
 }
 
+const NO_FILES: &[Mistake] = &[
+    live(
+        "RTSP",
+        |it| source(it, "rtsp://10.0.0.5/live"),
+        &["ffmpeg -i rtsp://10.0.0.5/live"],
+    ),
+    live(
+        "HTTP",
+        |it| source(it, "http://cam/b.mp4"),
+        &["ffmpeg -i http://cam/b.mp4", "name that file"],
+    ),
+    live(
+        "UDP",
+        |it| source(it, "udp://@:5000"),
+        &["record it first", "ffmpeg -i udp://@:5000"],
+    ),
+    live(
+        "V4L2",
+        |it| source(it, "v4l2:/dev/video0"),
+        &["ffmpeg -f v4l2 -i /dev/video0"],
+    ),
+    live(
+        "device",
+        |it| source(it, "/dev/video97"),
+        &["record it first", "/dev/video97"],
+    ),
+    live(
+        "number of a webcam",
+        |it| source(it, "0"),
+        &["number of a webcam", "record it to a file first"],
+    ),
+    live(
+        "file:// address",
+        |it| source(it, "file:///tmp/b.mp4"),
+        &["without file://: /tmp/b.mp4"],
+    ),
+    Mistake {
+        what: "number of a webcam without quotes",
+        made: |it| it.edit("deployment.toml", "source = \"b\"", "source = 0"),
+        command: CHECK,
+        code: 3,
+        says: &["deployment.toml:12", "`camera.source`", "found 0"],
+        tries: &["text in quotes"],
+    },
+    Mistake {
+        what: "scene of an unknown rig",
+        made: |it| source(it, "synth://humanevaa?camera=C1"),
+        command: CHECK,
+        code: 4,
+        says: &["synth://humanevaa", "is no rig"],
+        tries: &["expected humaneva, umpm, ring"],
+    },
+];
+
 #[test]
-fn footage_that_is_not_as_it_is_named() {
-    let footage = |what, made, says, tries| Mistake {
+fn sources_that_are_no_files() {
+    check(NO_FILES);
+}
+
+const fn footage(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made,
         command: CHECK,
         code: 4,
         says,
         tries,
-    };
-    check(&[
-        footage(
-            "absent video",
-            |it| source(it, "films/b.mp4"),
-            &["no such footage", "there is no folder", "camera \"b\""],
-            &["relative to the deployment file"],
-        ),
-        footage(
-            "no name",
-            |it| source(it, ""),
-            &["the footage has no name", "camera \"b\""],
-            &["is a video, an image"],
-        ),
-        footage(
-            "empty video",
-            |it| {
-                source(it, "b.mp4");
-                it.write("b.mp4", "");
-            },
-            &["b.mp4", "0 bytes"],
-            &["ffprobe"],
-        ),
-        footage(
-            "video whose copying was cut off",
-            |it| {
-                source(it, "b.mp4");
-                it.write("b.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
-            },
-            &["cannot decode the video", "b.mp4"],
-            &["ffprobe"],
-        ),
-        footage(
-            "text",
-            |it| source(it, "rig.toml"),
-            &["cannot decode", "rig.toml", "camera \"b\""],
-            &["shows whether the file is whole"],
-        ),
-        footage(
-            "pattern without a match",
-            |it| source(it, "b/%04d.jpg"),
-            &["no image", "b/%04d.jpg"],
-            &["a folder of images, a glob"],
-        ),
-        footage(
-            "later first frame than there are",
-            |it| capture(it, "start_frame = 9"),
-            &["first frame 9", "2 frames"],
-            &["`capture.start_frame`"],
-        ),
-        Mistake {
-            what: "no ffmpeg",
-            made: |it| {
-                source(it, "b.mp4");
-                it.write("b.mp4", "x");
-            },
-            command: "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
-            code: 4,
-            says: &["cannot run ffprobe", "b.mp4"],
-            tries: &["apt-get install ffmpeg"],
-        },
-        Mistake {
-            what: "name that is not UTF-8",
-            made: |it| {
-                fs::rename(
-                    it.path("b/0000.png"),
-                    it.folder()
-                        .join(Path::new(std::ffi::OsStr::from_bytes(b"\xff.png"))),
-                )
-                .unwrap()
-            },
-            command: "detect \"$(printf '\\377.png')\"",
-            code: 4,
-            says: &["no such footage: \u{fffd}.png", "not UTF-8"],
-            tries: &["rename it"],
-        },
-    ]);
+    }
 }
 
+const FOOTAGE: &[Mistake] = &[
+    footage(
+        "absent video",
+        |it| source(it, "films/b.mp4"),
+        &["no such footage", "there is no folder", "camera \"b\""],
+        &["relative to the deployment file"],
+    ),
+    footage(
+        "no name",
+        |it| source(it, ""),
+        &["the footage has no name", "camera \"b\""],
+        &["is a video, an image"],
+    ),
+    footage(
+        "empty video",
+        |it| {
+            source(it, "b.mp4");
+            it.write("b.mp4", "");
+        },
+        &["b.mp4", "0 bytes"],
+        &["ffprobe"],
+    ),
+    footage(
+        "video whose copying was cut off",
+        |it| {
+            source(it, "b.mp4");
+            it.write("b.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0");
+        },
+        &["cannot decode the video", "b.mp4"],
+        &["ffprobe"],
+    ),
+    footage(
+        "text",
+        |it| source(it, "rig.toml"),
+        &["cannot decode", "rig.toml", "camera \"b\""],
+        &["shows whether the file is whole"],
+    ),
+    footage(
+        "pattern without a match",
+        |it| source(it, "b/%04d.jpg"),
+        &["no image", "b/%04d.jpg"],
+        &["a folder of images, a glob"],
+    ),
+    footage(
+        "later first frame than there are",
+        |it| capture(it, "start_frame = 9"),
+        &["first frame 9", "2 frames"],
+        &["`capture.start_frame`"],
+    ),
+    Mistake {
+        what: "no ffmpeg",
+        made: |it| {
+            source(it, "b.mp4");
+            it.write("b.mp4", "x");
+        },
+        command: "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
+        code: 4,
+        says: &["cannot run ffprobe", "b.mp4"],
+        tries: &["apt-get install ffmpeg"],
+    },
+    Mistake {
+        what: "name that is not UTF-8",
+        made: |it| {
+            fs::rename(
+                it.path("b/0000.png"),
+                it.folder()
+                    .join(Path::new(std::ffi::OsStr::from_bytes(b"\xff.png"))),
+            )
+            .unwrap();
+        },
+        command: "detect \"$(printf '\\377.png')\"",
+        code: 4,
+        says: &["no such footage: \u{fffd}.png", "not UTF-8"],
+        tries: &["rename it"],
+    },
+];
+
 #[test]
-fn what_may_not_be_read() {
-    // The superuser may read everything, but not from a user namespace of its own.
-    let is_root =
-        fs::metadata("/proc/self").is_ok_and(|it| std::os::unix::fs::MetadataExt::uid(&it) == 0);
-    let command = if is_root {
-        "exec unshare -U \"$PARALLAX\" config check deployment.toml"
-    } else {
-        CHECK
-    };
-    let probe = Case::new("oops-may", &[2; 2], PLAIN);
-    if is_root
-        && probe
-            .start_in_shell("exec unshare -U true")
-            .wait()
-            .status
-            .code()
-            != Some(0)
-    {
-        return; // Nothing is forbidden to this user.
-    }
-    let forbidden = |what, made, says, tries| Mistake {
+fn footage_that_is_not_as_it_is_named() {
+    check(FOOTAGE);
+}
+
+/// The superuser may read everything, but not from a user namespace of its own.
+const FORBIDDEN: &str = "test $(id -u) = 0 || exec \"$PARALLAX\" config check deployment.toml\n\
+                         exec unshare -U \"$PARALLAX\" config check deployment.toml";
+
+const fn forbidden(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made,
-        command,
+        command: FORBIDDEN,
         code: 4,
         says,
         tries,
-    };
-    check(&[
-        forbidden(
-            "folder of images",
-            |it| forbid(it, "b"),
-            &["cannot read", "/b", "Permission denied"],
-            &["camera \"b\"", "needs to read it"],
-        ),
-        forbidden(
-            "rig",
-            |it| forbid(it, "rig.toml"),
-            &["cannot read", "rig.toml", "Permission denied"],
-            &["needs to read"],
-        ),
-        forbidden(
-            "model",
-            |it| forbid(it, "model.plx"),
-            &["cannot read the model file", "model.plx"],
-            &["Permission denied"],
-        ),
-        forbidden(
-            "deployment",
-            |it| forbid(it, "deployment.toml"),
-            &["cannot read the deployment file deployment.toml"],
-            &["Permission denied"],
-        ),
-        forbidden(
-            "folder above the footage",
-            |it| {
-                fs::create_dir(it.path("films")).unwrap();
-                fs::rename(it.path("b"), it.path("films/b")).unwrap();
-                source(it, "films/b");
-                forbid(it, "films");
-            },
-            &["cannot read", "films/b", "Permission denied"],
-            &["enter (x) every folder above it"],
-        ),
-    ]);
+    }
+}
+
+const MAY_NOT: &[Mistake] = &[
+    forbidden(
+        "folder of images",
+        |it| forbid(it, "b"),
+        &["cannot read", "/b", "Permission denied"],
+        &["camera \"b\"", "needs to read it"],
+    ),
+    forbidden(
+        "rig",
+        |it| forbid(it, "rig.toml"),
+        &["cannot read", "rig.toml", "Permission denied"],
+        &["needs to read"],
+    ),
+    forbidden(
+        "model",
+        |it| forbid(it, "model.plx"),
+        &["cannot read the model file", "model.plx"],
+        &["Permission denied"],
+    ),
+    forbidden(
+        "deployment",
+        |it| forbid(it, "deployment.toml"),
+        &["cannot read the deployment file deployment.toml"],
+        &["Permission denied"],
+    ),
+    forbidden(
+        "folder above the footage",
+        |it| {
+            fs::create_dir(it.path("films")).unwrap();
+            fs::rename(it.path("b"), it.path("films/b")).unwrap();
+            source(it, "films/b");
+            forbid(it, "films");
+        },
+        &["cannot read", "films/b", "Permission denied"],
+        &["enter (x) every folder above it"],
+    ),
+];
+
+#[test]
+fn what_may_not_be_read() {
+    let probe = Case::new("oops-may", &[2; 2], PLAIN);
+    let probe = probe.start_in_shell("test $(id -u) != 0 || exec unshare -U true");
+    if probe.wait().status.code() != Some(0) {
+        return; // Nothing is forbidden to this user.
+    }
+    check(MAY_NOT);
 }

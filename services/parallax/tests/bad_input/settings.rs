@@ -2,379 +2,419 @@
 
 use std::fs;
 
+use crate::common::Case;
+
 use crate::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check, section};
 
-#[test]
-fn deployment_files() {
-    let config = |what, made, says, tries| Mistake {
+const fn config(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made,
         command: CHECK,
         code: 3,
         says,
         tries,
-    };
-    check(&[
-        config(
-            "text for a number",
-            |it| capture(it, "n_frames = \"many\""),
-            &[
-                "deployment.toml:16",
-                "`capture.n_frames`",
-                "found the text \"many\"",
-            ],
-            &["a whole number of at least 0"],
-        ),
-        config(
-            "number below 0",
-            |it| capture(it, "n_frames = -1"),
-            &["`capture.n_frames`", "found -1"],
-            &["a whole number of at least 0"],
-        ),
-        config(
-            "half a frame",
-            |it| capture(it, "start_frame = 1.5"),
-            &["`capture.start_frame`", "found 1.5"],
-            &["a whole number"],
-        ),
-        config(
-            "larger than any number",
-            |it| capture(it, "n_frames = 99999999999999999999"),
-            &["`capture.n_frames`", "99999999999999999999"],
-            &["a whole number"],
-        ),
-        config(
-            "size as text",
-            |it| capture(it, "size = \"640x480\""),
-            &["`capture.size`", "found the text \"640x480\""],
-            &["a list of 2 values"],
-        ),
-        config(
-            "size of three",
-            |it| capture(it, "size = [96, 128, 3]"),
-            &["deployment.toml:16", "`capture.size` is a list of 3 values"],
-            &["expected 2"],
-        ),
-        config(
-            "1 for true",
-            |it| it.edit("deployment.toml", "upright = false", "upright = 1"),
-            &["`capture.upright`", "found 1"],
-            &["true or false"],
-        ),
-        config(
-            "word without quotes",
-            |it| capture(it, "mode = realtime"),
-            &["deployment.toml:16"],
-            &["text must stand in quotes"],
-        ),
-        config(
-            "unknown mode",
-            |it| capture(it, "mode = \"live\""),
-            &["`live`"],
-            &["`lossless` or `realtime`"],
-        ),
-        config(
-            "key twice",
-            |it| capture(it, "upright = true"),
-            &["deployment.toml:16", "`upright` is given twice"],
-            &[],
-        ),
-        config(
-            "[camera] in single brackets",
-            |it| it.edit("deployment.toml", "[[camera]]", "[camera]"),
-            &["deployment.toml:10", "`camera` is given twice"],
-            &["[[camera]], in double brackets"],
-        ),
-        config(
-            "[[cameras]]",
-            |it| it.edit("deployment.toml", "[[camera]]", "[[cameras]]"),
-            &["unknown key `cameras`"],
-            &["did you mean `camera`"],
-        ),
-        config(
-            "empty file",
-            |it| it.write("deployment.toml", ""),
-            &["missing key `name`"],
-            &["a deployment file needs `name`, `rig`, `output`"],
-        ),
-        config(
-            "camera without footage",
-            |it| it.edit("deployment.toml", "source = \"b\"", ""),
-            &["missing key `source`"],
-            &["every [[camera]] needs"],
-        ),
-        config(
-            "a name of many words",
-            |it| it.edit("deployment.toml", "name = \"oops", "name = \"My Room"),
-            &["`name` is \"My Room"],
-            &["lower-case letters"],
-        ),
-        Mistake {
-            what: "the rig",
-            made: NOTHING,
-            command: "config check rig.toml",
-            code: 3,
-            says: &["this is a rig file"],
-            tries: &["name the deployment file"],
-        },
-        Mistake {
-            what: "a folder",
-            made: NOTHING,
-            command: "config check a",
-            code: 4,
-            says: &["deployment file a", "is a folder"],
-            tries: &["name the .toml file in it"],
-        },
-        Mistake {
-            what: "a picture",
-            made: NOTHING,
-            command: "config check a/0000.png",
-            code: 4,
-            says: &["a/0000.png", "no text"],
-            tries: &["UTF-8"],
-        },
-        Mistake {
-            what: "no file",
-            made: NOTHING,
-            command: "config check nowhere.toml",
-            code: 4,
-            says: &["nowhere.toml"],
-            tries: &["No such file"],
-        },
-    ]);
+    }
 }
 
+const FILES: &[Mistake] = &[
+    config(
+        "text for a number",
+        |it| capture(it, "n_frames = \"many\""),
+        &[
+            "deployment.toml:16",
+            "`capture.n_frames`",
+            "found the text \"many\"",
+        ],
+        &["a whole number of at least 0"],
+    ),
+    config(
+        "number below 0",
+        |it| capture(it, "n_frames = -1"),
+        &["`capture.n_frames`", "found -1"],
+        &["a whole number of at least 0"],
+    ),
+    config(
+        "half a frame",
+        |it| capture(it, "start_frame = 1.5"),
+        &["`capture.start_frame`", "found 1.5"],
+        &["a whole number"],
+    ),
+    config(
+        "larger than any number",
+        |it| capture(it, "n_frames = 99999999999999999999"),
+        &["`capture.n_frames`", "99999999999999999999"],
+        &["a whole number"],
+    ),
+    config(
+        "size as text",
+        |it| capture(it, "size = \"640x480\""),
+        &["`capture.size`", "found the text \"640x480\""],
+        &["a list of 2 values"],
+    ),
+    config(
+        "size of three",
+        |it| capture(it, "size = [96, 128, 3]"),
+        &["deployment.toml:16", "`capture.size` is a list of 3 values"],
+        &["expected 2"],
+    ),
+    config(
+        "1 for true",
+        |it| it.edit("deployment.toml", "upright = false", "upright = 1"),
+        &["`capture.upright`", "found 1"],
+        &["true or false"],
+    ),
+    config(
+        "word without quotes",
+        |it| capture(it, "mode = realtime"),
+        &["deployment.toml:16"],
+        &["text must stand in quotes"],
+    ),
+    config(
+        "unknown mode",
+        |it| capture(it, "mode = \"live\""),
+        &["`live`"],
+        &["`lossless` or `realtime`"],
+    ),
+    config(
+        "key twice",
+        |it| capture(it, "upright = true"),
+        &["deployment.toml:16", "`upright` is given twice"],
+        &[],
+    ),
+    config(
+        "[camera] in single brackets",
+        |it| it.edit("deployment.toml", "[[camera]]", "[camera]"),
+        &["deployment.toml:10", "`camera` is given twice"],
+        &["[[camera]], in double brackets"],
+    ),
+    config(
+        "[[cameras]]",
+        |it| it.edit("deployment.toml", "[[camera]]", "[[cameras]]"),
+        &["unknown key `cameras`"],
+        &["did you mean `camera`"],
+    ),
+    config(
+        "empty file",
+        |it| it.write("deployment.toml", ""),
+        &["missing key `name`"],
+        &["a deployment file needs `name`, `rig`, `output`"],
+    ),
+    config(
+        "camera without footage",
+        |it| it.edit("deployment.toml", "source = \"b\"", ""),
+        &["missing key `source`"],
+        &["every [[camera]] needs"],
+    ),
+    config(
+        "a name of many words",
+        |it| it.edit("deployment.toml", "name = \"oops", "name = \"My Room"),
+        &["`name` is \"My Room"],
+        &["lower-case letters"],
+    ),
+    Mistake {
+        what: "the rig",
+        made: NOTHING,
+        command: "config check rig.toml",
+        code: 3,
+        says: &["this is a rig file"],
+        tries: &["name the deployment file"],
+    },
+    Mistake {
+        what: "a folder",
+        made: NOTHING,
+        command: "config check a",
+        code: 4,
+        says: &["deployment file a", "is a folder"],
+        tries: &["name the .toml file in it"],
+    },
+    Mistake {
+        what: "a picture",
+        made: NOTHING,
+        command: "config check a/0000.png",
+        code: 4,
+        says: &["a/0000.png", "no text"],
+        tries: &["UTF-8"],
+    },
+    Mistake {
+        what: "no file",
+        made: NOTHING,
+        command: "config check nowhere.toml",
+        code: 4,
+        says: &["nowhere.toml"],
+        tries: &["No such file"],
+    },
+];
+
 #[test]
-fn command_lines() {
-    let usage = |what, command, says, tries| Mistake {
+fn deployment_files() {
+    check(FILES);
+}
+
+const fn usage(
+    what: &'static str,
+    command: &'static str,
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made: NOTHING,
         command,
         code: 2,
         says,
         tries,
-    };
-    check(&[
-        usage(
-            "slip in a command",
-            "rum deployment.toml",
-            &["'rum'"],
-            &["'run'"],
-        ),
-        usage(
-            "slip in an option",
-            "run deployment.toml --dryrun",
-            &["'--dryrun'"],
-            &["'--dry-run'"],
-        ),
-        usage("no file", "run", &["<CONFIG>"], &["--help"]),
-        usage(
-            "nothing to check",
-            "config check",
-            &["config check"],
-            &["needs a deployment file"],
-        ),
-        usage(
-            "negative budget",
-            "run deployment.toml --latency-budget-ms -3",
-            &["-3"],
-            &["not above 0"],
-        ),
-        usage(
-            "recording into a folder",
-            "record deployment.toml --out a",
-            &["/a is a folder"],
-            &["run.mcap"],
-        ),
-        usage(
-            "unknown stage",
-            "replay run.mcap --from posee",
-            &["posee"],
-            &["'pose'"],
-        ),
-        Mistake {
-            what: "--set without a value",
-            made: NOTHING,
-            command: "config check deployment.toml --set fuse.workers",
-            code: 3,
-            says: &["--set fuse.workers"],
-            tries: &["expected key=value"],
-        },
-        Mistake {
-            what: "--set of another kind",
-            made: NOTHING,
-            command: "config check deployment.toml --set fuse.workers=two",
-            code: 3,
-            says: &["--set", "`fuse.workers`", "found the text \"two\""],
-            tries: &["a whole number"],
-        },
-        Mistake {
-            what: "--set of a slip",
-            made: NOTHING,
-            command: "config check deployment.toml --set fuse.wrokers=2",
-            code: 3,
-            says: &["--set", "`wrokers`"],
-            tries: &["did you mean `workers`"],
-        },
-        Mistake {
-            what: "recording into no folder",
-            made: NOTHING,
-            command: "record deployment.toml --out none/run.mcap",
-            code: 4,
-            says: &["run.mcap cannot be written", "there is no folder"],
-            tries: &["make the folder first"],
-        },
-        Mistake {
-            what: "results in the place of a file",
-            made: |it| it.write("out", ""),
-            command: "run deployment.toml",
-            code: 4,
-            says: &["cannot make the folder", "out is a file"],
-            tries: &["--out"],
-        },
-        Mistake {
-            what: "a recording that is none",
-            made: NOTHING,
-            command: "replay rig.toml --from fuse",
-            code: 4,
-            says: &["rig.toml"],
-            tries: &["not an MCAP file"],
-        },
-        Mistake {
-            what: "images in an empty folder",
-            made: |it| fs::create_dir(it.path("none")).unwrap(),
-            command: "detect none",
-            code: 4,
-            says: &["none: no image"],
-            tries: &["png, jpg, jpeg, bmp"],
-        },
-    ]);
+    }
 }
 
+const LINES: &[Mistake] = &[
+    usage(
+        "slip in a command",
+        "rum deployment.toml",
+        &["'rum'"],
+        &["'run'"],
+    ),
+    usage(
+        "slip in an option",
+        "run deployment.toml --dryrun",
+        &["'--dryrun'"],
+        &["'--dry-run'"],
+    ),
+    usage("no file", "run", &["<CONFIG>"], &["--help"]),
+    usage(
+        "nothing to check",
+        "config check",
+        &["config check"],
+        &["needs a deployment file"],
+    ),
+    usage(
+        "negative budget",
+        "run deployment.toml --latency-budget-ms -3",
+        &["-3"],
+        &["not above 0"],
+    ),
+    usage(
+        "recording into a folder",
+        "record deployment.toml --out a",
+        &["/a is a folder"],
+        &["run.mcap"],
+    ),
+    usage(
+        "unknown stage",
+        "replay run.mcap --from posee",
+        &["posee"],
+        &["'pose'"],
+    ),
+    Mistake {
+        what: "--set without a value",
+        made: NOTHING,
+        command: "config check deployment.toml --set fuse.workers",
+        code: 3,
+        says: &["--set fuse.workers"],
+        tries: &["expected key=value"],
+    },
+    Mistake {
+        what: "--set of another kind",
+        made: NOTHING,
+        command: "config check deployment.toml --set fuse.workers=two",
+        code: 3,
+        says: &["--set", "`fuse.workers`", "found the text \"two\""],
+        tries: &["a whole number"],
+    },
+    Mistake {
+        what: "--set of a slip",
+        made: NOTHING,
+        command: "config check deployment.toml --set fuse.wrokers=2",
+        code: 3,
+        says: &["--set", "`wrokers`"],
+        tries: &["did you mean `workers`"],
+    },
+    Mistake {
+        what: "recording into no folder",
+        made: NOTHING,
+        command: "record deployment.toml --out none/run.mcap",
+        code: 4,
+        says: &["run.mcap cannot be written", "there is no folder"],
+        tries: &["make the folder first"],
+    },
+    Mistake {
+        what: "results in the place of a file",
+        made: |it| it.write("out", ""),
+        command: "run deployment.toml",
+        code: 4,
+        says: &["cannot make the folder", "out is a file"],
+        tries: &["--out"],
+    },
+    Mistake {
+        what: "a recording that is none",
+        made: NOTHING,
+        command: "replay rig.toml --from fuse",
+        code: 4,
+        says: &["rig.toml"],
+        tries: &["not an MCAP file"],
+    },
+    Mistake {
+        what: "images in an empty folder",
+        made: |it| fs::create_dir(it.path("none")).unwrap(),
+        command: "detect none",
+        code: 4,
+        says: &["none: no image"],
+        tries: &["png, jpg, jpeg, bmp"],
+    },
+];
+
 #[test]
-fn models_rigs_and_what_goes_with_them() {
-    let input = |what, made, says, tries| Mistake {
+fn command_lines() {
+    check(LINES);
+}
+
+const fn input(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made,
         command: DRY,
         code: 4,
         says,
         tries,
-    };
-    let rig = |what, made, says, tries| Mistake {
+    }
+}
+
+const fn rig(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
         what,
         made,
         command: DRY,
         code: 5,
         says,
         tries,
-    };
-    check(&[
-        input(
-            "absent model",
-            |it| it.edit("deployment.toml", "model.plx", "person.mat"),
-            &["there is no model file", "person.mat"],
-            &["the one that ships with Parallax", "parallax model import"],
-        ),
-        input(
-            "empty model",
-            |it| it.write("model.plx", ""),
-            &["model.plx is empty"],
-            &["0 bytes"],
-        ),
-        input(
-            "folder for a model",
-            |it| it.edit("deployment.toml", "model.plx", "a"),
-            &["cannot read the model file", "/a"],
-            &["Is a directory"],
-        ),
-        input(
-            "absent network",
-            |it| section(it, "[quality]\nnetwork = \"person.quality.onnx\""),
-            &["person.quality.onnx"],
-            &["`quality.network`", "\"shipped\""],
-        ),
-        input(
-            "model for a network",
-            |it| section(it, "[quality]\nnetwork = \"model.plx\""),
-            &["model.plx"],
-            &["no ONNX file"],
-        ),
-        input(
-            "absent consistency",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "workers = 2",
-                    "workers = 2\nconsistency = \"person.consistency\"",
-                )
-            },
-            &["person.consistency"],
-            &["`fuse.consistency`", "\"shipped\""],
-        ),
-        input(
-            "rig for consistency",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "workers = 2",
-                    "workers = 2\nconsistency = \"rig.toml\"",
-                )
-            },
-            &["rig.toml"],
-            &["not JSON"],
-        ),
-        input(
-            "folder for a rig",
-            |it| it.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
-            &["cannot read", "/a"],
-            &["a rig is one file"],
-        ),
-        rig(
-            "empty rig",
-            |it| it.write("rig.toml", ""),
-            &["rig.toml", "no camera found"],
-            &["rig.toml is empty"],
-        ),
-        rig(
-            "deployment for a rig",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "rig = \"rig.toml\"",
-                    "rig = \"deployment.toml\"",
-                )
-            },
-            &["deployment.toml"],
-            &["the rig is the file that its `rig` names"],
-        ),
-        rig(
-            "unknown lens",
-            |it| {
-                it.edit(
-                    "rig.toml",
-                    "name = \"a\"",
-                    "name = \"a\"\nlens = \"fisheyee\"",
-                )
-            },
-            &["rig.toml", "fisheyee"],
-            &["`pinhole`, `brown-conrady`, `kannala-brandt`"],
-        ),
-        rig(
-            "size as text",
-            |it| crate::replace_line(it, "size_px", "size_px = \"96x128\""),
-            &[
+    }
+}
+
+const INPUTS: &[Mistake] = &[
+    input(
+        "absent model",
+        |it| it.edit("deployment.toml", "model.plx", "person.mat"),
+        &["there is no model file", "person.mat"],
+        &["the one that ships with Parallax", "parallax model import"],
+    ),
+    input(
+        "empty model",
+        |it| it.write("model.plx", ""),
+        &["model.plx is empty"],
+        &["0 bytes"],
+    ),
+    input(
+        "folder for a model",
+        |it| it.edit("deployment.toml", "model.plx", "a"),
+        &["cannot read the model file", "/a"],
+        &["Is a directory"],
+    ),
+    input(
+        "absent network",
+        |it| section(it, "[quality]\nnetwork = \"person.quality.onnx\""),
+        &["person.quality.onnx"],
+        &["`quality.network`", "\"shipped\""],
+    ),
+    input(
+        "model for a network",
+        |it| section(it, "[quality]\nnetwork = \"model.plx\""),
+        &["model.plx"],
+        &["no ONNX file"],
+    ),
+    input(
+        "absent consistency",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "workers = 2",
+                "workers = 2\nconsistency = \"person.consistency\"",
+            );
+        },
+        &["person.consistency"],
+        &["`fuse.consistency`", "\"shipped\""],
+    ),
+    input(
+        "rig for consistency",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "workers = 2",
+                "workers = 2\nconsistency = \"rig.toml\"",
+            );
+        },
+        &["rig.toml"],
+        &["not JSON"],
+    ),
+    input(
+        "folder for a rig",
+        |it| it.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
+        &["cannot read", "/a"],
+        &["a rig is one file"],
+    ),
+    rig(
+        "empty rig",
+        |it| it.write("rig.toml", ""),
+        &["rig.toml", "no camera found"],
+        &["rig.toml is empty"],
+    ),
+    rig(
+        "deployment for a rig",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "rig = \"rig.toml\"",
+                "rig = \"deployment.toml\"",
+            );
+        },
+        &["deployment.toml"],
+        &["the rig is the file that its `rig` names"],
+    ),
+    rig(
+        "unknown lens",
+        |it| {
+            it.edit(
                 "rig.toml",
-                "size_px = \"96x128\"",
-                "found the text \"96x128\"",
-            ],
-            &["a list of 2 values"],
-        ),
-        rig(
-            "negative focal length",
-            |it| crate::replace_line(it, "focal_px", "focal_px = [-170.0, 170.0]"),
-            &["rig.toml", "camera \"a\"", "-170"],
-            &["is not positive"],
-        ),
-    ]);
+                "name = \"a\"",
+                "name = \"a\"\nlens = \"fisheyee\"",
+            );
+        },
+        &["rig.toml", "fisheyee"],
+        &["`pinhole`, `brown-conrady`, `kannala-brandt`"],
+    ),
+    rig(
+        "size as text",
+        |it| crate::replace_line(it, "size_px", "size_px = \"96x128\""),
+        &[
+            "rig.toml",
+            "size_px = \"96x128\"",
+            "found the text \"96x128\"",
+        ],
+        &["a list of 2 values"],
+    ),
+    rig(
+        "negative focal length",
+        |it| crate::replace_line(it, "focal_px", "focal_px = [-170.0, 170.0]"),
+        &["rig.toml", "camera \"a\"", "-170"],
+        &["is not positive"],
+    ),
+];
+
+#[test]
+fn models_rigs_and_what_goes_with_them() {
+    check(INPUTS);
 }
