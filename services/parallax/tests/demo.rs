@@ -102,7 +102,7 @@ fn counts_are_those_of_the_results(case: &Case, report: &Value, page: &str) {
     let (posed, results) = (posed.count(), &report["frames_with_result"]);
     assert_eq!(report["frames_with_skeleton"], json!(posed));
     let said = format!(
-        "result{}: {posed} with a skeleton in space, {whole} of these by every camera",
+        "result{}: {posed} with a skeleton in space, {whole} of these from all 4 cameras",
         if *results == 1 { "" } else { "s" }
     );
     assert!(

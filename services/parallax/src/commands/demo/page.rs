@@ -31,14 +31,17 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
         title: "Parallax: the demo".to_owned(),
         lead: format!(
             "{} cameras saw a person who does not exist, {} frames at {} a second. {} processes and their supervisor \
-             gave {}: {} with a skeleton in space, {} of these by every camera.",
+             gave {}: {} with a skeleton in space, {} of these from all {} cameras.",
             run.cameras.len(),
             run.n_frames,
             run.rate_hz,
             run.processes.len(),
             plural(run.moments.len(), "result"),
             posed().count(),
-            posed().filter(|it| it.views.iter().all(|it| it.missing.is_none())).count(),
+            posed()
+                .filter(|it| it.views.iter().all(|it| it.missing.is_none()))
+                .count(),
+            run.cameras.len(),
         ),
         limits: report.limits.clone(),
         space: space(run, stage),
