@@ -272,7 +272,7 @@ pub(crate) fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
 
 /// Makes a folder for results.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, error))
+    fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
 
 /// A failure to read what a deployment names, with what its file says of where that comes from.

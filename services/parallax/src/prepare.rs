@@ -1,5 +1,6 @@
 //! From a deployment and its footage to what the stages work with.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use fmp::Model;
@@ -16,6 +17,7 @@ use crate::deployment::Deployment;
 use crate::inputs;
 use crate::padding;
 use crate::plan::Resolved;
+use crate::shipped;
 
 /// One view, ready.
 #[derive(Debug, Clone)]
@@ -104,6 +106,15 @@ impl Prepared {
     }
 
     fn predict(&self, resolved: &Resolved) -> Result<(), Failure> {
+        let deployment = &resolved.deployment;
+        let ships = |file: &Option<PathBuf>| file.as_deref().is_some_and(shipped::is_one);
+        let has_other_model = deployment.model.is_some() && !ships(&deployment.model);
+        if has_other_model && ships(&deployment.quality.network) {
+            tracing::warn!(
+                "quality.network is the one that ships, which was trained on what the model that ships finds; \
+                 of another model's poses it knows nothing"
+            );
+        }
         inputs::own_network(&resolved.deployment.quality, self.model.n_parts())?;
         let capture = &resolved.deployment.capture;
         for (view, footage) in resolved.footage.iter().enumerate() {

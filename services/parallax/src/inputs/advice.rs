@@ -83,7 +83,7 @@ pub(super) fn on_rig(error: &RigFileError) -> Option<String> {
 }
 
 /// A folder for results that cannot be made.
-pub(super) fn on_folder(folder: &Path, error: io::Error) -> Failure {
+pub(super) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
     let in_the_way = folder
         .ancestors()
         .find(|it| it.exists())

@@ -100,14 +100,18 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         (
             "energy",
             format!(
-                "{}, alpha {}, beta {}, distances up to {} cells",
+                "{}, alpha {}, beta {}, distances {}",
                 match job.config.energy {
                     fuse::Energy::Paper => "the paper's",
                     fuse::Energy::Released => "that of the released program",
                 },
                 settings.alpha,
                 settings.beta,
-                settings.max_distance_cells
+                if settings.max_distance_cells.is_finite() {
+                    format!("up to {} cells", settings.max_distance_cells)
+                } else {
+                    "of any number of cells".to_owned()
+                }
             ),
         ),
         (
