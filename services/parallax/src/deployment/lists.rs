@@ -6,17 +6,13 @@ use super::Deployment;
 use super::rules::Complaint;
 
 /// Sees that no list is longer than what was taken of it: readers of TOML pass over what is too much.
-pub(super) fn fits(deployment: &Deployment, said: &[&Table]) -> Result<(), Complaint> {
+///
+/// * `said`: all that `deployment` was read from.
+pub(super) fn fits(deployment: &Deployment, said: &Table) -> Result<(), Complaint> {
     let Ok(taken) = Table::try_from(deployment) else {
         return Ok(());
     };
-    let wrong = said.iter().find_map(|it| {
-        too_long(
-            &Value::Table((*it).clone()),
-            &Value::Table(taken.clone()),
-            "",
-        )
-    });
+    let wrong = too_long(&Value::Table(said.clone()), &Value::Table(taken), "");
     wrong.map_or(Ok(()), Err)
 }
 

@@ -42,12 +42,13 @@ impl Loaded {
         let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
         let in_file: Table = toml::from_str(text).map_err(|it| malformed(&it))?;
         let on_command_line = overrides(set)?;
+        let mut said = in_file.clone();
         if !on_command_line.is_empty() {
-            let mut table = in_file.clone();
-            merge(&mut table, on_command_line.clone());
-            deployment = table.try_into().map_err(|error| of_set(&error))?;
+            merge(&mut said, on_command_line.clone());
+            let read = said.clone().try_into();
+            deployment = read.map_err(|error| of_set(&error))?;
         }
-        fits(&deployment, &[&in_file, &on_command_line]).map_err(|it| {
+        fits(&deployment, &said).map_err(|it| {
             let at = place(file, text, span_of(text, &it.key));
             it.at(at)
         })?;
@@ -90,7 +91,7 @@ impl Loaded {
         merge(&mut table, on_command_line.clone());
         let read: Result<Deployment, toml::de::Error> = table.try_into();
         let mut deployment = read.map_err(|error| of_set(&error))?;
-        fits(&deployment, &[&on_command_line]).map_err(|it| it.at("--set".to_owned()))?;
+        fits(&deployment, &on_command_line).map_err(|it| it.at("--set".to_owned()))?;
         deployment.resolve(&base(Path::new("")));
         rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
         Ok(Self {
@@ -269,6 +270,25 @@ workers = 2
         assert_eq!(got.fuse.workers, 3);
         assert_eq!(got.fuse.energy, fuse::Energy::Released);
         assert_eq!(got.capture.n_frames, Some(7));
+    }
+
+    #[test]
+    fn a_list_that_is_too_long_is_refused_and_a_shorter_one_may_replace_a_longer() {
+        let text = SHORT.replace("workers = 2", "pairs = [['a', 'b'], ['b', 'a']]");
+        let one = read(&text, &["fuse.pairs=[['a', 'b']]"]).unwrap();
+        assert_eq!(one.deployment.fuse.pairs.len(), 1);
+        let pairs = text.replace("['b', 'a']", "['b', 'a', 'c']");
+        let got = refused(&pairs, &[]);
+        assert!(
+            got.ends_with("`fuse.pairs` is a list of 3 values, expected 2"),
+            "{got}"
+        );
+        let size = format!("{SHORT}\n[capture]\nsize = [64, 48, 3]\n");
+        let got = refused(&size, &[]);
+        assert!(
+            got.ends_with("`capture.size` is a list of 3 values, expected 2"),
+            "{got}"
+        );
     }
 
     #[test]
