@@ -7,7 +7,8 @@ use crate::{Model, Placement};
 /// One level of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelLayout {
-    /// Side of a cell, pixels of the original image: `cell_px * 2^(level / interval)`.
+    /// Side of a cell, pixels of the original image: `cell_px * 2^(level / interval)`, computed as
+    /// the reference programs do, to the last bit; a whole octave is exact.
     pub scale: f64,
     /// Size `[width, height]` of the resized image, pixels of the level.
     pub image_size: [usize; 2],
@@ -75,8 +76,12 @@ impl Layout {
         let mut levels: Vec<LevelLayout> = Vec::with_capacity(n_levels);
         let mut offset = 0;
         for level in 0..n_levels {
+            // The programs take a power for the first octave and halve it from there on. A running
+            // product strays by a few units in the last place, and a centre that lies half-way
+            // between two pixels is then rounded to the other one.
+            let shrink = 1.0 / step.powf((level % spec.interval) as f64);
+            let relative = shrink * 0.5_f64.powi((level / spec.interval) as i32);
             let image_size = if level < spec.interval {
-                let shrink = 1.0 / step.powi(level as i32);
                 [width, height].map(|side| (side as f64 * shrink).round() as usize)
             } else {
                 let [w, h] = levels[level - spec.interval].image_size;
@@ -88,7 +93,7 @@ impl Layout {
             let rows = (padded[0] + 1).saturating_sub(max_rows);
             let cols = (padded[1] + 1).saturating_sub(max_cols);
             levels.push(LevelLayout {
-                scale: spec.cell_px as f64 * step.powi(level as i32),
+                scale: spec.cell_px as f64 / relative,
                 image_size,
                 padded,
                 rows,
@@ -135,5 +140,20 @@ impl Layout {
         let y1 = (f64::from(at.y) - self.pad[0] as f64) * scale;
         let [rows, cols] = filter.map(|side| side as f64 * scale);
         [x1, y1, x1 + cols - 1.0, y1 + rows - 1.0]
+    }
+
+    /// Centre of a filter placed on a level, pixels counted from 1, in the reference programs' order
+    /// of operations: for whatever rounds a centre as they do.
+    pub fn centre_from_one(&self, level: usize, filter: [usize; 2], at: Placement) -> [f64; 2] {
+        let scale = self.levels[level].scale;
+        let centre = |at: f64, pad: usize, side: usize| {
+            let first = (at - pad as f64) * scale + 1.0;
+            let last = first + side as f64 * scale - 1.0;
+            (first + last) / 2.0
+        };
+        [
+            centre(f64::from(at.x), self.pad[1], filter[1]),
+            centre(f64::from(at.y), self.pad[0], filter[0]),
+        ]
     }
 }

@@ -36,6 +36,14 @@ impl Pose {
         )
     }
 
+    /// Centre of a part, pixels counted from 1; see [`Layout::centre_from_one`].
+    pub fn centre_from_one(&self, model: &Model, layout: &Layout, part: usize) -> [f64; 2] {
+        let placement = self.parts[part];
+        let filter = model.filter(part, usize::from(placement.mixture));
+        let filter = [filter.rows, filter.cols];
+        layout.centre_from_one(usize::from(self.level), filter, placement)
+    }
+
     /// Centres of all parts; see [`Self::centre`].
     pub fn centres(&self, model: &Model, layout: &Layout) -> Vec<[f64; 2]> {
         (0..self.parts.len())

@@ -64,7 +64,7 @@ impl<'a> ReleasedTerms<'a> {
         let target_from_support = pair.epipolar.support_from_target(target == 1);
         let line = |part: &usize| {
             let support_layout = support_plan.layout();
-            let centre = support.centre(support_plan.model(), support_layout, *part);
+            let centre = support.centre_from_one(support_plan.model(), support_layout, *part);
             let pixel = looked_up(centre, support_layout.image_size)?;
             let size = target_plan.layout().image_size;
             released.weights[1 - target][*part]
@@ -128,12 +128,12 @@ impl Extra for ReleasedTerms<'_> {
 
 /// The whole pixel, counted from 0, at which the program looks up the line of a support.
 ///
-/// * `support_px`: centre of the support, pixels from 0.
+/// * `from_one`: centre of the support, pixels from 1, as the program computes it.
 /// * `size`: of its image, which is that of the program's table. The pixels of the last row and
 ///   column are in the table, but the program takes them for outside.
-fn looked_up(support_px: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
-    // Rounding half away from zero happens to the coordinate counted from 1.
-    let from_one = support_px.map(|it| (it + 1.0).round());
+fn looked_up(from_one: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
+    // Half away from zero.
+    let from_one = from_one.map(f64::round);
     let inside = |at: f64, side: usize| 0.0 < at && at < side as f64;
     (inside(from_one[0], size[0]) && inside(from_one[1], size[1]))
         .then(|| from_one.map(|it| it - 1.0))
@@ -237,15 +237,51 @@ mod tests {
 
     #[test]
     fn a_support_is_looked_up_at_the_nearest_pixel() {
-        assert_eq!(looked_up([6.4, 19.5], [64, 48]), Some([6.0, 20.0]));
+        assert_eq!(looked_up([7.4, 20.5], [64, 48]), Some([6.0, 20.0]));
+    }
+
+    /// The head top of `HumanEva`'s C3: cell 35 of the eleventh level, whose cells are exactly 8 pixels.
+    /// 263.49999999999983 + 1 went to the pixel on its left.
+    #[test]
+    fn a_support_half_way_between_pixels_is_looked_up_where_the_program_looks() {
+        let filter = fmp::Filter {
+            rows: 6,
+            cols: 6,
+            weights: vec![0.0; 36 * fmp::N_CHANNELS],
+        };
+        let head = fmp::PartSpec {
+            name: "head top".to_owned(),
+            filter_of_type: vec![0],
+            edge: None,
+        };
+        let model = fmp::Model::new(fmp::ModelSpec {
+            name: "head".to_owned(),
+            parts: vec![head],
+            filters: vec![filter],
+            root_bias: 0.0,
+            interval: 10,
+            cell_px: 4,
+            threshold: 0.0,
+            mirror: None,
+        })
+        .expect("a model of one part");
+        let layout = fmp::Layout::new(&model, 640, 480).expect("large enough");
+        let at = fmp::Placement {
+            x: 34,
+            y: 14,
+            mixture: 0,
+        };
+        let centre = layout.centre_from_one(10, [6, 6], at);
+        assert_eq!(centre, [264.5, 104.5]);
+        assert_eq!(looked_up(centre, [640, 480]), Some([264.0, 104.0]));
     }
 
     #[test]
     fn a_support_outside_its_own_image_is_in_no_table() {
-        assert_eq!(looked_up([-0.6, 20.0], [64, 48]), None);
-        assert_eq!(looked_up([7.0, 100.0], [64, 48]), None);
+        assert_eq!(looked_up([0.4, 21.0], [64, 48]), None);
+        assert_eq!(looked_up([8.0, 101.0], [64, 48]), None);
         // The program takes the last row and column for outside.
-        assert_eq!(looked_up([63.0, 20.0], [64, 48]), None);
-        assert_eq!(looked_up([62.0, 46.0], [64, 48]), Some([62.0, 46.0]));
+        assert_eq!(looked_up([64.0, 21.0], [64, 48]), None);
+        assert_eq!(looked_up([63.0, 47.0], [64, 48]), Some([62.0, 46.0]));
     }
 }
