@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec};
+use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec, Turn};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
 /// Why there are no pictures.
@@ -38,6 +38,9 @@ pub struct FeedInfo {
     pub n_frames: u64,
     /// Frames handed out per second of the scene, where it is known.
     pub frame_rate_hz: Option<f64>,
+    /// What the orientation tag of the first image asks for, which is not done: a calibration speaks of pixels as
+    /// they are stored.
+    pub turn: Turn,
 }
 
 /// The pictures of a camera, in order: footage, or `synth://` (see [`Address`]).
@@ -117,6 +120,7 @@ impl Feed {
                 size: source.info().size,
                 n_frames: source.info().n_frames,
                 frame_rate_hz: source.info().frame_rate_hz,
+                turn: source.info().turn,
             },
             Self::Scene(stage) => stage.info,
         }
@@ -222,6 +226,7 @@ fn info(spec: &SourceSpec, address: &Address, size: Size) -> Result<FeedInfo, Fe
         size,
         n_frames,
         frame_rate_hz: Some(address.settings.rate_hz / spec.step as f64),
+        turn: Turn::default(),
     })
 }
 

@@ -12,6 +12,8 @@ pub(crate) struct Placed<'a> {
     model: &'a Model,
     layout: &'a Layout,
     framing: Option<&'a Framing>,
+    /// Pixels that are told per pixel of the image.
+    enlarged: [f64; 2],
 }
 
 impl<'a> Placed<'a> {
@@ -22,6 +24,7 @@ impl<'a> Placed<'a> {
             model,
             layout,
             framing: None,
+            enlarged: [1.0; 2],
         }
     }
 
@@ -29,6 +32,16 @@ impl<'a> Placed<'a> {
     pub(crate) fn in_footage(self, framing: &'a Framing) -> Self {
         Self {
             framing: Some(framing),
+            ..self
+        }
+    }
+
+    /// Pixels of a picture of which the image is a smaller copy.
+    ///
+    /// * `per_pixel`: pixels of the picture per pixel of the image, across and down.
+    pub(crate) fn enlarged(self, per_pixel: [f64; 2]) -> Self {
+        Self {
+            enlarged: per_pixel,
             ..self
         }
     }
@@ -46,10 +59,11 @@ impl<'a> Placed<'a> {
             .enumerate()
             .map(|(part, it)| self.part(part, *it))
             .collect();
+        let scale = self.layout.levels[usize::from(self.pose.level)].scale;
         let mut value = json!({
             "score": self.pose.score,
             "level": self.pose.level + 1,
-            "scale": self.layout.levels[usize::from(self.pose.level)].scale,
+            "scale": scale * self.enlarged[0],
             "parts": parts,
         });
         if let (Some(joints), Some(object)) = (joints, value.as_object_mut()) {
@@ -64,12 +78,20 @@ impl<'a> Placed<'a> {
             // A box of a turned frame is no box in the footage.
             return json!({ "x": x, "y": y, "type": mixture });
         }
-        let corners = self.pose.part_box(self.model, self.layout, part);
+        let [x1, y1, x2, y2] = self.pose.part_box(self.model, self.layout, part);
+        let ([x1, y1], [x2, y2]) = (self.at([x1, y1]), self.at([x2, y2]));
+        let corners = [x1, y1, x2, y2];
         json!({ "x": x, "y": y, "type": mixture, "box": corners })
     }
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        self.framing.map_or([x, y], |it| {
+        let [right, down] = self.enlarged;
+        let larger = if self.enlarged == [1.0; 2] {
+            [x, y]
+        } else {
+            [(x + 0.5) * right - 0.5, (y + 0.5) * down - 0.5]
+        };
+        self.framing.map_or(larger, |it| {
             it.source_from_output()
                 .map(|row| row[0] * x + row[1] * y + row[2])
         })

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use capture::Feed;
 use consistency::{Appearance, Learned, Shape};
 use fmp::Model;
-use footage::SourceSpec;
+use footage::{SourceSpec, Turn};
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
@@ -103,6 +103,7 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
                 let hint = advice::on_footage(&error, &camera.name);
                 Failure::new(ExitKind::Input, error).with_hint(hint)
             })?;
+            say_what_is_not_turned(&format!("camera {:?}", camera.name), info.turn);
             Ok(Footage {
                 size: [info.size.width as u32, info.size.height as u32],
                 n_frames: info.n_frames,
@@ -110,6 +111,17 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
             })
         })
         .collect()
+}
+
+/// Says that pictures of a calibrated camera are taken as they are stored, where a tag asks for more.
+pub(crate) fn say_what_is_not_turned(whose: &str, turn: Turn) {
+    if !turn.is_none() {
+        crate::output::message(format_args!(
+            "warning: {whose}: the orientation tag of its first picture asks for {turn}, which is not done: a \
+             calibration speaks of pixels as they are stored; if this one was made of pictures as they are seen, \
+             store these so (`mogrify -auto-orient`)"
+        ));
+    }
 }
 
 /// Reads the part-type tables of a pair: `first wrt second` and `second wrt first`.
@@ -328,7 +340,8 @@ pub(crate) fn images(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(images)
 }
 
-fn is_image(path: &Path) -> bool {
+/// Whether a file has an image's name.
+pub(crate) fn is_image(path: &Path) -> bool {
     let extension = path
         .extension()
         .and_then(|it| it.to_str())

@@ -26,6 +26,12 @@ pub(crate) fn message(text: impl Display) {
     drop(writeln!(io::stderr().lock(), "{text}"));
 }
 
+/// Reports a failure that does not end the program.
+pub(crate) fn failure(failure: &Failure) {
+    // There is nobody left to tell if that fails.
+    drop(failure.report(&mut io::stderr().lock()));
+}
+
 /// Whether standard error may be redrawn.
 pub(crate) fn is_lively() -> bool {
     io::stderr().is_terminal()

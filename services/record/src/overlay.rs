@@ -1,6 +1,6 @@
 //! Pictures of a view: the view's own answer, the fused one, and one part's epipolar lines.
 
-use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs};
+use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs, line_width};
 use geometry::epipolar::epipolar_curve;
 use messages::{FusedView, MAX_PARTS, Status};
 use nalgebra::Point2;
@@ -34,7 +34,8 @@ pub(crate) fn draw(
             draw_limbs(&mut canvas, &joints, &limbs(scene));
         }
         if let Some(at) = parts.get(part) {
-            canvas.ring(*at, 5.0, 1.5, ACCENT);
+            let width = line_width(size);
+            canvas.ring(*at, 10.0 / 3.0 * width, width, ACCENT);
         }
     }
     let facing = match fused.map(|it| it.exchanged) {
@@ -42,8 +43,13 @@ pub(crate) fn draw(
         _ => "",
     };
     let text = format!("{} {}{facing}", scene.views[view].name, record.frame());
-    canvas.text([2.0, 2.0], &text, CENTRE);
+    canvas.label([2.0, 2.0], &text, CENTRE);
     Some(canvas)
+}
+
+/// Two thirds of the width of the fused pose's lines: a pixel on a small picture.
+fn thin(canvas: &Canvas) -> f64 {
+    line_width(canvas.size()) / 1.5
 }
 
 fn fused(record: &FrameRecord, view: usize) -> Option<&FusedView> {
@@ -62,14 +68,15 @@ fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: u
     let Some(best) = candidates.first() else {
         return;
     };
+    let width = thin(canvas);
     let centres = best.centres(&scene.model, &scene.views[view].layout);
     if let Some(joints) = joints_of(scene, &centres) {
         for &(from, to) in scene.joints.limbs {
-            canvas.line(joints[from], joints[to], 1.0, FAINT);
+            canvas.line(joints[from], joints[to], width, FAINT);
         }
     }
     for centre in centres {
-        canvas.disc(centre, 1.2, FAINT);
+        canvas.disc(centre, 1.2 * width, FAINT);
     }
 }
 
@@ -86,7 +93,7 @@ fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: us
         let point = Point2::from(fused.centres_px[part]);
         let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
         let curve: Vec<[f64; 2]> = curve.iter().map(|it| [it.x, it.y]).collect();
-        canvas.polyline(&curve, 1.0, ACCENT);
+        canvas.polyline(&curve, thin(canvas), ACCENT);
     }
 }
 

@@ -19,10 +19,12 @@ mod overlay;
 pub use error::FootageError;
 pub use overlay::{
     ACCENT, CENTRE, Canvas, Colour, FAINT, LEFT, Limb, OverlayError, RIGHT, Side, TEXT_HEIGHT,
-    Tile, compose, draw_limbs, text_width,
+    Tile, compose, draw_limbs, line_width, text_width,
 };
 pub use pacer::Pacer;
 pub use size::Size;
-pub use source::{FrameView, Source, SourceInfo, SourceKind, is_live, read_image};
+pub use source::{
+    FrameView, Source, SourceInfo, SourceKind, Turn, is_image, is_live, read_image, read_upright,
+};
 pub use spec::SourceSpec;
 pub use warp::{Affine, Fill, Warp, WarpError, resize_map};

@@ -8,6 +8,8 @@ pub use canvas::{Canvas, OverlayError};
 pub use compose::{Tile, compose};
 pub use text::{TEXT_HEIGHT, text_width};
 
+use crate::Size;
+
 /// Red, green, blue.
 pub type Colour = [u8; 3];
 
@@ -59,13 +61,20 @@ pub struct Limb {
     pub side: Side,
 }
 
+/// How wide a line must be to show on a picture of this size: 1/240 of its height, at least 1.5 pixels.
+///
+/// That suits a person who fills the picture. Other marks are drawn in proportion to it.
+pub fn line_width(size: Size) -> f64 {
+    (size.height as f64 / 240.0).max(1.5)
+}
+
 /// Draws a skeleton: limbs with a dark edge, and a dot on every end of one.
 ///
-/// Lines are as wide as suits a person who fills the picture: 1/240 of its height, at least 1.5 pixels.
+/// Lines are as wide as [`line_width`] says.
 ///
 /// * `points`: pixels; limbs with an end that is not finite or not there are left out.
 pub fn draw_limbs(canvas: &mut Canvas, points: &[[f64; 2]], limbs: &[Limb]) {
-    let width = (canvas.size().height as f64 / 240.0).max(1.5);
+    let width = line_width(canvas.size());
     let point = |index: usize| {
         let point = points.get(index).copied();
         point.filter(|it| it.iter().all(|it| it.is_finite()))

@@ -10,8 +10,9 @@ mod video;
 
 use std::path::Path;
 
-pub use images::read_image;
-use images::{Images, Still, is_image};
+pub use decode::Turn;
+use images::{Images, Still};
+pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
 pub use live::is_live;
 use video::Video;
@@ -40,6 +41,9 @@ pub struct SourceInfo {
     pub frame_rate_hz: Option<f64>,
     /// What it is made of.
     pub kind: SourceKind,
+    /// What the orientation tag of the first image asks for, which is not done here; see [`Source`]. Of a
+    /// video nothing is known.
+    pub turn: Turn,
 }
 
 /// One frame of footage.
@@ -60,7 +64,8 @@ pub struct FrameView<'a> {
 ///
 /// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
 /// channel dropped, 16 bits are rounded to 8. Orientation tags (EXIF, or the display matrix of a
-/// phone's video) are ignored, because a calibration speaks of pixels as they are stored.
+/// phone's video) are ignored, because a calibration speaks of pixels as they are stored; [`read_upright`]
+/// obeys them.
 ///
 /// ```no_run
 /// use footage::{Source, SourceSpec};
@@ -230,6 +235,11 @@ impl Reader {
             n_frames,
             frame_rate_hz,
             kind,
+            turn: match self {
+                Self::Still(still) => still.turn,
+                Self::Images(images) => images.turn,
+                Self::Video(_) => Turn::default(),
+            },
         }
     }
 }

@@ -198,6 +198,7 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
     }
     let mut source = Source::open(&SourceSpec::new(file)).or_fail(ExitKind::Input)?;
     let size = source.info().size;
+    inputs::say_what_is_not_turned(file, source.info().turn);
     let roll = if arguments.no_upright {
         0.0
     } else {

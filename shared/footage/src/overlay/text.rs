@@ -18,18 +18,28 @@ pub fn text_width(text: &str) -> usize {
 impl Canvas {
     /// One line of text with a dark edge, its top-left corner at `at`; what is not ASCII becomes a
     /// question mark.
-    pub fn text(&mut self, [left, top]: [f64; 2], text: &str, colour: Colour) {
-        let at = [left.round(), top.round()];
-        for dy in [-1.0, 0.0, 1.0] {
-            for dx in [-1.0, 0.0, 1.0] {
-                self.glyphs([at[0] + dx, at[1] + dy], text, SHADOW);
-            }
-        }
-        self.glyphs(at, text, colour);
+    pub fn text(&mut self, at: [f64; 2], text: &str, colour: Colour) {
+        self.enlarged(at, text, colour, 1.0);
     }
 
-    fn glyphs(&mut self, [mut left, top]: [f64; 2], text: &str, colour: Colour) {
-        let advance = get_raster_width(WEIGHT, SIZE) as f64;
+    /// The same, as large as suits the picture: once for every 480 rows, rounded, and at least once.
+    pub fn label(&mut self, at: [f64; 2], text: &str, colour: Colour) {
+        let times = (self.size().height as f64 / 480.0).round().max(1.0);
+        self.enlarged(at, text, colour, times);
+    }
+
+    fn enlarged(&mut self, [left, top]: [f64; 2], text: &str, colour: Colour, times: f64) {
+        let at = [left.round(), top.round()];
+        for dy in [-times, 0.0, times] {
+            for dx in [-times, 0.0, times] {
+                self.glyphs([at[0] + dx, at[1] + dy], text, SHADOW, times);
+            }
+        }
+        self.glyphs(at, text, colour, times);
+    }
+
+    fn glyphs(&mut self, [mut left, top]: [f64; 2], text: &str, colour: Colour, times: f64) {
+        let advance = times * get_raster_width(WEIGHT, SIZE) as f64;
         for character in text.chars() {
             let glyph =
                 get_raster(character, WEIGHT, SIZE).or_else(|| get_raster('?', WEIGHT, SIZE));
@@ -37,11 +47,12 @@ impl Canvas {
                 left,
                 top,
                 left + advance - 1.0,
-                top + TEXT_HEIGHT as f64 - 1.0,
+                top + times * TEXT_HEIGHT as f64 - 1.0,
             ];
             self.paint(corners, colour, |x, y| {
                 // The glyph has no pixel at a column or row below 0, which wraps to a large one.
-                let (column, row) = ((x - left) as i64 as usize, (y - top) as i64 as usize);
+                let of_glyph = |at: f64| (at / times).floor() as i64 as usize;
+                let (column, row) = (of_glyph(x - left), of_glyph(y - top));
                 let pixel = glyph.and_then(|it| it.pixel(column, row));
                 f64::from(pixel.unwrap_or(0)) / 255.0
             });

@@ -1,12 +1,68 @@
 //! Decodes one image file to 8-bit RGB.
 
+use std::fmt;
 use std::io::Cursor;
 use std::path::Path;
 
 use image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
-use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use image::metadata::Orientation;
+use image::{
+    ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage,
+};
 
 use crate::{FootageError, Size};
+
+/// How a picture is turned between its stored pixels and what people see: its orientation tag (EXIF).
+///
+/// ```
+/// use footage::{Size, Turn};
+///
+/// let as_stored = Turn::default();
+/// assert!(as_stored.is_none());
+/// assert_eq!(as_stored.apply(Size::new(1, 1), vec![1, 2, 3]), (Size::new(1, 1), vec![1, 2, 3]));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn(Orientation);
+
+impl Default for Turn {
+    fn default() -> Self {
+        Self(Orientation::NoTransforms)
+    }
+}
+
+impl Turn {
+    /// Whether the pixels are stored as they are seen.
+    pub fn is_none(self) -> bool {
+        self.0 == Orientation::NoTransforms
+    }
+
+    /// The picture as it is seen, from its stored pixels; of pixels of another size, these themselves.
+    pub fn apply(self, size: Size, rgb: Vec<u8>) -> (Size, Vec<u8>) {
+        if self.is_none() || rgb.len() != size.rgb_bytes() {
+            return (size, rgb);
+        }
+        let stored = RgbImage::from_raw(size.width as u32, size.height as u32, rgb);
+        let mut image = DynamicImage::from(stored.unwrap_or_default());
+        image.apply_orientation(self.0);
+        let size = Size::new(image.width() as usize, image.height() as usize);
+        (size, image.into_rgb8().into_raw())
+    }
+}
+
+impl fmt::Display for Turn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.0 {
+            Orientation::NoTransforms => "as stored",
+            Orientation::Rotate90 => "turned by 90 degrees to the right",
+            Orientation::Rotate180 => "turned by 180 degrees",
+            Orientation::Rotate270 => "turned by 90 degrees to the left",
+            Orientation::FlipHorizontal => "mirrored",
+            Orientation::FlipVertical => "turned by 180 degrees and mirrored",
+            Orientation::Rotate90FlipH => "turned by 90 degrees to the right and mirrored",
+            Orientation::Rotate270FlipH => "turned by 90 degrees to the left and mirrored",
+        })
+    }
+}
 
 /// The largest image decoded, bytes: a header of 30 bytes may promise any size.
 const MAX_BYTES: u64 = 1 << 29;
@@ -35,6 +91,14 @@ impl<'a> Encoded<'a> {
     pub(super) fn size(&self) -> Result<Size, FootageError> {
         let decoder = self.decoder()?;
         Ok(size_of(&decoder))
+    }
+
+    /// How the picture is to be turned before people look at it, by its orientation tag (EXIF); a tag
+    /// that cannot be read counts as none.
+    pub(super) fn turn(&self) -> Turn {
+        let decoder = self.decoder();
+        let tag = decoder.and_then(|mut it| it.orientation().map_err(|source| self.wrong(source)));
+        Turn(tag.unwrap_or(Orientation::NoTransforms))
     }
 
     /// The pixels, row major: grey is replicated, alpha dropped, 16 bits rounded to 8, orientation tags

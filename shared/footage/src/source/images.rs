@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::decode::Encoded;
+use super::decode::{Encoded, Turn};
 use crate::{FootageError, Size, SourceSpec};
 
 /// The images that are handed out, in order.
@@ -11,6 +11,8 @@ pub(super) struct Images {
     paths: std::vec::IntoIter<PathBuf>,
     first: PathBuf,
     pub(super) size: Size,
+    /// Of the first.
+    pub(super) turn: Turn,
     pub(super) n_frames: u64,
 }
 
@@ -25,11 +27,13 @@ impl Images {
             .take(n_frames as usize)
             .collect();
         let first = paths.first().cloned().unwrap_or_default();
-        let size = Encoded::read(&first)?.size()?;
+        let encoded = Encoded::read(&first)?;
+        let (size, turn) = (encoded.size()?, encoded.turn());
         Ok(Self {
             paths: paths.into_iter(),
-            first,
             size,
+            turn,
+            first,
             n_frames,
         })
     }
@@ -67,6 +71,7 @@ impl Images {
 pub(super) struct Still {
     rgb: Vec<u8>,
     pub(super) size: Size,
+    pub(super) turn: Turn,
     pub(super) n_left: u64,
 }
 
@@ -79,6 +84,7 @@ impl Still {
         Ok(Self {
             rgb,
             size,
+            turn: encoded.turn(),
             n_left: n_frames,
         })
     }
@@ -109,8 +115,28 @@ pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
     Still::open(path, 1).map(|it| (it.size, it.rgb))
 }
 
+/// Decodes one image file as people see it: [`read_image`], turned as its orientation tag (EXIF) says, and how.
+///
+/// For pictures by themselves. A calibration speaks of pixels as they are stored: whoever has one takes
+/// [`read_image`] or [`Source`](crate::Source).
+///
+/// # Errors
+///
+/// As [`read_image`].
+pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> {
+    let Still {
+        rgb, size, turn, ..
+    } = Still::open(path, 1)?;
+    let (size, rgb) = turn.apply(size, rgb);
+    Ok((size, rgb, turn))
+}
+
 /// Whether the content of a file is that of an image (an empty file of an image's name counts as one).
-pub(super) fn is_image(path: &Path) -> Result<bool, FootageError> {
+///
+/// # Errors
+///
+/// [`FootageError`]: absent, unreadable or empty.
+pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     use std::io::Read as _;
     let mut head = Vec::with_capacity(32);
     std::fs::File::open(path)

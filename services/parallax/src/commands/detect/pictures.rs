@@ -1,0 +1,192 @@
+//! The pictures of a file, and the size at which one is searched.
+
+use std::path::{Path, PathBuf};
+
+use fmp::Layout;
+use footage::{Fill, Size, Source, SourceSpec, Turn, Warp, resize_map};
+use kernels::Rgb8View;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use super::Arguments;
+use crate::inputs;
+use crate::search::Search;
+
+/// A picture as people see it.
+#[derive(Debug)]
+pub(super) struct Picture {
+    /// The file, and the frame of it if it is a video.
+    pub(super) path: PathBuf,
+    pub(super) frame: Option<u64>,
+    /// How it was turned.
+    pub(super) turn: Turn,
+    pub(super) size: Size,
+    pub(super) rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// For people: the name of the file, and the frame.
+    pub(super) fn title(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let frame = self.frame.map(|it| format!(" {it}"));
+        format!("{name}{}", frame.unwrap_or_default())
+    }
+
+    /// For files.
+    pub(super) fn stem(&self) -> String {
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let frame = self.frame.map(|it| format!("-{it:06}"));
+        format!("{stem}{}", frame.unwrap_or_default())
+    }
+}
+
+/// The pictures of a file, one after the other.
+#[derive(Debug)]
+pub(super) enum Pictures {
+    /// An image; none once it was handed out.
+    Image(Option<PathBuf>),
+    /// A video.
+    Video(PathBuf, Box<Source>),
+}
+
+impl Pictures {
+    /// Opens a file.
+    pub(super) fn open(path: &Path, arguments: &Arguments) -> Result<Self, Failure> {
+        if path.is_file() && footage::is_image(path).or_fail(ExitKind::Input)? {
+            return Ok(Self::Image(Some(path.to_path_buf())));
+        }
+        let source = Source::open(&spec(path, arguments)).or_fail(ExitKind::Input)?;
+        Ok(Self::Video(path.to_path_buf(), Box::new(source)))
+    }
+
+    /// The next one; none at the end.
+    pub(super) fn next(&mut self) -> Result<Option<Picture>, Failure> {
+        match self {
+            Self::Image(path) => path.take().map(image).transpose(),
+            Self::Video(path, source) => {
+                let size = source.info().size;
+                let frame = source.next_frame().or_fail(ExitKind::Input)?;
+                Ok(frame.map(|it| Picture {
+                    path: path.clone(),
+                    frame: Some(it.index),
+                    turn: Turn::default(),
+                    size,
+                    rgb: it.rgb.to_vec(),
+                }))
+            }
+        }
+    }
+}
+
+fn image(path: PathBuf) -> Result<Picture, Failure> {
+    let (size, rgb, turn) = footage::read_upright(&path).or_fail(ExitKind::Input)?;
+    Ok(Picture {
+        path,
+        frame: None,
+        turn,
+        size,
+        rgb,
+    })
+}
+
+fn spec(path: &Path, arguments: &Arguments) -> SourceSpec {
+    SourceSpec {
+        step: arguments.every,
+        count: arguments.frames,
+        ..SourceSpec::new(path.to_string_lossy())
+    }
+}
+
+/// How many pictures a file promises; one if it does not say.
+pub(super) fn count(path: &Path, arguments: &Arguments) -> usize {
+    if inputs::is_image(path) {
+        return 1;
+    }
+    let source = Source::open(&spec(path, arguments));
+    source.map_or(1, |it| it.info().n_frames as usize)
+}
+
+/// What is searched of a picture.
+#[derive(Debug)]
+pub(super) struct Searched {
+    /// The pyramid of it.
+    pub(super) layout: Layout,
+    /// Pixels of the picture per pixel of it.
+    pub(super) per_pixel: [f64; 2],
+    /// Its pixels; none where they are the picture's own.
+    smaller: Option<Vec<u8>>,
+}
+
+impl Searched {
+    /// * `longest`: longest side that is searched, pixels; none: all pixels.
+    pub(super) fn new(
+        picture: &Picture,
+        longest: Option<usize>,
+        search: &Search,
+    ) -> Result<Self, Failure> {
+        let size = bounded(picture.size, longest);
+        let layout = Layout::new(&search.model, size.width, size.height);
+        let layout = layout.map_err(|error| inputs::in_file(&picture.path, &error))?;
+        search.check_memory(&layout).map_err(|needed| {
+            let message = format!("{}: {needed}", picture.path.display());
+            let hint = "leave --full out, or ask for a smaller --size";
+            Failure::new(ExitKind::Input, message).with_hint(hint)
+        })?;
+        let smaller = if size == picture.size {
+            None
+        } else {
+            let map = resize_map(picture.size, size);
+            let mut pixels = vec![0; size.rgb_bytes()];
+            let warp = Warp::new(picture.size, size, &map, Fill::Replicate);
+            warp.or_fail(ExitKind::Input)?
+                .apply(&picture.rgb, &mut pixels);
+            Some(pixels)
+        };
+        let share = |of: usize, to: usize| of as f64 / to as f64;
+        Ok(Self {
+            layout,
+            per_pixel: [
+                share(picture.size.width, size.width),
+                share(picture.size.height, size.height),
+            ],
+            smaller,
+        })
+    }
+
+    /// The pixels.
+    pub(super) fn image<'a>(&'a self, picture: &'a Picture) -> Result<Rgb8View<'a>, Failure> {
+        let [width, height] = self.layout.image_size;
+        let rgb = self.smaller.as_deref().unwrap_or(&picture.rgb);
+        let image = Rgb8View::new(width, height, rgb);
+        image.map_err(|error| inputs::in_file(&picture.path, &error))
+    }
+
+    /// Where a point of it is in the picture.
+    pub(super) fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| (point[axis] + 0.5) * self.per_pixel[axis] - 0.5)
+    }
+}
+
+/// The size with the longest side that is allowed, and the same shape.
+fn bounded(size: Size, longest: Option<usize>) -> Size {
+    let side = size.width.max(size.height);
+    let Some(longest) = longest.filter(|it| *it < side) else {
+        return size;
+    };
+    let scale = longest as f64 / side as f64;
+    let smaller = |it: usize| ((it as f64 * scale).round() as usize).max(1);
+    Size::new(smaller(size.width), smaller(size.height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_searched_keeps_its_shape_and_is_never_enlarged() {
+        let bounded = |width, height, longest| bounded(Size::new(width, height), longest);
+        assert_eq!(bounded(4000, 3000, Some(1280)), Size::new(1280, 960));
+        assert_eq!(bounded(3000, 4000, Some(1280)), Size::new(960, 1280));
+        assert_eq!(bounded(640, 480, Some(1280)), Size::new(640, 480));
+        assert_eq!(bounded(4000, 3000, None), Size::new(4000, 3000));
+    }
+}
