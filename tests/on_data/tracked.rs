@@ -104,7 +104,15 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
         let frames = (0..N_FRAMES).map(|frame| {
             let scope = tracker.scope(&layout, frame as u64);
             n_full += usize::from(scope == Scope::whole(&layout));
-            let found = step.run(image(clip, view, frame), scope, &mut responses);
+            let mut found = step.run(image(clip, view, frame), scope, &mut responses);
+            if step.gives_up(&tracker, &found) {
+                n_full += 1;
+                found = step.run(
+                    image(clip, view, frame),
+                    Scope::whole(&layout),
+                    &mut responses,
+                );
+            }
             step.follow(&mut tracker, frame as u64, &found);
             found.candidates[0].clone()
         });

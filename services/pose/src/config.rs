@@ -30,6 +30,12 @@ pub struct Config {
     pub tracked_max_gap: u64,
     /// Tracked: fall of the score below that of the last full search that asks for another.
     pub tracked_max_drop: f32,
+    /// Tracked: how far a pose may move in a second, as a share of its box's longer side.
+    pub tracked_speed: f64,
+    /// Tracked: longest time from frame to frame that is followed.
+    pub tracked_max_gap_ms: f64,
+    /// Tracked: a frame so long after the last full search is searched in full.
+    pub tracked_full_every_ms: f64,
 }
 
 /// How a pose process looks for poses.
@@ -62,6 +68,9 @@ impl Default for Config {
             tracked_full_every: track.full_every,
             tracked_max_gap: track.max_gap,
             tracked_max_drop: track.max_drop,
+            tracked_speed: track.speed,
+            tracked_max_gap_ms: 1000.0 * track.max_gap_s,
+            tracked_full_every_ms: 1000.0 * track.full_every_s,
         }
     }
 }
@@ -83,6 +92,9 @@ impl Config {
                 full_every: self.tracked_full_every,
                 max_gap: self.tracked_max_gap,
                 max_drop: self.tracked_max_drop,
+                speed: self.tracked_speed,
+                max_gap_s: self.tracked_max_gap_ms / 1000.0,
+                full_every_s: self.tracked_full_every_ms / 1000.0,
             }),
         }
     }

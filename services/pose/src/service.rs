@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use fmp::{Scope, Tracker};
+use fmp::{Moment, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{
     Cause, EvidenceHeader, FrameHeader, Searched, Stamp, Status, Timing, ViewPose, topic,
@@ -31,6 +31,8 @@ pub struct Job {
     pub start_frame: u64,
     /// Distance between the frames used.
     pub frame_step: u64,
+    /// Frames of the footage a second, where it is known: how far a pose may have moved.
+    pub frame_rate_hz: Option<f64>,
     /// How long they are waited for.
     pub patience: Duration,
 }
@@ -264,11 +266,20 @@ impl View<'_> {
                 return Ok(Err(Status::BAD_INPUT));
             }
         };
-        let scope = memory.tracker.scope(layout, nth);
-        let found = self.find(image, scope, &mut memory.responses)?;
-        self.job
-            .step
-            .follow(&mut memory.tracker, nth, &found.estimate);
+        let rate = self.job.frame_rate_hz;
+        let at = Moment {
+            frame: nth,
+            seconds: rate.map(|it| header.stamp.frame as f64 / it),
+        };
+        let scope = memory.tracker.scope(layout, at);
+        let mut found = self.find(image, scope, &mut memory.responses)?;
+        if self.job.step.gives_up(&memory.tracker, &found.estimate) {
+            // Its room for evidence goes back first.
+            drop(found);
+            found = self.find(image, Scope::whole(layout), &mut memory.responses)?;
+        }
+        let step = &self.job.step;
+        step.follow(&mut memory.tracker, at, &found.estimate);
         Ok(Ok(found))
     }
 

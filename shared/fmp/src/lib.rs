@@ -35,7 +35,7 @@ pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
 pub use solve::{Again, Bound, Bounds, CandidateSettings, Effort, Extra, Solver};
-pub use track::{Track, Tracker};
+pub use track::{Moment, Track, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
 /// texture energies, 1 that is set in the padding only.

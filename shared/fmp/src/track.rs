@@ -2,6 +2,24 @@
 
 use crate::{Layout, Model, Pose, Region, Scope};
 
+/// When a frame is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Its number, counted in frames that are to be answered.
+    pub frame: u64,
+    /// Its time in the footage, seconds; none where no frame rate is known.
+    pub seconds: Option<f64>,
+}
+
+impl From<u64> for Moment {
+    fn from(frame: u64) -> Self {
+        Self {
+            frame,
+            seconds: None,
+        }
+    }
+}
+
 /// How closely the last pose is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track {
@@ -13,8 +31,16 @@ pub struct Track {
     pub full_every: u64,
     /// Largest step from one frame to the next that is followed; 1: no frame may be left out.
     pub max_gap: u64,
-    /// How far below the score of the last full search a score may be before there is another.
+    /// How far below the score of the last full search a score may be before there is another, of the
+    /// same frame.
     pub max_drop: f32,
+    /// How far a pose may move in a second, as a share of its box's longer side: at low rates more
+    /// than `margin` is searched around it.
+    pub speed: f64,
+    /// Longest time from one frame to the next that is followed, seconds.
+    pub max_gap_s: f64,
+    /// A frame so long after the last full search is searched in full, seconds.
+    pub full_every_s: f64,
 }
 
 impl Default for Track {
@@ -25,6 +51,10 @@ impl Default for Track {
             full_every: 10,
             max_gap: 2,
             max_drop: 0.3,
+            // 3.4 m a second of somebody 1.7 m tall: hands and feet of who walks fast.
+            speed: 2.0,
+            max_gap_s: 0.25,
+            full_every_s: 0.5,
         }
     }
 }
@@ -32,8 +62,10 @@ impl Default for Track {
 /// Follows the best pose from frame to frame: decides where the next one is looked for.
 ///
 /// A full search is made of the first frame, and whenever nothing was found, frames were left out,
-/// the last full search is long ago, or the score has fallen; see [`Track`]. Between them only what
-/// is near the last pose is looked at: a better pose elsewhere is seen at the next full search.
+/// the last full search is long ago (in frames, or in seconds where a frame rate is known), or frames
+/// are too far apart in time; see [`Track`]. Between them only what is near the last pose is looked
+/// at: a better pose elsewhere is seen at the next full search. A frame in which nothing was found
+/// there, or something whose score has fallen, is searched once more, in full ([`Self::gives_up`]).
 ///
 /// Knows no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,9 +77,8 @@ pub struct Tracker {
 /// What was found in the last frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Last {
-    frame: u64,
+    at: Moment,
     level: u16,
-    score: f32,
     /// Box `[x1, y1, x2, y2]` around all parts, pixels.
     around: [f64; 4],
     full: Full,
@@ -56,7 +87,7 @@ struct Last {
 /// The last full search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Full {
-    frame: u64,
+    at: Moment,
     score: f32,
 }
 
@@ -71,36 +102,51 @@ impl Tracker {
 
     /// What is to be searched of a frame.
     ///
-    /// * `frame`: number of the frame, counted in frames that are to be answered.
-    pub fn scope(&self, layout: &Layout, frame: u64) -> Scope {
+    /// * `at`: when the frame is.
+    pub fn scope(&self, layout: &Layout, at: impl Into<Moment>) -> Scope {
+        let at = at.into();
         let near = || {
             let (settings, last) = (self.settings.as_ref()?, self.last.as_ref()?);
-            last.leads_to(settings, frame)
-                .then(|| last.near(settings, layout))?
+            last.leads_to(settings, at)
+                .then(|| last.near(settings, layout, at))?
         };
         near().unwrap_or_else(|| Scope::whole(layout))
     }
 
-    /// Takes note of what was found there.
+    /// Whether what was found near the last pose is not to be believed, and the frame is to be searched
+    /// in full: nothing was found, or its score has fallen since the last full search.
     ///
-    /// * `frame`, `scope`: as asked for and answered by [`Self::scope`].
+    /// * `scope`: as answered by [`Self::scope`].
+    /// * `best`: the best pose found there, if there is one.
+    pub fn gives_up(&self, layout: &Layout, scope: &Scope, best: Option<&Pose>) -> bool {
+        let (Some(settings), Some(last)) = (&self.settings, &self.last) else {
+            return false;
+        };
+        let least = last.full.score - settings.max_drop;
+        *scope != Scope::whole(layout) && best.is_none_or(|it| it.score < least)
+    }
+
+    /// Takes note of what was found in a frame.
+    ///
+    /// * `at`: as asked for.
+    /// * `scope`: what was searched at last: as answered by [`Self::scope`], or everything.
     /// * `best`: the best pose, if there is one.
     pub fn found(
         &mut self,
         (model, layout): (&Model, &Layout),
-        (frame, scope): (u64, &Scope),
+        (at, scope): (impl Into<Moment>, &Scope),
         best: Option<&Pose>,
     ) {
+        let at = at.into();
         let before = self.last.map(|it| it.full);
         self.last = best.map(|pose| {
             let here = Full {
-                frame,
+                at,
                 score: pose.score,
             };
             Last {
-                frame,
+                at,
                 level: pose.level,
-                score: pose.score,
                 around: pose.bounding_box(model, layout),
                 full: before
                     .filter(|_| *scope != Scope::whole(layout))
@@ -112,18 +158,22 @@ impl Tracker {
 
 impl Last {
     /// Whether a frame may be looked at near this one's pose only.
-    fn leads_to(&self, settings: &Track, frame: u64) -> bool {
-        let step = frame.checked_sub(self.frame).filter(|it| *it > 0);
-        let age = frame.saturating_sub(self.full.frame);
+    fn leads_to(&self, settings: &Track, at: Moment) -> bool {
+        let step = at.frame.checked_sub(self.at.frame).filter(|it| *it > 0);
+        let age = at.frame.saturating_sub(self.full.at.frame);
+        let within = |from: Moment, most: f64| seconds(from, at).is_none_or(|it| it <= most);
+        let is_recent = |most: f64| seconds(self.full.at, at).is_none_or(|it| it < most);
         step.is_some_and(|it| it <= settings.max_gap)
             && age < settings.full_every
-            && self.score >= self.full.score - settings.max_drop
+            && within(self.at, settings.max_gap_s)
+            && is_recent(settings.full_every_s)
     }
 
     /// What lies near this frame's pose, if any of it lies in the image.
-    fn near(&self, settings: &Track, layout: &Layout) -> Option<Scope> {
+    fn near(&self, settings: &Track, layout: &Layout, at: Moment) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
-        let margin = settings.margin * (x2 - x1).max(y2 - y1);
+        let moved = seconds(self.at, at).map_or(0.0, |it| settings.speed * it);
+        let margin = settings.margin.max(moved) * (x2 - x1).max(y2 - y1);
         let range = |begin: f64, end: f64, side: usize| {
             let inside = |it: f64| it.clamp(0.0, side as f64) as u32;
             [
@@ -141,4 +191,9 @@ impl Last {
         let end = end.min(layout.levels.len() as u16);
         Scope::new(layout, first..end, region).ok()
     }
+}
+
+/// From one moment to another, where both are known.
+fn seconds(from: Moment, to: Moment) -> Option<f64> {
+    Some(to.seconds? - from.seconds?)
 }

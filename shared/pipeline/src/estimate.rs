@@ -139,7 +139,10 @@ impl Estimator {
                     return (None, None);
                 };
                 responses.resize(step.layout().n_responses(), 0.0);
-                let found = step.run(image, tracker.scope(step.layout(), frame), responses);
+                let mut found = step.run(image, tracker.scope(step.layout(), frame), responses);
+                if step.gives_up(tracker, &found) {
+                    found = step.run(image, Scope::whole(step.layout()), responses);
+                }
                 step.follow(tracker, frame, &found);
                 let answer = (!found.candidates.is_empty()).then(|| Answer {
                     candidates: found.candidates.clone(),

@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use fmp::{
-    Bounds, Extractor, Layout, LocalScore, Model, Pose, Precision, Responses, Scope, Solver, Track,
-    Tracker, local_scores,
+    Bounds, Extractor, Layout, LocalScore, Model, Moment, Pose, Precision, Responses, Scope,
+    Solver, Track, Tracker, local_scores,
 };
 use kernels::{NoAmx, Rgb8View};
 
@@ -145,11 +145,17 @@ impl ViewStep {
         }
     }
 
+    /// Whether what was found near the last pose is not to be believed, and the frame is to be searched in
+    /// full; see [`Tracker::gives_up`].
+    pub fn gives_up(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
+        tracker.gives_up(&self.layout, &found.scope, found.candidates.first())
+    }
+
     /// Tells the tracker what was found in a frame.
     ///
-    /// * `frame`: as the tracker was asked about.
-    pub fn follow(&self, tracker: &mut Tracker, frame: u64, found: &ViewEstimate) {
+    /// * `at`: as the tracker was asked about.
+    pub fn follow(&self, tracker: &mut Tracker, at: impl Into<Moment>, found: &ViewEstimate) {
         let of = (&**self.solver.model(), &*self.layout);
-        tracker.found(of, (frame, &found.scope), found.candidates.first());
+        tracker.found(of, (at, &found.scope), found.candidates.first());
     }
 }

@@ -154,6 +154,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         n_evidence_consumers: audience.of_evidence(view),
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
+        frame_rate_hz: resolved.frame_rate_hz(),
         patience: resolved.patience(),
     };
     pose::run(service, &job)

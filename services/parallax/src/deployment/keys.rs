@@ -130,7 +130,19 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "pose.tracked_max_drop",
-        "tracked: fall of the score since the last full search that asks for another",
+        "tracked: fall of the score since the last full search that asks for another, of the same frame",
+    ),
+    (
+        "pose.tracked_speed",
+        "tracked: how far a pose may move in a second, as a share of its box's longer side",
+    ),
+    (
+        "pose.tracked_max_gap_ms",
+        "tracked: longest time from frame to frame that is followed; longer ones are searched in full",
+    ),
+    (
+        "pose.tracked_full_every_ms",
+        "tracked: a frame so long after the last full search is searched in full",
     ),
     (
         "quality.network",

@@ -130,6 +130,9 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
     within("pose.threads", it.threads, 1, 256)?;
     not_negative("pose.tracked_margin", it.tracked_margin)?;
     not_negative("pose.tracked_max_drop", f64::from(it.tracked_max_drop))?;
+    not_negative("pose.tracked_speed", it.tracked_speed)?;
+    not_negative("pose.tracked_max_gap_ms", it.tracked_max_gap_ms)?;
+    not_negative("pose.tracked_full_every_ms", it.tracked_full_every_ms)?;
     not_negative("pose.min_separation", it.min_separation)
 }
 

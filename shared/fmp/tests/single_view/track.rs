@@ -1,6 +1,6 @@
 //! Where the next pose is looked for.
 
-use fmp::{Layout, Model, Placement, Pose, Scope, Track, Tracker};
+use fmp::{Layout, Model, Moment, Placement, Pose, Scope, Track, Tracker};
 
 use crate::common::{Noise, tree};
 
@@ -10,6 +10,9 @@ const TRACK: Track = Track {
     full_every: 5,
     max_gap: 2,
     max_drop: 0.25,
+    speed: 2.0,
+    max_gap_s: 0.25,
+    full_every_s: 0.5,
 };
 
 struct Scene {
@@ -32,12 +35,31 @@ impl Scene {
     }
 
     /// Whether a frame is searched in full, given the score that is found then.
-    fn is_full(&mut self, frame: u64, score: Option<f32>) -> bool {
-        let scope = self.tracker.scope(&self.layout, frame);
+    fn is_full(&mut self, at: impl Into<Moment>, score: Option<f32>) -> bool {
+        let (at, whole) = (at.into(), Scope::whole(&self.layout));
+        let mut scope = self.tracker.scope(&self.layout, at);
         let pose = score.map(pose);
+        if self.tracker.gives_up(&self.layout, &scope, pose.as_ref()) {
+            scope = whole;
+        }
         let of = (&*self.model, &self.layout);
-        self.tracker.found(of, (frame, &scope), pose.as_ref());
-        scope == Scope::whole(&self.layout)
+        self.tracker.found(of, (at, &scope), pose.as_ref());
+        scope == whole
+    }
+
+    /// Which of ten frames are searched in full at a frame rate, all as good as the first.
+    fn full_at(rate_hz: f64) -> Vec<u64> {
+        let mut scene = Self::new(Some(Track {
+            full_every: 1000,
+            ..TRACK
+        }));
+        let at = |frame: u64| Moment {
+            frame,
+            seconds: Some(frame as f64 / rate_hz),
+        };
+        (0..10)
+            .filter(|it| scene.is_full(at(*it), Some(1.0)))
+            .collect()
     }
 }
 
@@ -65,14 +87,56 @@ fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
 }
 
 #[test]
-fn a_frame_after_one_without_a_pose_is_searched_in_full() {
+fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     let mut scene = Scene::new(Some(TRACK));
     let found = [Some(1.0), Some(1.0), None, Some(1.0), Some(1.0)];
     let full: Vec<bool> = (0..)
         .zip(found)
         .map(|(it, score)| scene.is_full(it, score))
         .collect();
-    assert_eq!(full, [true, false, false, true, false]);
+    assert_eq!(full, [true, false, true, true, false]);
+}
+
+/// At one frame a second somebody is elsewhere by the next: what lies near the last pose is another's, or nothing.
+#[test]
+fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
+    assert_eq!(Scene::full_at(1.0), (0..10).collect::<Vec<_>>());
+    assert_eq!(Scene::full_at(3.9), (0..10).collect::<Vec<_>>());
+    assert_eq!(Scene::full_at(5.0), [0, 3, 6, 9]);
+    assert_eq!(Scene::full_at(10.0), [0, 5]);
+    assert_eq!(Scene::full_at(30.0), [0]);
+}
+
+#[test]
+fn the_longer_ago_the_last_pose_is_the_farther_around_it_is_searched() {
+    let mut scene = Scene::new(Some(TRACK));
+    let at = |seconds: f64| Moment {
+        frame: 1,
+        seconds: Some(seconds),
+    };
+    let first = Moment {
+        frame: 0,
+        seconds: Some(0.0),
+    };
+    let pose = pose(1.0);
+    let whole = Scope::whole(&scene.layout);
+    let of = (&*scene.model, &scene.layout);
+    scene.tracker.found(of, (first, &whole), Some(&pose));
+    let [x1, _, x2, _] = pose.bounding_box(&scene.model, &scene.layout);
+    // Half a box's side at least, and a side more for every half of a second.
+    for (seconds, share) in [(0.01, 0.5), (0.2, 0.5), (0.25, 0.5)] {
+        let scope = scene.tracker.scope(&scene.layout, at(seconds));
+        let begin = (x1 - share * (x2 - x1)).floor().max(0.0);
+        assert_eq!(f64::from(scope.region().x[0]), begin, "{seconds} s");
+    }
+    scene.tracker = Tracker::new(Some(Track {
+        margin: 0.1,
+        ..TRACK
+    }));
+    scene.tracker.found(of, (first, &whole), Some(&pose));
+    let begin = |seconds: f64| scene.tracker.scope(&scene.layout, at(seconds)).region().x[0];
+    assert!(begin(0.2) < begin(0.1) && begin(0.1) < begin(0.06));
+    assert_eq!(begin(0.05), begin(0.0), "the margin at least");
 }
 
 #[test]
@@ -84,7 +148,7 @@ fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
 }
 
 #[test]
-fn a_score_that_has_fallen_since_the_last_full_search_asks_for_another() {
+fn a_score_that_has_fallen_since_the_last_full_search_asks_for_another_of_the_same_frame() {
     let mut scene = Scene::new(Some(TRACK));
     // Little by little counts as well; what the full search finds is the new measure.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
@@ -92,7 +156,7 @@ fn a_score_that_has_fallen_since_the_last_full_search_asks_for_another() {
         .zip(scores)
         .map(|(it, score)| scene.is_full(it, Some(score)))
         .collect();
-    assert_eq!(full, [true, false, false, false, true, false]);
+    assert_eq!(full, [true, false, false, true, false, false]);
 }
 
 #[test]
