@@ -138,10 +138,7 @@ fn the_pyramid_equals_the_vectors_bit_for_bit() {
     let it = Stages::new(&shared);
     let scales = it.array("pyramid_scale");
     assert_eq!(scales.values.len(), it.layout.levels.len());
-    assert_eq!(
-        difference(&scales, |at| it.layout.levels[at[0]].scale),
-        0.0
-    );
+    assert_eq!(difference(&scales, |at| it.layout.levels[at[0]].scale), 0.0);
     for (name, level) in [
         ("resize_level3_rgb", 2),
         ("reduce_level11_rgb", 10),

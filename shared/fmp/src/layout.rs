@@ -149,7 +149,7 @@ impl Layout {
         let centre = |at: f64, pad: usize, side: usize| {
             let first = (at - pad as f64) * scale + 1.0;
             let last = first + side as f64 * scale - 1.0;
-            (first + last) / 2.0
+            f64::midpoint(first, last)
         };
         [
             centre(f64::from(at.x), self.pad[1], filter[1]),
