@@ -3,7 +3,9 @@
 
 use crate::common;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
+use std::fmt::Write as _;
+use std::fs;
 
 use common::started::signal;
 use common::{Case, PACED};
@@ -25,6 +27,7 @@ impl Struck {
     fn new(more: &str, name: &str, victim: &str) -> Self {
         let process = victim.replace(" --index ", "-");
         let case = Case::new(&process, &[N_FRAMES as usize; 3], more);
+        case.write("q.csv", expected_errors());
         let mut started = case.start(&["run", "deployment.toml", "--json"]);
         started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
         signal(name, started.pid_of(victim).into());
@@ -46,6 +49,16 @@ impl Struck {
         frames.collect()
     }
 
+    /// The frames that have a result, and those that are counted as missed, are all that there were.
+    fn assert_all_accounted_for(&self) {
+        let frames = self.frames();
+        assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+        assert_eq!(frames.last(), Some(&(N_FRAMES - 1)), "{}", self.said);
+        let missed = N_FRAMES as usize - frames.len();
+        assert_eq!(self.summary["frames_missed"], json!(missed), "{frames:?}");
+        assert!(missed < 40, "it was not back soon: {frames:?}");
+    }
+
     fn assert_every_frame(&self) {
         let expected: Vec<u64> = (0..N_FRAMES).collect();
         assert_eq!(self.frames(), expected, "{}", self.said);
@@ -56,6 +69,70 @@ impl Struck {
         let views = self.lines.iter().map(|it| &it["views_present"]);
         views.filter(|it| **it != json!(["a", "b", "c"])).collect()
     }
+}
+
+/// A table of expected errors of the three views.
+fn expected_errors() -> String {
+    let model = common::planted::model();
+    let parts = (0..model.n_parts()).map(|it| format!("part_{}", it + 1));
+    let parts: Vec<String> = parts.collect();
+    let mut table = format!("view,frame,{}\n", parts.join(","));
+    for view in ["a", "b", "c"] {
+        for frame in 0..N_FRAMES {
+            let errors = vec!["3"; parts.len()].join(",");
+            writeln!(table, "{view},{frame},{errors}").unwrap();
+        }
+    }
+    table
+}
+
+/// What a plain `kill` of a process leaves: no more than a crash.
+fn told_to_end(name: &str, victim: &str) -> Struck {
+    let struck = Struck::new(PACED, name, victim);
+    let number = HashMap::from([("TERM", 15), ("INT", 2), ("HUP", 1)])[name];
+    let said = format!("ended by signal {number}");
+    assert!(struck.said.contains(&said), "{}", struck.said);
+    struck.assert_all_accounted_for();
+    struck
+}
+
+#[test]
+fn a_camera_that_is_told_to_end_comes_back_and_goes_on_where_it_was() {
+    let struck = told_to_end("TERM", "capture --index 1");
+    struck.assert_every_frame();
+    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+}
+
+#[test]
+fn a_pose_process_that_is_told_to_end_comes_back() {
+    let struck = told_to_end("HUP", "pose --index 1");
+    struck.assert_every_frame();
+    assert!(struck.without_all().len() <= 2, "{}", struck.said);
+}
+
+#[test]
+fn a_quality_process_that_is_told_to_end_comes_back() {
+    let more = PACED.to_owned() + "[quality]\ntable = \"q.csv\"\n";
+    let struck = Struck::new(&more, "INT", "quality --index 1");
+    struck.assert_every_frame();
+    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+}
+
+#[test]
+fn a_fusion_worker_that_is_told_to_end_comes_back() {
+    let struck = told_to_end("TERM", "fuse --index 0");
+    struck.assert_every_frame();
+    assert_eq!(struck.lines.last().unwrap()["pairs"], json!(3));
+}
+
+#[test]
+fn a_triangulation_that_is_told_to_end_comes_back() {
+    told_to_end("INT", "triangulate");
+}
+
+#[test]
+fn a_recorder_that_is_told_to_end_comes_back() {
+    told_to_end("HUP", "record");
 }
 
 #[test]

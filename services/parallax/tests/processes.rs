@@ -3,7 +3,9 @@
 
 use crate::common;
 
-use common::started::signal;
+use std::process::Command;
+
+use common::started::{processes, signal};
 use common::{Case, PACED, PLAIN};
 use serde_json::{Value, json};
 
@@ -32,6 +34,38 @@ fn an_interrupted_run_ends_cleanly() {
             "{name}: {} frames",
             lines.len()
         );
+    }
+}
+
+#[test]
+fn signals_to_all_processes_at_once_end_the_run_in_order() {
+    // As systemd ends a unit (all of them, whatever their group), `timeout` a command (twice), and a terminal that
+    // closes what runs in it (twice).
+    for (name, signals, to_all) in [
+        ("unit", &["TERM"][..], true),
+        ("timeout", &["TERM", "TERM"], false),
+        ("hangup", &["HUP", "HUP"], false),
+        ("session", &["TERM", "HUP"], true),
+    ] {
+        let case = Case::new(name, &[400; 2], PACED);
+        let mut started = case.start(&["run", "deployment.toml"]);
+        started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
+        let children = processes(case.folder()).into_iter().map(|it| it.0.into());
+        let run = started.id();
+        let children: Vec<i64> = children.filter(|_| to_all).collect();
+        for sent in signals {
+            // The children first: they must not take it for an order of their own.
+            // Who has ended at the first one does not hear the second.
+            let all = children.iter().chain([&run]).map(i64::to_string);
+            let script = format!("kill -s {sent} {} 2>&-", all.collect::<Vec<_>>().join(" "));
+            Command::new("sh").args(["-c", &script]).status().unwrap();
+        }
+        let ended = started.wait();
+        assert_eq!(ended.status.code(), Some(130), "{name}: {}", ended.stderr);
+        case.assert_nothing_left();
+        assert!(!ended.stderr.contains("restart"), "{}", ended.stderr);
+        let finished = case.path("out/summary.json");
+        assert!(finished.exists(), "{name}: {}", ended.stderr);
     }
 }
 

@@ -86,6 +86,10 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
         }
     }
     writer.finish(service)?;
+    if !is_over {
+        // Told to end before the footage did: what was written is whole, but it is not all.
+        return Ok(());
+    }
     rest(service, &waiter)
 }
 

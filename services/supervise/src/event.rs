@@ -8,7 +8,7 @@ use messages::Health;
 /// How a process ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Death {
-    /// It ended by itself with an exit status other than 0.
+    /// It ended by itself: with an exit status other than 0, or with 0 before it was done.
     Exit {
         /// The exit status.
         status: i32,
@@ -47,6 +47,7 @@ pub enum Death {
 impl fmt::Display for Death {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Exit { status: 0 } => f.write_str("ended with status 0 without having finished"),
             Self::Exit { status } => write!(f, "ended with status {status}"),
             Self::Signal { number } => write!(f, "ended by signal {number}"),
             Self::Hung { still } => write!(f, "hung for {:.1} s", still.as_secs_f64()),

@@ -84,9 +84,9 @@ impl Fault for SuperviseError {
 
 /// Runs a deployment until all its processes are done, `stop` is requested, or it fails.
 ///
-/// A process is done when it ends with status 0, or says in its signs of life that it has finished;
-/// the latter is asked to end once all are done, so that its last message stays there for a
-/// receiver that had to be restarted.
+/// A process is done when it says in its signs of life that it has finished. It is asked to end once all are done,
+/// so that its last message stays there for a receiver that had to be restarted. One that ends
+/// without having said so and without having been asked to has failed, whatever its exit status is.
 ///
 /// However it ends, no process, no file and no shared memory of the deployment is left. Call it from
 /// a thread that lives as long as the run: its children end with it.
@@ -283,11 +283,13 @@ impl Supervisor<'_> {
         };
         // What it said last.
         self.listen(index, now);
-        if let Some(death) = death_of(status) {
+        let watch = &mut self.watches[index];
+        // Who was told to end together with the supervisor may be sooner.
+        let is_in_order = watch.says_finished() || self.stop.is_requested();
+        if let Some(death) = death_of(status, is_in_order) {
             return self.died(index, death, now);
         }
-        let watch = &mut self.watches[index];
-        watch.end(false);
+        watch.end();
         (self.on_event)(Event::Finished {
             process: &watch.spec.name,
         });
@@ -399,6 +401,6 @@ impl Supervisor<'_> {
             return;
         }
         self.listen(index, Instant::now());
-        self.watches[index].end(true);
+        self.watches[index].end();
     }
 }

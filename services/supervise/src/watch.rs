@@ -195,8 +195,10 @@ impl Watch {
         let (turned, is_first) = (health.n_loops != self.turned.count, self.turned.count == 0);
         self.work.note(health.cpu_millis, turned, is_first);
         self.turned.note(health.n_loops, now);
-        if self.turned.count > 0 {
-            self.at_work_since.get_or_insert(now);
+        if self.turned.count > 0 && self.at_work_since.is_none() {
+            self.at_work_since = Some(now);
+            // It could not receive anything before.
+            self.received.at = now;
         }
         self.received.note(health.n_received, now);
         self.current = Some(*health);
@@ -286,12 +288,9 @@ impl Watch {
         Sequel::Restart(pause)
     }
 
-    /// Ends a life that ended well.
-    ///
-    /// * `asked`: whether it was asked to end.
-    pub(crate) fn end(&mut self, asked: bool) {
-        let done = !asked || self.says_finished();
-        self.life = Life::Ended(if done {
+    /// Ends a life that ended well: it was done, or was asked to end.
+    pub(crate) fn end(&mut self) {
+        self.life = Life::Ended(if self.says_finished() {
             State::Finished
         } else {
             State::Stopped
@@ -315,7 +314,8 @@ impl Watch {
             && since(self.received) > policy.idle_limit
     }
 
-    fn says_finished(&self) -> bool {
+    /// Whether this life has said that its work is done.
+    pub(crate) fn says_finished(&self) -> bool {
         self.current.is_some_and(|health| health.finished != 0)
     }
 
@@ -354,9 +354,11 @@ impl Watch {
 }
 
 /// How a process ended, from what the system says; none if it ended as it should.
-pub(crate) fn death_of(status: ExitStatus) -> Option<Death> {
+///
+/// * `is_in_order`: whether it had said that it was done, or was asked to end.
+pub(crate) fn death_of(status: ExitStatus, is_in_order: bool) -> Option<Death> {
     match (status.code(), status.signal()) {
-        (Some(0), _) => None,
+        (Some(0), _) if is_in_order => None,
         (Some(status), _) => Some(Death::Exit { status }),
         (None, Some(number)) => Some(Death::Signal { number }),
         (None, None) => Some(Death::Exit { status: -1 }),
@@ -373,6 +375,22 @@ mod tests {
         let millis = Duration::from_millis;
         // The start is no turn, whatever it took.
         work.note(900, true, true);
+    #[test]
+    fn who_ends_well_without_being_done_and_unasked_has_failed() {
+        let well = ExitStatus::from_raw(0);
+        assert_eq!(death_of(well, true), None);
+        let death = death_of(well, false).unwrap();
+        assert_eq!(death, Death::Exit { status: 0 });
+        let said = "ended with status 0 without having finished";
+        assert_eq!(death.to_string(), said);
+        let (killed, failed) = (ExitStatus::from_raw(15), ExitStatus::from_raw(1 << 8));
+        for in_order in [true, false] {
+            let deaths = [killed, failed].map(|it| death_of(it, in_order));
+            let expected = [Death::Signal { number: 15 }, Death::Exit { status: 1 }];
+            assert_eq!(deaths, expected.map(Some));
+        }
+    }
+
         work.note(1000, false, false);
         assert_eq!((work.since_turn, work.longest), (millis(100), millis(0)));
         work.note(1080, true, false);

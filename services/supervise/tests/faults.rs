@@ -119,6 +119,40 @@ fn a_killed_sender_comes_back_and_the_others_go_on() {
 }
 
 #[test]
+fn who_is_told_to_end_by_somebody_else_than_the_supervisor_has_failed() {
+    for (signal, number) in [("-TERM", 15), ("-INT", 2), ("-HUP", 1)] {
+        let case = Case::new(
+            Delivery::Realtime,
+            &[
+                ("sink", "receive 0", Role::Essential),
+                ("source", "send 1000000 1 1", Role::Redundant),
+            ],
+        );
+        let mut kill = kill_once("source", signal, |event| {
+            is_line(event, "source", "sent 32")
+        });
+        let run = case.run(|event, stop| {
+            kill(event, stop);
+            if heard_from(event, 1) {
+                stop.request();
+            }
+        });
+        assert_eq!(run.deaths("source"), [Death::Signal { number }]);
+        assert!(run.deaths("sink").is_empty());
+        assert_eq!(run.outcome().processes[1].restarts, 1);
+    }
+}
+
+#[test]
+fn who_ends_well_before_it_is_done_has_failed() {
+    let case = Case::new(Delivery::Realtime, &[("only", "leave", Role::Essential)]);
+    let run = case.run(|_, _| {});
+    assert_eq!(run.deaths("only"), [Death::Exit { status: 0 }]);
+    assert_eq!(run.outcome().processes[0].restarts, 1);
+    assert_eq!(state_of(&run, "only"), State::Finished);
+}
+
+#[test]
 fn a_receiver_that_is_killed_at_the_very_end_comes_back_and_hears_the_end() {
     for delivery in [Delivery::Realtime, Delivery::Lossless] {
         let case = Case::new(

@@ -142,9 +142,14 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     }
     tape.listen()?;
     tape.settle(&channels);
+    let is_over = tape.is_over;
     drop(tape);
     drop(inlet);
     finish(service, thread)?;
+    if !is_over {
+        // Told to end before the run did: what the file holds is whole, but it is not all.
+        return Ok(());
+    }
     rest(service, &waiter)
 }
 

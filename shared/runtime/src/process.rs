@@ -114,7 +114,9 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
     for denied in launch.scheduling.apply() {
         tracing::warn!(hint = denied.hint(), "{denied}; going on without");
     }
-    let stop = Stop::on_signals()
+    let stop = launch
+        .supervisor
+        .map_or_else(Stop::on_signals, Stop::on_signals_of)
         .map_err(|error| Failure::new(ExitKind::Run, error).with_hint("signals are needed"))?;
     let bus = Bus::open(&launch.namespace, &launch.process, &stop)?;
     let bus = bus.with_spin(launch.scheduling.spin);
