@@ -305,7 +305,7 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         path: path.clone(),
         source,
     };
-    private::directory(namespace)?;
+    private::Root::open(namespace)?;
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(directory)?;
     }

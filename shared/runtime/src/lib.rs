@@ -5,6 +5,7 @@ mod deployment;
 mod namespace;
 mod topic;
 
+mod beneath;
 mod bus;
 mod clean;
 mod copies;

@@ -1,9 +1,9 @@
 //! One run of a deployment at a time, beginning and ending with nothing left behind.
 
 use core::time::Duration;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, Read as _, Seek as _, Write as _};
-use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Instant;
@@ -15,7 +15,8 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
-use crate::{BusError, ExitKind, Fault, Namespace, private};
+use crate::private::{self, Root};
+use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub(crate) const LOCK_FILE: &str = "lock";
@@ -83,6 +84,7 @@ impl Fault for LockError {
 pub struct DeploymentLock {
     namespace: Namespace,
     config: Config,
+    root: Root,
     _file: File,
 }
 
@@ -93,7 +95,9 @@ impl Namespace {
     ///
     /// [`LockError`].
     pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
-        let file = lock_file(self)?;
+        let (root, file) = lock_file(self)?;
+        // The run before may have taken its mark away since.
+        root.mark(self).map_err(BusError::from)?;
         private::shared_memory(self).map_err(BusError::from)?;
         let config = self.config().map_err(BusError::from)?;
         let begin = Instant::now();
@@ -110,11 +114,12 @@ impl Namespace {
             }
             sleep(DYING_PAUSE);
         }
-        wipe(self)?;
+        wipe(self, &root)?;
         prepare(self)?;
         Ok(DeploymentLock {
             namespace: self.clone(),
             config,
+            root,
             _file: file,
         })
     }
@@ -149,17 +154,11 @@ impl Drop for DeploymentLock {
             tracing::warn!(?alive, "processes are left: so are their files");
             return;
         }
-        // The lock goes last, while it is held, so that nobody else can have begun below it.
-        let removed = wipe(&self.namespace)
-            .and_then(|()| remove(&self.namespace.root().join(LOCK_FILE)))
-            .and_then(|()| match fs::remove_dir(self.namespace.root()) {
-                // The next run has already begun.
-                Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
-                result => result.map_err(|source| LockError::File {
-                    path: self.namespace.root().to_owned(),
-                    source,
-                }),
-            });
+        let root = &self.root;
+        let removed = wipe(&self.namespace, root).and_then(|()| {
+            root.remove(&self.namespace)
+                .map_err(unusable(&self.namespace))
+        });
         if let Err(error) = removed {
             tracing::warn!(%error, "cannot remove the files of the deployment");
         }
@@ -167,24 +166,17 @@ impl Drop for DeploymentLock {
 }
 
 /// Opens and locks the lock file, which another run may remove at the same time.
-fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
+fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
     let path = namespace.root().join(LOCK_FILE);
     let failed = |source: io::Error| LockError::File {
         path: path.clone(),
         source,
     };
     loop {
-        private::directory(namespace).map_err(BusError::from)?;
-        let opened = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(&path);
-        let mut file = match opened {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-            opened => opened.map_err(failed)?,
+        let root = Root::open(namespace).map_err(BusError::from)?;
+        let mut file = match beneath::file_in(&root, LOCK_FILE) {
+            Err(Errno::NOENT) => continue,
+            opened => opened.map_err(|error| failed(error.into()))?,
         };
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
@@ -199,11 +191,11 @@ fn lock_file(namespace: &Namespace) -> Result<File, LockError> {
             Err(error) => return Err(failed(error.into())),
         }
         let own = file.metadata().map_err(failed)?.ino();
-        if fs::metadata(&path).is_ok_and(|there| there.ino() == own) {
+        if beneath::look(&root, c"lock").is_ok_and(|there| there.st_ino == own) {
             file.set_len(0).map_err(failed)?;
             file.rewind().map_err(failed)?;
             write!(file, "{}", std::process::id()).map_err(failed)?;
-            return Ok(file);
+            return Ok((root, file));
         }
     }
 }
@@ -236,23 +228,16 @@ pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
     living
 }
 
-/// Removes everything but the lock. Nothing may be alive.
-fn wipe(namespace: &Namespace) -> Result<(), LockError> {
-    for path in entries(namespace.root())? {
-        if path.file_name().is_none_or(|name| name != LOCK_FILE) {
-            remove(&path)?;
-        }
-    }
-    for path in entries(Path::new(SHARED_MEMORY))? {
-        let own = path
-            .file_name()
-            .and_then(|name| name.to_str())
-            .is_some_and(|name| name.starts_with(namespace.prefix()));
-        if own {
-            remove(&path)?;
-        }
-    }
+/// Removes everything but the lock and the mark. Nothing may be alive.
+fn wipe(namespace: &Namespace, root: &Root) -> Result<(), LockError> {
+    root.empty().map_err(unusable(namespace))?;
+    private::remove_shared_memory(namespace).map_err(BusError::from)?;
     Ok(())
+}
+
+fn unusable(namespace: &Namespace) -> impl FnOnce(io::Error) -> LockError {
+    let path = namespace.root().to_owned();
+    move |source| LockError::File { path, source }
 }
 
 pub(crate) fn entries(directory: &Path) -> Result<Vec<PathBuf>, LockError> {
@@ -265,20 +250,4 @@ pub(crate) fn entries(directory: &Path) -> Result<Vec<PathBuf>, LockError> {
         paths.push(entry.map_err(failed)?.path());
     }
     Ok(paths)
-}
-
-fn remove(path: &Path) -> Result<(), LockError> {
-    let is_directory = fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_dir());
-    let removed = if is_directory {
-        fs::remove_dir_all(path)
-    } else {
-        fs::remove_file(path)
-    };
-    match removed {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        removed => removed.map_err(|source| LockError::File {
-            path: path.to_owned(),
-            source,
-        }),
-    }
 }

@@ -6,15 +6,18 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 
 use rustix::fs::{major, minor};
+use rustix::io::Errno;
 
 use crate::lock::{LOCK_FILE, SHARED_MEMORY, alive, entries};
-use crate::{BusError, LockError, Namespace};
+use crate::{BusError, LockError, Namespace, beneath, private};
 
 /// A deployment that runs, or that has left something behind.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remains {
     /// Where it lives.
     pub namespace: Namespace,
+    /// Whether its directory says that it is a deployment's. What does not is never removed.
+    pub is_marked: bool,
     /// The process that runs it; none if it is dead.
     pub supervisor: Option<u32>,
     /// Names and process ids of its processes.
@@ -46,24 +49,31 @@ impl Remains {
 ///
 /// [`LockError::File`], [`LockError::Bus`].
 pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
-    if !base.exists() {
+    let Some(opened) = private::open_base(base).map_err(BusError::from)? else {
         return Ok(Vec::new());
-    }
+    };
     let locks = fs::read_to_string("/proc/locks").unwrap_or_default();
     let mut found = Vec::new();
-    for path in entries(base)? {
-        let name = path.file_name().and_then(|it| it.to_str());
+    let unreadable = |error: Errno| LockError::File {
+        path: base.to_owned(),
+        source: error.into(),
+    };
+    for name in beneath::names(&opened).map_err(unreadable)? {
         // What has another kind of name is nobody's deployment.
-        let namespace = name.and_then(|it| Namespace::below(it, base).ok());
-        if let Some(namespace) = namespace.filter(|_| path.is_dir()) {
-            found.push(look_at(namespace, &locks)?);
+        let namespace = name.to_str().ok();
+        let namespace = namespace.and_then(|it| Namespace::below(it, base).ok());
+        // Nor is a link to a directory.
+        let directory = beneath::directory_in(&opened, name.as_bytes());
+        if let Some((namespace, directory)) = namespace.zip(directory.ok()) {
+            let is_marked = private::is_marked(&directory, &namespace);
+            found.push(look_at(namespace, is_marked, &locks)?);
         }
     }
     found.sort_by(|a, b| a.namespace.name().cmp(b.namespace.name()));
     Ok(found)
 }
 
-fn look_at(namespace: Namespace, locks: &str) -> Result<Remains, LockError> {
+fn look_at(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains, LockError> {
     let config = namespace.config().map_err(BusError::from)?;
     let mut size = (0, 0);
     measure(namespace.root(), &mut size);
@@ -75,7 +85,12 @@ fn look_at(namespace: Namespace, locks: &str) -> Result<Remains, LockError> {
     }
     Ok(Remains {
         supervisor: supervisor(&namespace.root().join(LOCK_FILE), locks),
-        processes: alive(&config),
+        processes: if is_marked {
+            alive(&config)
+        } else {
+            Vec::new()
+        },
+        is_marked,
         n_files: size.0,
         bytes: size.1,
         namespace,
@@ -132,7 +147,8 @@ mod tests {
         let lock = lives.acquire().unwrap();
         // A killed supervisor leaves its lock file, and whatever else there is.
         let dead = base.path().join("dead");
-        fs::create_dir(&dead).unwrap();
+        let marked = Namespace::below("dead", base.path()).unwrap();
+        private::Root::open(&marked).unwrap();
         fs::write(dead.join(LOCK_FILE), "1").unwrap();
         fs::write(dead.join("capture-0.place"), vec![1; 5000]).unwrap();
         fs::write(base.path().join("a file"), "").unwrap();
@@ -140,7 +156,7 @@ mod tests {
         let names: Vec<&str> = found.iter().map(|it| it.namespace.name()).collect();
         assert_eq!(names, ["dead", "lives"]);
         assert_eq!(found[0].supervisor, None);
-        assert_eq!(found[0].n_files, 2);
+        assert_eq!(found[0].n_files, 3);
         assert!(found[0].bytes >= 5000, "{}", found[0].bytes);
         assert_eq!(found[1].supervisor, Some(std::process::id()));
         found[0].remove().unwrap();
@@ -152,6 +168,31 @@ mod tests {
         );
         drop(lock);
         assert_eq!(deployments(base.path()).unwrap(), []);
+    }
+
+    #[test]
+    fn what_says_not_that_it_is_a_deployment_is_named_and_stays() {
+        let base = base();
+        let photos = base.path().join("photos");
+        fs::create_dir(&photos).unwrap();
+        fs::write(photos.join("one.jpg"), "x").unwrap();
+        // The mark of another is none.
+        let other = Namespace::below("other", base.path()).unwrap();
+        private::Root::open(&other).unwrap();
+        let mark = other.root().join("parallax-deployment");
+        fs::copy(mark, photos.join("parallax-deployment")).unwrap();
+        let found = deployments(base.path()).unwrap();
+        let told = found.iter().map(|it| (it.namespace.name(), it.is_marked));
+        let told: Vec<_> = told.collect();
+        assert_eq!(told, [("other", true), ("photos", false)]);
+        let error = found[1].remove().unwrap_err().to_string();
+        assert!(
+            error.contains("photos\" is no directory of a deployment"),
+            "{error}"
+        );
+        assert!(photos.join("one.jpg").exists());
+        found[0].remove().unwrap();
+        assert!(!other.root().exists());
     }
 
     #[test]

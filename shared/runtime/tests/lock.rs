@@ -41,6 +41,9 @@ fn what_a_killed_run_left_behind_is_removed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let leftover = format!("/dev/shm/{}123.data", namespace.prefix());
+    // What a run that was killed leaves: its directory says whose it is.
+    std::mem::forget(namespace.acquire().unwrap());
+    fs::remove_file(namespace.root().join("lock")).unwrap();
     fs::write(&leftover, "x").unwrap();
     fs::create_dir_all(namespace.root().join("nodes/17")).unwrap();
     fs::write(namespace.root().join("nodes/17/node.details"), "x").unwrap();

@@ -5,7 +5,7 @@
 mod common;
 
 use std::fs::{self, Permissions};
-use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown, lchown, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -186,7 +186,93 @@ fn a_file_in_the_place_of_the_directory_is_named() {
     assert!(error.to_string().contains("is not a directory"), "{error}");
     // Nor is a way to another one followed.
     fs::remove_file(namespace.root()).unwrap();
-    std::os::unix::fs::symlink(base.path(), namespace.root()).unwrap();
+    symlink(base.path(), namespace.root()).unwrap();
     let error = namespace.acquire().unwrap_err();
-    assert!(error.to_string().contains("is not a directory"), "{error}");
+    assert!(error.to_string().contains("and not a directory"), "{error}");
+}
+
+/// A home with folders, one of which has the name of a deployment and looks like the leftovers of one.
+fn home(base: &Path, name: &str) -> PathBuf {
+    let home = base.join("home");
+    for file in ["lock", "nodes/17/node.details", "letters.txt"] {
+        let file = home.join(name).join(file);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, "x").unwrap();
+    }
+    fs::create_dir(home.join("photos")).unwrap();
+    fs::write(home.join("photos/one.jpg"), "x").unwrap();
+    home
+}
+
+/// All that is there, with its mode.
+fn census(path: &Path) -> Vec<(PathBuf, u32)> {
+    let mut found = Vec::new();
+    below(path, &mut found);
+    found.sort();
+    let mode = |it: &PathBuf| fs::symlink_metadata(it).unwrap().mode();
+    found
+        .into_iter()
+        .map(|it| (it.clone(), mode(&it)))
+        .collect()
+}
+
+#[test]
+fn a_link_in_the_place_of_the_base_is_never_followed() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let home = home(base.path(), "t");
+    // Where another user's directories would lie; made by somebody else, if that can be done here.
+    let link = base.path().join("px");
+    symlink(&home, &link).unwrap();
+    let owner = if is_root() {
+        lchown(&link, Some(OTHER), None).unwrap();
+        OTHER
+    } else {
+        getuid().as_raw()
+    };
+    let before = census(&home);
+    let own = Namespace::below("t", &link).unwrap();
+    let refused = [
+        own.acquire().unwrap_err().to_string(),
+        Bus::open(&own, "one", &Stop::new().unwrap())
+            .unwrap_err()
+            .to_string(),
+        runtime::deployments(&link).unwrap_err().to_string(),
+    ];
+    for text in refused {
+        assert!(text.contains(link.to_str().unwrap()), "{text}");
+        let whose = format!("({owner}) to {home:?}");
+        assert!(text.contains("is a symbolic link of user"), "{text}");
+        assert!(text.contains(&whose) || !is_root(), "{text}");
+    }
+    assert_eq!(census(&home), before);
+}
+
+#[test]
+fn a_directory_that_is_no_deployments_is_named_and_stays_as_it_was() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let home = home(base.path(), "t");
+    let before = census(&home);
+    let error = Namespace::below("t", &home).unwrap().acquire().unwrap_err();
+    let LockError::Bus(BusError::Privacy(PrivacyError::Unmarked { path, n_files: 2 })) = &error
+    else {
+        panic!("{error}");
+    };
+    assert_eq!(*path, home.join("t"));
+    assert_eq!(census(&home), before);
+    assert!(error.hint().unwrap().contains("nothing in it was touched"));
+}
+
+#[test]
+fn a_base_in_which_others_may_replace_what_is_there_is_shut() {
+    let base = tempfile::tempdir_in("/dev/shm").unwrap();
+    let mode = || fs::metadata(base.path()).unwrap().mode() & 0o7777;
+    fs::set_permissions(base.path(), Permissions::from_mode(0o777)).unwrap();
+    let own = namespace(base.path());
+    drop(own.acquire().unwrap());
+    assert_eq!(mode(), 0o755);
+    // Where everybody may make something and nobody remove another's, as in /tmp, it is safe.
+    fs::set_permissions(base.path(), Permissions::from_mode(0o1777)).unwrap();
+    drop(own.acquire().unwrap());
+    assert_eq!(mode(), 0o1777);
+    assert!(!own.root().exists());
 }

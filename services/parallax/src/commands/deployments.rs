@@ -10,6 +10,9 @@ use crate::commands::top;
 use crate::live::{self, Live};
 use crate::output;
 
+/// What is said of a directory among those of deployments that is none.
+const UNMARKED: &str = "not a deployment: left alone";
+
 /// How to show what is there.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -50,6 +53,7 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     for it in &found {
         let name = it.namespace.name();
         let how = match it.supervisor {
+            _ if !it.is_marked => UNMARKED.to_owned(),
             Some(pid) => format!("runs (process {pid}), {} processes", it.processes.len()),
             None if it.processes.is_empty() => "dead: `parallax clean` removes it".to_owned(),
             None => format!("dead, but for {}", it.processes.join(", ")),
@@ -81,9 +85,13 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
         }
     }
     let is_meant = |it: &&Remains| match &arguments.names[..] {
-        [] => it.supervisor.is_none(),
+        [] => it.supervisor.is_none() && it.is_marked,
         names => names.iter().any(|name| name == it.namespace.name()),
     };
+    for it in found.iter().filter(|it| !it.is_marked) {
+        let path = it.namespace.root().display();
+        output::message(format_args!("{path}: {UNMARKED}"));
+    }
     let (mut removed, mut failed) = (Vec::new(), Vec::new());
     for it in found.iter().filter(is_meant) {
         match it.remove() {
@@ -120,6 +128,7 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
 fn describe(it: &Remains) -> Value {
     json!({
         "name": it.namespace.name(),
+        "is_deployment": it.is_marked,
         "supervisor": it.supervisor,
         "processes": it.processes,
         "files": it.n_files,
