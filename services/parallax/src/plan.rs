@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 use std::ffi::OsString;
+use std::io::{IsTerminal as _, Read as _};
 use std::path::{Path, PathBuf};
 
 use runtime::{
@@ -68,16 +69,32 @@ impl Resolved {
         Some(used * self.deployment.capture.frame_step as f64)
     }
 
-    /// Writes it for the processes to read.
+    /// Writes it for the user to read.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(self).or_fail(ExitKind::Run)?;
-        std::fs::write(file, text).map_err(|error| inputs::in_file(file, &error))
+        std::fs::write(file, self.to_text()?).map_err(|error| inputs::in_file(file, &error))
     }
 
-    /// Reads what [`Self::write`] wrote.
-    pub(crate) fn read(file: &Path) -> Result<Self, Failure> {
-        let text = inputs::text(file)?;
-        serde_json::from_str(&text).map_err(|error| inputs::in_file(file, &error))
+    /// What every process is given.
+    pub(crate) fn to_text(&self) -> Result<String, Failure> {
+        serde_json::to_string_pretty(self).or_fail(ExitKind::Run)
+    }
+
+    /// Reads what the supervisor has given to this process, in its standard input: the file in the output folder may
+    /// be gone or be another run's when a process is started again.
+    ///
+    /// * `file`: the file of the same content; it is read by a process that was started by hand, without anything in
+    ///   its input.
+    pub(crate) fn given(file: &Path) -> Result<Self, Failure> {
+        let wrong = |error: &dyn core::error::Error| inputs::in_file(file, error);
+        let mut text = String::new();
+        if !std::io::stdin().is_terminal() {
+            let read = std::io::stdin().read_to_string(&mut text);
+            read.map_err(|error| wrong(&error))?;
+        }
+        if text.is_empty() {
+            text = inputs::text(file)?;
+        }
+        serde_json::from_str(&text).map_err(|error| wrong(&error))
     }
 
     /// What happens when a receiver is slower than its sender.
@@ -179,7 +196,7 @@ pub(crate) fn topics(
 
 /// The processes of a deployment, consumers first.
 ///
-/// * `file`: the resolved deployment, which every process reads.
+/// * `file`: the resolved deployment, as the user finds it.
 pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -> Vec<ProcessSpec> {
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let n_views = prepared.views.len();
@@ -257,6 +274,7 @@ pub(crate) fn plan(
     let settings = &resolved.deployment.supervise;
     Ok(Plan {
         executable: executable()?,
+        given: resolved.to_text()?.into_bytes(),
         namespace: Namespace::new(&resolved.deployment.name)?,
         session: now_nanos(),
         delivery: resolved.delivery(),

@@ -143,6 +143,51 @@ fn a_killed_camera_goes_on_where_it_was() {
 }
 
 #[test]
+fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
+    let case = Case::new("moved", &[N_FRAMES as usize; 3], PACED);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    fs::rename(case.path("out"), case.path("gone")).unwrap();
+    for victim in ["capture --index 1", "fuse --index 0"] {
+        signal("KILL", started.pid_of(victim).into());
+    }
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let restarts =
+        json!([{ "process": "fuse-0", "restarts": 1 }, { "process": "capture-1", "restarts": 1 }]);
+    assert_eq!(report["restarts"], restarts, "{}", ended.stderr);
+    // The recorder has its files open, wherever they are by now.
+    let text = fs::read_to_string(case.path("gone/pose3d.jsonl.part")).unwrap();
+    assert_eq!(text.lines().count() as u64, N_FRAMES, "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("rename the finished"),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn a_model_that_is_gone_when_a_process_comes_back_costs_that_process_alone() {
+    let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
+    let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+    fs::remove_file(case.path("model.plx")).unwrap();
+    signal("KILL", started.pid_of("pose --index 1").into());
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
+    assert!(ended.stderr.contains("model.plx"), "{}", ended.stderr);
+    let last = case.lines("pose3d.jsonl").pop().unwrap();
+    assert_eq!(last["frame"], json!(N_FRAMES - 1));
+    assert_eq!(last["views_present"], json!(["a", "c"]));
+}
+
+#[test]
 fn a_killed_fusion_worker_costs_its_pairs_of_a_few_frames() {
     let struck = Struck::new(PACED, "KILL", "fuse --index 0");
     struck.assert_every_frame();

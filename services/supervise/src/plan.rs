@@ -12,6 +12,8 @@ use tracing::Level;
 pub struct Plan {
     /// The program that becomes any of the services: `executable service <service> <args>`.
     pub executable: PathBuf,
+    /// What every process finds in its standard input, in every life: a file that it needs could be removed meanwhile.
+    pub given: Vec<u8>,
     /// Where the deployment lives.
     pub namespace: Namespace,
     /// The run; goes into the stamp of every message.

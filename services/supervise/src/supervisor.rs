@@ -206,7 +206,7 @@ impl Supervisor<'_> {
         let mut args = vec!["service".into(), watch.spec.service.clone().into()];
         args.extend(launch.to_args());
         args.extend(watch.spec.args.iter().cloned());
-        match Child::start(&self.plan.executable, &args) {
+        match Child::start_given(&self.plan.executable, &args, &self.plan.given) {
             Ok(child) => {
                 (self.on_event)(Event::Started {
                     process: &watch.spec.name,

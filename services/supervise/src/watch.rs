@@ -30,6 +30,8 @@ pub(crate) struct Watch {
     restarts: VecDeque<Instant>,
     /// When the main loop of this life turned for the first time.
     at_work_since: Option<Instant>,
+    /// Whether the main loop of an earlier life turned: what it was given was good then.
+    has_worked: bool,
     /// How many lives in a row ended before they were steady, the last ones.
     n_hasty: u32,
     output: VecDeque<String>,
@@ -137,6 +139,7 @@ impl Watch {
             epoch: 0,
             restarts: VecDeque::new(),
             at_work_since: None,
+            has_worked: false,
             n_hasty: 0,
             output: VecDeque::new(),
             past: Counts::default(),
@@ -264,7 +267,9 @@ impl Watch {
     /// Ends a life, and says what is to follow.
     pub(crate) fn die(&mut self, death: Death, policy: &Policy, now: Instant) -> Sequel {
         self.past = self.past.and(self.current.take().as_ref());
-        if let Death::Exit { status } = death
+        // What an earlier life could use may be back for a later one; the others have it and go on.
+        if !self.has_worked
+            && let Death::Exit { status } = death
             && let Some(kind) = ExitKind::of_status(status).filter(|kind| kind.is_permanent())
         {
             self.life = Life::GivenUp;
@@ -275,6 +280,7 @@ impl Watch {
         {
             self.restarts.pop_front();
         }
+        self.has_worked |= self.at_work_since.is_some();
         let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
         let is_steady = self.at_work_since.is_some_and(worked);
         self.n_hasty = if is_steady { 0 } else { self.n_hasty + 1 };
@@ -370,12 +376,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_work_of_a_turn_is_what_was_used_until_the_next() {
-        let mut work = Work::default();
-        let millis = Duration::from_millis;
-        // The start is no turn, whatever it took.
-        work.note(900, true, true);
-    #[test]
     fn who_ends_well_without_being_done_and_unasked_has_failed() {
         let well = ExitStatus::from_raw(0);
         assert_eq!(death_of(well, true), None);
@@ -391,6 +391,12 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_work_of_a_turn_is_what_was_used_until_the_next() {
+        let mut work = Work::default();
+        let millis = Duration::from_millis;
+        // The start is no turn, whatever it took.
+        work.note(900, true, true);
         work.note(1000, false, false);
         assert_eq!((work.since_turn, work.longest), (millis(100), millis(0)));
         work.note(1080, true, false);

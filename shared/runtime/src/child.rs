@@ -2,13 +2,15 @@
 
 use core::time::Duration;
 use std::ffi::OsString;
-use std::io::{self, PipeReader, Read as _};
+use std::fs::File;
+use std::io::{self, PipeReader, Read as _, Seek as _, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::io::{Errno, ioctl_fionbio};
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, kill_process_group, pidfd_open};
 
@@ -39,11 +41,27 @@ impl Child {
     ///
     /// The executable cannot be run, or the system has no room for another process.
     pub fn start(executable: &Path, args: &[OsString]) -> io::Result<Self> {
+        Self::with_input(executable, args, Stdio::null())
+    }
+
+    /// The same with something to read in its standard input: a file without a name, which nobody can remove.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`start`](Self::start), or the system has no room for the file.
+    pub fn start_given(executable: &Path, args: &[OsString], given: &[u8]) -> io::Result<Self> {
+        let mut file = File::from(memfd_create("given", MemfdFlags::CLOEXEC)?);
+        file.write_all(given)?;
+        file.rewind()?;
+        Self::with_input(executable, args, file.into())
+    }
+
+    fn with_input(executable: &Path, args: &[OsString], input: Stdio) -> io::Result<Self> {
         let (output, writer) = io::pipe()?;
         ioctl_fionbio(&output, true)?;
         let child = Command::new(executable)
             .args(args)
-            .stdin(Stdio::null())
+            .stdin(input)
             .stdout(writer.try_clone()?)
             .stderr(writer)
             .process_group(0)
@@ -261,6 +279,15 @@ mod tests {
         let (lines, status) = run(&mut child);
         assert_eq!(lines, ["one", "two", "three"]);
         assert!(status.success());
+    }
+
+    #[test]
+    fn what_a_child_is_given_is_its_input_from_the_beginning_to_the_end() {
+        let args = ["-c", "cat; echo over"].map(OsString::from);
+        for _ in 0..2 {
+            let mut child = Child::start_given(Path::new("/bin/sh"), &args, b"one\n2\n").unwrap();
+            assert_eq!(run(&mut child).0, ["one", "2", "over"]);
+        }
     }
 
     #[test]

@@ -180,7 +180,7 @@ impl Planned {
     }
 }
 
-/// The resolved deployment, which every process reads.
+/// The resolved deployment, for the user; the processes are given the same in their standard input.
 fn file_of(deployment: &Deployment) -> PathBuf {
     deployment.output.join("deployment.json")
 }

@@ -55,7 +55,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true)]
 struct Own {
-    /// The resolved deployment.
+    /// The resolved deployment, where standard input does not hold it.
     #[arg(long)]
     plan: PathBuf,
     /// View or worker, from 0.
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 }
 
 fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
-    let resolved = Resolved::read(&own.plan)?;
+    let resolved = Resolved::given(&own.plan)?;
     let n_views = resolved.deployment.cameras.len();
     let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
     if per_view && own.index >= n_views {

@@ -67,6 +67,7 @@ impl Case {
             .flat_map(|&(name, _, _)| process_topics(name));
         let plan = Plan {
             executable: env!("CARGO_BIN_EXE_supervise-dummy").into(),
+            given: Vec::new(),
             namespace: Namespace::below("t", base.path()).unwrap(),
             session: 42,
             delivery,
