@@ -5,6 +5,9 @@ use core::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use rustix::process::{Resource, getrlimit};
+
+use crate::reserve::Refused;
 use crate::words::in_words;
 
 /// Exit statuses, the same for the command and for all its services.
@@ -195,18 +198,37 @@ impl<E: Fault> From<E> for Failure {
 const ROOM: &str =
     "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
 
+/// Where there was no room for a segment: how much was wanted, how much there is, and what to try.
+fn no_room() -> Option<String> {
+    let kilobytes = |bytes: u64| bytes.div_ceil(1000);
+    Some(match crate::reserve::refused()? {
+        Refused::NoRoom { wanted_bytes } => format!(
+            "{} KB of shared memory were wanted, {} KB are free in /dev/shm: {ROOM}",
+            kilobytes(wanted_bytes),
+            crate::free_shared_memory().unwrap_or(0) / 1000
+        ),
+        Refused::TooLarge { wanted_bytes } => format!(
+            "{} KB of shared memory were wanted in one piece, and no file may have more than {} KB: \
+             allow more (`ulimit -f unlimited`)",
+            kilobytes(wanted_bytes),
+            getrlimit(Resource::Fsize).current.unwrap_or(0) / 1000
+        ),
+    })
+}
+
 impl Fault for crate::BusError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::Privacy(error) => error.hint(),
             Self::Full { .. } => Some(ROOM.to_owned()),
-            _ => None,
+            _ => no_room(),
         }
     }
 }
 impl Fault for crate::PortError {
     fn hint(&self) -> Option<String> {
-        matches!(self, Self::Memory { .. }).then(|| ROOM.to_owned())
+        let is_known = matches!(self, Self::Memory { .. });
+        no_room().or_else(|| is_known.then(|| ROOM.to_owned()))
     }
 }
 

@@ -15,6 +15,7 @@ mod memory;
 mod payload;
 mod private;
 mod publisher;
+mod reserve;
 mod service;
 mod subscriber;
 mod waiter;

@@ -15,9 +15,11 @@ use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 use rustix::mm::{Advice, madvise};
+use rustix::process::{Resource, getrlimit};
 
 use crate::mapped::Mapping;
 use crate::payload::{Element, Header};
+use crate::reserve::{self, Refused};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 
@@ -35,6 +37,16 @@ pub enum MemoryError {
         needed_bytes: u64,
         /// What is left.
         free_bytes: u64,
+    },
+    /// No file of this process may be as large.
+    #[error("{path:?} needs {needed_bytes} bytes of shared memory, a file may have {limit_bytes}")]
+    Limited {
+        /// The pool.
+        path: PathBuf,
+        /// Its size.
+        needed_bytes: u64,
+        /// The limit of this process (`ulimit -f`).
+        limit_bytes: u64,
     },
     /// The pool cannot be opened or extended.
     #[error("cannot reserve pool {path:?}")]
@@ -117,6 +129,25 @@ pub(crate) fn populate(
         }
     }
     Ok(())
+}
+
+/// Why the pool of a publisher was not made, if that was for want of memory.
+///
+/// * `prefix`: of the files of the deployment.
+pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
+    let path = Path::new(SHARED_MEMORY).join(prefix);
+    Some(match reserve::refused()? {
+        Refused::NoRoom { wanted_bytes } => MemoryError::Full {
+            path,
+            needed_bytes: wanted_bytes,
+            free_bytes: free_shared_memory().unwrap_or(0),
+        },
+        Refused::TooLarge { wanted_bytes } => MemoryError::Limited {
+            path,
+            needed_bytes: wanted_bytes,
+            limit_bytes: getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX),
+        },
+    })
 }
 
 /// Views a loaned array as what it already holds, instead of writing megabytes of zeros to it.

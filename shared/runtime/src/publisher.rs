@@ -267,9 +267,15 @@ impl<E: Message, H: Header> Port<E, H> {
             .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
             .set_backpressure_handler(patience(bus))
             .create()
-            .map_err(|source| PortError::Publisher {
-                topic: topic.to_owned(),
-                source,
+            .map_err(|source| match memory::refused(bus.namespace().prefix()) {
+                Some(source) => PortError::Memory {
+                    topic: topic.to_owned(),
+                    source,
+                },
+                None => PortError::Publisher {
+                    topic: topic.to_owned(),
+                    source,
+                },
             })?;
         let mapped = [extras.mapped, extras.chunks];
         let pool = (bus.namespace().prefix(), publisher.id().value());
