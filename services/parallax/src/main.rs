@@ -30,9 +30,9 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
-    match commands::run(cli) {
-        Ok(code) => code,
-        Err(failure) => failure.exit(),
+    if let Err(error) = runtime::guard_process() {
+        return runtime::Failure::new(runtime::ExitKind::Run, error).exit();
     }
+    let cli = cli::Cli::parse();
+    runtime::run_command(|| commands::run(cli))
 }

@@ -4,11 +4,13 @@
 
 use crate::common;
 
+use core::time::Duration;
 use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, chown};
+use std::time::Instant;
 
-use common::started::processes;
+use common::started::{processes, signal};
 use common::{Case, Ended, PACED, PLAIN, Started};
 use runtime::Namespace;
 use serde_json::{Value, json};
@@ -59,6 +61,161 @@ fn shared_memory_that_is_filled_during_a_run_costs_who_begins_and_nobody_else() 
     let summary = &report["recorded"]["summary"];
     assert_eq!(summary["frames"], json!(300), "{}", ended.stderr);
     assert_eq!(summary["views_present"]["a"], json!(300));
+}
+
+#[test]
+fn shared_memory_that_is_filled_while_a_run_begins_is_an_error_and_no_signal() {
+    let case = Case::new("filling", &[20; 3], PLAIN);
+    // Something takes all that is left as soon as the supervisor has its lock, and goes on doing so; when it is no
+    // longer needed the next run has room again.
+    let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
+        for wait in 0 1 3 5 8; do\n\
+          \"$PARALLAX\" run deployment.toml --json >said-$wait 2>&1 & run=$!\n\
+          while ! ls /dev/shm/px*/*/lock >/dev/null 2>&1; do kill -0 $run; done\n\
+          sleep 0.0$wait\n\
+          while kill -0 $run 2>/dev/null; do cat /dev/zero >>/dev/shm/filler 2>/dev/null || true; done\n\
+          code=0; wait $run || code=$?; echo $code >code-$wait\n\
+          rm /dev/shm/filler\n\
+        done\n\
+        exec \"$PARALLAX\" run deployment.toml --json";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let mut n_refused = 0;
+    for wait in [0, 1, 3, 5, 8] {
+        let read = |name: &str| fs::read_to_string(case.path(&format!("{name}-{wait}"))).unwrap();
+        let (said, code) = (read("said"), read("code"));
+        for words in ["signal 7", "SIGBUS", "signal 11", "SIGSEGV", "panic"] {
+            assert!(!said.contains(words), "{words}: {said}");
+        }
+        if code.trim() == "1" {
+            n_refused += 1;
+            let tells = said.contains("free in /dev/shm") && said.contains("make room");
+            assert!(tells || said.contains("No space left"), "{said}");
+        }
+    }
+    assert!(n_refused > 0, "it was filled too late");
+}
+
+#[test]
+fn a_file_that_may_not_grow_is_counted_and_ends_nobody() {
+    let case = Case::new("limit", &[60; 2], PACED);
+    let mut started = case.start(&["run", "deployment.toml", "--json"]);
+    started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
+    let record = started.pid_of("record").to_string();
+    // What it has written is larger already.
+    let limit = "--fsize=1000:1000";
+    let set = std::process::Command::new("prlimit")
+        .args(["--pid", &record, limit])
+        .status();
+    assert!(
+        set.is_ok_and(|it| it.success()),
+        "prlimit belongs to util-linux"
+    );
+    let ended = started.wait();
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    case.assert_nothing_left();
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
+    assert!(ended.stderr.contains("os error 27"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_limit_on_the_size_of_files_is_an_error_with_its_number() {
+    let case = Case::new("small", &[2; 2], PLAIN);
+    let script = "ulimit -f 16; exec \"$PARALLAX\" run deployment.toml --json";
+    let ended = case.start_in_shell(script).wait();
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    for words in ["error: ", "no file may have more than 8 KB", "ulimit -f"] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    case.assert_nothing_left();
+}
+
+#[test]
+fn what_a_run_makes_is_its_users_alone_whatever_the_umask_is() {
+    let case = Case::new(
+        "umask",
+        &[3; 2],
+        &PLAIN.replace("overlay_every = 0", "overlay_every = 1"),
+    );
+    let script = "umask 0\n\
+        if mount -t tmpfs tmpfs /dev/shm 2>/dev/null; then mkdir -m 777 /dev/shm/px-$(id -u); fi\n\
+        \"$PARALLAX\" record deployment.toml --out run.mcap --json\n\
+        stat -c %a /dev/shm/px-$(id -u) >base";
+    let started = Started::among_own_file_systems(case.folder(), script);
+    let in_own = started.is_some();
+    let ended = started
+        .unwrap_or_else(|| case.start_in_shell(script))
+        .wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    if in_own {
+        let mode = fs::read_to_string(case.path("base")).unwrap();
+        assert_eq!(mode.trim(), "700", "the directory that was open to all");
+    }
+    let mut folders = vec![case.path("out")];
+    let mut n_files = 0;
+    while let Some(path) = folders.pop() {
+        let found = fs::symlink_metadata(&path).unwrap();
+        assert_eq!(
+            found.mode() & 0o077,
+            0,
+            "{} is open to others",
+            path.display()
+        );
+        if found.is_dir() {
+            let inner = fs::read_dir(&path).unwrap();
+            folders.extend(inner.map(|it| it.unwrap().path()));
+        } else {
+            n_files += 1;
+        }
+    }
+    assert!(n_files > 8, "{n_files} files");
+    let mode = fs::metadata(case.path("run.mcap")).unwrap().mode();
+    assert_eq!(mode & 0o077, 0, "{mode:o}");
+}
+
+#[test]
+fn shared_memory_that_is_cut_off_is_told_and_ends_nobody_by_a_signal() {
+    let case = Case::new("cut", &[400; 2], PACED);
+    let mut started = case.start(&["run", "deployment.toml"]);
+    started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
+    let namespace = Namespace::new(&case.name).unwrap();
+    for entry in fs::read_dir("/dev/shm").unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        if name.starts_with(namespace.prefix()) {
+            // One may go while this looks.
+            let file = fs::OpenOptions::new().write(true).open(entry.path());
+            file.and_then(|it| it.set_len(0)).ok();
+        }
+    }
+    // Most often the supervisor ends at once. It may also wait for ever for what a cut off file should say: then only
+    // a kill ends it, which is a limit that is stated.
+    let (id, begin) = (started.id(), Instant::now());
+    while !started.is_over() && begin.elapsed() < Duration::from_secs(15) {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let is_stuck = !started.is_over();
+    if is_stuck {
+        signal("KILL", id);
+    }
+    // Its processes end with it, which takes them a moment.
+    let ended = started.wait_among_others();
+    let expected = if is_stuck { None } else { Some(1) };
+    assert_eq!(ended.status.code(), expected, "{}", ended.stderr);
+    for words in [
+        "error: shared memory of the deployment is gone or damaged",
+        "parallax clean",
+    ] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    let cleaned = case.start(&["clean", &case.name]).wait();
+    assert_eq!(cleaned.status.code(), Some(0), "{}", cleaned.stderr);
+    case.assert_nothing_left();
 }
 
 #[test]

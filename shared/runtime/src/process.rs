@@ -76,6 +76,9 @@ impl Service {
 /// How long the processes of a deployment may take to find each other when it begins.
 const BEGINNING: Duration = Duration::from_secs(10);
 
+const DEFECT: &str = "this is a defect of the program, unless something else has changed its files in /dev/shm: \
+    please report it";
+
 /// Runs a service in this process and answers with its exit status.
 ///
 /// The process ends with its supervisor, and a panic ends it with a logged line instead of going
@@ -100,8 +103,22 @@ pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Fai
         }
         Ok(Err(failure)) => failure.exit(),
         Err(panic) => Failure::new(ExitKind::Run, panic_text(panic.as_ref()))
-            .with_hint("this is a defect of the program: please report it")
+            .with_hint(DEFECT)
             .exit(),
+    }
+}
+
+/// Runs a command in this process and answers with its exit status. A panic ends it with an error like any other.
+///
+/// * `body`: the command, and its exit status if it did what was asked.
+pub fn run_command(body: impl FnOnce() -> Result<ExitCode, Failure>) -> ExitCode {
+    match catch_unwind(AssertUnwindSafe(body)) {
+        Ok(Ok(code)) => code,
+        Ok(Err(failure)) => failure.exit(),
+        Err(panic) => {
+            let text = format!("the program panicked: {}", panic_text(panic.as_ref()));
+            Failure::new(ExitKind::Run, text).with_hint(DEFECT).exit()
+        }
     }
 }
 

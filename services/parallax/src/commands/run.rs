@@ -19,9 +19,10 @@ use crate::{inputs, output, scheduling};
 /// What to run.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A second Ctrl-C ends the run at once. The output folder holds pose3d.jsonl, pose3d.csv, pose3d.trc,
-pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and overlays/; files of an earlier run are
-replaced when the new ones are whole, until then they are called *.part.
+A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
+pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
+overlays/, all for their user alone; files of an earlier run are replaced when the new ones are whole, until then they
+are called *.part.
 
 Examples:
     parallax run configs/pose2sim-balancing.toml
