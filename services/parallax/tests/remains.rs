@@ -1,10 +1,13 @@
 //! What runs is shown, and what a killed run leaves behind is removed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
 
+use std::fs;
+
 use common::started::signal;
-use common::{Case, PACED};
+use common::{Case, PACED, Started};
 use serde_json::Value;
 
 /// What `status` says of the deployment of a case.
@@ -65,4 +68,45 @@ fn a_name_of_nothing_is_refused() {
     let ended = case.start(&["clean", &case.name]).wait();
     assert_eq!(ended.status.code(), Some(2));
     assert!(ended.stderr.contains(&case.name), "{}", ended.stderr);
+}
+
+#[test]
+fn what_is_no_deployment_is_named_and_stays_and_no_link_is_followed() {
+    let case = Case::new("stays", &[2; 2], "");
+    // First among the deployments; then behind a link in the place of their directory.
+    let script = "mount -t tmpfs tmpfs /dev/shm\n\
+        base=/dev/shm/px-$(id -u); name=$(sed -n 's/^name = \"\\(.*\\)\"/\\1/p' deployment.toml | head -n 1)\n\
+        mkdir -m 700 $base; mkdir $base/photos $base/$name\n\
+        echo x >$base/photos/one.jpg; echo x >$base/$name/letter.txt; cp -r $base before\n\
+        attack() {\n\
+          for command in clean 'clean photos' status 'run deployment.toml'; do\n\
+            code=0; \"$PARALLAX\" $command >said 2>&1 || code=$?\n\
+            echo \"$1 $command: $code\"; cat said\n\
+          done\n\
+        }\n\
+        attack folder; diff -r before $base; rm -r $base\n\
+        cp -r before home; chown -h 65534 home; ln -s $PWD/home $base; chown -h 65534 $base\n\
+        attack link; diff -r before home";
+    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+        eprintln!("skipped: no private file system may be mounted here");
+        return;
+    };
+    let ended = started.wait();
+    let said = &ended.stdout;
+    assert_eq!(ended.status.code(), Some(0), "{said}{}", ended.stderr);
+    for words in [
+        "folder clean: 0",
+        "photos: not a deployment: left alone",
+        "folder clean photos: 1",
+        "folder run deployment.toml: 1",
+        "is no directory of a deployment (files in it: 1;",
+        "link clean: 1",
+        "link clean photos: 1",
+        "link status: 1",
+        "link run deployment.toml: 1",
+        "is a symbolic link of user nobody (65534) to",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(fs::exists(case.path("home/photos/one.jpg")).unwrap());
 }

@@ -68,7 +68,7 @@ pub enum PrivacyError {
     },
     /// It holds files, and none that says that they are a deployment's.
     #[error(
-        "{path:?} is no directory of a deployment: it holds {n_files} files, and no {MARK_FILE:?} of its own"
+        "{path:?} is no directory of a deployment (files in it: {n_files}; none is its {MARK_FILE:?})"
     )]
     Unmarked {
         /// The directory.

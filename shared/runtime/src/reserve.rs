@@ -95,8 +95,6 @@ mod tests {
     use std::os::fd::AsRawFd as _;
     use std::os::unix::fs::MetadataExt as _;
 
-    use super::*;
-
     #[test]
     fn what_is_given_a_size_in_memory_has_its_memory() {
         let file = tempfile::tempfile_in("/dev/shm").unwrap();
