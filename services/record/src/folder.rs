@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+/// The file that says that a folder of pictures was made by a run.
+const MARK: &str = ".parallax";
+
 /// The folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {doing} {}", path.display())]
@@ -131,9 +134,12 @@ impl Folder {
     pub fn folder(&mut self, name: &str) -> Result<PathBuf, FolderError> {
         let path = self.part(name);
         if !self.resume {
-            remove(&path)?;
+            remove_pictures(&path)?;
         }
-        fs::create_dir_all(&path).map_err(|source| FolderError {
+        let made = fs::create_dir_all(&path);
+        let made =
+            made.and_then(|()| fs::write(path.join(MARK), "pictures of a run of parallax\n"));
+        made.map_err(|source| FolderError {
             doing: "make the folder",
             path: path.clone(),
             source,
@@ -158,7 +164,7 @@ impl Folder {
             let (from, to) = (self.part(name), self.dir.join(name));
             // A folder does not take the place of another by renaming.
             if from.is_dir() {
-                remove(&to)?;
+                remove_pictures(&to)?;
             }
             fs::rename(&from, &to).map_err(|source| FolderError {
                 doing: "rename the finished",
@@ -189,15 +195,56 @@ fn cut_half_line(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-fn remove(path: &Path) -> Result<(), FolderError> {
-    match fs::remove_dir_all(path) {
-        Err(source) if source.kind() != io::ErrorKind::NotFound => Err(FolderError {
-            doing: "empty",
-            path: path.to_owned(),
-            source,
-        }),
-        _ => Ok(()),
+/// Removes a folder of pictures if a run has made it: it says so, or numbered pictures are all that it and its
+/// folders hold. A link to a folder is removed, and what it leads to stays.
+///
+/// # Errors
+///
+/// Anything else lies in it: then all of it stays.
+pub fn remove_pictures(path: &Path) -> Result<(), FolderError> {
+    let failed = |source| FolderError {
+        doing: "empty",
+        path: path.to_owned(),
+        source,
+    };
+    let found = match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        found => found.map_err(failed)?,
+    };
+    if !found.is_dir() {
+        return fs::remove_file(path).map_err(failed);
     }
+    if !path.join(MARK).is_file()
+        && let Some(other) = other_than_pictures(path, 2).map_err(failed)?
+    {
+        let text = format!("{} is no picture of a run; move it away", other.display());
+        return Err(failed(io::Error::other(text)));
+    }
+    fs::remove_dir_all(path).map_err(failed)
+}
+
+/// Something in a folder that is no numbered picture.
+///
+/// * `deep`: folders that may lie in each other.
+fn other_than_pictures(folder: &Path, deep: usize) -> io::Result<Option<PathBuf>> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let path = entry.path();
+        if entry.file_type()?.is_dir() && deep > 1 {
+            if let Some(other) = other_than_pictures(&path, deep - 1)? {
+                return Ok(Some(other));
+            }
+            continue;
+        }
+        let name = entry.file_name().into_string().unwrap_or_default();
+        let number = name
+            .split_once('.')
+            .filter(|it| matches!(it.1, "png" | "png.part"));
+        if !number.is_some_and(|it| it.0.bytes().all(|digit| digit.is_ascii_digit())) {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
 }
 
 #[cfg(test)]
@@ -224,6 +271,29 @@ mod tests {
         assert_eq!(fs::read_to_string(dir.path().join("a.txt")).unwrap(), "two");
         assert!(!dir.path().join("pictures/one.png").exists());
         assert!(dir.path().join("pictures/two.png").exists());
+    }
+
+    #[test]
+    fn a_folder_that_no_run_has_made_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let pictures = dir.path().join("pictures");
+        fs::create_dir_all(pictures.join("left")).unwrap();
+        fs::write(pictures.join("left/000001.png"), "").unwrap();
+        let own = pictures.join("left/holiday.png");
+        fs::write(&own, "").unwrap();
+        let mut folder = Folder::open(dir.path(), false).unwrap();
+        folder.folder("pictures").unwrap();
+        let errors = folder.finish();
+        let text = format!("{} {}", errors[0], errors[0].source);
+        assert!(
+            text.contains("holiday.png is no picture of a run"),
+            "{text}"
+        );
+        assert!(own.exists() && pictures.join("left/000001.png").exists());
+        // What earlier versions left does not say that it was made by a run.
+        fs::remove_file(own).unwrap();
+        assert!(folder.finish().is_empty());
+        assert!(!pictures.join("left").exists());
     }
 
     #[test]

@@ -32,7 +32,7 @@ mod service;
 
 pub use calibration::CameraFit;
 pub use config::Config;
-pub use folder::{Folder, FolderError};
+pub use folder::{Folder, FolderError, remove_pictures};
 pub use frame::{FrameRecord, Picture, ViewRecord};
 pub use latency::{Latency, Percentiles, Report};
 pub use missing::Missing;

@@ -56,9 +56,7 @@ fn draw_view(
     folder: &Path,
     is_enough: &mut dyn FnMut() -> bool,
 ) -> Result<(), Failure> {
-    if folder.exists() {
-        std::fs::remove_dir_all(folder).map_err(|error| inputs::in_file(folder, &error))?;
-    }
+    record::remove_pictures(folder).or_fail(ExitKind::Input)?;
     inputs::make_folder(folder)?;
     let size = view.size();
     let mut rgb = vec![0; size.rgb_bytes()];
