@@ -18,6 +18,7 @@ mod toml_fields;
 pub mod humaneva;
 pub mod opencv;
 pub mod own;
+pub mod panoptic;
 pub mod pose2sim;
 pub mod qualisys;
 pub mod umpm;
@@ -49,6 +50,8 @@ pub enum Format {
     HumanEva,
     /// `.ini` of UMPM: [`umpm`].
     Umpm,
+    /// JSON of CMU Panoptic: [`panoptic`].
+    Panoptic,
 }
 
 impl Format {
@@ -61,6 +64,7 @@ impl Format {
             Self::OpenCv => "OpenCV storage",
             Self::HumanEva => "HumanEva .cal",
             Self::Umpm => "UMPM .ini",
+            Self::Panoptic => "Panoptic calibration",
         }
     }
 }
@@ -90,7 +94,7 @@ impl Unit {
 /// What a file may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Unit of lengths, where it is not the format's own. Our own format is always in metres.
+    /// Unit of lengths, where it is not the format's own.
     pub unit: Option<Unit>,
     /// Direction against gravity, where the file does not say.
     pub up: Option<UnitVector3<f64>>,
@@ -145,7 +149,7 @@ pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileE
 /// Writes a rig.
 ///
 /// `HumanEva` and UMPM files hold one camera each: `path` is then a folder that exists, and the files are
-/// named after the cameras. The Qualisys format is only read.
+/// named after the cameras. The formats of Qualisys and Panoptic are only read.
 ///
 /// # Errors
 ///
@@ -173,7 +177,7 @@ pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError>
         Format::OpenCv => single(opencv::write(rig)),
         Format::HumanEva => each("cal", humaneva::write),
         Format::Umpm => each("ini", umpm::write),
-        Format::Qualisys => Err(UnwritableRig::ReadOnly {
+        Format::Qualisys | Format::Panoptic => Err(UnwritableRig::ReadOnly {
             format: format.name(),
         }),
     };
@@ -206,6 +210,7 @@ impl Document {
             Format::OpenCv => opencv::parse(&[(&self.stem(), &self.text)], options),
             Format::HumanEva => humaneva::parse(&self.stem(), &self.text, options),
             Format::Umpm => umpm::parse(&self.stem(), &self.text, options),
+            Format::Panoptic => panoptic::parse(&self.text, options),
         };
         rig.map_err(|source| self.error(source))
     }

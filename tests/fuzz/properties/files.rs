@@ -5,7 +5,7 @@ use consistency::{Appearance, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
-use geometry::files::{ReadOptions, humaneva, opencv, pose2sim, qualisys, umpm};
+use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use multiview::Compatibility;
 use scene::Address;
 use scene::truth::{Frame, Header};
@@ -128,6 +128,7 @@ pub fn calibration(input: &[u8]) {
     let _qualisys = qualisys::parse(input, &options);
     let _humaneva = humaneva::parse("C1", input, &options);
     let _umpm = umpm::parse("l", input, &options);
+    let _panoptic = panoptic::parse(input, &options);
     let _opencv = opencv::parse(&[("cam01", input)], &options);
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Format, own, pose2sim};
+use super::{Format, own, panoptic, pose2sim};
 
 /// Tells the format by content, and by extension where the content is only numbers.
 ///
@@ -22,6 +22,9 @@ pub fn detect(path: &Path, text: &str) -> Option<Format> {
     }
     if start.starts_with("%YAML") {
         return Some(Format::OpenCv);
+    }
+    if extension == "json" || panoptic::is_panoptic(text) {
+        return panoptic::is_panoptic(text).then_some(Format::Panoptic);
     }
     if start.starts_with('<') {
         return start.contains("<camera").then_some(Format::Qualisys);

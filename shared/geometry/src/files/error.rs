@@ -29,7 +29,7 @@ pub enum RigFileError {
         limit: u64,
     },
     /// Neither content nor extension tell what the file is.
-    #[error("{path} is no calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini)", path = .path.display())]
+    #[error("{path} is no calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini, Panoptic JSON)", path = .path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,

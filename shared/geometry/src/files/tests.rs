@@ -17,6 +17,55 @@ const BARREL: LensModel = LensModel::BrownConrady {
     p: [0.001, -0.002],
 };
 
+/// Two cameras as CMU Panoptic writes them, with numbers that are made up.
+const PANOPTIC: &str = r#"{ "calibDataSource": "made up", "cameras": [
+    { "name": "00_00", "type": "hd", "resolution": [1920, 1080], "panel": 0, "node": 0,
+      "K": [[1500.5, 0, 950.25], [0, 1498.5, 545.75], [0, 0, 1]],
+      "distCoef": [-0.25, 0.125, 0.001, -0.002, 0.0625],
+      "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [[50], [120], [300]] },
+    { "name": "50_07", "type": "kinect-color", "resolution": [640, 480], "panel": 50, "node": 7,
+      "K": [[745.5, 0, 367.5], [0, 745.25, 233.25], [0, 0, 1]], "distCoef": [0, 0, 0, 0, 0],
+      "R": [[0, 0, -1], [0, 1, 0], [1, 0, 0]], "t": [-20.5, 110, 280] } ] }"#;
+
+#[test]
+fn panoptic_is_in_centimetres_with_y_down() {
+    let path = Path::new("calibration.json");
+    assert_eq!(detect(path, PANOPTIC), Some(Format::Panoptic));
+    let rig = panoptic::parse(PANOPTIC, &ReadOptions::default()).expect("two cameras");
+    let [a, b] = rig.cameras() else {
+        panic!("{rig:?}")
+    };
+    assert_eq!([a.name.as_str(), &b.name], ["00_00", "50_07"]);
+    assert_eq!(
+        [a.intrinsics.size, b.intrinsics.size],
+        [[1920, 1080], [640, 480]]
+    );
+    let k = [-0.25, 0.125, 0.0625, 0.0, 0.0, 0.0];
+    let lens = LensModel::BrownConrady {
+        k,
+        p: [0.001, -0.002],
+    };
+    assert_eq!(*a.intrinsics.lens.model(), lens);
+    assert_eq!(*b.intrinsics.lens.model(), LensModel::Pinhole);
+    let at = Vector3::new(0.5, 1.2, 3.0);
+    assert!((a.camera_from_world.translation.vector - at).norm() < 1e-12);
+    // R turns the world's x into the camera's z: a plain list of three does for t.
+    let x = b.camera_from_world * nalgebra::Point3::new(1.0, 0.0, 0.0);
+    assert!(
+        (x.coords - Vector3::new(-0.205, 1.1, 3.8)).norm() < 1e-12,
+        "{x}"
+    );
+    assert_eq!(rig.up_in_world(), Some(-Vector3::y_axis()));
+    // A camera that is held level sees up as up.
+    assert!(crate::upright_roll(a, &rig).expect("up").abs() < 0.02);
+    let metres = ReadOptions {
+        unit: Some(Unit::Metres),
+        ..ReadOptions::default()
+    };
+    let rig = panoptic::parse(PANOPTIC, &metres).expect("two cameras");
+    assert_eq!(rig.cameras()[0].camera_from_world.translation.x, 50.0);
+}
+
 /// One to four cameras with names that any format can write.
 fn rig() -> impl Strategy<Value = Rig> {
     prop::collection::vec((camera(), 1_u32..5000, 1_u32..5000), 1..4).prop_map(|cameras| {

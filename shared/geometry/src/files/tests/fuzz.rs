@@ -8,7 +8,7 @@ fn read_with_all(text: &str) {
         size: Some([640, 480]),
         ..ReadOptions::default()
     };
-    for name in ["a.toml", "a.yml", "a.cal", "a.ini", "a.txt", ""] {
+    for name in ["a.toml", "a.json", "a.yml", "a.cal", "a.ini", "a.txt", ""] {
         std::hint::black_box(detect(Path::new(name), text));
     }
     let rigs = [
@@ -18,6 +18,7 @@ fn read_with_all(text: &str) {
         opencv::parse(&[("a", text), ("b", text)], &options),
         humaneva::parse("a", text, &options),
         umpm::parse("a", text, &options),
+        panoptic::parse(text, &options),
     ];
     for rig in rigs.into_iter().flatten() {
         std::hint::black_box(check(&rig));
@@ -34,6 +35,7 @@ fn good_files() -> Vec<String> {
         opencv::write(&rig).expect("writable"),
         humaneva::write(camera).expect("writable"),
         umpm::write(camera).expect("writable"),
+        PANOPTIC.to_owned(),
         "<c><camera serial=\"1\"><fov_video left=\"0\" top=\"0\" right=\"9\" bottom=\"9\"/><transform x=\"0\" y=\"0\" z=\"0\" \
          r11=\"1\" r12=\"0\" r13=\"0\" r21=\"0\" r22=\"1\" r23=\"0\" r31=\"0\" r32=\"0\" r33=\"1\"/><intrinsic focalLengthU=\"64\" \
          focalLengthV=\"64\" centerPointU=\"320\" centerPointV=\"320\" radialDistortion1=\"0\" radialDistortion2=\"0\" \
@@ -54,7 +56,7 @@ fn every_good_file_is_good() {
         2
     );
     assert_eq!(
-        qualisys::parse(&files[5], &options)
+        qualisys::parse(&files[6], &options)
             .expect("qualisys")
             .cameras()
             .len(),
@@ -70,7 +72,7 @@ proptest! {
 
     #[test]
     fn mutated_files_are_read_without_panic(
-        file in 0_usize..6,
+        file in 0_usize..7,
         edits in prop::collection::vec((any::<prop::sample::Index>(), "[-0-9.eEnaif\\[\\]\"=,\n<>/: ]{0,3}", 0_usize..4), 1..5),
     ) {
         let mut text: Vec<char> = good_files()[file].chars().collect();

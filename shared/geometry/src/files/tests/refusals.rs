@@ -248,6 +248,45 @@ fn qualisys_names_what_is_wrong() {
 }
 
 #[test]
+fn panoptic_names_what_is_wrong() {
+    let with = |from: &str, to: &str| {
+        assert!(PANOPTIC.contains(from), "{from}");
+        panoptic::parse(&PANOPTIC.replacen(from, to, 1), &ReadOptions::default())
+    };
+    refused(
+        with("[0, 1498.5,", "[3, 1498.5,"),
+        &["00_00", "K[1][0]", "3"],
+    );
+    refused(
+        with("1500.5, 0,", "1500.5, 0.5,"),
+        &["00_00", "K[0][1]", "skew"],
+    );
+    refused(
+        with("[1920, 1080]", "[1920, 0]"),
+        &["00_00", "resolution", "0"],
+    );
+    refused(with("-0.25, 0.125, ", ""), &["00_00", "distCoef"]);
+    refused(
+        with("[[1, 0, 0]", "[[2, 0, 0]"),
+        &["00_00", "R", "not a rotation"],
+    );
+    refused(
+        with("[[50], [120], [300]]", "[50, 120]"),
+        &["JSON", "three numbers"],
+    );
+    refused(
+        with("\"50_07\"", "\"00_00\""),
+        &["two cameras are named \"00_00\""],
+    );
+    refused(with("\"K\"", "\"k\""), &["JSON", "missing field `K`"]);
+    let none = r#"{ "cameras": [] }"#;
+    refused(
+        panoptic::parse(none, &ReadOptions::default()),
+        &["no camera"],
+    );
+}
+
+#[test]
 fn errors_name_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("broken.cal");
@@ -304,6 +343,7 @@ fn formats_say_what_they_have_no_words_for() {
     assert!(cause(Format::HumanEva, &fisheye).contains("KannalaBrandt"));
     assert!(cause(Format::Umpm, &fisheye).contains("KannalaBrandt"));
     assert!(cause(Format::Qualisys, &fisheye).contains("only read"));
+    assert!(cause(Format::Panoptic, &fisheye).contains("only read"));
     let named = |name: &str| {
         let mut cameras = ring_rig(1, BARREL).cameras().to_vec();
         cameras[0].name = name.to_owned();
