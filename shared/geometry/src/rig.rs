@@ -4,6 +4,13 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector
 
 use crate::{Camera, Intrinsics};
 
+/// The longest focal length, in image sizes: a hundred times that of the longest telephoto lens.
+const FOCAL_LIMIT: f64 = 1e4;
+/// The largest lens coefficient: calibrations that fit noise have some of thousands.
+const COEFFICIENT_LIMIT: f64 = 1e7;
+/// The furthest place of a camera: worlds that begin in the centre of the Earth are within it.
+const PLACE_LIMIT_METRES: f64 = 1e7;
+
 /// Why a set of cameras is no rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RigError {
@@ -61,6 +68,44 @@ pub enum RigError {
         value: f64,
         /// Width or height of the image.
         extent: u32,
+    },
+    /// A focal length so long that the whole image is one direction.
+    #[error(
+        "camera {camera:?}: focal length {value} px is more than {limit:e} times the image, which is {extent} px"
+    )]
+    LongFocal {
+        /// Name of the camera.
+        camera: String,
+        /// The focal length in pixels.
+        value: f64,
+        /// The larger of width and height.
+        extent: u32,
+        /// The longest accepted, as a multiple of it.
+        limit: f64,
+    },
+    /// A lens coefficient that no lens has.
+    #[error(
+        "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: is the order that of the format?"
+    )]
+    LensCoefficient {
+        /// Name of the camera.
+        camera: String,
+        /// The coefficient.
+        value: f64,
+        /// The largest accepted.
+        limit: f64,
+    },
+    /// A camera that is further away than the ends of the Earth.
+    #[error(
+        "camera {camera:?}: it stands {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
+    )]
+    Place {
+        /// Name of the camera.
+        camera: String,
+        /// The distance.
+        metres: f64,
+        /// The largest accepted.
+        limit: f64,
     },
     /// The rotation is none.
     #[error("camera {camera:?}: rotation")]
@@ -211,6 +256,7 @@ impl Rig {
 fn check_camera(camera: &Camera) -> Result<(), RigError> {
     check_finite(camera)?;
     check_image(camera)?;
+    check_size(camera)?;
     let rotation = camera.camera_from_world.rotation.to_rotation_matrix();
     rotation_from_matrix(rotation.matrix()).map_err(|source| {
         let camera = camera.name.clone();
@@ -266,6 +312,43 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
         }
         None => Ok(()),
     }
+}
+
+/// Refuses what would leave no digits to compute with.
+fn check_size(camera: &Camera) -> Result<(), RigError> {
+    let Intrinsics {
+        fx, fy, size, lens, ..
+    } = camera.intrinsics;
+    let name = || camera.name.clone();
+    let extent = size[0].max(size[1]);
+    let longest = FOCAL_LIMIT * f64::from(extent);
+    if let Some(value) = [fx, fy].into_iter().find(|&it| it > longest) {
+        return Err(RigError::LongFocal {
+            camera: name(),
+            value,
+            extent,
+            limit: FOCAL_LIMIT,
+        });
+    }
+    let mut coefficients = lens.model().coefficients();
+    if let Some(value) = coefficients.find(|it| it.abs() > COEFFICIENT_LIMIT) {
+        return Err(RigError::LensCoefficient {
+            camera: name(),
+            value,
+            limit: COEFFICIENT_LIMIT,
+        });
+    }
+    // As long as the translation, and finite where its square is not.
+    let translation = camera.camera_from_world.translation.vector;
+    let metres = translation.amax().max(translation.norm());
+    if metres.is_nan() || metres > PLACE_LIMIT_METRES {
+        return Err(RigError::Place {
+            camera: name(),
+            metres: translation.amax(),
+            limit: PLACE_LIMIT_METRES,
+        });
+    }
+    Ok(())
 }
 
 fn check_image(camera: &Camera) -> Result<(), RigError> {

@@ -1,154 +1,36 @@
 //! Whether a rig is plausible: what a reader cannot know but a person would notice.
 
-use std::fmt;
+mod agreement;
+mod finding;
 
 use nalgebra::{Point2, Point3};
 
-use crate::{Camera, Rig, epipolar, upright_roll};
+use crate::{Camera, Rig, upright_roll};
 
-/// How bad a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// Worth knowing.
-    Note,
-    /// Probably a mistake.
-    Warning,
-}
+pub use agreement::{CameraError, EpipolarReport, PairError, epipolar_check};
+pub use finding::{Finding, Severity};
 
-/// Something odd about a rig.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Finding {
-    /// Two cameras are so near or far from each other that the unit is probably wrong.
-    Distance {
-        /// Names of the two.
-        cameras: [String; 2],
-        /// How far they are apart.
-        metres: f64,
-    },
-    /// Two cameras have one place and one direction.
-    SamePose {
-        /// Names of the two.
-        cameras: [String; 2],
-    },
-    /// The principal point is far from the middle of the image: was the image cropped or scaled?
-    PrincipalPoint {
-        /// Name of the camera.
-        camera: String,
-        /// Where it is, in parts of width and height.
-        fraction: [f64; 2],
-    },
-    /// Focal lengths along rows and columns differ by more than a tenth.
-    Aspect {
-        /// Name of the camera.
-        camera: String,
-        /// fy / fx.
-        ratio: f64,
-    },
-    /// The field of view is that of no usual lens: was the image size changed after calibration?
-    FieldOfView {
-        /// Name of the camera.
-        camera: String,
-        /// The wider of both angles, degrees.
-        degrees: f64,
-    },
-    /// The lens model cannot be inverted in a corner of the image.
-    LensRange {
-        /// Name of the camera.
-        camera: String,
-    },
-    /// The rig does not say which way is up, so that pictures cannot be turned upright.
-    UpUnknown,
-    /// A camera is upside down, or up is.
-    UpsideDown {
-        /// Name of the camera.
-        camera: String,
-        /// The turn that would make it upright, degrees.
-        degrees: f64,
-    },
-    /// A camera does not see the place at which the others look.
-    LooksElsewhere {
-        /// Name of the camera.
-        camera: String,
-    },
-}
-
-impl Finding {
-    /// How bad it is.
-    pub fn severity(&self) -> Severity {
-        match self {
-            Self::UpUnknown | Self::LensRange { .. } | Self::PrincipalPoint { .. } => {
-                Severity::Note
-            }
-            _ => Severity::Warning,
-        }
-    }
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Distance {
-                cameras: [a, b],
-                metres,
-            } => {
-                write!(f, "{a} and {b} are {metres:.3} m apart: is the unit right?")
-            }
-            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have one pose"),
-            Self::PrincipalPoint {
-                camera,
-                fraction: [x, y],
-            } => {
-                write!(
-                    f,
-                    "{camera}: the principal point is at {x:.2} of the width and {y:.2} of the height: was the image cropped or scaled after calibration?"
-                )
-            }
-            Self::Aspect { camera, ratio } => write!(f, "{camera}: fy / fx is {ratio:.3}"),
-            Self::FieldOfView { camera, degrees } => {
-                write!(
-                    f,
-                    "{camera}: the field of view is {degrees:.1} degrees: is the image size that of the calibration?"
-                )
-            }
-            Self::LensRange { camera } => {
-                write!(
-                    f,
-                    "{camera}: the lens model cannot be inverted in the corners of the image"
-                )
-            }
-            Self::UpUnknown => write!(
-                f,
-                "the rig does not say which way is up: frames are not turned upright"
-            ),
-            Self::UpsideDown { camera, degrees } => {
-                write!(
-                    f,
-                    "{camera} would have to be turned by {degrees:.0} degrees to be upright: is up right?"
-                )
-            }
-            Self::LooksElsewhere { camera } => {
-                write!(
-                    f,
-                    "{camera} does not see the place at which the cameras look: are the poses world to camera?"
-                )
-            }
-        }
-    }
-}
+/// Cameras that are all nearer to each other are at one place, metres.
+const ONE_PLACE: f64 = 0.01;
+/// Distance from the origin beyond which a camera is far away, metres.
+const FAR_AWAY: f64 = 10_000.0;
 
 /// Looks for what is odd about a rig. An empty list says that nothing was found, not that all is right.
 pub fn check(rig: &Rig) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for (i, a) in rig.cameras().iter().enumerate() {
+    let cameras = rig.cameras();
+    for (i, a) in cameras.iter().enumerate() {
         inside(a, &mut findings);
-        for b in &rig.cameras()[i + 1..] {
+        findings.extend(far_away(a));
+        for b in &cameras[i + 1..] {
             findings.extend(apart(a, b));
         }
     }
+    findings.extend(one_place(cameras).or_else(|| nothing_shared(cameras)));
     if rig.up_in_world().is_none() {
         findings.push(Finding::UpUnknown);
     }
-    for camera in rig.cameras() {
+    for camera in cameras {
         let degrees = upright_roll(camera, rig)
             .map(f64::to_degrees)
             .filter(|d| d.abs() > 100.0);
@@ -191,18 +73,59 @@ fn inside(camera: &Camera, findings: &mut Vec<Finding>) {
             degrees,
         });
     }
+    findings.extend(lens_range(camera).or_else(|| lens_strength(camera)));
+}
+
+/// Whether every pixel has a ray: asked of a grid, and of the corners.
+fn lens_range(camera: &Camera) -> Option<Finding> {
+    const STEPS: usize = 16;
+    let [width, height] = camera.intrinsics.size.map(f64::from);
+    let has_ray = |x: f64, y: f64| {
+        let at = Point2::new(x * (width - 1.0), y * (height - 1.0));
+        camera.undistort(&at).is_some()
+    };
+    let middle = |nth: usize| (nth as f64 + 0.5) / STEPS as f64;
+    let grid = (0..STEPS * STEPS).map(|it| [middle(it % STEPS), middle(it / STEPS)]);
+    let n_without = grid.filter(|[x, y]| !has_ray(*x, *y)).count();
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let is_whole = n_without == 0 && corners.iter().all(|[x, y]| has_ray(*x, *y));
+    (!is_whole).then(|| Finding::LensRange {
+        camera: camera.name.clone(),
+        share: n_without as f64 / (STEPS * STEPS) as f64,
+    })
+}
+
+/// Whether the distortion moves a corner further than to half, or twice, its angle to the axis.
+fn lens_strength(camera: &Camera) -> Option<Finding> {
+    let [width, height] = camera.intrinsics.size.map(f64::from);
+    let ratio = |[bent, straight]: [f64; 2]| bent / straight;
     let corners = [
         (0.0, 0.0),
         (width - 1.0, 0.0),
         (0.0, height - 1.0),
         (width - 1.0, height - 1.0),
     ];
-    if corners
-        .iter()
-        .any(|&(u, v)| camera.undistort(&Point2::new(u, v)).is_none())
-    {
-        findings.push(Finding::LensRange { camera: name() });
-    }
+    let angles = corners.iter().filter_map(|&(x, y)| {
+        let at = Point2::new(x, y);
+        let straight = camera.intrinsics.normalised(&at).coords.norm();
+        let bent = camera.undistort(&at)?.coords.norm();
+        Some([bent, straight].map(|it| it.atan().to_degrees()))
+    });
+    let odd = |it: &[f64; 2]| it[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*it));
+    let worst = angles
+        .filter(odd)
+        .min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)));
+    worst.map(|[bent_degrees, straight_degrees]| Finding::LensStrength {
+        camera: camera.name.clone(),
+        straight_degrees,
+        bent_degrees,
+    })
+}
+
+fn far_away(camera: &Camera) -> Option<Finding> {
+    let metres = camera.centre_in_world().coords.norm();
+    let camera = camera.name.clone();
+    (metres > FAR_AWAY).then_some(Finding::FarAway { camera, metres })
 }
 
 fn apart(a: &Camera, b: &Camera) -> Option<Finding> {
@@ -218,104 +141,54 @@ fn apart(a: &Camera, b: &Camera) -> Option<Finding> {
     (!(0.1..=100.0).contains(&metres)).then_some(Finding::Distance { cameras, metres })
 }
 
+fn one_place(cameras: &[Camera]) -> Option<Finding> {
+    let places: Vec<Point3<f64>> = cameras.iter().map(Camera::centre_in_world).collect();
+    let others = |(nth, a): (usize, &Point3<f64>)| {
+        let distances = places[nth + 1..].iter().map(|b| (a - b).norm());
+        distances.fold(0.0, f64::max)
+    };
+    let metres = places.iter().enumerate().map(others).fold(0.0, f64::max);
+    (cameras.len() > 1 && metres < ONE_PLACE).then_some(Finding::OnePlace {
+        n_cameras: cameras.len(),
+        metres,
+    })
+}
+
+/// Whether no place that one camera sees, up to twenty times the size of the rig away, is seen by another.
+fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
+    const STEPS: usize = 8;
+    const DEPTHS: usize = 40;
+    let first = cameras.first()?.centre_in_world();
+    let far = cameras
+        .iter()
+        .map(|it| (it.centre_in_world() - first).norm());
+    let size = far.fold(0.0, f64::max);
+    let depth = |nth: usize| 0.02 * size * 1000_f64.powf(nth as f64 / DEPTHS as f64);
+    let is_shared = |camera: &Camera, pixel: &Point2<f64>| {
+        let Some(ray) = camera.ray(pixel) else {
+            return false;
+        };
+        (0..DEPTHS).any(|nth| {
+            let point = ray.origin + depth(nth) * *ray.direction;
+            let others = cameras.iter().filter(|it| it.name != camera.name);
+            others.into_iter().any(|it| sees(it, &point))
+        })
+    };
+    let shares = |camera: &Camera| {
+        let [width, height] = camera.intrinsics.size.map(f64::from);
+        let at = |nth: usize| (nth as f64 + 0.5) / STEPS as f64;
+        let mut pixels = (0..STEPS * STEPS)
+            .map(|it| Point2::new(at(it % STEPS) * width, at(it / STEPS) * height));
+        pixels.any(|it| is_shared(camera, &it))
+    };
+    let is_none = cameras.len() > 1 && !cameras.iter().any(shares);
+    is_none.then_some(Finding::NothingShared {
+        n_cameras: cameras.len(),
+    })
+}
+
 fn sees(camera: &Camera, point: &Point3<f64>) -> bool {
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let pixel = camera.project(point);
     pixel.is_some_and(|p| (-0.5..width).contains(&p.x) && (-0.5..height).contains(&p.y))
-}
-
-/// How well a pair of cameras agrees on what both have seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairError {
-    /// Positions of the two in the rig.
-    pub cameras: [usize; 2],
-    /// Points that both saw.
-    pub n_points: usize,
-    /// Median over the points of the distance to the epipolar line, mean of both directions, ideal pixels.
-    pub median_px: f64,
-}
-
-/// How well a camera agrees with all others.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CameraError {
-    /// Position in the rig.
-    pub camera: usize,
-    /// Pairs of observations in which it took part.
-    pub n_points: usize,
-    /// Median over those, ideal pixels.
-    pub median_px: f64,
-}
-
-/// How well a rig agrees with correspondences.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EpipolarReport {
-    /// One for each pair that saw a point.
-    pub pairs: Vec<PairError>,
-    /// One for each camera that saw a point together with another.
-    pub cameras: Vec<CameraError>,
-}
-
-/// Measures the epipolar error of a rig.
-///
-/// * `points`: for each point the pixel (recorded, distorted) in every camera of the rig, in its
-///   order, `None` where it was not seen. Shorter lists are taken as not seen.
-///
-/// A camera whose median stands out is the one to calibrate again.
-pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> EpipolarReport {
-    let n = rig.cameras().len();
-    let mut of_camera = vec![Vec::new(); n];
-    let mut pairs = Vec::new();
-    for a in 0..n {
-        for b in a + 1..n {
-            let errors = pair_errors(&rig.cameras()[a], &rig.cameras()[b], points, [a, b]);
-            of_camera[a].extend_from_slice(&errors);
-            of_camera[b].extend_from_slice(&errors);
-            let n_points = errors.len();
-            pairs.extend(median(errors).map(|median_px| PairError {
-                cameras: [a, b],
-                n_points,
-                median_px,
-            }));
-        }
-    }
-    let cameras = of_camera
-        .into_iter()
-        .enumerate()
-        .filter_map(|(camera, errors)| {
-            let n_points = errors.len();
-            median(errors).map(|median_px| CameraError {
-                camera,
-                n_points,
-                median_px,
-            })
-        });
-    EpipolarReport {
-        pairs,
-        cameras: cameras.collect(),
-    }
-}
-
-fn pair_errors(
-    a: &Camera,
-    b: &Camera,
-    points: &[Vec<Option<Point2<f64>>>],
-    [i, j]: [usize; 2],
-) -> Vec<f64> {
-    let fundamental = epipolar::fundamental(a, b);
-    let error = |point: &Vec<Option<Point2<f64>>>| {
-        let in_a = a.undistorted_px(&(*point.get(i)?)?)?;
-        let in_b = b.undistorted_px(&(*point.get(j)?)?)?;
-        let [at_a, at_b] = epipolar::symmetric_distance(&fundamental, &in_a, &in_b)?;
-        Some(0.5 * (at_a + at_b))
-    };
-    points.iter().filter_map(error).collect()
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let (low, high) = (
-        values.get(values.len().checked_sub(1)? / 2)?,
-        values.get(values.len() / 2)?,
-    );
-    Some(0.5 * (low + high))
 }

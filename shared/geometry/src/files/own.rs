@@ -72,7 +72,8 @@ pub(super) fn is_own(text: &str) -> bool {
             .any(|line| line.starts_with("format = \"parallax-rig\""))
 }
 
-/// Reads a rig file. The unit and the image size of `options` are not asked: the file knows.
+/// Reads a rig file. The image size of `options` is not asked: the file knows. A unit in `options` says that the
+/// file was written wrongly, in another unit than metres.
 ///
 /// # Errors
 ///
@@ -102,12 +103,12 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     let cameras = file
         .camera
         .into_iter()
-        .map(camera)
+        .map(|it| camera(it, options.unit.unwrap_or(Unit::Metres)))
         .collect::<Result<_, _>>()?;
     Rig::new(cameras, up, file.source.unwrap_or_default()).map_err(ParseError::Rig)
 }
 
-fn camera(file: CameraFile) -> Result<Camera, ParseError> {
+fn camera(file: CameraFile, unit: Unit) -> Result<Camera, ParseError> {
     let field = |key: &str| format!("camera {:?}: {key}", file.name);
     let rotation = match (file.rotation_rad, file.rotation) {
         (Some(vector), None) => numbers::rodrigues(&field("rotation_rad"), vector)?,
@@ -126,7 +127,7 @@ fn camera(file: CameraFile) -> Result<Camera, ParseError> {
         }
     };
     let place = field("translation_metres");
-    let pose = numbers::pose(&place, rotation, file.translation_metres, Unit::Metres)?;
+    let pose = numbers::pose(&place, rotation, file.translation_metres, unit)?;
     let lens = lens(&file, &field)?;
     let ([fx, fy], [cx, cy]) = (file.focal_px, file.principal_point_px);
     let k = nalgebra::Matrix3::new(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);

@@ -9,6 +9,7 @@ use crate::{
     testing::{camera, ring_rig, z_up},
 };
 
+mod extremes;
 mod fuzz;
 mod refusals;
 

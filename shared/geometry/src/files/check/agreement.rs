@@ -1,0 +1,101 @@
+//! How well a rig agrees with points that several cameras saw.
+
+use nalgebra::Point2;
+
+use crate::{Camera, Rig, epipolar};
+
+/// How well a pair of cameras agrees on what both have seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairError {
+    /// Positions of the two in the rig.
+    pub cameras: [usize; 2],
+    /// Points that both saw.
+    pub n_points: usize,
+    /// Median over the points of the distance to the epipolar line, mean of both directions, ideal pixels.
+    pub median_px: f64,
+}
+
+/// How well a camera agrees with all others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraError {
+    /// Position in the rig.
+    pub camera: usize,
+    /// Pairs of observations in which it took part.
+    pub n_points: usize,
+    /// Median over those, ideal pixels.
+    pub median_px: f64,
+}
+
+/// How well a rig agrees with correspondences.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpipolarReport {
+    /// One for each pair that saw a point.
+    pub pairs: Vec<PairError>,
+    /// One for each camera that saw a point together with another.
+    pub cameras: Vec<CameraError>,
+}
+
+/// Measures the epipolar error of a rig.
+///
+/// * `points`: for each point the pixel (recorded, distorted) in every camera of the rig, in its
+///   order, `None` where it was not seen. Shorter lists are taken as not seen.
+///
+/// A camera whose median stands out is the one to calibrate again.
+pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> EpipolarReport {
+    let n = rig.cameras().len();
+    let mut of_camera = vec![Vec::new(); n];
+    let mut pairs = Vec::new();
+    for a in 0..n {
+        for b in a + 1..n {
+            let errors = pair_errors(&rig.cameras()[a], &rig.cameras()[b], points, [a, b]);
+            of_camera[a].extend_from_slice(&errors);
+            of_camera[b].extend_from_slice(&errors);
+            let n_points = errors.len();
+            pairs.extend(median(errors).map(|median_px| PairError {
+                cameras: [a, b],
+                n_points,
+                median_px,
+            }));
+        }
+    }
+    let cameras = of_camera
+        .into_iter()
+        .enumerate()
+        .filter_map(|(camera, errors)| {
+            let n_points = errors.len();
+            median(errors).map(|median_px| CameraError {
+                camera,
+                n_points,
+                median_px,
+            })
+        });
+    EpipolarReport {
+        pairs,
+        cameras: cameras.collect(),
+    }
+}
+
+fn pair_errors(
+    a: &Camera,
+    b: &Camera,
+    points: &[Vec<Option<Point2<f64>>>],
+    [i, j]: [usize; 2],
+) -> Vec<f64> {
+    let fundamental = epipolar::fundamental(a, b);
+    let error = |point: &Vec<Option<Point2<f64>>>| {
+        let in_a = a.undistorted_px(&(*point.get(i)?)?)?;
+        let in_b = b.undistorted_px(&(*point.get(j)?)?)?;
+        let [at_a, at_b] = epipolar::symmetric_distance(&fundamental, &in_a, &in_b)?;
+        Some(0.5 * (at_a + at_b))
+    };
+    points.iter().filter_map(error).collect()
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (
+        values.get(values.len().checked_sub(1)? / 2)?,
+        values.get(values.len() / 2)?,
+    );
+    Some(0.5 * (low + high))
+}

@@ -1,0 +1,258 @@
+//! What may be odd about a rig, in numbers and in words.
+
+use std::fmt;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Worth knowing.
+    Note,
+    /// Probably a mistake.
+    Warning,
+    /// With this nothing in space can be found: a run refuses it.
+    Error,
+}
+
+/// Something odd about a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Finding {
+    /// Two cameras are so near or far from each other that the unit is probably wrong.
+    Distance {
+        /// Names of the two.
+        cameras: [String; 2],
+        /// How far they are apart.
+        metres: f64,
+    },
+    /// All cameras are at one place: no two of their rays meet at an angle.
+    OnePlace {
+        /// How many.
+        n_cameras: usize,
+        /// The largest distance between two of them.
+        metres: f64,
+    },
+    /// Two cameras have one place and one direction.
+    SamePose {
+        /// Names of the two.
+        cameras: [String; 2],
+    },
+    /// A camera is so far from the origin of the world that little is left of the digits.
+    FarAway {
+        /// Name of the camera.
+        camera: String,
+        /// How far.
+        metres: f64,
+    },
+    /// The principal point is far from the middle of the image: was the image cropped or scaled?
+    PrincipalPoint {
+        /// Name of the camera.
+        camera: String,
+        /// Where it is, in parts of width and height.
+        fraction: [f64; 2],
+    },
+    /// Focal lengths along rows and columns differ by more than a tenth.
+    Aspect {
+        /// Name of the camera.
+        camera: String,
+        /// fy / fx.
+        ratio: f64,
+    },
+    /// The field of view is that of no usual lens: was the image size changed after calibration?
+    FieldOfView {
+        /// Name of the camera.
+        camera: String,
+        /// The wider of both angles, degrees.
+        degrees: f64,
+    },
+    /// The lens model cannot be inverted in some of the image.
+    LensRange {
+        /// Name of the camera.
+        camera: String,
+        /// The share of the image, 0 to 1; 0 if only corners.
+        share: f64,
+    },
+    /// The distortion moves the corner of the image by more than any lens does.
+    LensStrength {
+        /// Name of the camera.
+        camera: String,
+        /// The angle of the corner to the axis without distortion, degrees.
+        straight_degrees: f64,
+        /// The same with it.
+        bent_degrees: f64,
+    },
+    /// The rig does not say which way is up, so that pictures cannot be turned upright.
+    UpUnknown,
+    /// A camera is upside down, or up is.
+    UpsideDown {
+        /// Name of the camera.
+        camera: String,
+        /// The turn that would make it upright, degrees.
+        degrees: f64,
+    },
+    /// A camera does not see the place at which the others look.
+    LooksElsewhere {
+        /// Name of the camera.
+        camera: String,
+    },
+    /// No place in space is seen by two cameras.
+    NothingShared {
+        /// How many cameras.
+        n_cameras: usize,
+    },
+}
+
+/// Most degrees that a camera can see by its focal length, and least.
+const FIELDS: core::ops::RangeInclusive<f64> = 0.3..=170.0;
+
+impl Finding {
+    /// How bad it is.
+    pub fn severity(&self) -> Severity {
+        let (error, warning) = match self {
+            Self::Distance { metres, .. } => (*metres > 100.0, true),
+            Self::OnePlace { .. } | Self::NothingShared { .. } => (true, true),
+            Self::FieldOfView { degrees, .. } => (!FIELDS.contains(degrees), true),
+            Self::Aspect { ratio, .. } => (!(0.4..=2.5).contains(ratio), true),
+            Self::LensRange { share, .. } => (*share > 0.5, *share > 0.1),
+            Self::LensStrength {
+                straight_degrees,
+                bent_degrees,
+                ..
+            } => (*bent_degrees < 0.1 * straight_degrees, true),
+            Self::PrincipalPoint { fraction, .. } => {
+                let is_outside = fraction.iter().any(|it| !(0.0..=1.0).contains(it));
+                (false, is_outside)
+            }
+            Self::UpUnknown => (false, false),
+            Self::SamePose { .. }
+            | Self::FarAway { .. }
+            | Self::UpsideDown { .. }
+            | Self::LooksElsewhere { .. } => (false, true),
+        };
+        match (error, warning) {
+            (true, _) => Severity::Error,
+            (false, true) => Severity::Warning,
+            (false, false) => Severity::Note,
+        }
+    }
+
+    /// Whether another unit of length would mend it.
+    pub fn is_of_unit(&self) -> bool {
+        matches!(
+            self,
+            Self::Distance { .. } | Self::OnePlace { .. } | Self::FarAway { .. }
+        )
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Distance { .. }
+            | Self::OnePlace { .. }
+            | Self::SamePose { .. }
+            | Self::FarAway { .. } => self.place(f),
+            Self::PrincipalPoint { .. }
+            | Self::Aspect { .. }
+            | Self::FieldOfView { .. }
+            | Self::LensRange { .. }
+            | Self::LensStrength { .. } => self.inside(f),
+            Self::UpUnknown => {
+                write!(
+                    f,
+                    "the rig does not say which way is up: it has to be found"
+                )
+            }
+            Self::UpsideDown { camera, degrees } => write!(
+                f,
+                "{camera} would have to be turned by {degrees:.0} degrees to be upright: is up right?"
+            ),
+            Self::LooksElsewhere { camera } => write!(
+                f,
+                "{camera} does not see the place at which the cameras look: are the poses world to camera?"
+            ),
+            Self::NothingShared { n_cameras } => write!(
+                f,
+                "no place in space is seen by two of the {n_cameras} cameras: are the poses world to camera?"
+            ),
+        }
+    }
+}
+
+impl Finding {
+    /// What is said of where cameras stand.
+    fn place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Distance {
+                cameras: [a, b],
+                metres,
+            } => {
+                let metres = Metres(*metres);
+                write!(f, "{a} and {b} are {metres} m apart: is the unit right?")
+            }
+            Self::OnePlace { n_cameras, metres } => write!(
+                f,
+                "the {n_cameras} cameras are at one place (at most {:.1} mm apart), so that nothing can be located in space",
+                1000.0 * metres
+            ),
+            Self::SamePose { cameras: [a, b] } => write!(f, "{a} and {b} have one pose"),
+            Self::FarAway { camera, metres } => write!(
+                f,
+                "{camera} is {} m from the origin of the world: is the unit right?",
+                Metres(*metres)
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is said of a camera without regard to others.
+    fn inside(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PrincipalPoint {
+                camera,
+                fraction: [x, y],
+            } => write!(
+                f,
+                "{camera}: the principal point is at {x:.2} of the width and {y:.2} of the height: was the image cropped or scaled after calibration?"
+            ),
+            Self::Aspect { camera, ratio } => write!(
+                f,
+                "{camera}: fy / fx is {ratio:.3}, of pixels that are squares it is 1"
+            ),
+            Self::FieldOfView { camera, degrees } => write!(
+                f,
+                "{camera}: the field of view is {degrees:.1} degrees: is the image size that of the calibration?"
+            ),
+            Self::LensRange { camera, share } if *share == 0.0 => write!(
+                f,
+                "{camera}: the lens model cannot be inverted in the corners of the image"
+            ),
+            Self::LensRange { camera, share } => write!(
+                f,
+                "{camera}: the lens model cannot be inverted in {:.0} % of the image: are the distortion coefficients right?",
+                100.0 * share
+            ),
+            Self::LensStrength {
+                camera,
+                straight_degrees,
+                bent_degrees,
+            } => write!(
+                f,
+                "{camera}: the distortion moves the corner of the image from {straight_degrees:.1} to {bent_degrees:.1} degrees off the axis: are the distortion coefficients right?"
+            ),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Metres to the millimetre, or as a power of ten where they are many.
+struct Metres(f64);
+
+impl fmt::Display for Metres {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let metres = self.0;
+        if metres < 1e6 {
+            write!(f, "{metres:.3}")
+        } else {
+            write!(f, "{metres:.1e}")
+        }
+    }
+}
