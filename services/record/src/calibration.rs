@@ -2,14 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use geometry::RigWatch;
+use geometry::{RigWatch, SwapWatch};
 use messages::Status;
 use serde::Serialize;
 
 use crate::{FrameRecord, Scene};
-
-/// A camera is reported once it has been suspected for so many frames in a row.
-const PERSISTENT: u32 = 10;
 
 /// How well a camera fits the others, over the last frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -23,22 +20,37 @@ pub struct CameraFit {
     pub suspected: bool,
 }
 
+/// Two cameras that look as if each had the footage of the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Exchanged {
+    /// The two.
+    pub cameras: [String; 2],
+    /// By how much rays to the same part miss each other as it is, degrees: the median.
+    pub degrees: f64,
+    /// The same with the two exchanged.
+    pub exchanged_degrees: f64,
+    /// Whether it is these two: of cameras in a ring others may fit almost as well.
+    pub sure: bool,
+}
+
 /// Follows all cameras over a run.
 #[derive(Debug)]
 pub(crate) struct Calibration {
     watch: RigWatch,
-    /// By view: frames in a row in which it was suspected.
-    streaks: Vec<u32>,
+    swaps: SwapWatch,
+    exchanged: Option<Exchanged>,
     fits: Vec<CameraFit>,
 }
 
 impl Calibration {
     pub(crate) fn new(scene: &Scene) -> Self {
         let cameras = scene.views.iter().map(|it| it.framing.camera().clone());
+        let framings = scene.views.iter().map(|it| it.framing.clone());
         let n = scene.views.len();
         Self {
             watch: RigWatch::new(cameras.collect()),
-            streaks: vec![0; n],
+            swaps: SwapWatch::new(framings.collect(), scene.model.spec().mirror.clone()),
+            exchanged: None,
             fits: vec![CameraFit::default(); n],
         }
     }
@@ -49,16 +61,15 @@ impl Calibration {
             .map(|view| parts(scene, record, view))
             .collect();
         self.watch.note(&points);
-        let suspects = self.watch.suspects();
+        self.swaps.note(&points);
+        self.find_exchanged(scene);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
             fit.without_px = self.watch.without_px(view).map(|it| it * scale);
-            let is_suspect = suspects.iter().any(|it| it.view == view);
-            let streak = &mut self.streaks[view];
-            *streak = if is_suspect { *streak + 1 } else { 0 };
-            if *streak >= PERSISTENT && !fit.suspected {
-                fit.suspected = true;
+            // With the footage of another camera none of them stands where it says.
+            let is_named = self.watch.is_named(view) && self.exchanged.is_none();
+            if is_named && !fit.suspected {
                 tracing::warn!(
                     camera = scene.views[view].name,
                     residual_px = fit.residual_px,
@@ -66,7 +77,40 @@ impl Calibration {
                     "does not stand where the calibration says"
                 );
             }
+            fit.suspected = is_named;
         }
+    }
+
+    /// Says it once.
+    fn find_exchanged(&mut self, scene: &Scene) {
+        let Some(it) = self.swaps.swap().filter(|_| self.exchanged.is_none()) else {
+            return;
+        };
+        let cameras = it.views.map(|view| scene.views[view].name.clone());
+        tracing::warn!(
+            "{} and {} look exchanged: rays of the cameras miss each other by {:.1} degrees, with the footage of the two \
+             exchanged by {:.1}{}",
+            cameras[0],
+            cameras[1],
+            it.degrees,
+            it.exchanged_degrees,
+            if it.is_sure {
+                ""
+            } else {
+                "; it may be other two"
+            },
+        );
+        self.exchanged = Some(Exchanged {
+            cameras,
+            degrees: it.degrees,
+            exchanged_degrees: it.exchanged_degrees,
+            sure: it.is_sure,
+        });
+    }
+
+    /// The two cameras that look exchanged.
+    pub(crate) fn exchanged(&self) -> Option<&Exchanged> {
+        self.exchanged.as_ref()
     }
 
     /// What is known of every camera, by name.

@@ -30,7 +30,7 @@ mod gather;
 
 mod service;
 
-pub use calibration::CameraFit;
+pub use calibration::{CameraFit, Exchanged};
 pub use config::Config;
 pub use folder::{Folder, FolderError, remove_pictures};
 pub use frame::{FrameRecord, Picture, ViewRecord};

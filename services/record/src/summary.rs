@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::calibration::Calibration;
 use crate::pose3d::{is_placed, joints, missing};
-use crate::{CameraFit, FrameRecord, Scene};
+use crate::{CameraFit, Exchanged, FrameRecord, Scene};
 
 /// What was seen and what was missed, over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -37,6 +37,8 @@ pub struct Summary {
     pub reprojection_px: Option<f64>,
     /// How well every camera fits the others, by name; since the recorder was started last.
     pub calibration: BTreeMap<String, CameraFit>,
+    /// Two cameras that look as if each had the footage of the other.
+    pub exchanged: Option<Exchanged>,
     /// Frames of all views that the cameras' side dropped.
     pub frames_dropped_by_capture: u64,
     /// Results whose number was skipped, as far as the recorder can tell.
@@ -218,6 +220,7 @@ impl Tally {
             reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
             frames_dropped_by_capture: self.dropped.iter().sum(),
             calibration: self.calibration.fits(names.cloned()),
+            exchanged: self.calibration.exchanged().cloned(),
             ..self.summary.clone()
         }
     }

@@ -1,5 +1,7 @@
 //! Whether every camera stands where the calibration says, from what the cameras see of a person.
 
+mod swap;
+
 #[cfg(test)]
 mod tests;
 
@@ -9,10 +11,14 @@ use nalgebra::{Point2, Point3};
 
 use crate::{Camera, Ray};
 
+pub use swap::{Swap, SwapWatch};
+
 /// Frames that the running median looks back on.
 const WINDOW: usize = 60;
 /// Frames without which nothing is said.
-const LEAST_FRAMES: usize = 20;
+const LEAST_FRAMES: usize = 12;
+/// A camera is named once it has been suspected for so many frames in a row that told something.
+const PERSISTENT: u32 = 8;
 /// Points of a frame without which it says nothing.
 const LEAST_POINTS: usize = 5;
 /// Sine of the angle between two rays below which their meeting point is too uncertain.
@@ -43,6 +49,10 @@ const MOST_DEGREES: f64 = 1.5;
 pub struct RigWatch {
     cameras: Vec<Camera>,
     groups: Vec<Group>,
+    /// By camera: frames in a row in which it was suspected.
+    streaks: Vec<u32>,
+    /// By camera: whether it was named, at any time.
+    named: Vec<bool>,
 }
 
 /// Some cameras, and how far apart they saw the same points.
@@ -80,6 +90,8 @@ impl RigWatch {
         });
         Self {
             groups: groups.collect(),
+            streaks: vec![0; n],
+            named: vec![false; n],
             cameras,
         }
     }
@@ -95,6 +107,7 @@ impl RigWatch {
             points.map(|at| Seen::new(camera, *at)).collect()
         };
         let seen: Vec<Vec<Option<Seen>>> = views.map(see).collect();
+        let mut tells = false;
         for group in &mut self.groups {
             let [Some(own), Some(a), Some(b)] = group.views.map(|it| seen.get(it)) else {
                 continue;
@@ -112,8 +125,27 @@ impl RigWatch {
                 }
             });
             let px: Vec<[f64; 2]> = px.collect();
-            group.note(&px);
+            tells |= group.note(&px);
         }
+        if tells {
+            self.follow();
+        }
+    }
+
+    /// Names who has been suspected long enough.
+    fn follow(&mut self) {
+        let suspects = self.suspects();
+        for (view, streak) in self.streaks.iter_mut().enumerate() {
+            let is_suspect = suspects.iter().any(|it| it.view == view);
+            *streak = if is_suspect { *streak + 1 } else { 0 };
+            self.named[view] |= *streak >= PERSISTENT;
+        }
+    }
+
+    /// Whether a camera was found, at any time, not to stand where the calibration says: suspected for
+    /// several frames in a row.
+    pub fn is_named(&self, view: usize) -> bool {
+        self.named.get(view).copied().unwrap_or(false)
     }
 
     /// How far apart cameras see the same points if a camera is one of them, pixels; `None` while too
@@ -134,36 +166,58 @@ impl RigWatch {
     }
 
     /// The cameras that do not stand where the calibration says.
+    ///
+    /// One at a time: the one without which the others agree best. A wrong camera spoils what the others say of each
+    /// other, so that a second is sought among those that are left, of which there must be four.
     pub fn suspects(&self) -> Vec<Suspect> {
-        let suspect = |(view, camera): (usize, &Camera)| {
-            let residual_px = self.residual_px(view)?;
-            let without_px = self.without_px(view)?;
-            let it = &camera.intrinsics;
-            let px = |degrees: f64| it.fx.min(it.fy).abs() * degrees.to_radians().tan();
-            let least_px = px(LEAST_DEGREES).max(LEAST_PX);
-            let is_wrong =
-                residual_px > least_px.max(FACTOR * without_px) && without_px < px(MOST_DEGREES);
-            is_wrong.then_some(Suspect {
-                view,
-                residual_px,
-                without_px,
-            })
-        };
-        let cameras = self.cameras.iter().enumerate();
-        cameras.filter_map(suspect).collect()
+        let mut left_out = Vec::new();
+        let mut found = Vec::new();
+        while let Some(it) = self.worst(&left_out) {
+            left_out.push(it.view);
+            found.push(it);
+            if self.cameras.len() < 4 + left_out.len() {
+                break;
+            }
+        }
+        found
+    }
+
+    /// Of the cameras that are not left out, the one without which the others agree best, if it is wrong.
+    fn worst(&self, left_out: &[usize]) -> Option<Suspect> {
+        let views = (0..self.cameras.len()).filter(|it| !left_out.contains(it));
+        let suspects = views.filter_map(|view| self.suspect(view, left_out));
+        let gain = |it: &Suspect| it.residual_px / it.without_px.max(1e-9);
+        suspects.max_by(|a, b| gain(a).total_cmp(&gain(b)))
+    }
+
+    fn suspect(&self, view: usize, left_out: &[usize]) -> Option<Suspect> {
+        let counts = |it: &Group| !left_out.iter().any(|out| it.views.contains(out));
+        let residual_px = self.apart(|it| counts(it) && it.views.contains(&view))?;
+        let without_px = self.apart(|it| counts(it) && !it.views.contains(&view))?;
+        let it = &self.cameras[view].intrinsics;
+        let px = |degrees: f64| it.fx.min(it.fy).abs() * degrees.to_radians().tan();
+        let least_px = px(LEAST_DEGREES).max(LEAST_PX);
+        let is_wrong =
+            residual_px > least_px.max(FACTOR * without_px) && without_px < px(MOST_DEGREES);
+        is_wrong.then_some(Suspect {
+            view,
+            residual_px,
+            without_px,
+        })
     }
 }
 
 impl Group {
-    /// Notes the ways between where the points of a frame should be and were seen.
-    fn note(&mut self, px: &[[f64; 2]]) {
+    /// Notes the ways between where the points of a frame should be and were seen; whether they were enough.
+    fn note(&mut self, px: &[[f64; 2]]) -> bool {
         if px.len() < LEAST_POINTS {
-            return;
+            return false;
         }
         self.px.extend(median_way(px));
         if self.px.len() > WINDOW {
             self.px.pop_front();
         }
+        true
     }
 
     fn apart(&self) -> Option<f64> {
