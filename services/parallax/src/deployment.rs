@@ -2,6 +2,7 @@
 
 mod error;
 mod keys;
+mod limits;
 mod lists;
 mod load;
 mod places;
@@ -29,6 +30,10 @@ pub(crate) struct Deployment {
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
+    /// Unit of the lengths in it, where it is not what its format says.
+    pub unit: Option<Unit>,
+    /// Direction against gravity in its world; replaces what it says.
+    pub up: Option<[f64; 3]>,
     /// Trained model; the one that ships with Parallax if not given.
     pub model: Option<PathBuf>,
     /// Folder for the results.
@@ -62,6 +67,28 @@ pub(crate) struct Deployment {
     /// Cores, priorities, and how processes wait.
     #[serde(default)]
     pub runtime: Runtime,
+}
+
+/// A unit of lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Unit {
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+}
+
+impl From<Unit> for geometry::files::Unit {
+    fn from(from: Unit) -> Self {
+        match from {
+            Unit::M => Self::Metres,
+            Unit::Cm => Self::Centimetres,
+            Unit::Mm => Self::Millimetres,
+        }
+    }
 }
 
 /// Section `[supervise]`: how long to wait, and how often to try again.

@@ -15,6 +15,7 @@ use footage::{SourceSpec, Turn};
 use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
+use nalgebra::UnitVector3;
 use pipeline::PairTables;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
@@ -68,6 +69,21 @@ pub(crate) fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<R
             None => failure,
         }
     })
+}
+
+/// Reads the calibration of a deployment, in its unit, and with its up.
+pub(crate) fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
+    let options = ReadOptions {
+        unit: deployment.unit.map(Into::into),
+        ..ReadOptions::default()
+    };
+    let read = rig(&[&deployment.rig], &options)?;
+    let up = deployment
+        .up
+        .and_then(|it| UnitVector3::try_new(it.into(), 1e-9));
+    let Some(up) = up else { return Ok(read) };
+    let with_up = Rig::new(read.cameras().to_vec(), Some(up), read.source());
+    with_up.or_fail(ExitKind::Calibration)
 }
 
 /// What is known of a camera's footage before it is read.

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fmp::Model;
-use geometry::files::ReadOptions;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
@@ -58,7 +57,7 @@ impl Prepared {
     fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let model = inputs::model_or_shipped(deployment.model.as_deref())?;
-        let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
+        let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
         for (index, camera) in deployment.cameras.iter().enumerate() {
             let framing = framing(resolved, &rig, index)?;
@@ -221,6 +220,14 @@ fn settings(
     if ![0, model.n_parts()].contains(&n_thresholds) {
         let message = format!(
             "`fuse.tau` has {n_thresholds} thresholds, the model has {} parts",
+            model.n_parts()
+        );
+        return Err(Failure::new(ExitKind::Config, message));
+    }
+    let part = deployment.record.epipolar_part;
+    if !(1..=model.n_parts()).contains(&part) {
+        let message = format!(
+            "`record.epipolar_part` is {part}, the model has parts 1 to {}",
             model.n_parts()
         );
         return Err(Failure::new(ExitKind::Config, message));

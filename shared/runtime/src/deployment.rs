@@ -210,11 +210,17 @@ fn check_descriptors(n_topics: u64, limit: u64) -> Result<(), PreflightError> {
     Err(PreflightError::Descriptors { needed, limit })
 }
 
-fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightError> {
-    let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
+/// Shared memory that a deployment with these topics needs, bytes.
+pub fn needed_bytes(topics: &[TopicPlan]) -> u64 {
+    let pools = topics.iter().map(TopicPlan::pool_bytes);
+    let pools = pools.fold(0, u64::saturating_add);
     let of_process = |plan: &&TopicPlan| topic::process_of_metrics(plan.topic()).is_some();
     let n_processes = topics.iter().filter(of_process).count() as u64;
-    let needed_bytes = pools + OVERHEAD_BYTES * n_processes;
+    pools.saturating_add(OVERHEAD_BYTES * n_processes)
+}
+
+fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightError> {
+    let needed_bytes = needed_bytes(topics);
     if needed_bytes <= free_bytes {
         return Ok(());
     }

@@ -42,7 +42,9 @@ pub use child::{Child, freeze, kill, thaw, wait_for_any};
 pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use copies::Copies;
-pub use deployment::{DeploymentPlan, PreflightError, ViewPlan, preflight, process_topics};
+pub use deployment::{
+    DeploymentPlan, PreflightError, ViewPlan, needed_bytes, preflight, process_topics,
+};
 pub use failure::{ExitKind, Failure, Fault, OrFail};
 pub use guard::guard_process;
 pub use health::{HEARTBEAT, Health, HealthError};

@@ -169,9 +169,10 @@ impl TopicPlan {
         self.chunk_bytes as u64
     }
 
-    /// Shared memory that all publishers of the topic take together, bytes.
+    /// Shared memory that all publishers of the topic take together, bytes; the largest number where it is more.
     pub fn pool_bytes(&self) -> u64 {
-        (self.limits.publishers * self.chunks()) as u64 * self.chunk_bytes as u64
+        let chunks = (self.limits.publishers as u64).saturating_mul(self.chunks() as u64);
+        chunks.saturating_mul(self.chunk_bytes as u64)
     }
 
     /// Creates the services of the topic.

@@ -39,6 +39,7 @@ pub(crate) enum Command {
     #[command(after_help = "\
 Examples:
     parallax calib convert Calib.qca.txt --out rig.toml
+    parallax calib convert calibration_171204_pose1.json --out rig.toml      (CMU Panoptic)
     parallax calib convert C1.cal C2.cal --size 640 480 --up 0 0 1 --out rig.toml
     parallax calib convert rig.toml --to pose2sim --out Calib.toml")]
     Convert {
@@ -156,7 +157,9 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
             "up is ({:.3}, {:.3}, {:.3})",
             up.x, up.y, up.z
         ))?,
-        None => output::line("which way is up is not known: frames are not turned upright")?,
+        None => output::line(
+            "which way is up is not known: a run finds it, or is told by `up` in its deployment",
+        )?,
     }
     for camera in rig.cameras() {
         let inside = &camera.intrinsics;

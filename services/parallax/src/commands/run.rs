@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
-use runtime::{ExitKind, Failure, OrFail as _, Scheduling, Stop, free_shared_memory};
+use runtime::{
+    ExitKind, Failure, OrFail as _, Scheduling, Stop, free_shared_memory, needed_bytes, preflight,
+};
 use supervise::{Event, Plan};
 use tracing::Level;
 
@@ -46,7 +48,8 @@ pub(crate) struct Arguments {
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Show what would be started and how much shared memory it needs, and start nothing.
+    /// Show what would be started and how much shared memory it needs, and start nothing; fails where the run would not
+    /// begin.
     #[arg(long)]
     dry_run: bool,
     /// Print the summary as JSON.
@@ -193,7 +196,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
         let line = format!("  {:<12} {}", process.name, process.scheduling);
         output::line(line.trim_end())?;
     }
-    let total: u64 = plan.topics.iter().map(runtime::TopicPlan::pool_bytes).sum();
+    let total = needed_bytes(&plan.topics);
     let free = free_shared_memory().or_fail(ExitKind::Run)?;
     let mb = |bytes: u64| bytes as f64 / 1e6;
     output::line(format_args!(
@@ -210,5 +213,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
             mb(topic.pool_bytes())
         ))?;
     }
+    // What the run would ask before it starts anything.
+    preflight(&plan.topics)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -7,7 +7,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
-use geometry::files::ReadOptions;
 use messages::topic;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use rayon::ThreadPoolBuilder;
@@ -125,7 +124,7 @@ fn pool(n_threads: usize) -> ThreadPoolBuilder {
 
 fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let deployment = &resolved.deployment;
-    let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
+    let rig = inputs::rig_of(deployment)?;
     let dealing = Dealing::new(&[], 0);
     let job = capture::Job {
         view,

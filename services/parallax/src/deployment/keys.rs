@@ -48,6 +48,15 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     ("rig", "calibration of the cameras"),
     (
+        "unit",
+        "unit of the lengths in that file, m, cm or mm, where it is not what its format says",
+    ),
+    (
+        "up",
+        "direction against gravity in the world of that file, [x, y, z]; replaces what it says; found from cameras and people \
+         where neither says",
+    ),
+    (
         "model",
         "trained model; without it the one that ships with Parallax",
     ),
@@ -78,7 +87,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ),
     (
         "capture.upright",
-        "turn frames until the world's up points up, where the rig knows it",
+        "turn frames until the world's up points up",
     ),
     (
         "capture.frame_rate_hz",

@@ -3,7 +3,7 @@
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
 use runtime::MAX_CORES;
 
-use super::{ConfigError, Deployment};
+use super::{ConfigError, Deployment, limits};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
 const MOST_AT_ONCE: usize = 8;
@@ -45,6 +45,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     let beats = it.supervise.missed_beats as usize;
     within("supervise.missed_beats", beats, 1, 1_000_000)?;
     runtime(it)?;
+    limits::check(it)?;
     let joints = &it.triangulate.joints;
     let known = skeleton::JointSet::ALL.map(|it| it.name).join(", ");
     demand(
@@ -180,7 +181,7 @@ pub(crate) fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
     for tau in it.tau.px() {
         not_negative("fuse.tau", f64::from(tau))?;
     }
-    Ok(())
+    limits::fuse(it)
 }
 
 fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
@@ -294,7 +295,7 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
     )
 }
 
-fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {
+pub(super) fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {
     if holds {
         return Ok(());
     }
@@ -330,5 +331,15 @@ fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
         key,
         &got.to_string(),
         "a number of at least 0",
+    )
+}
+
+/// A number from `least` to `most`.
+pub(super) fn between(key: &str, got: f64, least: f64, most: f64) -> Result<(), Complaint> {
+    demand(
+        (least..=most).contains(&got),
+        key,
+        &got.to_string(),
+        &format!("{least} to {most}"),
     )
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use fastrand::Rng;
-use geometry::files::{Format, ReadOptions};
+use geometry::files::Format;
 use geometry::{Camera, Rig};
 use nalgebra::{UnitQuaternion, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -43,11 +43,14 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     let mut random = Rng::with_seed(arguments.seed);
     let cameras = &deployment.cameras;
     let camera = cameras[random.usize(..cameras.len())].name.clone();
-    let rig = inputs::rig(&[&deployment.rig], &ReadOptions::default())?;
+    let rig = inputs::rig_of(deployment)?;
     let rig = moved(&rig, &camera, &mut random)?;
     let file: PathBuf = ground.folder.join("moved-rig.toml");
     geometry::files::write(&file, Format::Own, &rig).or_fail(ExitKind::Input)?;
-    let planned = ground.plan_with(NAME, &[], &|it| it.rig.clone_from(&file))?;
+    let planned = ground.plan_with(NAME, &[], &|it| {
+        it.rig.clone_from(&file);
+        it.unit = None;
+    })?;
     let ran = ground.watch(&planned, &mut |_| None);
     let mut after = ran.aftermath(|_| 0);
     let is_named = after.accused.contains(&camera);

@@ -1,0 +1,172 @@
+//! Between which numbers every key of a deployment file lies, and which of them are doubtful.
+
+use super::rules::{Complaint, between, demand};
+use super::{Deployment, Runtime};
+
+/// One hour, and one day, milliseconds.
+const HOUR_MS: u64 = 3_600_000;
+const DAY_MS: u64 = 24 * HOUR_MS;
+/// A year, seconds.
+const YEAR_S: u64 = 366 * 86_400;
+/// The most frames of any footage: a thousand years of video.
+const MOST_FRAMES: u64 = 1_000_000_000_000;
+
+/// Checks every number against the least and the most that it can mean.
+pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
+    if let Some([x, y, z]) = it.up {
+        let length = (x * x + y * y + z * z).sqrt();
+        demand(
+            length.is_finite() && length > 1e-9,
+            "up",
+            &format!("[{x}, {y}, {z}]"),
+            "a direction: three numbers, not all 0",
+        )?;
+    }
+    capture(&it.capture)?;
+    pose(&it.pose)?;
+    let quality = &it.quality;
+    whole("quality.deadline_ms", quality.deadline_ms, 0, HOUR_MS)?;
+    whole("quality.max_age_ms", quality.max_age_ms, 0, DAY_MS)?;
+    demand(
+        quality.frame_offset.unsigned_abs() <= MOST_FRAMES,
+        "quality.frame_offset",
+        &quality.frame_offset.to_string(),
+        &format!("-{MOST_FRAMES} to {MOST_FRAMES}"),
+    )?;
+    let step = u64::from(quality.frame_step);
+    whole("quality.frame_step", step, 1, 1_000_000)?;
+    let triangulate = &it.triangulate;
+    between("triangulate.loss_px", triangulate.loss_px, 0.01, 1e4)?;
+    between(
+        "triangulate.error_weight",
+        triangulate.error_weight,
+        0.0,
+        1e3,
+    )?;
+    let part = it.record.epipolar_part as u64;
+    whole("record.epipolar_part", part, 1, 1000)?;
+    supervise(it)
+}
+
+/// Checks the numbers of the section `[fuse]`.
+pub(super) fn fuse(it: &fuse::Config) -> Result<(), Complaint> {
+    between("fuse.alpha", it.alpha.unwrap_or(0.0), 0.0, 1e6)?;
+    between("fuse.beta", it.beta.unwrap_or(0.0), 0.0, 1e6)?;
+    between("fuse.epsilon_px", it.epsilon_px, 0.0, 1e4)?;
+    if let Some(cells) = it.max_distance_cells {
+        between("fuse.max_distance_cells", cells, 1e-3, 1e6)?;
+    }
+    for tau in it.tau.px() {
+        between("fuse.tau", f64::from(tau), 0.0, 1e6)?;
+    }
+    Ok(())
+}
+
+fn capture(it: &capture::Config) -> Result<(), Complaint> {
+    if let Some(scale) = it.scale {
+        between("capture.scale", scale, 0.001, 8.0)?;
+    }
+    if let Some(rate) = it.frame_rate_hz {
+        between("capture.frame_rate_hz", rate, 0.001, 1e5)?;
+    }
+    whole("capture.start_frame", it.start_frame, 0, MOST_FRAMES)?;
+    whole("capture.frame_step", it.frame_step, 1, 1_000_000_000)?;
+    let n_frames = it.n_frames.unwrap_or(1);
+    whole("capture.n_frames", n_frames, 1, MOST_FRAMES)
+}
+
+fn pose(it: &pose::Config) -> Result<(), Complaint> {
+    between("pose.min_separation", it.min_separation, 0.0, 1e3)?;
+    between("pose.tracked_margin", it.tracked_margin, 0.0, 100.0)?;
+    let drop = f64::from(it.tracked_max_drop);
+    between("pose.tracked_max_drop", drop, 0.0, 1e6)?;
+    let every = it.tracked_full_every;
+    whole("pose.tracked_full_every", every, 1, 1_000_000)?;
+    whole("pose.tracked_max_gap", it.tracked_max_gap, 1, 1_000_000)
+}
+
+fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.supervise;
+    let deadline = it.deadline_ms.unwrap_or(1);
+    whole("supervise.deadline_ms", deadline, 1, HOUR_MS)?;
+    let hang = it.hang_limit_s.unwrap_or(1);
+    whole("supervise.hang_limit_s", hang, 1, 86_400)?;
+    let window = it.restart_window_s;
+    whole("supervise.restart_window_s", window, 1, YEAR_S)?;
+    let restarts = u64::from(it.max_restarts);
+    whole("supervise.max_restarts", restarts, 0, 1_000_000)?;
+    if let Some(budget) = it.latency_budget_ms {
+        between("supervise.latency_budget_ms", budget, 1e-3, DAY_MS as f64)?;
+    }
+    Ok(())
+}
+
+fn whole(key: &str, got: u64, least: u64, most: u64) -> Result<(), Complaint> {
+    demand(
+        (least..=most).contains(&got),
+        key,
+        &got.to_string(),
+        &format!("{least} to {most}"),
+    )
+}
+
+impl Deployment {
+    /// What can be, but is hardly meant: with its number and what to try.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let is_lossless = self.capture.mode == capture::Mode::Lossless;
+        let deadline_ms = self.deadline_ms();
+        if is_lossless && deadline_ms < 1000 {
+            doubts.push(format!(
+                "`supervise.deadline_ms` is {deadline_ms}, and `capture.mode` \"lossless\": a view whose frame takes \
+                 longer has no part in the result; 10000 is usual"
+            ));
+        }
+        let hang_limit_s = self.hang_limit_s();
+        if is_lossless && hang_limit_s < 10 {
+            doubts.push(format!(
+                "`supervise.hang_limit_s` is {hang_limit_s}: a process that computes for longer on one frame is killed; \
+                 120 is usual"
+            ));
+        }
+        if let Some(rate) = self
+            .capture
+            .frame_rate_hz
+            .filter(|it| !(1.0..=1000.0).contains(it))
+        {
+            doubts.push(format!(
+                "`capture.frame_rate_hz` is {rate} frames per second: cameras have 1 to 1000"
+            ));
+        }
+        let loss_px = self.triangulate.loss_px;
+        if !(0.2..=200.0).contains(&loss_px) {
+            doubts.push(format!(
+                "`triangulate.loss_px` is {loss_px}: errors of one pixel and of a hundred then count alike; 10 is usual"
+            ));
+        }
+        let threads = self.pose.threads;
+        let cores = std::thread::available_parallelism().map_or(usize::MAX, usize::from);
+        if threads > 4 * cores {
+            doubts.push(format!(
+                "`pose.threads` is {threads} in every pose process, of a machine of {cores} cores"
+            ));
+        }
+        doubts.extend(self.runtime.doubts());
+        doubts
+    }
+}
+
+impl Runtime {
+    fn doubts(&self) -> Vec<String> {
+        let high = self.priority.iter().filter(|it| *it.1 == 99);
+        let said = high.map(|(name, _)| {
+            format!(
+                "`runtime.priority` of {name} is 99, above that of the system's own threads: up to 98 leaves those in charge"
+            )
+        });
+        said.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,398 @@
+//! Every numeric key of a deployment with values that cannot be: the message that each gets.
+
+use std::fs;
+
+use super::super::keys::KEYS;
+use super::super::{ConfigError, Loaded};
+
+const SHORT: &str = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
+    [[camera]]\nname = 'a'\nsource = 'a.mp4'\n[[camera]]\nname = 'b'\nsource = 'b.mp4'\n";
+
+fn read(set: &str) -> Result<Loaded, ConfigError> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("deployment.toml");
+    fs::write(&file, SHORT).unwrap();
+    Loaded::read(&file, &[set.to_owned()])
+}
+
+/// Key, values that are refused with what the message says; values that are taken.
+type Row = (
+    &'static str,
+    &'static [(&'static str, &'static str)],
+    &'static [&'static str],
+);
+
+const ROWS: &[Row] = &[
+    (
+        "up",
+        &[
+            ("[0, 0, 0]", "expected a direction"),
+            ("[nan, 0, 1]", "[NaN, 0, 1]"),
+            ("[1e200, 0, 0]", "a direction"),
+        ],
+        &["[0, -1, 0]"],
+    ),
+    (
+        "capture.size",
+        &[
+            ("[0, 480]", "is 0, expected 1 to 16384"),
+            ("[480, 99999]", "is 99999"),
+            ("[-1, 2]", "invalid value"),
+        ],
+        &["[272, 480]"],
+    ),
+    (
+        "capture.scale",
+        &[
+            ("0", "is 0"),
+            ("-1.0", "is -1"),
+            ("nan", "is NaN"),
+            ("inf", "is inf"),
+            ("1e-300", "expected 0.001 to 8"),
+            ("9.0", "is 9"),
+        ],
+        &["0.25", "8.0"],
+    ),
+    (
+        "capture.frame_rate_hz",
+        &[
+            ("0", "is 0"),
+            ("-30", "is -30"),
+            ("nan", "is NaN"),
+            ("1e-308", "expected 0.001 to 100000"),
+            ("1e308", "expected 0.001 to 100000"),
+        ],
+        &["29.97", "240"],
+    ),
+    (
+        "capture.start_frame",
+        &[
+            ("-1", "invalid value"),
+            ("9223372036854775807", "expected 0 to"),
+        ],
+        &["0", "5000"],
+    ),
+    (
+        "capture.frame_step",
+        &[("0", "expected"), ("9223372036854775807", "expected 1 to")],
+        &["1", "30"],
+    ),
+    (
+        "capture.n_frames",
+        &[
+            ("0", "is 0, expected 1 to"),
+            ("9223372036854775807", "expected 1 to"),
+        ],
+        &["1"],
+    ),
+    (
+        "capture.frozen_after",
+        &[("-1", "invalid value"), ("99999999999", "invalid value")],
+        &["0", "10"],
+    ),
+    (
+        "pose.evidence_window",
+        &[("-1", "levels"), ("70000", "levels")],
+        &["0", "2", "'all'"],
+    ),
+    (
+        "pose.candidates",
+        &[("0", "is 0, expected 1 to"), ("100000", "is 100000")],
+        &["1"],
+    ),
+    (
+        "pose.min_separation",
+        &[
+            ("-0.1", "is -0.1"),
+            ("nan", "is NaN"),
+            ("1e308", "expected 0 to 1000"),
+        ],
+        &["0.0", "1.5"],
+    ),
+    (
+        "pose.threads",
+        &[("0", "is 0, expected 1 to 256"), ("257", "is 257")],
+        &["1"],
+    ),
+    (
+        "pose.tracked_levels",
+        &[("-1", "invalid value"), ("65536", "invalid value")],
+        &["2"],
+    ),
+    (
+        "pose.tracked_margin",
+        &[
+            ("-1", "is -1"),
+            ("nan", "is NaN"),
+            ("1e308", "expected 0 to 100"),
+        ],
+        &["0.3"],
+    ),
+    (
+        "pose.tracked_full_every",
+        &[("0", "is 0, expected 1 to")],
+        &["1", "10"],
+    ),
+    (
+        "pose.tracked_max_gap",
+        &[("0", "is 0, expected 1 to")],
+        &["1"],
+    ),
+    (
+        "pose.tracked_max_drop",
+        &[("-1", "is -1"), ("1e308", "is inf"), ("nan", "is NaN")],
+        &["0.5"],
+    ),
+    (
+        "quality.deadline_ms",
+        &[
+            ("-1", "invalid value"),
+            ("9223372036854775807", "expected 0 to 3600000"),
+        ],
+        &["0", "50"],
+    ),
+    (
+        "quality.max_age_ms",
+        &[("9223372036854775807", "expected 0 to 86400000")],
+        &["0", "500"],
+    ),
+    (
+        "quality.frame_offset",
+        &[
+            ("-9223372036854775808", "expected -1000000000000 to"),
+            ("9223372036854775807", "1000000000000"),
+        ],
+        &["-5", "80"],
+    ),
+    (
+        "quality.frame_step",
+        &[("0", "is 0"), ("4294967295", "expected 1 to 1000000")],
+        &["4"],
+    ),
+    (
+        "fuse.alpha",
+        &[
+            ("-1", "is -1"),
+            ("nan", "is NaN"),
+            ("1e308", "expected 0 to 1000000"),
+        ],
+        &["0.0", "0.002"],
+    ),
+    (
+        "fuse.beta",
+        &[
+            ("-1", "is -1"),
+            ("inf", "is inf"),
+            ("1e308", "expected 0 to 1000000"),
+        ],
+        &["0.03"],
+    ),
+    (
+        "fuse.max_distance_cells",
+        &[
+            ("0", "is 0"),
+            ("1e-300", "expected 0.001 to"),
+            ("nan", "is NaN"),
+        ],
+        &["10"],
+    ),
+    (
+        "fuse.tau",
+        &[
+            ("[-1.0]", "is -1"),
+            ("[nan]", "is NaN"),
+            ("[1e30]", "expected 0 to 1000000"),
+        ],
+        &["[5.0, 6.0]"],
+    ),
+    (
+        "fuse.workers",
+        &[("0", "is 0, expected 1 to 16"), ("17", "is 17")],
+        &["2"],
+    ),
+    (
+        "fuse.max_iterations",
+        &[("0", "is 0"), ("1001", "is 1001, expected 1 to 1000")],
+        &["12"],
+    ),
+    (
+        "fuse.epsilon_px",
+        &[
+            ("-1", "is -1"),
+            ("1e308", "expected 0 to 10000"),
+            ("nan", "is NaN"),
+        ],
+        &["0.1"],
+    ),
+    (
+        "triangulate.loss_px",
+        &[
+            ("0", "is 0"),
+            ("1e-300", "expected 0.01 to 10000"),
+            ("1e300", "expected 0.01 to 10000"),
+        ],
+        &["10"],
+    ),
+    (
+        "triangulate.error_weight",
+        &[("-1", "is -1"), ("1e300", "expected 0 to 1000")],
+        &["0.0", "1.0"],
+    ),
+    (
+        "record.overlay_every",
+        &[("-1", "invalid value")],
+        &["0", "10"],
+    ),
+    (
+        "record.epipolar_part",
+        &[
+            ("0", "is 0, expected 1 to 1000"),
+            ("9223372036854775807", "expected 1 to 1000"),
+        ],
+        &["1", "26"],
+    ),
+    (
+        "supervise.deadline_ms",
+        &[
+            ("0", "is 0, expected 1 to 3600000"),
+            ("9223372036854775807", "expected 1 to 3600000"),
+        ],
+        &["200"],
+    ),
+    (
+        "supervise.hang_limit_s",
+        &[
+            ("0", "is 0, expected 1 to 86400"),
+            ("9223372036854775807", "expected 1 to 86400"),
+        ],
+        &["3"],
+    ),
+    (
+        "supervise.missed_beats",
+        &[("0", "is 0, expected 1 to 1000000")],
+        &["3"],
+    ),
+    (
+        "supervise.max_restarts",
+        &[("4294967295", "expected 0 to 1000000")],
+        &["0"],
+    ),
+    (
+        "supervise.restart_window_s",
+        &[
+            ("0", "is 0, expected 1 to"),
+            ("9223372036854775807", "expected 1 to"),
+        ],
+        &["60"],
+    ),
+    (
+        "supervise.latency_budget_ms",
+        &[
+            ("0", "is 0"),
+            ("nan", "is NaN"),
+            ("1e308", "expected 0.001 to"),
+        ],
+        &["0.001", "150"],
+    ),
+    (
+        "runtime.cores",
+        &[
+            ("{ pose = [99999999999] }", "is 99999999999"),
+            ("{ pose = [] }", "empty"),
+        ],
+        &["{ pose = [0] }"],
+    ),
+    (
+        "runtime.priority",
+        &[
+            ("{ pose = 0 }", "is 0, expected 1 to 99"),
+            ("{ pose = 100 }", "is 100"),
+        ],
+        &["{ pose = 10 }"],
+    ),
+];
+
+/// Keys without a number.
+const OTHERS: &[&str] = &[
+    "name",
+    "rig",
+    "unit",
+    "model",
+    "output",
+    "camera",
+    "capture.mode",
+    "capture.pace",
+    "capture.upright",
+    "pose.precision",
+    "pose.search",
+    "quality.network",
+    "quality.onnx_runtime",
+    "quality.device",
+    "quality.table",
+    "quality.subject",
+    "quality.action",
+    "quality.views",
+    "fuse.energy",
+    "fuse.views",
+    "fuse.consistency",
+    "fuse.consistency_rig",
+    "fuse.compatibility",
+    "fuse.switch",
+    "fuse.facing",
+    "fuse.pairs",
+    "triangulate.joints",
+    "triangulate.combine",
+    "record.trc",
+    "runtime.spin",
+    "runtime.policy",
+    "runtime.lock_memory",
+];
+
+#[test]
+fn every_key_with_a_number_says_what_it_may_be() {
+    let mut wrong = Vec::new();
+    for (key, refused, taken) in ROWS {
+        for (value, words) in *refused {
+            let said = read(&format!("{key}={value}"))
+                .map_or_else(|it| it.to_string(), |_| "taken".to_owned());
+            if !said.contains(words) {
+                wrong.push(format!("{key} = {value}, expected {words:?}: {said}"));
+            }
+        }
+        for value in *taken {
+            if let Err(error) = read(&format!("{key}={value}")) {
+                wrong.push(format!("{key} = {value} is refused: {error}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    for (key, _) in KEYS {
+        let is_asked = ROWS.iter().any(|it| it.0 == *key) || OTHERS.contains(key);
+        assert!(is_asked, "{key} stands in no table: what may it be?");
+    }
+}
+
+#[test]
+fn what_is_hardly_meant_is_named_with_its_number() {
+    let doubts = |set: &str| read(set).unwrap().deployment.doubts();
+    assert_eq!(doubts("capture.mode=lossless"), Vec::<String>::new());
+    for (set, words) in [
+        ("supervise.deadline_ms=5", "`supervise.deadline_ms` is 5"),
+        ("supervise.hang_limit_s=2", "`supervise.hang_limit_s` is 2"),
+        (
+            "capture.frame_rate_hz=0.01",
+            "`capture.frame_rate_hz` is 0.01",
+        ),
+        ("triangulate.loss_px=0.02", "`triangulate.loss_px` is 0.02"),
+        (
+            "runtime.priority={ pose = 99 }",
+            "`runtime.priority` of pose is 99",
+        ),
+    ] {
+        let said = doubts(set);
+        assert!(
+            matches!(&said[..], [one] if one.contains(words)),
+            "{set}: {said:?}"
+        );
+    }
+}
