@@ -15,6 +15,7 @@ mod output;
 mod padding;
 mod plan;
 mod prepare;
+mod sanity;
 mod scheduling;
 mod search;
 mod sheet;
@@ -23,6 +24,7 @@ mod spread;
 mod summary;
 mod taped;
 mod trial;
+mod vertical;
 mod views;
 
 use std::process::ExitCode;

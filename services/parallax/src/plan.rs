@@ -17,6 +17,8 @@ use crate::audience::{Audience, Replay, Stage, Tape};
 use crate::deployment::Deployment;
 use crate::inputs::{self, Footage};
 use crate::prepare::Prepared;
+use crate::sanity;
+use crate::vertical;
 
 /// A deployment with what was found out about its footage: what every process is given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,15 +49,22 @@ pub(crate) const SERVICES: [&str; 6] = [
 const EVEN: u32 = 3;
 
 impl Resolved {
-    /// Looks at the footage of a deployment.
+    /// Looks at the footage of a deployment, and whether it can be that of its cameras; says what is doubtful.
     pub(crate) fn new(deployment: &Deployment) -> Result<Self, Failure> {
-        Ok(Self {
-            footage: inputs::footage(deployment)
-                .map_err(|it| inputs::of_deployment(it, deployment))?,
+        let footage = inputs::footage(deployment);
+        let mut resolved = Self {
+            footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
             deployment: deployment.clone(),
             tape: None,
             replay: None,
-        })
+        };
+        sanity::warn(&resolved)?;
+        // Of the processes none has to find it again, and a replay takes the same.
+        if let Some(found) = vertical::find(deployment)? {
+            tracing::warn!("{}", found.why);
+            resolved.deployment.up = Some(found.up);
+        }
+        Ok(resolved)
     }
 
     /// Frames that will be used.
@@ -65,8 +74,14 @@ impl Resolved {
 
     /// Frames of the footage per second, where any camera knows.
     pub(crate) fn frame_rate_hz(&self) -> Option<f64> {
-        let used = self.footage.iter().find_map(|it| it.frame_rate_hz)?;
-        Some(used * self.deployment.capture.frame_step as f64)
+        let capture = &self.deployment.capture;
+        let step = capture.frame_step as f64;
+        let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
+        let all: Vec<f64> = known.map(|it| it * step).collect();
+        // Files that contradict each other are overruled by who knows better.
+        let agree = all.iter().all(|it| (it / all[0] - 1.0).abs() < 1e-3);
+        let given = capture.frame_rate_hz.filter(|_| !agree);
+        given.or_else(|| all.first().copied())
     }
 
     /// Writes it for the user to read.

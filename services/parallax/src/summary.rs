@@ -219,6 +219,12 @@ impl Report {
         suspected.map(|it| it.0.clone()).collect()
     }
 
+    /// Two cameras that look as if each had the footage of the other.
+    fn exchanged(&self) -> Option<&Value> {
+        let found = &self.recorded["summary"]["exchanged"];
+        found.is_object().then_some(found)
+    }
+
     /// What the recorder wrote about the run; null if it did not.
     pub(crate) fn recorded(&self) -> &Value {
         &self.recorded
@@ -251,6 +257,7 @@ impl Report {
             && (!self.given_up.is_empty()
                 || !self.restarts.is_empty()
                 || self.recorded.is_null()
+                || self.exchanged().is_some()
                 || (self.is_lossless && count("frames") < self.n_frames)
                 || lost.iter().any(|it| count(it) > 0)
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
@@ -365,6 +372,24 @@ impl Report {
     }
 
     fn write_misplaced(&self, text: &mut String) -> core::fmt::Result {
+        if let Some(it) = self.exchanged() {
+            let name = |nth: usize| it["cameras"][nth].as_str().unwrap_or_default();
+            let degrees = |key: &str| it[key].as_f64().unwrap_or(f64::NAN);
+            writeln!(
+                text,
+                "  calibration   {} and {} look exchanged: rays miss each other by {:.1} degrees, with the footage of the two \
+                 exchanged by {:.1}{}; exchange their `source` in the deployment",
+                name(0),
+                name(1),
+                degrees("degrees"),
+                degrees("exchanged_degrees"),
+                if it["sure"] == true {
+                    ""
+                } else {
+                    " (it may be other two)"
+                },
+            )?;
+        }
         for camera in self.misplaced() {
             let it = &self.recorded["summary"]["calibration"][&camera];
             let px = |key: &str| it[key].as_f64().unwrap_or(f64::NAN);

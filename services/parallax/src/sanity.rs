@@ -1,0 +1,279 @@
+//! Whether footage and calibration of a deployment can belong together: asked before anything is started.
+
+use std::path::PathBuf;
+
+use capture::Feed;
+use footage::SourceSpec;
+use geometry::Rig;
+use geometry::files::{Finding, Severity, check as check_rig};
+use runtime::{ExitKind, Failure};
+use scene::Address;
+
+use crate::deployment::Deployment;
+use crate::inputs;
+use crate::plan::Resolved;
+
+/// Rates further apart than this factor cannot be paired frame by frame.
+const RATES: f64 = 1.02;
+/// Brightness, of 255, by which parts of a picture must differ for it to tell cameras apart.
+const LEAST_CONTRAST: f64 = 16.0;
+/// Pictures that differ by less, of 255, on average over a grid of so many cells either way, look the same.
+const LEAST_APART: f64 = 1.0;
+const CELLS: usize = 32;
+
+/// Says what is doubtful.
+///
+/// # Errors
+///
+/// What cannot give joints in space: one camera, cameras at one place, another unit, one footage for two cameras,
+/// rates that differ.
+pub(crate) fn check(resolved: &Resolved) -> Result<Vec<String>, Failure> {
+    let deployment = &resolved.deployment;
+    let mut doubts = deployment.doubts();
+    several(deployment)?;
+    sources(deployment)?;
+    doubts.extend(cameras(deployment)?);
+    doubts.extend(rates(resolved)?);
+    doubts.extend(lengths(resolved));
+    doubts.extend(pictures(resolved)?);
+    Ok(doubts)
+}
+
+/// Refuses a single camera.
+fn several(deployment: &Deployment) -> Result<(), Failure> {
+    let [camera] = &deployment.cameras[..] else {
+        return Ok(());
+    };
+    let message = format!(
+        "the deployment has one camera, {:?}: nothing can be located in space by one alone",
+        camera.name
+    );
+    let failure = Failure::new(ExitKind::Config, message);
+    Err(failure.with_hint(
+        "add a [[camera]] that sees the same people from elsewhere; `parallax detect` finds people in single images",
+    ))
+}
+
+/// Refuses two cameras of one source.
+fn sources(deployment: &Deployment) -> Result<(), Failure> {
+    let same = |source: &str| -> PathBuf {
+        let path = PathBuf::from(source);
+        if Address::is_one(source) {
+            return path;
+        }
+        path.canonicalize().unwrap_or(path)
+    };
+    let all: Vec<PathBuf> = deployment
+        .cameras
+        .iter()
+        .map(|it| same(&it.source))
+        .collect();
+    for (nth, source) in all.iter().enumerate() {
+        let Some(first) = all[..nth].iter().position(|it| it == source) else {
+            continue;
+        };
+        let [a, b] = [first, nth].map(|it| &deployment.cameras[it].name);
+        let message = format!(
+            "cameras {a:?} and {b:?} have one source, {}",
+            source.display()
+        );
+        let failure = Failure::new(ExitKind::Config, message);
+        return Err(failure.with_hint("every [[camera]] needs the footage of its own camera"));
+    }
+    Ok(())
+}
+
+/// Asks of the cameras that are used what `parallax calib check` asks of a file.
+fn cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
+    let rig = inputs::rig_of(deployment)?;
+    let named = deployment
+        .cameras
+        .iter()
+        .filter_map(|it| rig.camera(&it.name));
+    let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
+    // None of the cameras, or not all: said elsewhere, with the names.
+    let Ok(used) = used else {
+        return Ok(Vec::new());
+    };
+    let findings = check_rig(&used);
+    let is_meant = |it: &Finding| {
+        let is_distance = matches!(it, Finding::Distance { .. });
+        is_distance && deployment.unit.is_some()
+    };
+    let (refused, rest): (Vec<&Finding>, Vec<&Finding>) = findings
+        .iter()
+        .partition(|it| it.severity() == Severity::Error && !is_meant(it));
+    if let Some(first) = refused.first() {
+        let more = match refused.len() - 1 {
+            0 => String::new(),
+            n => format!(" (and {n} more: `parallax calib check` prints them)"),
+        };
+        let message = format!("{}: {first}{more}", deployment.rig.display());
+        let failure = Failure::new(ExitKind::Calibration, message);
+        return Err(failure.with_hint(hint(first)));
+    }
+    let doubtful = rest
+        .into_iter()
+        .filter(|it| it.severity() >= Severity::Warning);
+    Ok(doubtful
+        .map(|it| format!("{}: {it}", deployment.rig.display()))
+        .collect())
+}
+
+/// What to try.
+fn hint(finding: &Finding) -> String {
+    match finding {
+        Finding::Distance { metres, .. } => format!(
+            "say in the deployment what the numbers of the file are: `unit = \"mm\"` makes this {:.3} m, `unit = \"cm\"` {:.3} m, \
+             `unit = \"m\"` means that it is so",
+            metres / 1000.0,
+            metres / 100.0
+        ),
+        Finding::OnePlace { .. } => {
+            "joints in space need cameras that stand apart, best a metre or more; `unit` in the deployment says what \
+             the numbers of the file are"
+                .to_owned()
+        }
+        _ => "`parallax calib check` says more; calibrate again, or leave the camera out".to_owned(),
+    }
+}
+
+/// Refuses footage of different rates, unless the rate is given; says by how much rates drift apart.
+fn rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
+    let deployment = &resolved.deployment;
+    let step = deployment.capture.frame_step as f64;
+    let views = deployment.cameras.iter().zip(&resolved.footage);
+    let known: Vec<(&str, f64)> = views
+        .filter_map(|(camera, it)| Some((camera.name.as_str(), it.frame_rate_hz? * step)))
+        .collect();
+    let slowest = known.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    let fastest = known.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let (Some((slow, low)), Some((fast, high))) = (slowest, fastest) else {
+        return Ok(None);
+    };
+    let numbers = format!("{slow} has {low:.6} frames per second, {fast} {high:.6}");
+    let drift = resolved.n_frames() as f64 * step * (high / low - 1.0);
+    let text = format!(
+        "{numbers}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
+    );
+    if high / low <= RATES || deployment.capture.frame_rate_hz.is_some() {
+        return Ok((drift >= 0.5).then_some(text));
+    }
+    let failure = Failure::new(ExitKind::Input, text);
+    Err(failure.with_hint(
+        "convert one of them to the rate of the other (`ffmpeg -i in.mp4 -r RATE out.mp4`); if a file is wrong about \
+         its rate, give the true one as `capture.frame_rate_hz`",
+    ))
+}
+
+/// Says which footage is much shorter than another.
+fn lengths(resolved: &Resolved) -> Option<String> {
+    let names = resolved.deployment.cameras.iter().map(|it| &it.name);
+    let all: Vec<_> = names
+        .zip(resolved.footage.iter().map(|it| it.n_frames))
+        .collect();
+    let (short, few) = all.iter().min_by_key(|it| it.1)?;
+    let (long, many) = all.iter().max_by_key(|it| it.1)?;
+    let is_much = *many >= few + 10 && *many as f64 > 1.1 * *few as f64;
+    is_much.then(|| {
+        format!("{short} has {few} frames, {long} {many}: frames are paired by their numbers; do they begin together, at one rate?")
+    })
+}
+
+/// Refuses cameras whose first pictures are equal, bit for bit; names those whose pictures look the same.
+fn pictures(resolved: &Resolved) -> Result<Vec<String>, Failure> {
+    let deployment = &resolved.deployment;
+    let first = deployment
+        .cameras
+        .iter()
+        .map(|it| Pictures::of(it, &deployment.capture));
+    let first: Vec<Option<Pictures>> = first.collect();
+    let mut said = Vec::new();
+    for (nth, own) in first.iter().enumerate() {
+        for (other, theirs) in first[..nth].iter().enumerate() {
+            let (Some(own), Some(theirs)) = (own, theirs) else {
+                continue;
+            };
+            let [a, b] = [other, nth].map(|it| &deployment.cameras[it].name);
+            if own.rgb == theirs.rgb {
+                let message = format!(
+                    "the first {} pictures of cameras {a:?} and {b:?} are equal, bit for bit, which two cameras never see",
+                    own.rgb.len()
+                );
+                let failure = Failure::new(ExitKind::Input, message);
+                return Err(
+                    failure.with_hint("every [[camera]] needs the footage of its own camera")
+                );
+            }
+            let apart = own.apart(theirs);
+            if apart < LEAST_APART {
+                said.push(format!(
+                    "the first pictures of {a} and {b} differ by {apart:.1} of 255 on average: is it one video, given for two cameras?"
+                ));
+            }
+        }
+    }
+    Ok(said)
+}
+
+/// The first pictures of a camera.
+struct Pictures {
+    rgb: Vec<Vec<u8>>,
+    /// Brightness of the first, on a grid.
+    grid: Vec<f64>,
+}
+
+impl Pictures {
+    /// Unless all pixels are alike, as of a camera without light. Scenes are not made for it.
+    fn of(camera: &capture::Camera, capture: &capture::Config) -> Option<Self> {
+        if Address::is_one(&camera.source) {
+            return None;
+        }
+        let spec = SourceSpec {
+            start: capture.start_frame,
+            step: 5,
+            count: Some(2),
+            ..SourceSpec::new(camera.source.clone())
+        };
+        // What cannot be read is said by who reads it.
+        let mut feed = Feed::open(&spec).ok()?;
+        let mut rgb = Vec::new();
+        while let Ok(Some(frame)) = feed.next_frame() {
+            rgb.push(frame.rgb.to_vec());
+        }
+        let size = feed.info().size;
+        let grid = grid(rgb.first()?, [size.width, size.height]);
+        let most = grid.iter().copied().fold(f64::MIN, f64::max);
+        let least = grid.iter().copied().fold(f64::MAX, f64::min);
+        (most - least >= LEAST_CONTRAST).then_some(Self { rgb, grid })
+    }
+
+    /// Mean difference of brightness.
+    fn apart(&self, other: &Self) -> f64 {
+        let pairs = self.grid.iter().zip(&other.grid);
+        let sum: f64 = pairs.map(|(a, b)| (a - b).abs()).sum();
+        sum / self.grid.len() as f64
+    }
+}
+
+/// Mean brightness in cells, whatever the size of the picture.
+fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
+    let mut cells = vec![[0.0, 0.0]; CELLS * CELLS];
+    for (row, line) in rgb.chunks_exact(3 * width).enumerate() {
+        for (column, pixel) in line.chunks_exact(3).enumerate() {
+            let cell = &mut cells[row * CELLS / height * CELLS + column * CELLS / width];
+            let sum: u32 = pixel.iter().map(|it| u32::from(*it)).sum();
+            *cell = [cell[0] + f64::from(sum) / 3.0, cell[1] + 1.0];
+        }
+    }
+    let mean = |[sum, n]: [f64; 2]| if n > 0.0 { sum / n } else { 0.0 };
+    cells.into_iter().map(mean).collect()
+}
+
+/// The same, said as warnings.
+pub(crate) fn warn(resolved: &Resolved) -> Result<(), Failure> {
+    for doubt in check(resolved)? {
+        tracing::warn!("{doubt}");
+    }
+    Ok(())
+}

@@ -1,0 +1,322 @@
+//! Footage, calibrations and settings that cannot belong together: refused before the start, or named, with numbers.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use std::fs;
+
+use common::{Case, Ended, PLAIN};
+
+const CHECK: &[&str] = &["config", "check", "deployment.toml"];
+const RUN: &[&str] = &["run", "deployment.toml"];
+const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
+
+/// What a user did, how the program ends, and what it says of it.
+type Row = (
+    &'static str,
+    fn(&Case),
+    &'static [&'static str],
+    i32,
+    &'static [&'static str],
+);
+
+/// Tries a deployment of three views, of two frames.
+fn try_all(rows: &[Row]) {
+    let mut wrong = Vec::new();
+    for (what, broken, arguments, code, words) in rows {
+        let case = Case::new("nonsense", &[2; 3], PLAIN);
+        broken(&case);
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = case.start(arguments).wait();
+        case.assert_nothing_left();
+        let lacks = words.iter().find(|it| !stderr.contains(**it));
+        if status.code() != Some(*code) || lacks.is_some() {
+            wrong.push(format!(
+                "{what}: {status}, expected {code}; lacks {lacks:?}\n{stdout}{stderr}"
+            ));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Replaces every translation of the rig by what `to` makes of it.
+fn move_cameras(case: &Case, to: impl Fn(f64) -> f64) {
+    let text = fs::read_to_string(case.path("rig.toml")).unwrap();
+    let line = |line: &str| {
+        let Some(numbers) = line.strip_prefix("translation_metres = [") else {
+            return line.to_owned();
+        };
+        let numbers = numbers.trim_end_matches(']').split(',');
+        let moved: Vec<String> = numbers
+            .map(|it| format!("{:?}", to(it.trim().parse().unwrap())))
+            .collect();
+        format!("translation_metres = [{}]", moved.join(", "))
+    };
+    let lines: Vec<String> = text.lines().map(line).collect();
+    case.write("rig.toml", lines.join("\n"));
+}
+
+fn add(case: &Case, line: &str) {
+    case.edit("deployment.toml", "rig = ", &format!("{line}\nrig = "));
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_the_start() {
+    try_all(&[
+        ("as it is", |_| (), CHECK, 0, &[]),
+        (
+            "a rig in millimetres",
+            |it| move_cameras(it, |metres| 1000.0 * metres),
+            CHECK,
+            5,
+            &[
+                "rig.toml: a and b are 1",
+                "m apart",
+                "`unit = \"mm\"` makes this 1.",
+            ],
+        ),
+        (
+            "the same, run",
+            |it| move_cameras(it, |metres| 1000.0 * metres),
+            RUN,
+            5,
+            &["unit = \"mm\""],
+        ),
+        (
+            "the same, with the unit",
+            |it| {
+                move_cameras(it, |metres| 1000.0 * metres);
+                add(it, "unit = \"mm\"");
+            },
+            CHECK,
+            0,
+            &[],
+        ),
+        (
+            "far away, and meant",
+            |it| {
+                move_cameras(it, |metres| 1000.0 * metres);
+                add(it, "unit = \"m\"");
+            },
+            CHECK,
+            0,
+            &["m apart: is the unit right?"],
+        ),
+        (
+            "cameras beyond the Earth",
+            |it| move_cameras(it, |metres| 3e307 * metres.signum()),
+            CHECK,
+            5,
+            &["3e307 m from the origin"],
+        ),
+        (
+            "cameras at one place",
+            |it| move_cameras(it, |_| 0.0),
+            RUN,
+            5,
+            &["3 cameras are at one place", "0.0 mm apart", "stand apart"],
+        ),
+        (
+            "a part that the model has not",
+            |it| {
+                it.edit(
+                    "deployment.toml",
+                    "[record]",
+                    "[record]\nepipolar_part = 99",
+                )
+            },
+            CHECK,
+            3,
+            &["`record.epipolar_part` is 99", "parts 1 to 26"],
+        ),
+        (
+            "no deadline",
+            |it| {
+                it.edit(
+                    "deployment.toml",
+                    "[record]",
+                    "[supervise]\ndeadline_ms = 0\n[record]",
+                )
+            },
+            CHECK,
+            3,
+            &["`supervise.deadline_ms` is 0, expected 1 to"],
+        ),
+        (
+            "no patience",
+            |it| {
+                it.edit(
+                    "deployment.toml",
+                    "[record]",
+                    "[supervise]\nhang_limit_s = 0\n[record]",
+                )
+            },
+            CHECK,
+            3,
+            &["`supervise.hang_limit_s` is 0, expected 1 to"],
+        ),
+        (
+            "a doubtful deadline",
+            |it| {
+                it.edit(
+                    "deployment.toml",
+                    "[record]",
+                    "[supervise]\ndeadline_ms = 5\n[record]",
+                )
+            },
+            CHECK,
+            0,
+            &["`supervise.deadline_ms` is 5", "10000 is usual"],
+        ),
+    ]);
+}
+
+#[test]
+fn one_camera_alone_is_refused_with_what_to_use() {
+    let case = Case::new("alone", &[2], PLAIN);
+    for arguments in [CHECK, RUN, DRY] {
+        let ended = case.start(arguments).wait();
+        assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains("one camera, \"a\""),
+            "{}",
+            ended.stderr
+        );
+        assert!(ended.stderr.contains("parallax detect"), "{}", ended.stderr);
+    }
+}
+
+#[test]
+fn footage_that_is_not_that_of_its_camera_is_refused_or_named() {
+    try_all(&[
+        (
+            "one source for two cameras",
+            |it| it.edit("deployment.toml", "source = \"b\"", "source = \"a\""),
+            CHECK,
+            3,
+            &[
+                "cameras \"a\" and \"b\" have one source",
+                "footage of its own camera",
+            ],
+        ),
+        (
+            "the same by another name",
+            |it| it.edit("deployment.toml", "source = \"b\"", "source = \"./c/../a\""),
+            RUN,
+            3,
+            &["cameras \"a\" and \"b\" have one source"],
+        ),
+        (
+            "copies of one footage",
+            |it| {
+                for frame in ["0000.png", "0001.png"] {
+                    fs::copy(it.path("a").join(frame), it.path("c").join(frame)).unwrap();
+                }
+            },
+            RUN,
+            4,
+            &["pictures of cameras \"a\" and \"c\" are equal, bit for bit"],
+        ),
+    ]);
+}
+
+/// A video of a test pattern, of the size of the planted pictures.
+fn video(case: &Case, name: &str, rate: &str, pattern: &str) {
+    let source = format!("{pattern}=s=96x128:r={rate}:d=2");
+    let done = std::process::Command::new("ffmpeg")
+        .args([
+            "-v", "error", "-f", "lavfi", "-i", &source, "-pix_fmt", "yuv420p",
+        ])
+        .arg(case.path(name))
+        .status();
+    assert!(done.unwrap().success());
+}
+
+#[test]
+fn rates_that_differ_are_refused_with_both_numbers() {
+    let case = Case::new("rates", &[2; 2], PLAIN);
+    for (name, rate, pattern) in [
+        ("a.mp4", "30", "testsrc"),
+        ("b.mp4", "60", "testsrc2"),
+        ("c.mp4", "30000/1001", "smptebars"),
+    ] {
+        video(&case, name, rate, pattern);
+    }
+    case.edit("deployment.toml", "source = \"a\"", "source = \"a.mp4\"");
+    case.edit("deployment.toml", "source = \"b\"", "source = \"b.mp4\"");
+    let ended = case.start(CHECK).wait();
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    for words in [
+        "a has 30.0",
+        "b 60.0",
+        "60.0 frames apart",
+        "capture.frame_rate_hz",
+    ] {
+        let words = if words.starts_with("60.0") {
+            "frames apart"
+        } else {
+            words
+        };
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    // Who knows better says so.
+    let given = [CHECK, &["--set", "capture.frame_rate_hz=30"]].concat();
+    let ended = case.start(&given).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(ended.stderr.contains("frames apart"), "{}", ended.stderr);
+    // A thousandth, over two seconds, is nothing.
+    case.edit(
+        "deployment.toml",
+        "source = \"b.mp4\"",
+        "source = \"c.mp4\"",
+    );
+    let ended = case.start(CHECK).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(!ended.stderr.contains("frames apart"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_dry_run_fails_where_the_run_would_not_begin() {
+    let case = Case::new("huge", &[2; 16], PLAIN);
+    // So large that no machine has the memory: every frame has 0.8 GB, and is there seven times.
+    case.edit(
+        "deployment.toml",
+        "upright",
+        "size = [16384, 16384]\nupright",
+    );
+    let ended = case.start(DRY).wait();
+    // Where a machine has it all the same, too few files are enough.
+    let script = "ulimit -n 64; exec \"$PARALLAX\" run deployment.toml --dry-run";
+    let few = case.start_in_shell(script).wait();
+    for (ended, words) in [(&ended, "/dev/shm"), (&few, "ulimit -n")] {
+        assert!(ended.stdout.contains("shared memory: "), "{}", ended.stdout);
+        let is_refused = ended.status.code() == Some(3) && ended.stderr.contains(words);
+        let fits = words == "/dev/shm" && ended.status.success();
+        assert!(is_refused || fits, "{}{}", ended.stdout, ended.stderr);
+    }
+}
+
+#[test]
+fn a_vertical_that_nobody_says_is_found_and_said() {
+    let case = Case::new("upright", &[2; 3], PLAIN);
+    let text = fs::read_to_string(case.path("rig.toml")).unwrap();
+    let without: Vec<&str> = text.lines().filter(|it| !it.starts_with("up = ")).collect();
+    assert!(without.len() < text.lines().count());
+    case.write("rig.toml", without.join("\n"));
+    case.edit("deployment.toml", "upright = false", "upright = true");
+    let ended = case.start(CHECK).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let said = "does not say which way is up; taken is up = [0.000, 0.000, 1.000]: cameras are held within 0 degrees";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    // Who says it is not asked.
+    add(&case, "up = [0, 0, 1]");
+    let ended = case.start(CHECK).wait();
+    assert!(
+        !ended.stderr.contains("which way is up"),
+        "{}",
+        ended.stderr
+    );
+}
