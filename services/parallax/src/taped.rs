@@ -6,16 +6,19 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use recording::{About, Recording, Without};
+use recording::{About, Checked, Damaged, Kind, Recording, Without};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::audience::Tape;
+use crate::audience::{Audience, Stage, Tape};
 use crate::deployment::Deployment;
 use crate::inputs;
-use crate::plan::Resolved;
+use crate::plan::{Dealing, Resolved};
 use crate::shipped::{self, Shipped};
+
+/// So many damaged messages are named, and so many places.
+const MOST_NAMED: usize = 10;
 
 /// The settings of a run, as they stand in its recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -83,7 +86,65 @@ pub(crate) fn open(file: &Path) -> Result<Recording, Failure> {
 
 /// Whether everything that was sent is in the file, as far as the file can say.
 pub(crate) fn is_whole(recording: &Recording) -> bool {
-    recording.extent.is_complete && recording.n_lost() == 0 && recording.extent.n_malformed == 0
+    is_undamaged(recording) && recording.n_lost() == 0
+}
+
+/// Whether everything that was written is still there, as far as it can be told without reading the messages.
+pub(crate) fn is_undamaged(recording: &Recording) -> bool {
+    let extent = &recording.extent;
+    extent.is_complete
+        && extent.damage.is_empty()
+        && extent.n_malformed == 0
+        && recording.n_missing() == 0
+}
+
+/// Reads what is replayed, and finds the messages that are not what was written.
+pub(crate) fn damaged(
+    file: &Path,
+    recording: &Recording,
+    resolved: &Resolved,
+    from: Stage,
+) -> Result<Vec<Damaged>, Failure> {
+    let has_frames = Audience::new(resolved, &Dealing::new(&[], 0)).of_frames() > 0;
+    let is_replayed = |topic: &str| match Kind::of_topic(topic) {
+        Some(Kind::Frame) => from > Stage::Capture && has_frames,
+        Some(Kind::ViewPose) => from > Stage::Pose,
+        Some(Kind::Evidence) => (Stage::Quality..=Stage::Fuse).contains(&from),
+        Some(Kind::ViewQuality) => from > Stage::Quality,
+        Some(Kind::PairPose) => from > Stage::Fuse,
+        Some(Kind::Pose3d | Kind::Health) | None => false,
+    };
+    let mut input = File::open(file).map_err(|error| inputs::in_file(file, &error))?;
+    recording::check(&mut input, recording, is_replayed)
+        .map_err(|error| inputs::in_file(file, &error))
+}
+
+/// Names the messages that are not what was written, the first ones at length.
+pub(crate) fn damaged_text(damaged: &[Damaged]) -> Option<String> {
+    let mut text = format!(
+        "  {} damaged messages are left out: they are not what their checksums say",
+        damaged.len()
+    );
+    let named = damaged.iter().take(MOST_NAMED).map(|it| {
+        let frame = it.frame.map_or(String::new(), |it| format!(", frame {it}"));
+        format!("\n    {}{frame}, at byte {}", it.topic, it.offset)
+    });
+    text.extend(named);
+    if damaged.len() > MOST_NAMED {
+        text += &format!(
+            "\n    and {} more; --json names all",
+            damaged.len() - MOST_NAMED
+        );
+    }
+    (!damaged.is_empty()).then_some(text)
+}
+
+/// The same for programs.
+pub(crate) fn damaged_json(damaged: &[Damaged]) -> Value {
+    let damaged = damaged
+        .iter()
+        .map(|it| json!({ "topic": it.topic, "frame": it.frame, "offset": it.offset }));
+    damaged.collect()
 }
 
 /// What a file holds, for people: a line, and another for each thing that is wrong with it.
@@ -104,12 +165,31 @@ pub(crate) fn text(file: &Path, recording: &Recording) -> String {
 fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
     let extent = &recording.extent;
     if !extent.is_complete {
-        let why = extent.damage.unwrap_or("cut off");
+        let why = if extent.damage.is_empty() {
+            "cut off"
+        } else {
+            "damaged"
+        };
         let [whole, all] = [extent.whole_bytes, extent.file_bytes];
         write!(
             text,
             "\n  not complete: {why}; read up to byte {whole} of {all}"
         )?;
+    }
+    for it in extent.damage.iter().take(MOST_NAMED) {
+        write!(text, "\n  damaged at byte {}: {}", it.offset, it.what)?;
+    }
+    if extent.damage.len() > MOST_NAMED {
+        let more = extent.damage.len() - MOST_NAMED;
+        write!(text, "\n  and at {more} more places")?;
+    }
+    for (topic, n) in &extent.missing {
+        write!(text, "\n  {topic}: {n} messages are damaged and not found")?;
+    }
+    if extent.checks == Checked::Chunks {
+        text.push_str(
+            "\n  written by an earlier version: only its chunks have checksums, not its messages and settings",
+        );
     }
     if extent.n_malformed > 0 {
         let n = extent.n_malformed;
@@ -141,7 +221,12 @@ pub(crate) fn json(file: &Path, recording: &Recording) -> Value {
         "bytes": extent.file_bytes,
         "bytes_read": extent.whole_bytes,
         "complete": extent.is_complete,
-        "damage": extent.damage,
+        "damage": extent.damage.iter().map(|it| json!({ "offset": it.offset, "what": it.what })).collect::<Vec<_>>(),
+        "missing": extent.missing,
+        "checksums_of": match extent.checks {
+            Checked::Messages => "messages",
+            Checked::Chunks => "chunks",
+        },
         "malformed": extent.n_malformed,
         "messages": recording.n_messages(),
         "lost": recording.n_lost(),

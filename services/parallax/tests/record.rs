@@ -128,3 +128,37 @@ fn what_was_left_out_or_is_in_the_way_is_told() {
         ended.stderr
     );
 }
+
+#[test]
+fn a_changed_byte_of_a_recording_is_named_and_its_message_left_out() {
+    const N_FRAMES: usize = 6;
+    let case = Case::new("changed", &[N_FRAMES; 2], PLAIN);
+    recorded(&case, &["--without", "evidence", "--without", "pixels"]);
+    let mut file = fs::read(case.path("run.mcap")).unwrap();
+    let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
+    let poses = &recording.tracks["view-pose/v3/1"].entries;
+    let entry = poses.iter().find(|it| it.frame == Some(3)).unwrap();
+    // Behind stamp and times: of what was found. Six bytes of a pose move a joint.
+    let at = (entry.offset + entry.len / 2) as usize;
+    file[at..at + 6].iter_mut().for_each(|it| *it ^= 0x15);
+    case.write("run.mcap", &file);
+
+    let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
+    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let named = format!("view-pose/v3/1, frame 3, at byte {}", entry.offset);
+    assert!(ended.stderr.contains(&named), "{}", ended.stderr);
+    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let expected = json!([{ "topic": "view-pose/v3/1", "frame": 3, "offset": entry.offset }]);
+    assert_eq!(report["recording"]["damaged"], expected);
+    let [before, after] = ["out", "less"].map(|it| text(&case.path(it), "pose3d.jsonl"));
+    for (frame, (before, after)) in before.lines().zip(after.lines()).enumerate() {
+        let line: Value = serde_json::from_str(after).unwrap();
+        let missing = line["views_missing"].as_object().unwrap().len();
+        assert_eq!(
+            (line["frame"].as_u64(), missing),
+            (Some(frame as u64), usize::from(frame == 3))
+        );
+        assert!(frame >= 3 || before == after, "{before}\n{after}");
+    }
+    assert_eq!(after.lines().count(), N_FRAMES, "{after}");
+}

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use messages::{Cause, Stamp, Status, Timing};
-use recording::{Entry, Envelope, Recording, Track, in_order};
+use recording::{Entry, Envelope, ReadError, Recording, Track, in_order};
 use runtime::{
     ExitKind, Failure, OrFail as _, Place, SendError, Service, Waiter, Woken, now_nanos,
 };
@@ -38,7 +38,8 @@ pub struct Line {
     pub n_consumers: usize,
 }
 
-/// Sends what the recording holds of some topics, in the order in which it was sent, then its end.
+/// Sends what the recording holds of some topics, in the order in which it was sent, then its end. A message that is
+/// not what was written is left out: who starts the replay has named it.
 ///
 /// # Errors
 ///
@@ -64,8 +65,16 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             return Ok(());
         }
         let kind = tracks[*line].kind;
-        let message =
-            recording::read(&mut file, kind, entry, &mut buffer).or_fail(ExitKind::Input)?;
+        let message = match recording::read(&mut file, kind, entry, &mut buffer) {
+            Ok(message) => message,
+            Err(error @ ReadError::Read(_)) => return Err(error).or_fail(ExitKind::Input),
+            Err(error) => {
+                let (topic, frame) = (speaker.topic(*line), entry.frame);
+                tracing::debug!(%error, topic, frame, "damaged: left out");
+                service.health().dropped(Cause::Malformed, 1);
+                continue;
+            }
+        };
         let Some(envelope) = Envelope::of(kind, message.head) else {
             continue;
         };
@@ -153,6 +162,11 @@ impl<'a> Speaker<'a> {
             },
             waiter: service.bus().waiter(),
         })
+    }
+
+    fn topic(&self, line: usize) -> &str {
+        let mut lines = self.job.lines.iter().filter(|it| it.n_consumers > 0);
+        lines.nth(line).map_or("", |it| &it.topic)
     }
 
     fn wait_for_all(&self) {

@@ -4,8 +4,12 @@ use std::collections::BTreeMap;
 
 /// Name of the metadata record.
 pub(crate) const NAME: &str = "parallax";
-/// Version of what this crate writes; another is refused.
-const FORMAT: &str = "1";
+/// Name of the metadata record that names the topics by the numbers of their channels.
+pub(crate) const TOPICS: &str = "parallax.topics";
+/// Version of what this crate writes.
+const FORMAT: &str = "2";
+/// The version before it, which is read, too: only chunks have checksums.
+pub(crate) const OLDER: &str = "1";
 
 /// What was left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -46,7 +50,7 @@ pub enum AboutError {
         got: String,
     },
     /// It was written by another version.
-    #[error("the recording has format {got:?}, this program reads format {FORMAT}")]
+    #[error("the recording has format {got:?}, this program reads formats {OLDER} and {FORMAT}")]
     Format {
         /// What stands there.
         got: String,
@@ -84,7 +88,7 @@ impl About {
             other => Err(refused(key, other)),
         };
         let format = text("format")?;
-        if format != FORMAT {
+        if ![OLDER, FORMAT].contains(&format.as_str()) {
             let got = format.chars().take(40).collect();
             return Err(AboutError::Format { got });
         }
@@ -99,6 +103,11 @@ impl About {
             },
         })
     }
+}
+
+/// Whether a map is of a recording of format 1, whose maps have no checksum.
+pub(crate) fn is_older(map: &BTreeMap<String, String>) -> bool {
+    map.get("format").is_some_and(|it| it == OLDER) && !map.contains_key(crate::seal::KEY)
 }
 
 #[cfg(test)]
@@ -140,7 +149,7 @@ mod tests {
             map.insert(key.to_owned(), value.to_owned());
             About::from_map(&map).unwrap_err().to_string()
         };
-        assert!(refused("format", "2").contains("format \"2\""));
+        assert!(refused("format", "3").contains("format \"3\""));
         assert!(refused("session", "-1").contains("session is \"-1\""));
         assert!(refused("without_pixels", "maybe").contains("\"maybe\""));
     }

@@ -72,6 +72,31 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         self.input.seek_relative(n).map_err(Stop::Io)
     }
 
+    /// Kind and length of a record.
+    pub(crate) fn record_head(&mut self) -> Result<(u8, u64), Stop> {
+        let [op] = self.array()?;
+        Ok((op, u64::from_le_bytes(self.array()?)))
+    }
+
+    /// Goes to a place of the file.
+    pub(crate) fn go(&mut self, at: u64) -> io::Result<()> {
+        self.at = at;
+        self.input.seek(SeekFrom::Start(at)).map(drop)
+    }
+
+    /// The checksum of what follows; nothing is passed over.
+    pub(crate) fn checksum(&mut self, mut n: u64) -> Result<u32, Stop> {
+        let begin = self.at;
+        let mut hasher = crc32fast::Hasher::new();
+        while n > 0 {
+            let some = n.min(1 << 16);
+            hasher.update(&self.bytes(some)?);
+            n -= some;
+        }
+        self.go(begin).map_err(Stop::Io)?;
+        Ok(hasher.finalize())
+    }
+
     /// Passes over all that follows; whether the file ends with these bytes.
     pub(crate) fn ends_with(&mut self, bytes: &[u8]) -> Result<bool, Stop> {
         if self.end - self.at < bytes.len() as u64 {

@@ -15,6 +15,10 @@ pub struct Entry {
     pub offset: u64,
     /// How long it is, bytes.
     pub len: u64,
+    /// The frame that it is about; none for signs of life, and where the recording does not say it.
+    pub frame: Option<u64>,
+    /// Of its data, by which it is checked when it is read; none if the recording has none for every message.
+    pub checksum: Option<u32>,
 }
 
 /// One topic.
@@ -35,10 +39,33 @@ pub struct Extent {
     pub whole_bytes: u64,
     /// Whether the file ends as a recording should.
     pub is_complete: bool,
-    /// What is wrong there, if it is not merely cut off.
-    pub damage: Option<&'static str>,
+    /// Places where it is not what was written; the first thousand.
+    pub damage: Vec<Damage>,
     /// Messages that are none of their topic's, and were passed over.
     pub n_malformed: u64,
+    /// Messages that were written and are not found, by topic: of each the numbers run on.
+    pub missing: BTreeMap<String, u64>,
+    /// What its checksums are of.
+    pub checks: Checked,
+}
+
+/// A place where a file is not what was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Damage {
+    /// Where, bytes from the beginning.
+    pub offset: u64,
+    /// What is wrong.
+    pub what: &'static str,
+}
+
+/// What the checksums of a recording are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Checked {
+    /// Every message has its own, and so has all that is said about the run.
+    #[default]
+    Messages,
+    /// Only chunks have, of a megabyte or more: a recording of format 1.
+    Chunks,
 }
 
 /// What a file holds.
@@ -65,6 +92,11 @@ impl Recording {
     pub fn n_lost(&self) -> u64 {
         let lost = self.counts.values().map(|it| it.lost);
         lost.fold(0, u64::saturating_add)
+    }
+
+    /// Messages of all topics that were written and are not found.
+    pub fn n_missing(&self) -> u64 {
+        self.extent.missing.values().sum()
     }
 
     /// When the first and the last message were sent, of those that say so; signs of life do not count.
@@ -106,6 +138,7 @@ mod tests {
                     publish_time,
                     offset,
                     len: 1,
+                    ..Entry::default()
                 })
                 .collect(),
         }

@@ -15,10 +15,13 @@ pub(crate) mod op {
     pub(crate) const CHUNK: u8 = 0x06;
     pub(crate) const MESSAGE_INDEX: u8 = 0x07;
     pub(crate) const CHUNK_INDEX: u8 = 0x08;
+    pub(crate) const ATTACHMENT: u8 = 0x09;
     pub(crate) const STATISTICS: u8 = 0x0b;
     pub(crate) const METADATA: u8 = 0x0c;
     pub(crate) const METADATA_INDEX: u8 = 0x0d;
     pub(crate) const DATA_END: u8 = 0x0f;
+    /// Our own, of those that the format leaves to programs; others pass over it.
+    pub(crate) const CHECKS: u8 = 0x80;
 }
 
 /// Bytes of what every record begins with: its kind and its length.
@@ -33,6 +36,15 @@ pub(crate) const CHUNK_HEAD_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
 pub(crate) struct Body(Vec<u8>);
 
 impl Body {
+    /// Fields that were put together elsewhere.
+    pub(crate) fn of(fields: Vec<u8>) -> Self {
+        Self(fields)
+    }
+
+    pub(crate) fn fields(&self) -> &[u8] {
+        &self.0
+    }
+
     pub(crate) fn u16(mut self, it: u16) -> Self {
         self.0.extend_from_slice(&it.to_le_bytes());
         self
@@ -96,6 +108,10 @@ impl<'a> Fields<'a> {
 
     pub(crate) fn u32(&mut self) -> Option<u32> {
         Some(u32::from_le_bytes(self.take(4)?.try_into().ok()?))
+    }
+
+    pub(crate) fn u64(&mut self) -> Option<u64> {
+        Some(u64::from_le_bytes(self.take(8)?.try_into().ok()?))
     }
 
     pub(crate) fn text(&mut self) -> Option<String> {

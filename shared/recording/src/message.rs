@@ -6,7 +6,7 @@ use messages::{Stamp, Status, Timing};
 use crate::Kind;
 
 /// What CDR begins with: little endian, no options.
-const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
+pub(crate) const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
 
 const _: () = assert!(
     cfg!(target_endian = "little"),

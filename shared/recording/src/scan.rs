@@ -1,20 +1,26 @@
 //! Reading a recording: where every message lies, up to the last whole record.
 //!
-//! Reads the file from its beginning, record by record, and passes over what messages hold; so it
-//! needs no index at the end, and a file that was cut off anywhere is read like any other.
+//! Reads the file from its beginning, by the record before each chunk that says what lies in it, and passes over
+//! what messages hold; so it needs no index at the end, and a file that was cut off anywhere is read like any
+//! other. Where something is not what was written, the next record that is, is searched for.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom};
 
+use crate::checks::{Checks, TAG};
 use crate::cursor::{Cursor, Stop};
-use crate::mcap::{CHUNK_HEAD_BYTES, Fields, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
-use crate::{About, AboutError, Entry, Extent, Kind, Message, Recording, Track};
-use crate::{about, count, message};
+use crate::found::Found;
+use crate::mcap::{Fields, MAGIC, RECORD_HEAD_BYTES, op};
+use crate::seal::unseal;
+use crate::{Checked, Entry, Kind, Message, Recording, about, chunk, message, older};
 
 /// Longest record that is not a message or a chunk, bytes.
-const MAX_RECORD_BYTES: u64 = 16 << 20;
-/// Most topics.
-const MAX_TOPICS: usize = 1024;
+pub(crate) const MAX_RECORD_BYTES: u64 = 16 << 20;
+/// So much is searched at a time, bytes.
+const WINDOW_BYTES: u64 = 1 << 16;
+/// What looks like the beginning of a record and is none, at most.
+const MOST_FALSE_STARTS: u32 = 10_000;
+
 /// A recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
@@ -24,6 +30,12 @@ pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] io::Error),
+    /// A message is not what was written.
+    #[error("the message at byte {offset} is not what its checksum says")]
+    Checksum {
+        /// Where it begins.
+        offset: u64,
+    },
     /// A message is no longer what it was when the file was scanned.
     #[error("the message at byte {offset} cannot be read")]
     Message {
@@ -36,221 +48,290 @@ pub enum ReadError {
 }
 
 /// Finds every message of a file. Whatever the file holds, it takes memory only for messages that
-/// are there, 32 bytes each.
+/// are there, 56 bytes each. What messages hold is not read: see [`read`] and [`check`].
 ///
 /// # Errors
 ///
 /// [`ReadError::NotMcap`], [`ReadError::Read`]. A file that is cut off or damaged is no error: see
-/// [`Extent`].
+/// [`Extent`](crate::Extent).
 pub fn scan<R: Read + Seek>(input: &mut R) -> Result<Recording, ReadError> {
-    let mut scan = Scan {
-        cursor: Cursor::new(input)?,
-        recording: Recording {
-            about: Err(AboutError::Missing("settings")),
-            tracks: BTreeMap::new(),
-            counts: BTreeMap::new(),
-            extent: Extent {
-                file_bytes: 0,
-                whole_bytes: 0,
-                is_complete: false,
-                damage: None,
-                n_malformed: 0,
-            },
-        },
-        channels: BTreeMap::new(),
-    };
-    scan.recording.extent.file_bytes = scan.cursor.end();
-    match scan.cursor.array::<{ MAGIC.len() }>() {
+    let mut cursor = Cursor::new(input)?;
+    match cursor.array::<{ MAGIC.len() }>() {
         Ok(magic) if magic == *MAGIC => {}
         Err(Stop::Io(error)) => return Err(error.into()),
         _ => return Err(ReadError::NotMcap),
     }
-    match scan.records() {
-        Ok(is_complete) => scan.recording.extent.is_complete = is_complete,
-        Err(Stop::Cut) => {}
-        Err(Stop::Damaged(what)) => scan.recording.extent.damage = Some(what),
-        Err(Stop::Io(error)) => return Err(error.into()),
+    let mut scan = Scan {
+        found: Found::new(cursor.end(), Checked::Messages),
+        cursor,
+        is_older: false,
+        n_false_starts: 0,
+    };
+    scan.records()?;
+    if scan.is_older {
+        scan.cursor.go(MAGIC.len() as u64)?;
+        return Ok(older::scan(&mut scan.cursor)?);
     }
-    Ok(scan.recording)
+    Ok(scan.found.finish())
 }
 
-/// Reads a message into `buffer` and takes it apart.
+/// Reads a message into `buffer`, compares its checksum, and takes it apart.
 ///
 /// # Errors
 ///
-/// [`ReadError::Read`], [`ReadError::Message`].
+/// [`ReadError::Read`], [`ReadError::Checksum`], [`ReadError::Message`].
 pub fn read<'a, R: Read + Seek>(
     input: &mut R,
     kind: Kind,
     entry: &Entry,
     buffer: &'a mut Vec<u8>,
 ) -> Result<Message<'a>, ReadError> {
-    input.seek(SeekFrom::Start(entry.offset))?;
+    let offset = entry.offset;
+    input.seek(SeekFrom::Start(offset))?;
     buffer.resize(entry.len as usize, 0);
     input.read_exact(buffer)?;
-    Message::parse(kind, buffer).map_err(|source| ReadError::Message {
-        offset: entry.offset,
-        source,
-    })
+    if entry
+        .checksum
+        .is_some_and(|it| it != crc32fast::hash(buffer))
+    {
+        return Err(ReadError::Checksum { offset });
+    }
+    Message::parse(kind, buffer).map_err(|source| ReadError::Message { offset, source })
+}
+
+/// A message that is not what was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Damaged {
+    /// Its topic.
+    pub topic: String,
+    /// What it is about.
+    pub frame: Option<u64>,
+    /// Where it begins, bytes from the beginning of the file.
+    pub offset: u64,
+}
+
+/// Reads all messages of some topics, and names those that [`read`] would refuse.
+///
+/// * `wanted`: whether a topic is looked at.
+///
+/// # Errors
+///
+/// If the file cannot be read.
+pub fn check<R: Read + Seek>(
+    input: &mut R,
+    recording: &Recording,
+    wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<Damaged>, ReadError> {
+    let tracks = recording.tracks.iter().filter(|it| wanted(it.0));
+    let mut all: Vec<_> = tracks
+        .flat_map(|(topic, track)| track.entries.iter().map(move |it| (topic, track.kind, it)))
+        .collect();
+    all.sort_by_key(|it| it.2.offset);
+    let (mut damaged, mut buffer) = (Vec::new(), Vec::new());
+    for (topic, kind, entry) in all {
+        match read(input, kind, entry, &mut buffer) {
+            Ok(_) => {}
+            Err(error @ ReadError::Read(_)) => return Err(error),
+            Err(_) => damaged.push(Damaged {
+                topic: topic.clone(),
+                frame: entry.frame,
+                offset: entry.offset,
+            }),
+        }
+    }
+    Ok(damaged)
+}
+
+/// Name and entries of metadata; none if the fields are not those.
+pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
+    let mut fields = Fields(body);
+    Some((fields.text()?, fields.map()?))
 }
 
 struct Scan<'a, R: Read + Seek> {
     cursor: Cursor<'a, R>,
-    recording: Recording,
-    /// Names of the topics that are known.
-    channels: BTreeMap<u16, Option<String>>,
+    found: Found,
+    is_older: bool,
+    n_false_starts: u32,
 }
 
 impl<R: Read + Seek> Scan<'_, R> {
-    /// Reads all records; whether the file ends as it should.
-    fn records(&mut self) -> Result<bool, Stop> {
+    /// Reads all records that are what was written.
+    fn records(&mut self) -> io::Result<()> {
         loop {
-            self.note_place();
-            let (op, len) = self.record_head()?;
-            match op {
-                op::CHUNK => self.chunk(len)?,
-                op::DATA_END => {
-                    self.cursor.skip(len)?;
-                    self.note_place();
-                    let is_complete = self.cursor.ends_with(MAGIC)?;
-                    if is_complete {
-                        self.note_place();
-                    }
-                    return Ok(is_complete);
-                }
-                _ => self.record(op, len)?,
-            }
-        }
-    }
-
-    /// Everything before here is whole.
-    fn note_place(&mut self) {
-        self.recording.extent.whole_bytes = self.cursor.at();
-    }
-
-    fn record_head(&mut self) -> Result<(u8, u64), Stop> {
-        let [op] = self.cursor.array()?;
-        Ok((op, u64::from_le_bytes(self.cursor.array()?)))
-    }
-
-    /// The records of a chunk, as far as it is there.
-    fn chunk(&mut self, len: u64) -> Result<(), Stop> {
-        self.cursor.skip(8 + 8 + 8 + 4)?;
-        let n_name = u64::from(u32::from_le_bytes(self.cursor.array()?));
-        if n_name > 0 {
-            return Err(Stop::Damaged("a compressed chunk, which is not supported"));
-        }
-        let records = u64::from_le_bytes(self.cursor.array()?);
-        if len.checked_sub(CHUNK_HEAD_BYTES) != Some(records) {
-            return Err(Stop::Damaged("a chunk whose lengths contradict each other"));
-        }
-        let end = self.cursor.at().checked_add(records).ok_or(Stop::Cut)?;
-        while self.cursor.at() < end {
-            self.note_place();
-            let room = end - self.cursor.at();
-            let (op, len) = self.record_head()?;
-            if room < RECORD_HEAD_BYTES || room - RECORD_HEAD_BYTES < len {
-                return Err(Stop::Damaged("a record that is longer than its chunk"));
-            }
-            if op == op::CHUNK {
-                return Err(Stop::Damaged("a chunk within a chunk"));
-            }
-            self.record(op, len)?;
-        }
-        Ok(())
-    }
-
-    fn record(&mut self, op: u8, len: u64) -> Result<(), Stop> {
-        match op {
-            op::MESSAGE => self.message(len),
-            op::CHANNEL | op::METADATA if len <= MAX_RECORD_BYTES => {
-                let body = self.cursor.bytes(len)?;
-                let mut fields = Fields(&body);
-                let known = if op == op::CHANNEL {
-                    self.channel(&mut fields)
-                } else {
-                    self.metadata(&mut fields)
-                };
-                known.unwrap_or(Err(Stop::Damaged("a record that contradicts itself")))
-            }
-            op::CHANNEL | op::METADATA => Err(Stop::Damaged("a record beyond all measure")),
-            _ => self.cursor.skip(len),
-        }
-    }
-
-    /// None if the fields are not those of a channel.
-    fn channel(&mut self, fields: &mut Fields<'_>) -> Option<Result<(), Stop>> {
-        let (id, _schema) = (fields.u16()?, fields.u16()?);
-        let (topic, encoding) = (fields.text()?, fields.text()?);
-        Some(self.add(id, topic, &encoding))
-    }
-
-    fn add(&mut self, id: u16, topic: String, encoding: &str) -> Result<(), Stop> {
-        if self.channels.len() >= MAX_TOPICS {
-            return Err(Stop::Damaged("more topics than any deployment has"));
-        }
-        let kind = Kind::of_topic(&topic).filter(|_| encoding == "cdr");
-        let known = kind.map(|_| topic.clone());
-        if *self.channels.entry(id).or_insert_with(|| known.clone()) != known {
-            return Err(Stop::Damaged("two topics with one number"));
-        }
-        if let Some(kind) = kind {
-            let empty = || Track {
-                kind,
-                entries: Vec::new(),
+            let begin = self.cursor.at();
+            self.found.extent.whole_bytes = begin;
+            let what = match self.record() {
+                Ok(false) => continue,
+                Ok(true) => return Ok(()),
+                Err(Stop::Io(error)) => return Err(error),
+                Err(Stop::Damaged(what)) => Some(what),
+                Err(Stop::Cut) => None,
             };
-            self.recording.tracks.entry(topic).or_insert_with(empty);
+            // A length that was damaged may look like an end.
+            let whole = self.found.extent.whole_bytes;
+            let is_found = self.go_to_next(begin + 1)?;
+            if let Some(what) =
+                what.or_else(|| is_found.then_some("a record that cannot be so long"))
+            {
+                self.found.damaged(begin, what);
+            }
+            if !is_found {
+                self.found.extent.whole_bytes = whole;
+                return Ok(());
+            }
+        }
+    }
+
+    /// Reads a record; whether it was the last.
+    fn record(&mut self) -> Result<bool, Stop> {
+        let begin = self.cursor.at();
+        let (op, len) = self.cursor.record_head()?;
+        match op {
+            op::CHECKS if len <= MAX_RECORD_BYTES => {
+                let body = self.cursor.bytes(len)?;
+                match Checks::read(&body) {
+                    Some(checks) => self.take(checks)?,
+                    // The chunk has a checksum, too.
+                    None => self.found.damaged(begin, "what says where messages lie"),
+                }
+            }
+            op::METADATA if len <= MAX_RECORD_BYTES => {
+                let body = self.cursor.bytes(len)?;
+                let (name, map) =
+                    metadata(&body).ok_or(Stop::Damaged("a record that contradicts itself"))?;
+                if name == about::NAME && about::is_older(&map) {
+                    self.is_older = true;
+                    return Ok(true);
+                }
+                let map = unseal(&name, map);
+                let map = map.ok_or(Stop::Damaged("what is said about the run"))?;
+                self.found.metadata(&name, map);
+            }
+            op::CHUNK => chunk::take(
+                &mut self.cursor,
+                &mut self.found,
+                len,
+                |cursor, _, _, len| cursor.skip(len),
+            )?,
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::ATTACHMENT => {
+                self.cursor.skip(len)?;
+            }
+            op::DATA_END if len == 4 => {
+                self.cursor.skip(len)?;
+                self.end()?;
+                return Ok(true);
+            }
+            _ => return Err(Stop::Damaged("a record that no recording has")),
+        }
+        Ok(false)
+    }
+
+    /// Takes the messages of a chunk, and passes over it.
+    fn take(&mut self, checks: Checks) -> Result<(), Stop> {
+        let base = self.cursor.at();
+        let [begin, end, next] = checks.ends;
+        for (channel, nth, entry) in checks.messages {
+            let last = [begin, entry.offset, entry.len];
+            let last = last.iter().try_fold(0_u64, |sum, it| sum.checked_add(*it));
+            let last = last.filter(|it| *it <= end);
+            let last = last.ok_or(Stop::Damaged("a message beyond its chunk"))?;
+            let last = base.checked_add(last).ok_or(Stop::Cut)?;
+            if last > self.cursor.end() {
+                return Err(Stop::Cut);
+            }
+            self.found.extent.whole_bytes = last;
+            let offset = base + begin + entry.offset;
+            self.found.message(channel, nth, Entry { offset, ..entry });
+        }
+        self.cursor.skip(next)
+    }
+
+    /// Reads what follows the messages: an index, for other programs, and its checksum.
+    fn end(&mut self) -> Result<(), Stop> {
+        let begin = self.cursor.at();
+        let extent = &mut self.found.extent;
+        extent.whole_bytes = begin;
+        if !self.cursor.ends_with(MAGIC)? {
+            return Ok(());
+        }
+        extent.whole_bytes = self.cursor.at();
+        extent.is_complete = true;
+        let n = self.cursor.at() - begin;
+        let Some(n) = n.checked_sub((MAGIC.len() + size_of::<u32>()) as u64) else {
+            return Err(Stop::Damaged("an end without an index"));
+        };
+        self.cursor.go(begin).map_err(Stop::Io)?;
+        let got = self.cursor.checksum(n)?;
+        self.cursor.skip(n)?;
+        let said = u32::from_le_bytes(self.cursor.array()?);
+        if got != said {
+            let what = "the index for other programs, which is not needed here";
+            self.found.damaged(begin, what);
         }
         Ok(())
     }
 
-    /// None if the fields are not those of metadata.
-    fn metadata(&mut self, fields: &mut Fields<'_>) -> Option<Result<(), Stop>> {
-        let (name, map) = (fields.text()?, fields.map()?);
-        match name.as_str() {
-            about::NAME if self.recording.about.is_err() => {
-                self.recording.about = About::from_map(&map);
+    /// Goes to the next record that is what was written; `false` if there is none.
+    fn go_to_next(&mut self, mut from: u64) -> io::Result<bool> {
+        let (least, overlap) = (from, TAG.len() as u64 - 1);
+        while from + overlap < self.cursor.end() {
+            self.cursor.go(from)?;
+            let n = WINDOW_BYTES.min(self.cursor.end() - from);
+            let Some(window) = or_io(self.cursor.bytes(n))? else {
+                return Ok(false);
+            };
+            for (nth, it) in (from..).zip(window.windows(TAG.len())) {
+                let before = match it {
+                    it if it == TAG => RECORD_HEAD_BYTES,
+                    it if it == about::NAME.as_bytes() => RECORD_HEAD_BYTES + 4,
+                    _ => continue,
+                };
+                let Some(begin) = nth.checked_sub(before) else {
+                    continue;
+                };
+                if begin < least {
+                    continue;
+                }
+                if self.is_sound(begin)? {
+                    self.cursor.go(begin)?;
+                    return Ok(true);
+                }
+                self.n_false_starts += 1;
+                if self.n_false_starts > MOST_FALSE_STARTS {
+                    return Ok(false);
+                }
             }
-            count::NAME => {
-                let counts = map.into_iter();
-                let counts = counts.filter_map(|(topic, it)| Some((topic, it.parse().ok()?)));
-                self.recording.counts = counts.collect();
-            }
-            _ => {}
+            from += n - overlap.min(n - 1);
         }
-        Some(Ok(()))
+        Ok(false)
     }
 
-    fn message(&mut self, len: u64) -> Result<(), Stop> {
-        let Some(n_data) = len.checked_sub(MESSAGE_HEAD_BYTES) else {
-            return Err(Stop::Damaged("a message shorter than its head"));
+    /// Whether a record begins here that is what was written.
+    fn is_sound(&mut self, begin: u64) -> io::Result<bool> {
+        self.cursor.go(begin)?;
+        let Some((op, len)) = or_io(self.cursor.record_head())? else {
+            return Ok(false);
         };
-        let channel = u16::from_le_bytes(self.cursor.array()?);
-        self.cursor.skip(4)?;
-        let log_time = u64::from_le_bytes(self.cursor.array()?);
-        let publish_time = u64::from_le_bytes(self.cursor.array()?);
-        let entry = Entry {
-            log_time,
-            publish_time,
-            offset: self.cursor.at(),
-            len: n_data,
-        };
-        self.cursor.skip(n_data)?;
-        let Some(topic) = self.channels.get(&channel) else {
-            return Err(Stop::Damaged(
-                "a message of a topic that was not introduced",
-            ));
-        };
-        let track = topic
-            .as_ref()
-            .and_then(|it| self.recording.tracks.get_mut(it));
-        match track {
-            None => {}
-            Some(track) if message::check_length(track.kind, n_data).is_ok() => {
-                track.entries.push(entry);
-            }
-            Some(_) => self.recording.extent.n_malformed += 1,
+        if len > MAX_RECORD_BYTES {
+            return Ok(false);
         }
-        Ok(())
+        let Some(body) = or_io(self.cursor.bytes(len))? else {
+            return Ok(false);
+        };
+        Ok(match op {
+            op::CHECKS => Checks::read(&body).is_some(),
+            op::METADATA => metadata(&body).is_some_and(|(name, map)| unseal(&name, map).is_some()),
+            _ => false,
+        })
+    }
+}
+
+/// None where the file is over, or what stands there cannot be.
+fn or_io<T>(it: Result<T, Stop>) -> io::Result<Option<T>> {
+    match it {
+        Ok(it) => Ok(Some(it)),
+        Err(Stop::Io(error)) => Err(error),
+        Err(_) => Ok(None),
     }
 }

@@ -5,8 +5,10 @@ use core::mem::take;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
+use crate::checks::Checks;
 use crate::mcap::{Body, CHUNK_HEAD_BYTES, MAGIC, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
-use crate::{About, Count, Entry, Kind, about, count};
+use crate::seal::seal;
+use crate::{About, Count, Entry, Envelope, Kind, about, count, message};
 
 /// Messages are gathered to so many bytes before they are written.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -32,6 +34,9 @@ pub enum WriteError {
 ///
 /// Between two flushes it holds at most a chunk (1 MiB, or one message if that is larger), and of
 /// every chunk its entry in the index, about a hundred bytes and ten for each of its topics.
+///
+/// Before every chunk stands the checksum of each of its messages. What is said about the run has one, too, and stands
+/// in the file twice, at its beginning and at its end.
 pub struct Writer<W: Write> {
     out: W,
     n_bytes: u64,
@@ -39,6 +44,8 @@ pub struct Writer<W: Write> {
     is_broken: bool,
     topics: Vec<Topic>,
     chunk: Chunk,
+    /// What is said again at the end.
+    about: [(&'static str, BTreeMap<String, String>); 2],
     /// Schemas, and channels, as they stand in the first chunk and again at the end.
     definitions: [Vec<u8>; 2],
     /// What is said at the end about metadata, and about chunks.
@@ -53,6 +60,7 @@ pub struct Writer<W: Write> {
 
 struct Topic {
     name: String,
+    kind: Kind,
     n_recorded: u64,
 }
 
@@ -62,6 +70,7 @@ struct Chunk {
     records: Vec<u8>,
     /// Of every topic: when its messages came, and where they lie among the records.
     messages: BTreeMap<u16, Vec<[u64; 2]>>,
+    checks: Checks,
     times: Option<[u64; 2]>,
 }
 
@@ -87,6 +96,10 @@ impl<W: Write> Writer<W> {
             n_bytes: 0,
             is_broken: false,
             topics: Vec::new(),
+            about: [
+                (about::NAME, about.to_map()),
+                (about::TOPICS, numbered(topics)),
+            ],
             chunk: Chunk::default(),
             definitions: [Vec::new(), Vec::new()],
             indexes: [Vec::new(), Vec::new()],
@@ -101,10 +114,18 @@ impl<W: Write> Writer<W> {
         let header = Body::default().bytes(b"ros2").bytes(library.as_bytes());
         header.finish(op::HEADER, &mut start);
         writer.put(&start)?;
-        writer.describe(about::NAME, &about.to_map())?;
+        writer.say_about()?;
         writer.introduce(topics)?;
         writer.flush(&vec![0; topics.len()])?;
         Ok(writer)
+    }
+
+    /// Of which run it is, and which topics there are.
+    fn say_about(&mut self) -> Result<(), WriteError> {
+        let about = self.about.clone();
+        about
+            .into_iter()
+            .try_for_each(|(name, map)| self.describe(name, map))
     }
 
     fn introduce(&mut self, names: &[String]) -> Result<(), WriteError> {
@@ -124,6 +145,7 @@ impl<W: Write> Writer<W> {
             body.map(&BTreeMap::new()).finish(op::CHANNEL, channels);
             self.topics.push(Topic {
                 name: name.clone(),
+                kind,
                 n_recorded: 0,
             });
         }
@@ -149,8 +171,10 @@ impl<W: Write> Writer<W> {
             return Ok(());
         };
         let (channel, time) = (topic as u16 + 1, entry.log_time);
-        let sequence = it.n_recorded as u32;
+        let nth = it.n_recorded;
+        let sequence = nth as u32;
         it.n_recorded += 1;
+        let envelope = Envelope::of(it.kind, data.get(message::PREAMBLE.len()..).unwrap_or(&[]));
         if self.chunk.records.len() >= CHUNK_BYTES {
             self.write_chunk()?;
         }
@@ -165,6 +189,14 @@ impl<W: Write> Writer<W> {
         chunk.records.extend_from_slice(&time.to_le_bytes());
         let published = entry.publish_time.to_le_bytes();
         chunk.records.extend_from_slice(&published);
+        let checked = Entry {
+            offset: chunk.records.len() as u64,
+            len: data.len() as u64,
+            frame: envelope.map(|it| it.stamp.frame),
+            checksum: Some(crc32fast::hash(data)),
+            ..*entry
+        };
+        chunk.checks.messages.push((channel, nth, checked));
         chunk.records.extend_from_slice(data);
         chunk.times = Some(with(chunk.times, time));
         self.times = Some(with(self.times, time));
@@ -196,8 +228,9 @@ impl<W: Write> Writer<W> {
     pub fn finish(mut self, lost: &[u64]) -> Result<(), WriteError> {
         self.write_chunk()?;
         self.tell(lost)?;
+        self.say_about()?;
         let mut end = Vec::new();
-        // Without a checksum of the data: every chunk has its own.
+        // Without a checksum of the data: every message and every chunk has its own.
         Body::default().u32(0).finish(op::DATA_END, &mut end);
         self.put(&end)?;
         let summary_start = self.n_bytes;
@@ -242,9 +275,15 @@ impl<W: Write> Writer<W> {
         let mut chunk = take(&mut self.chunk);
         let n_records = chunk.records.len() as u64;
         let [first, last] = chunk.times.unwrap_or_default();
-        let start = self.n_bytes;
-        let mut head = vec![op::CHUNK];
         let len = CHUNK_HEAD_BYTES + n_records;
+        let index = chunk.index();
+        let n_index: u64 = index.iter().map(|it| it.1.len() as u64).sum();
+        let begin = RECORD_HEAD_BYTES + CHUNK_HEAD_BYTES;
+        chunk.checks.ends = [begin, begin + n_records, begin + n_records + n_index];
+        let mut head = Vec::new();
+        chunk.checks.finish(&mut head);
+        let start = self.n_bytes + head.len() as u64;
+        head.push(op::CHUNK);
         for it in [len, first, last, n_records] {
             head.extend_from_slice(&it.to_le_bytes());
         }
@@ -254,22 +293,15 @@ impl<W: Write> Writer<W> {
         head.extend_from_slice(&n_records.to_le_bytes());
         self.put(&head)?;
         self.put(&chunk.records)?;
-        let (mut index, mut offsets) = (Vec::new(), Vec::new());
-        for (channel, messages) in &chunk.messages {
-            offsets.push((*channel, self.n_bytes + index.len() as u64));
-            let places: Vec<u8> = messages
-                .iter()
-                .flatten()
-                .flat_map(|it| it.to_le_bytes())
-                .collect();
-            let body = Body::default().u16(*channel).bytes(&places);
-            body.finish(op::MESSAGE_INDEX, &mut index);
+        let mut offsets = Vec::new();
+        for (channel, record) in &index {
+            offsets.push((*channel, self.n_bytes));
+            self.put(record)?;
         }
-        self.put(&index)?;
         let entry = Body::default().u64(first).u64(last).u64(start);
         let entry = entry.u64(RECORD_HEAD_BYTES + len);
         let entry = entry.by_channel(offsets.into_iter());
-        let entry = entry.u64(index.len() as u64).bytes(b"");
+        let entry = entry.u64(n_index).bytes(b"");
         let entry = entry.u64(n_records).u64(n_records);
         entry.finish(op::CHUNK_INDEX, &mut self.indexes[1]);
         self.n_chunks += 1;
@@ -287,15 +319,16 @@ impl<W: Write> Writer<W> {
             (topic.name.clone(), Count { recorded, lost }.to_string())
         });
         let counts = counts.collect();
-        self.describe(count::NAME, &counts)?;
+        self.describe(count::NAME, counts)?;
         self.told = lost.to_vec();
         Ok(())
     }
 
     /// Writes metadata; between chunks.
-    fn describe(&mut self, name: &str, map: &BTreeMap<String, String>) -> Result<(), WriteError> {
+    fn describe(&mut self, name: &str, map: BTreeMap<String, String>) -> Result<(), WriteError> {
         let mut record = Vec::new();
-        let body = Body::default().bytes(name.as_bytes()).map(map);
+        let map = seal(name, map);
+        let body = Body::default().bytes(name.as_bytes()).map(&map);
         body.finish(op::METADATA, &mut record);
         let [offset, len] = [self.n_bytes, record.len() as u64];
         self.put(&record)?;
@@ -336,6 +369,29 @@ impl<W: Write> Writer<W> {
             source,
         }
     }
+}
+
+impl Chunk {
+    /// Where each message lies: a record for each channel.
+    fn index(&self) -> Vec<(u16, Vec<u8>)> {
+        let channels = self.messages.iter().map(|(channel, messages)| {
+            let places = messages.iter().flatten();
+            let places: Vec<u8> = places.flat_map(|it| it.to_le_bytes()).collect();
+            let mut record = Vec::new();
+            let body = Body::default().u16(*channel).bytes(&places);
+            body.finish(op::MESSAGE_INDEX, &mut record);
+            (*channel, record)
+        });
+        channels.collect()
+    }
+}
+
+/// Names of topics by the numbers of their channels.
+fn numbered(topics: &[String]) -> BTreeMap<String, String> {
+    let numbered = (1_u16..).zip(topics);
+    numbered
+        .map(|(channel, name)| (channel.to_string(), name.clone()))
+        .collect()
 }
 
 fn with(times: Option<[u64; 2]>, time: u64) -> [u64; 2] {

@@ -8,7 +8,8 @@ use std::rc::Rc;
 use messages::topic;
 use proptest::prelude::*;
 use recording::{
-    About, Count, Entry, Kind, ReadError, Recording, WriteError, Writer, encode, read, scan,
+    About, Checked, Count, Entry, Kind, ReadError, Recording, WriteError, Writer, check, encode,
+    read, scan,
 };
 
 /// One message of the tests: its topic, when it was sent, and its array.
@@ -142,7 +143,11 @@ fn a_file_cut_off_at_any_byte_holds_what_was_whole_in_it() {
         };
         let extent = &recording.extent;
         assert_eq!(extent.is_complete, n == file.len());
-        assert_eq!((extent.damage, extent.n_malformed), (None, 0), "{n} bytes");
+        assert_eq!(
+            (&extent.damage[..], extent.n_malformed),
+            (&[][..], 0),
+            "{n}"
+        );
         assert_eq!(extent.file_bytes, n as u64);
         assert!(extent.whole_bytes <= n as u64);
         let n_held = held(&recording, part, &said);
@@ -244,23 +249,212 @@ proptest! {
     }
 
     #[test]
-    fn damage_anywhere_is_never_more_than_damage(
-        at in 0.0..1.0, to: [u8; 8], n in 1_usize..9,
+    fn damage_anywhere_is_said_and_what_is_read_is_what_was_written(
+        said in any_said(), flush_every in 1_usize..8,
+        at in any::<prop::sample::Index>(), to: [u8; 8], n in 1_usize..9,
     ) {
-        let mut file = written(&some(), 4);
-        let at = (file.len() as f64 * at) as usize;
+        let whole = written(&said, flush_every);
+        let mut file = whole.clone();
+        let at = at.index(file.len());
         let end = (at + n).min(file.len());
         file[at..end].copy_from_slice(&to[..end - at]);
-        if let Ok(recording) = scan(&mut Cursor::new(&file)) {
+        check_damaged(&whole, &file)?;
+    }
+
+    #[test]
+    fn bytes_that_were_lost_or_came_between_are_said(
+        said in any_said(), flush_every in 1_usize..8,
+        [begin, end, other] in any::<[prop::sample::Index; 3]>(),
+    ) {
+        let whole = written(&said, flush_every);
+        let [begin, end, other] = [begin, end, other].map(|it| it.index(whole.len()));
+        let mut file = whole.clone();
+        file.splice(begin.min(end)..begin.max(end), whole[other..].iter().copied().take(9));
+        check_damaged(&whole, &file)?;
+    }
+}
+
+/// All that a recording gives: what it says about itself, and of every topic the messages that can be read.
+fn given(file: &[u8]) -> Option<(Recording, Vec<(String, Vec<Entry>, Vec<u8>)>, usize)> {
+    let recording = scan(&mut Cursor::new(file)).ok()?;
+    let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();
+    let mut all = Vec::new();
+    for (topic, track) in &recording.tracks {
+        for entry in &track.entries {
             let mut buffer = Vec::new();
-            for track in recording.tracks.values() {
-                for entry in &track.entries {
-                    prop_assert!(entry.offset + entry.len <= file.len() as u64);
-                    if let Ok(it) = read(&mut Cursor::new(&file), track.kind, entry, &mut buffer) {
-                        prop_assert_eq!(it.head.len(), track.kind.head_bytes());
-                    }
-                }
+            if read(&mut Cursor::new(file), track.kind, entry, &mut buffer).is_ok() {
+                let when = Entry {
+                    offset: 0,
+                    ..*entry
+                };
+                all.push((topic.clone(), vec![when], buffer));
             }
         }
+    }
+    Some((recording, all, damaged.len()))
+}
+
+/// A changed file gives what the whole one gives, or says that it does not; and nothing that was not written.
+fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
+    let (before, mut all, _) = given(whole).unwrap();
+    let Some((after, some, n_damaged)) = given(changed) else {
+        return Ok(());
+    };
+    let extent = &after.extent;
+    let is_said = n_damaged > 0
+        || !extent.is_complete
+        || !extent.damage.is_empty()
+        || after.n_missing() > 0
+        || after.about != before.about;
+    let n_all = all.len();
+    prop_assert!(is_said || some.len() == n_all, "{} of {n_all}", some.len());
+    if let Ok(about) = &after.about {
+        prop_assert_eq!(Ok(about), before.about.as_ref());
+    }
+    for mut it in some {
+        if extent.checks == Checked::Messages {
+            let place = all.iter().position(|other| same(&mut it, other));
+            prop_assert!(place.is_some(), "{it:?} was not written");
+            all.remove(place.unwrap_or_default());
+        }
+    }
+    Ok(())
+}
+
+/// Where a message was found by the checksum of its chunk, its frame and its own checksum are not known.
+fn same(it: &mut (String, Vec<Entry>, Vec<u8>), other: &(String, Vec<Entry>, Vec<u8>)) -> bool {
+    for (entry, other) in it.1.iter_mut().zip(&other.1) {
+        if entry.checksum.is_none() {
+            (entry.frame, entry.checksum) = (other.frame, other.checksum);
+        }
+    }
+    it == other
+}
+
+#[test]
+fn one_changed_byte_of_a_message_costs_that_message_only_and_names_it() {
+    let said: Vec<Said> = (0..9).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
+    let mut file = written(&said, 100);
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    let entry = recording.tracks["frame/v1/0"].entries[4];
+    file[entry.offset as usize + 150] ^= 1;
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    let damaged = check(&mut Cursor::new(&file), &recording, |_| true).unwrap();
+    assert_eq!(damaged.len(), 1);
+    let it = &damaged[0];
+    assert_eq!((it.topic.as_str(), it.offset), ("frame/v1/0", entry.offset));
+    assert_eq!(it.frame, entry.frame);
+    let mut buffer = Vec::new();
+    let refused = read(&mut Cursor::new(&file), Kind::Frame, &entry, &mut buffer);
+    assert!(matches!(refused, Err(ReadError::Checksum { offset }) if offset == entry.offset));
+    let other = check(&mut Cursor::new(&file), &recording, |it| it != "frame/v1/0");
+    assert!(other.unwrap().is_empty());
+}
+
+#[test]
+fn damage_between_two_chunks_costs_none_of_the_chunks_behind_it() {
+    let said: Vec<Said> = (0..30).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
+    let whole = written(&said, 1);
+    let n = |file: &[u8]| {
+        let recording = scan(&mut Cursor::new(file)).unwrap();
+        let missing = recording.n_missing();
+        (
+            recording.n_messages(),
+            missing,
+            recording.extent.damage.len(),
+        )
+    };
+    assert_eq!(n(&whole), (30, 0, 0));
+    let tag = whole
+        .windows(8)
+        .enumerate()
+        .filter(|it| it.1 == b"pxchecks");
+    let tags: Vec<usize> = tag.map(|it| it.0).collect();
+    // The length of the record that says where messages lie.
+    let mut file = whole.clone();
+    file[tags[12] - 8..tags[12]].fill(0xff);
+    assert_eq!(n(&file), (29, 1, 1));
+    // Its content: then the checksum of the chunk serves.
+    let mut file = whole.clone();
+    file[tags[12] + 20] ^= 1;
+    assert_eq!(n(&file), (30, 0, 1));
+    // All of a chunk, and what was said about it.
+    let mut file = whole;
+    file[tags[12] - 9..tags[14] - 9].fill(0);
+    let (held, missing, damage) = n(&file);
+    assert!(held >= 28 && held + missing == 30 && damage > 0);
+}
+
+/// A recording of format 1, as this program once wrote it.
+fn older() -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut out = mcap::WriteOptions::new()
+        .compression(None)
+        .create(Cursor::new(&mut file))
+        .unwrap();
+    let entries = [
+        ("format", "1"),
+        ("version", "0.1.0"),
+        ("session", "77"),
+        ("began_unix_nanos", "0"),
+        ("settings", "{}"),
+        ("without_pixels", "no"),
+        ("without_evidence", "no"),
+    ];
+    let metadata = entries
+        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .into();
+    let about = mcap::records::Metadata {
+        name: "parallax".to_owned(),
+        metadata,
+    };
+    out.write_metadata(&about).unwrap();
+    let schema = out
+        .add_schema("parallax/msg/Frame", "ros2msg", b"")
+        .unwrap();
+    let channel = out
+        .add_channel(
+            schema,
+            "frame/v1/0",
+            "cdr",
+            &std::collections::BTreeMap::new(),
+        )
+        .unwrap();
+    for nth in 0..6 {
+        let head = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: nth,
+            log_time: nth.into(),
+            publish_time: nth.into(),
+        };
+        out.write_to_known_channel(&head, &data(&(0, nth.into(), vec![nth as u8; 40])))
+            .unwrap();
+        out.flush().unwrap();
+    }
+    out.finish().unwrap();
+    drop(out);
+    file
+}
+
+#[test]
+fn a_recording_of_the_older_format_is_read_and_checked_by_its_chunks() {
+    let whole = older();
+    let recording = scan(&mut Cursor::new(&whole)).unwrap();
+    assert_eq!(recording.extent.checks, Checked::Chunks);
+    assert_eq!(recording.about, Ok(about_older()));
+    assert_eq!((recording.n_messages(), recording.n_missing()), (6, 0));
+    assert!(recording.extent.is_complete && recording.extent.damage.is_empty());
+    let mut file = whole;
+    let offset = recording.tracks["frame/v1/0"].entries[2].offset as usize;
+    file[offset + 140] ^= 1;
+    let recording = scan(&mut Cursor::new(&file)).unwrap();
+    assert_eq!((recording.n_messages(), recording.n_missing()), (5, 1));
+    assert_eq!(recording.extent.damage.len(), 1);
+}
+
+fn about_older() -> About {
+    About {
+        version: "0.1.0".to_owned(),
+        ..about()
     }
 }

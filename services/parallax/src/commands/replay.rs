@@ -23,8 +23,9 @@ The stages before --from are not run: processes under their names send what the 
 others run for real, with the settings of the recorded run but for what --set replaces. Where nothing may be
 lost their results are those of the recorded run, bit for bit, if neither settings nor files are others.
 
-A file that was cut off is replayed as far as it goes; the exit code is then 7. End-to-end latency means
-something at --speed 1 only; the times of the stages that run always do.
+A file that was cut off is replayed as far as it goes. Every message has a checksum; one that is not what was
+written is named, counted and left out. In both cases the exit code is 7. End-to-end latency means something
+at --speed 1 only; the times of the stages that run always do.
 
 Examples:
     parallax replay run.mcap                                         from pose on, the frames are given
@@ -103,18 +104,30 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     };
     check(&file, &recording, &resolved, from)?;
+    let damaged = taped::damaged(&file, &recording, &resolved, from)?;
+    if let Some(text) = taped::damaged_text(&damaged).filter(|_| !globals.quiet) {
+        output::message(text);
+    }
     let planned = Planned::of(resolved, globals.level())?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let report = planned.carry_out(globals, &stop, &mut |_| None)?;
     if arguments.json {
         let mut value = report.json();
         value["recording"] = taped::json(&file, &recording);
+        value["recording"]["damaged"] = taped::damaged_json(&damaged);
         output::json(&value)?;
     } else if !globals.quiet {
         output::line(report.text())?;
+        if !damaged.is_empty() {
+            let n = damaged.len();
+            output::line(format_args!(
+                "  damaged       {n} messages of the recording were left out"
+            ))?;
+        }
     }
-    let is_cut = from != Stage::Capture && !recording.extent.is_complete;
-    let kind = report.kind().or(is_cut.then_some(ExitKind::Degraded));
+    let is_sound = damaged.is_empty() && taped::is_undamaged(&recording);
+    let is_less = from != Stage::Capture && !is_sound;
+    let kind = report.kind().or(is_less.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
