@@ -64,6 +64,18 @@ impl Struck {
         assert_eq!(self.frames(), expected, "{}", self.said);
     }
 
+    /// Frames without a result say why, are few, and are counted.
+    fn assert_reasons(&self, expected: &[&str]) {
+        let without = self.lines.iter().filter(|it| it["status"] == "no result");
+        let reasons: Vec<&str> = without.map(|it| it["reason"].as_str().unwrap()).collect();
+        assert!(reasons.len() < 20, "{reasons:?}");
+        let known = |it: &&str| expected.contains(it);
+        assert!(reasons.iter().all(known), "{reasons:?}");
+        assert_eq!(self.summary["frames_missed"], json!(reasons.len()));
+        let counted = self.summary["frames"].as_u64().unwrap();
+        assert_eq!(counted + reasons.len() as u64, self.lines.len() as u64);
+    }
+
     /// The views of the frames that do not have all of them.
     fn without_all(&self) -> Vec<&Value> {
         let views = self.lines.iter().map(|it| &it["views_present"]);
@@ -203,12 +215,25 @@ fn a_killed_fusion_worker_costs_its_pairs_of_a_few_frames() {
 #[test]
 fn a_killed_triangulation_costs_the_frames_it_held_and_they_are_counted() {
     let struck = Struck::new(PACED, "KILL", "triangulate");
+    // A line of every frame, in order and none twice: a result, or why there is none.
+    struck.assert_every_frame();
+    struck.assert_reasons(&["process lost"]);
+}
+
+#[test]
+fn every_frame_of_a_live_run_has_one_line_though_triangulation_was_killed() {
+    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+    let struck = Struck::new(&live, "KILL", "triangulate");
     let frames = struck.frames();
-    assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
-    assert_eq!(frames.last(), Some(&(N_FRAMES - 1)), "{}", struck.said);
-    let missed = N_FRAMES as usize - frames.len();
-    assert!(missed < 20, "{frames:?}");
-    assert_eq!(struck.summary["frames_missed"], json!(missed));
+    let expected: Vec<u64> = (0..frames.len() as u64).collect();
+    assert_eq!(frames, expected, "{}", struck.said);
+    for it in struck.lines.iter().filter(|it| it["status"] == "no result") {
+        assert!(!it["reason"].as_str().unwrap().is_empty(), "{it}");
+        assert_eq!(it["views_missing"].as_object().unwrap().len(), 3, "{it}");
+    }
+    let n_lines = struck.summary["frames"].as_u64().unwrap()
+        + struck.summary["frames_missed"].as_u64().unwrap();
+    assert_eq!(n_lines, frames.len() as u64);
 }
 
 #[test]

@@ -29,6 +29,17 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
+/// A frame without a result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Absent {
+    /// Index of the frame in the footage.
+    pub frame: u64,
+    /// Why there is no result.
+    pub reason: String,
+    /// Why every view would have had no part in it.
+    pub views: Vec<Missing>,
+}
+
 /// What was said about one frame.
 #[derive(Debug, Clone)]
 pub struct FrameRecord {

@@ -33,7 +33,7 @@ mod service;
 pub use calibration::{CameraFit, Exchanged};
 pub use config::Config;
 pub use folder::{Folder, FolderError, remove_pictures};
-pub use frame::{FrameRecord, Picture, ViewRecord};
+pub use frame::{Absent, FrameRecord, Picture, ViewRecord};
 pub use latency::{Latency, Percentiles, Report};
 pub use missing::Missing;
 pub use output::{Output, OutputError};

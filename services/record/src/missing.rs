@@ -68,6 +68,11 @@ impl Voice {
         }
     }
 
+    /// Its first frame that does not exist, once that is known.
+    pub(crate) fn end(&self) -> Option<u64> {
+        self.end
+    }
+
     /// Hears an answer, or that there are no more.
     pub(crate) fn pose(&mut self, pose: &ViewPose) {
         self.is_absent = false;

@@ -10,8 +10,8 @@ use crate::latency::Report;
 use crate::lines::Lines;
 use crate::summary::Tally;
 use crate::{
-    Config, Folder, FolderError, FrameRecord, Latency, Scene, Summary, overlay, pose2d, pose3d,
-    times, trc,
+    Absent, Config, Folder, FolderError, FrameRecord, Latency, Scene, Summary, overlay, pose2d,
+    pose3d, times, trc,
 };
 
 const LATENCY: &str = "latency.json";
@@ -97,15 +97,59 @@ impl Output {
         })
     }
 
+    /// The first frame that has no line yet; none if there is no line.
+    pub fn next_frame(&self) -> Option<u64> {
+        let step = self.scene.frame_step.max(1);
+        self.tally.last_frame().map(|it| it.saturating_add(step))
+    }
+
+    /// Writes that frames have no result, and why. Frames before them of which nothing was said are written, too.
+    pub fn absent(&mut self, absent: &[Absent]) {
+        for it in absent {
+            self.fill_up_to(it.frame);
+            self.without(it);
+        }
+    }
+
+    /// What waited for the disk too long was left out.
+    fn fill_up_to(&mut self, frame: u64) {
+        let begin = self.next_frame().unwrap_or(frame);
+        for frame in (begin..frame).step_by(self.scene.frame_step.max(1) as usize) {
+            self.without(&Absent {
+                frame,
+                reason: "writing was too slow".to_owned(),
+                views: Vec::new(),
+            });
+        }
+    }
+
+    fn without(&mut self, it: &Absent) {
+        self.tally.without(it.frame);
+        let scene = &self.scene;
+        let nothing = pose3d::nothing(scene, it.frame);
+        let line = pose3d::absent_line(scene, it);
+        let rows = pose3d::csv_rows(scene, &nothing);
+        let row = trc::row(scene, self.tally.n_lines(), &nothing);
+        let outcomes = [
+            self.pose3d_jsonl.append(&format!("{line}\n")),
+            self.pose3d_csv.append(&rows),
+            self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
+        ];
+        for outcome in outcomes {
+            self.note(outcome);
+        }
+    }
+
     /// Writes one frame. What fails is counted, and never stops anything.
     pub fn frame(&mut self, record: &FrameRecord) {
+        self.fill_up_to(record.frame());
         self.tally.add(&self.scene, record);
         self.latency.add(record);
         let (scene, pose) = (&self.scene, &record.pose3d);
         let line = pose3d::json_line(scene, record);
         let rows = pose3d::csv_rows(scene, pose);
         let lines = pose2d::json_lines(scene, record);
-        let row = trc::row(scene, self.tally.n_frames(), pose);
+        let row = trc::row(scene, self.tally.n_lines(), pose);
         let outcomes = [
             self.pose3d_jsonl.append(&format!("{line}\n")),
             self.pose3d_csv.append(&rows),
@@ -337,7 +381,53 @@ mod tests {
         assert_eq!((summary.frames, summary.frames_with_pose), (3, 3));
         assert_eq!(summary.frames_missed, 1);
         assert_eq!(summary.views_used[0].1, 3);
-        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 3 * 14);
+        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 4 * 14);
+    }
+
+    #[test]
+    fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = Folder::open(dir.path(), false).unwrap();
+        let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
+        let absent = |frame| Absent {
+            frame,
+            reason: "dropped".to_owned(),
+            views: vec![Missing::Dropped; 2],
+        };
+        output.absent(&[absent(0)]);
+        output.frame(&record(2));
+        // 4 was handed on and not taken: the queue was full.
+        output.absent(&[absent(6)]);
+        output.frame(&record(8));
+        output.absent(&[absent(10)]);
+        let summary = output.finish(1);
+        assert_eq!((summary.frames, summary.frames_missed), (2, 4));
+        let lines = text(&dir, "pose3d.jsonl");
+        let lines = lines.lines().map(|it| serde_json::from_str(it).unwrap());
+        let lines: Vec<Value> = lines.collect();
+        let told = |it: &Value| {
+            (
+                it["frame"].as_u64(),
+                it["reason"].as_str().map(str::to_owned),
+            )
+        };
+        let dropped = Some("dropped".to_owned());
+        let expected = [
+            (Some(0), dropped.clone()),
+            (Some(2), None),
+            (Some(4), Some("writing was too slow".to_owned())),
+            (Some(6), dropped.clone()),
+            (Some(8), None),
+            (Some(10), dropped),
+        ];
+        assert_eq!(lines.iter().map(told).collect::<Vec<_>>(), expected);
+        assert_eq!(
+            lines[0]["views_missing"],
+            json!({ "left": "dropped", "right": "dropped" })
+        );
+        assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
+        let trc = evaluation::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+        assert_eq!(trc.frames.len(), 6);
     }
 
     #[test]

@@ -2,10 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use bytemuck::Zeroable as _;
 use messages::{Joint3d, Pose3d, Status};
 use serde_json::{Map, Value, json};
 
-use crate::{FrameRecord, Scene};
+use crate::{Absent, FrameRecord, Scene};
+
+/// Status of a frame without a result.
+pub(crate) const NO_RESULT: &str = "no result";
 
 /// First line of `pose3d.csv`; one row a joint follows, empty where there is no position.
 pub(crate) const CSV_HEADER: &str = "frame,time_s,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
@@ -48,6 +52,44 @@ pub(crate) fn json_line(scene: &Scene, record: &FrameRecord) -> String {
         "joints": joints,
     })
     .to_string()
+}
+
+/// The line of a frame that has no result: the reason, and what every view has to say for itself.
+pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> String {
+    let views = scene.views.iter().enumerate();
+    let why = |view: usize| {
+        it.views
+            .get(view)
+            .map_or(it.reason.as_str(), |it| it.reason())
+    };
+    let missing: BTreeMap<&str, &str> = views
+        .map(|(view, it)| (it.name.as_str(), why(view)))
+        .collect();
+    json!({
+        "frame": it.frame,
+        "time_s": scene.time_s(it.frame),
+        "status": NO_RESULT,
+        "reason": it.reason,
+        "views_present": [],
+        "views_missing": missing,
+        "views_used": [],
+        "pairs": 0,
+        "facing_margin": null,
+        "joints": {},
+    })
+    .to_string()
+}
+
+/// A result without any joint, for the files that have rows of numbers.
+pub(crate) fn nothing(scene: &Scene, frame: u64) -> Pose3d {
+    let mut pose = Pose3d::zeroed();
+    pose.stamp.frame = frame;
+    pose.status = Status::NO_FRAME;
+    pose.n_joints = scene.joints.joints.len() as u32;
+    for it in &mut pose.joints {
+        it.status = Status::NO_FRAME;
+    }
+    pose
 }
 
 /// The views that have no part in the result, and why.

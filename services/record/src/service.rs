@@ -17,8 +17,8 @@ use runtime::{
 };
 use wire::{Expected, WireError};
 
-use crate::gather::Gather;
-use crate::{Config, Folder, FrameRecord, Output, Picture, Scene};
+use crate::gather::{Gather, Settled};
+use crate::{Absent, Config, Folder, FrameRecord, Output, Picture, Scene};
 
 /// Results that may wait to be written.
 const QUEUE: usize = 256;
@@ -51,11 +51,12 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let n_joints = job.scene.joints.joints.len();
     if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
         // Killed after its work was done: to begin anew would empty the files.
-        return rest(service, &waiter);
+        return Ports::open(service, &job, &mut waiter)?.rest(service, &waiter);
     }
     let ports = Ports::open(service, &job, &mut waiter)?;
+    let frame_step = job.scene.frame_step;
     let writer = Writer::start(job, service)?;
-    let mut gather = Gather::new(n_views);
+    let mut gather = Gather::new(n_views, writer.next, frame_step, service.epoch() > 0);
     let mut is_over = false;
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.listen(service, &mut gather, &writer)?;
@@ -66,6 +67,8 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
                 continue;
             }
             if pose3d.status == Status::END {
+                ports.listen(service, &mut gather, &writer)?;
+                writer.rest(gather.rest());
                 is_over = true;
                 break;
             }
@@ -75,9 +78,13 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
                 continue;
             }
             ports.listen(service, &mut gather, &writer)?;
-            let record = gather.result(&pose3d);
-            note_times(service, &record);
-            if writer.write(record) {
+            let Some(settled) = gather.result(&pose3d) else {
+                // A frame has one line.
+                service.health().dropped(Cause::Late, 1);
+                continue;
+            };
+            note_times(service, &settled.record);
+            if writer.write(settled) {
                 service.health().sent(pose3d.stamp.frame);
             } else {
                 service.health().dropped(Cause::QueueFull, 1);
@@ -90,7 +97,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
         // Told to end before the footage did: what was written is whole, but it is not all.
         return Ok(());
     }
-    rest(service, &waiter)
+    ports.rest(service, &waiter)
 }
 
 /// How old a result was when it was sent, over all and of every view that has a part in it; and how
@@ -112,13 +119,6 @@ fn note_times(service: &Service, record: &FrameRecord) {
     }
     let waited = now_nanos().saturating_sub(sent_at);
     health.spent(Span::WAITING, None, waited);
-}
-
-/// Says that all is done, and waits to be told so.
-fn rest(service: &Service, waiter: &Waiter) -> Result<(), Failure> {
-    service.health().finished();
-    while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
-    Ok(())
 }
 
 struct Ports {
@@ -150,6 +150,29 @@ impl Ports {
                 .collect::<Result<_, _>>()?,
             pose3d: bus.subscriber(&topic::pose3d(), waiter)?,
         })
+    }
+
+    /// Says that all is done, and waits to be told so. What comes is taken in all the same: a sender whose words have
+    /// no part in any result, such as frames when a replay begins behind them, waits for room where nothing may be lost,
+    /// and to be heard before it begins.
+    fn rest(&self, service: &Service, waiter: &Waiter) -> Result<(), Failure> {
+        service.health().finished();
+        while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
+            for it in &self.frames {
+                while it.receive()?.is_some() {}
+            }
+            for it in &self.poses {
+                while it.receive()?.is_some() {}
+            }
+            for it in &self.qualities {
+                while it.receive()?.is_some() {}
+            }
+            for it in &self.pairs {
+                while it.receive()?.is_some() {}
+            }
+            while self.pose3d.receive()?.is_some() {}
+        }
+        Ok(())
     }
 
     /// Takes in all that has come, but for results.
@@ -229,13 +252,21 @@ fn is_ours(
     checked.is_ok()
 }
 
+/// What is to be written: frames without a result, and then one that has it.
+struct Lot {
+    absent: Vec<Absent>,
+    record: Option<FrameRecord>,
+}
+
 /// The thread that writes, and the queue before it.
 struct Writer {
-    queue: SyncSender<FrameRecord>,
+    queue: SyncSender<Lot>,
     thread: JoinHandle<()>,
     n_missed: Arc<AtomicU64>,
     n_written: Arc<AtomicU64>,
     n_handed_on: Cell<u64>,
+    /// The first frame that had no line when it began.
+    next: u64,
     overlay_every: u64,
     start_frame: u64,
     frame_step: u64,
@@ -254,14 +285,15 @@ impl Writer {
         let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
         let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
         let output = output.or_fail(kind)?;
-        let (queue, records) = sync_channel(QUEUE);
+        let next = output.next_frame().unwrap_or(job.start_frame);
+        let (queue, lots) = sync_channel(QUEUE);
         let n_missed = Arc::new(AtomicU64::new(0));
         let missed = Arc::clone(&n_missed);
         let n_written = Arc::new(AtomicU64::new(0));
         let written = Arc::clone(&n_written);
         let thread = Builder::new()
             .name("writer".to_owned())
-            .spawn(move || write_all(output, &records, [&missed, &written], session))
+            .spawn(move || write_all(output, &lots, [&missed, &written], session))
             .or_fail(ExitKind::Run)?;
         Ok(Self {
             queue,
@@ -269,6 +301,7 @@ impl Writer {
             n_missed,
             n_written,
             n_handed_on: Cell::new(0),
+            next,
             overlay_every,
             start_frame: job.start_frame,
             frame_step: frame_step.max(1),
@@ -282,8 +315,9 @@ impl Writer {
     }
 
     /// Hands a record on; `false` if it was missed, because too many wait already.
-    fn write(&self, record: FrameRecord) -> bool {
-        match self.queue.try_send(record) {
+    fn write(&self, Settled { absent, record }: Settled) -> bool {
+        let record = Some(record);
+        match self.queue.try_send(Lot { absent, record }) {
             Ok(()) => {
                 self.n_handed_on.set(self.n_handed_on.get() + 1);
                 true
@@ -292,6 +326,14 @@ impl Writer {
                 self.n_missed.fetch_add(1, Ordering::Relaxed);
                 false
             }
+        }
+    }
+
+    /// Hands on frames that have no result, behind all others; waits for room, for nothing follows.
+    fn rest(&self, absent: Vec<Absent>) {
+        let record = None;
+        if let Err(error) = self.queue.send(Lot { absent, record }) {
+            tracing::debug!(%error, "the writing thread is gone");
         }
     }
 
@@ -315,11 +357,13 @@ impl Writer {
 
 fn write_all(
     mut output: Output,
-    records: &Receiver<FrameRecord>,
+    lots: &Receiver<Lot>,
     [n_missed, n_written]: [&AtomicU64; 2],
     session: u64,
 ) {
-    while let Ok(record) = records.recv() {
+    while let Ok(Lot { absent, record }) = lots.recv() {
+        output.absent(&absent);
+        let Some(record) = record else { continue };
         output.frame(&record);
         n_written.fetch_add(1, Ordering::Relaxed);
     }

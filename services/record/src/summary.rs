@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::calibration::Calibration;
-use crate::pose3d::{is_placed, joints, missing};
+use crate::pose3d::{NO_RESULT, is_placed, joints, missing};
 use crate::{CameraFit, Exchanged, FrameRecord, Scene};
 
 /// What was seen and what was missed, over the whole run.
@@ -41,7 +41,7 @@ pub struct Summary {
     pub exchanged: Option<Exchanged>,
     /// Frames of all views that the cameras' side dropped.
     pub frames_dropped_by_capture: u64,
-    /// Results whose number was skipped, as far as the recorder can tell.
+    /// Frames without a result; each has a line that says why.
     pub frames_missed: u64,
     /// Results that came but were not written, because writing was too slow.
     pub frames_not_recorded: u64,
@@ -57,6 +57,7 @@ pub(crate) struct Tally {
     summary: Summary,
     squared_px: (f64, u64),
     last_frame: Option<u64>,
+    n_without: u64,
     /// By view.
     dropped: Vec<u64>,
     /// By view: bytes of evidence, and frames.
@@ -78,6 +79,7 @@ impl Tally {
             },
             squared_px: (0.0, 0),
             last_frame: None,
+            n_without: 0,
             dropped: vec![0; scene.views.len()],
             evidence: vec![[0; 2]; scene.views.len()],
             calibration: Calibration::new(scene),
@@ -105,6 +107,9 @@ impl Tally {
         let is_used = |name: &str| used.is_some_and(|it| it.iter().any(|it| *it == name));
         let missing = value["views_missing"].as_object();
         let why = |name: &str| missing.and_then(|it| it.get(name)).and_then(Value::as_str);
+        if value["status"] == NO_RESULT {
+            return self.without(frame);
+        }
         self.frame(scene, frame, value["status"] == Status::OK.reason());
         self.views(&is_used, &why);
         let joints = value["joints"].as_object();
@@ -207,9 +212,21 @@ impl Tally {
         is_first
     }
 
-    /// Results that were counted.
-    pub(crate) fn n_frames(&self) -> u64 {
-        self.summary.frames
+    /// Counts a frame that has no result.
+    pub(crate) fn without(&mut self, frame: u64) {
+        self.last_frame = Some(frame);
+        self.summary.frames_missed += 1;
+        self.n_without += 1;
+    }
+
+    /// The last frame that was counted.
+    pub(crate) fn last_frame(&self) -> Option<u64> {
+        self.last_frame
+    }
+
+    /// Frames that were counted, with a result or without.
+    pub(crate) fn n_lines(&self) -> u64 {
+        self.summary.frames + self.n_without
     }
 
     /// What was seen so far.
