@@ -104,7 +104,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let epoch = service.epoch();
     if epoch > 0 && is_complete(&file_of_life(&job.file, epoch - 1)) {
         // Killed after its work was done.
-        return rest(service, &waiter);
+        return rest(service, &waiter, &[]);
     }
     let kind = if epoch == 0 {
         ExitKind::Input
@@ -142,15 +142,14 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     }
     tape.listen()?;
     tape.settle(&channels);
-    let is_over = tape.is_over;
-    drop(tape);
+    let Tape { ears, is_over, .. } = tape;
     drop(inlet);
     finish(service, thread)?;
     if !is_over {
         // Told to end before the run did: what the file holds is whole, but it is not all.
         return Ok(());
     }
-    rest(service, &waiter)
+    rest(service, &waiter, &ears)
 }
 
 fn is_complete(file: &std::path::Path) -> bool {
@@ -170,10 +169,15 @@ fn finish(service: &Service, thread: JoinHandle<()>) -> Result<(), Failure> {
     thread.join().map_err(panicked)
 }
 
-/// Says that all is done, and waits to be told so.
-fn rest(service: &Service, waiter: &Waiter) -> Result<(), Failure> {
+/// Says that all is done, and waits to be told so. What comes is taken in all the same: where nothing may be lost a
+/// sender that speaks after the last result waits for room, and to be heard before it begins.
+fn rest(service: &Service, waiter: &Waiter, ears: &[Ear]) -> Result<(), Failure> {
     service.health().finished();
-    while waiter.wait(Duration::from_secs(1))? != Woken::Stop {}
+    while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
+        for ear in ears {
+            while ear.hear(|_| false)?.is_some() {}
+        }
+    }
     Ok(())
 }
 

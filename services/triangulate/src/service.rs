@@ -274,6 +274,16 @@ impl<'a> Stage<'a> {
             .collect()
     }
 
+    /// Takes in what comes after the end.
+    fn discard(&self) {
+        for it in &self.poses {
+            while it.receive().is_ok_and(|it| it.is_some()) {}
+        }
+        for it in &self.pairs {
+            while it.receive().is_ok_and(|it| it.is_some()) {}
+        }
+    }
+
     fn end(&self, waiter: &Waiter) -> Result<(), Failure> {
         let say = || -> Result<(), Failure> {
             let end = wire::end_of_results(self.service.session());
@@ -282,7 +292,12 @@ impl<'a> Stage<'a> {
         };
         say()?;
         self.service.health().finished();
-        waiter.linger(|| self.publisher.n_connected(), say)
+        // Who was given up on as silent may speak again; nobody shall wait for room here.
+        let n_connected = || {
+            self.discard();
+            self.publisher.n_connected()
+        };
+        waiter.linger(n_connected, say)
     }
 }
 

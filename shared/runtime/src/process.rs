@@ -61,14 +61,15 @@ impl Service {
     }
 
     /// How long to wait for receivers before the first message. All processes of a deployment begin
-    /// at the same time and take as long as they take; one that was restarted finds the others there.
+    /// at the same time and take as long as they take; one that was restarted finds the others there. Where nothing
+    /// may be lost, who comes later misses what was said before: receivers are waited for as long as for room.
     ///
     /// * `deadline`: how long anybody is waited for later on.
     pub fn patience_at_start(&self, deadline: Duration) -> Duration {
-        if self.launch.epoch == 0 {
-            deadline.max(BEGINNING)
-        } else {
-            deadline
+        match (self.launch.epoch, self.launch.delivery) {
+            (0, Delivery::Lossless) => deadline.max(self.bus.patience()),
+            (0, Delivery::Realtime) => deadline.max(BEGINNING),
+            _ => deadline,
         }
     }
 }
