@@ -23,6 +23,14 @@ pub enum RigError {
         /// Position in the list, from 0.
         index: usize,
     },
+    /// A name that cannot be that of a folder.
+    #[error("camera {index} is named {name:?}; expected {PLAIN_NAME}")]
+    Name {
+        /// Position in the list, from 0.
+        index: usize,
+        /// The name.
+        name: String,
+    },
     /// Two cameras of one name.
     #[error("two cameras are named {name:?}")]
     DuplicateName {
@@ -192,6 +200,10 @@ impl Rig {
         for (index, camera) in cameras.iter().enumerate() {
             if camera.name.is_empty() {
                 return Err(RigError::EmptyName { index });
+            }
+            if !is_plain_name(&camera.name) {
+                let name = camera.name.clone();
+                return Err(RigError::Name { index, name });
             }
             if cameras[..index]
                 .iter()
@@ -389,3 +401,15 @@ fn check_image(camera: &Camera) -> Result<(), RigError> {
 
 #[cfg(test)]
 mod tests;
+
+/// What [`is_plain_name`] asks for, in words.
+pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with neither a dot nor a space, without / \\ , \" and control \
+                              characters: the name of a camera becomes that of a folder";
+
+/// Whether a name can be that of a folder, and stand in a line of a table.
+pub fn is_plain_name(name: &str) -> bool {
+    (1..=64).contains(&name.len())
+        && !name.starts_with(['.', ' '])
+        && !name.contains(['/', '\\', ',', '"'])
+        && !name.chars().any(char::is_control)
+}

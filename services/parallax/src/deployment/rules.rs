@@ -96,6 +96,12 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             &format!("twice {:?}", camera.name),
             "every camera once",
         )?;
+        demand(
+            geometry::is_plain_name(&camera.name),
+            "camera.name",
+            &format!("{:?}", camera.name),
+            geometry::PLAIN_NAME,
+        )?;
     }
     Ok(())
 }
@@ -280,7 +286,7 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
         ("capture", n_views),
         ("pose", n_views),
         ("quality", n_views),
-        ("fuse", deployment.fuse.workers),
+        ("fuse", deployment.fuse.most_workers()),
         ("triangulate", 0),
         ("record", 0),
     ];

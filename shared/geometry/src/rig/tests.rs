@@ -37,6 +37,29 @@ fn refuses_empty_and_repeated_names() {
 }
 
 #[test]
+fn refuses_names_that_lead_out_of_a_folder_or_break_a_line() {
+    let long = "c".repeat(65);
+    for name in [
+        "../x", "..", ".", "/", "a/b", "a\\b", "a\nb", "a,b", " a", "\0", &long,
+    ] {
+        let expected = RigError::Name {
+            index: 1,
+            name: name.to_owned(),
+        };
+        assert_eq!(refusal(|c| c.name = name.to_owned()), expected);
+    }
+    for name in [
+        "C1",
+        "int_cam-2.img",
+        "Kamera (links)",
+        "caméra 3",
+        "21:09+x#1",
+    ] {
+        assert!(is_plain_name(name), "{name}");
+    }
+}
+
+#[test]
 fn refuses_numbers_that_are_none() {
     let nan = LensModel::KannalaBrandt {
         k: [0.0, f64::NAN, 0.0, 0.0],
