@@ -6,6 +6,7 @@ use crate::common;
 use std::fs;
 use std::path::Path;
 
+use common::started::signal;
 use common::{Case, Ended, PLAIN};
 use serde_json::{Value, json};
 
@@ -161,4 +162,56 @@ fn a_changed_byte_of_a_recording_is_named_and_its_message_left_out() {
         assert!(frame >= 3 || before == after, "{before}\n{after}");
     }
     assert_eq!(after.lines().count(), N_FRAMES, "{after}");
+}
+
+#[test]
+fn a_sender_that_comes_after_the_last_result_is_heard_all_the_same() {
+    const N_FRAMES: usize = 12;
+    let case = Case::new("after", &[N_FRAMES; 2], PLAIN);
+    recorded(&case, &[]);
+    let patient = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
+    let arguments = [
+        "replay",
+        "run.mcap",
+        "--from",
+        "triangulate",
+        "--out",
+        "late",
+    ];
+    let patient = ["--set", patient[0], "--set", patient[1]];
+    let mut started = case.start(&[&arguments[..], &patient].concat());
+    // Its frames have no part in the results, which are all there before it begins.
+    let pid = started.pid_of("replay --stage capture --index 1");
+    signal("STOP", pid.into());
+    started.until("all results", |folder| {
+        let text = |name: &str| fs::read_to_string(folder.join("late").join(name));
+        let text = text("pose3d.jsonl").or_else(|_| text("pose3d.jsonl.part"));
+        text.is_ok_and(|it| it.lines().count() == N_FRAMES)
+    });
+    signal("CONT", pid.into());
+    let ended = started.wait();
+    case.assert_nothing_left();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for said in ["without all receivers", "had no room"] {
+        assert!(!ended.stderr.contains(said), "{}", ended.stderr);
+    }
+}
+
+#[test]
+fn all_views_at_once_are_recorded_and_replayed_however_many_workers_are_asked_for() {
+    let at_once = PLAIN.replace("workers = 2", "workers = 2\nviews = \"all\"");
+    let case = Case::new("at-once", &[4; 3], &at_once);
+    recorded(&case, &["--without", "pixels"]);
+    for from in ["fuse", "triangulate"] {
+        let ended = replayed(&case, &["--from", from, "--out", from]);
+        assert_eq!(
+            ended.status.code(),
+            Some(0),
+            "from {from}: {}",
+            ended.stderr
+        );
+        let [before, after] = [case.path("out"), case.path(from)];
+        let [before, after] = [before, after].map(|it| text(&it, "pose3d.jsonl"));
+        assert_eq!(before, after, "from {from}");
+    }
 }

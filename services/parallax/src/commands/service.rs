@@ -268,7 +268,7 @@ fn tape(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let tape = tape
         .ok_or("there is no recording")
         .or_fail(ExitKind::Config)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let processes = plan::processes(resolved, &prepared, Path::new(""));
     let job = tape::Job {
         file: tape.file.clone(),
@@ -290,7 +290,7 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
     let (it, stage) = recording
         .ok_or("there is no recording, or no --stage")
         .or_fail(ExitKind::Config)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.workers);
+    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let audience = Audience::new(resolved, &dealing);
     let line = |topic: String, n_consumers: usize| replay::Line { topic, n_consumers };
     let lines = match stage {
