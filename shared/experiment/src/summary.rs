@@ -39,6 +39,8 @@ pub struct Summary {
     pub schema_version: u32,
     /// Names of the versions, in the order of [`Group::versions`].
     pub versions: Vec<String>,
+    /// The version that gains and changes of all others are counted against; none where there is none.
+    pub compared_with: Option<String>,
     /// What the confidence intervals hold.
     pub confidence: f64,
     /// The sequences, then the groups of them.
@@ -173,6 +175,7 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
     Summary {
         schema_version: 1,
         versions: versions.to_vec(),
+        compared_with: versions.first().cloned(),
         confidence: bootstrap.confidence,
         groups,
         predictions: Vec::new(),
