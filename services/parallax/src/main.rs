@@ -3,6 +3,7 @@
 
 mod audience;
 mod budget;
+mod claim;
 mod cli;
 mod commands;
 mod deployment;
@@ -11,6 +12,7 @@ mod exit;
 mod inputs;
 mod judged;
 mod live;
+mod nothing;
 mod output;
 mod padding;
 mod plan;

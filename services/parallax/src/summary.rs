@@ -14,6 +14,7 @@ use supervise::{Event, Outcome};
 
 use crate::budget::{self, Budget};
 use crate::live;
+use crate::nothing;
 use crate::output;
 use crate::plan::Resolved;
 use crate::views::ViewReport;
@@ -254,13 +255,20 @@ impl Report {
             &["frames_not_recorded", "writes_failed"]
         };
         !self.interrupted
-            && (!self.given_up.is_empty()
+            && (self.why_nothing().is_some()
+                || !self.given_up.is_empty()
                 || !self.restarts.is_empty()
                 || self.recorded.is_null()
                 || self.exchanged().is_some()
                 || (self.is_lossless && count("frames") < self.n_frames)
                 || lost.iter().any(|it| count(it) > 0)
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
+    }
+
+    /// Why there is no result in space; nothing is said of an interrupted run.
+    fn why_nothing(&self) -> Option<String> {
+        let is_told = !self.interrupted && !self.recorded.is_null();
+        is_told.then(|| nothing::why(&self.recorded["summary"], &self.views))?
     }
 
     /// For programs.
@@ -273,6 +281,7 @@ impl Report {
             "seconds": self.seconds,
             "interrupted": self.interrupted,
             "degraded": self.is_degraded(),
+            "no_results": self.why_nothing(),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
@@ -320,6 +329,9 @@ impl Report {
             )?;
             if let Some(px) = it["reprojection_px"].as_f64() {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
+            }
+            if let Some(why) = self.why_nothing() {
+                writeln!(text, "  no results    {why}")?;
             }
             self.write_views(text)?;
             self.write_misplaced(text)?;

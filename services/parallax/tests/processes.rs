@@ -164,3 +164,51 @@ fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
     );
     assert_eq!(ended.status.code(), Some(7), "{report:#}\n{}", ended.stderr);
 }
+
+#[test]
+fn an_output_folder_belongs_to_one_run_at_a_time() {
+    let [first, second] = ["first", "second"].map(|it| Case::new(it, &[400; 2], PACED));
+    let mut started = first.start(&["run", "deployment.toml"]);
+    started.until("three frames", |_| first.lines("pose3d.jsonl").len() >= 3);
+    let out = first.path("out");
+    let into = ["--out", out.to_str().unwrap()];
+    let ended = second.start(&[&["run", "deployment.toml"][..], &into].concat());
+    let ended = ended.wait_among_others();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    for said in [&format!("process {}", started.id()), &first.name] {
+        assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
+    }
+    second.assert_nothing_left();
+    // A dead one blocks nobody, and what it had written is whole.
+    signal("KILL", started.id());
+    assert_eq!(started.wait_among_others().status.code(), None);
+    let more = ["--set", "capture.pace=\"fast\""];
+    let ended = second.start(&[&["run", "deployment.toml"][..], &into, &more].concat());
+    let ended = ended.wait_among_others();
+    assert_ne!(ended.status.code(), Some(1), "{}", ended.stderr);
+    assert!(
+        !ended.stderr.contains("is being written to"),
+        "{}",
+        ended.stderr
+    );
+    first.start(&["clean", &first.name]).wait();
+    first.assert_nothing_left();
+}
+
+#[test]
+fn the_name_of_a_camera_leads_nowhere() {
+    let case = Case::new("escape", &[2; 2], PLAIN);
+    let name = "../../../../x_escape";
+    case.edit(
+        "deployment.toml",
+        "name = \"b\"",
+        &format!("name = {name:?}"),
+    );
+    let ended = case.run();
+    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let rig = std::fs::read_to_string(case.path("rig.toml")).unwrap();
+    case.write("rig.toml", rig.replace("\"b\"", &format!("{name:?}")));
+    let ended = case.start(&["calib", "check", "rig.toml"]).wait();
+    assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("without /"), "{}", ended.stderr);
+}

@@ -25,10 +25,18 @@ pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     file.with_extension(format!("{epoch}.{ending}"))
 }
 
-/// Makes a file that is not there yet, for its owner only: it shows people.
+/// Makes a file that is not there yet, for its owner only: it shows people. It is locked as long as it is written.
 pub(crate) fn create(file: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
-    options.write(true).create_new(true).mode(0o600).open(file)
+    let made = options
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(file)?;
+    if let Err(error) = made.try_lock() {
+        tracing::debug!(%error, "cannot lock the recording");
+    }
+    Ok(made)
 }
 
 /// What is to be written.
@@ -99,7 +107,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("run.mcap");
         create(&file).unwrap();
-        let refused = create(&file).unwrap_err();
+        let refused = create(&file).map(drop).unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
     }
 }

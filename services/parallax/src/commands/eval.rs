@@ -18,9 +18,11 @@ use sequences::{Alignment, Sequence, SequenceError};
 use viewquality::Forecaster;
 
 use super::judge::selection;
+use crate::claim::Claim;
 use crate::cli::Globals;
 use crate::deployment::fuse_numbers;
 use crate::inputs;
+use crate::nothing;
 use crate::shipped::{self, Shipped};
 use job::Job;
 
@@ -178,6 +180,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Some(file) => Some(inputs::network(file, model.n_parts())?),
         None => None,
     };
+    let _mine = Claim::of(&arguments.out, "eval")?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
     let pool = rayon::ThreadPoolBuilder::new()
@@ -215,7 +218,13 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Err(failure.with_hint("--resume goes on where it was"));
     }
     match done.n_missing {
-        0 => Ok(ExitCode::SUCCESS),
+        0 => {
+            let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
+            nothing::unless(
+                is_judged,
+                "no frame was judged: there is none, or --only and --every leave none",
+            )
+        }
         n => {
             let message = format!("{n} frames were left out: the footage ended before the truth");
             Err(Failure::new(ExitKind::Degraded, message))

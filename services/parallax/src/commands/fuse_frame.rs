@@ -165,7 +165,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     } else {
         report.print()?;
     }
-    Ok(ExitCode::SUCCESS)
+    let is_found = estimate.skeleton.joints.iter().any(Result::is_ok);
+    crate::nothing::unless(is_found, "no joint has a place in space")
 }
 
 /// The cameras that were given an image, in the rig's order, with their images framed.

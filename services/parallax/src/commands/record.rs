@@ -2,6 +2,7 @@
 
 mod room;
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -151,6 +152,13 @@ fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
             let message = format!("{} is there already", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
             return Err(failure.with_hint("take another name, or --force to replace it"));
+        }
+        let busy = File::open(&file)
+            .is_ok_and(|it| matches!(it.try_lock_shared(), Err(TryLockError::WouldBlock)));
+        if busy {
+            let message = format!("{} is being recorded to by another run", file.display());
+            let failure = Failure::new(ExitKind::Config, message);
+            return Err(failure.with_hint("wait until it ends, or take another name"));
         }
         std::fs::remove_file(&file).map_err(|error| crate::inputs::in_file(&file, &error))?;
     }

@@ -11,12 +11,13 @@ use runtime::{
 use supervise::{Event, Plan};
 use tracing::Level;
 
+use crate::claim::Claim;
 use crate::cli::Globals;
 use crate::deployment::{Deployment, Loaded};
 use crate::plan::{self, Resolved};
 use crate::prepare::Prepared;
 use crate::summary::{Report, Watcher};
-use crate::{inputs, output, scheduling};
+use crate::{output, scheduling};
 
 /// What to run.
 #[derive(Debug, Args)]
@@ -24,7 +25,9 @@ use crate::{inputs, output, scheduling};
 A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
 pose3d.jsonl, pose3d.csv, pose3d.trc, pose2d.jsonl, times.jsonl, latency.json, summary.json, deployment.json and
 overlays/, all for their user alone; files of an earlier run are replaced when the new ones are whole, until then they
-are called *.part.
+are called *.part. Every frame has one line of pose3d.jsonl, in order: its result, or with status \"no result\" the
+reason why it has none; in pose3d.trc its row is then blank. The folder belongs to one run at a time. A run without
+any result is degraded, and says why.
 
 Examples:
     parallax run configs/pose2sim-balancing.toml
@@ -164,6 +167,7 @@ impl Planned {
         let deployment = &self.resolved.deployment;
         let folder = &deployment.output;
         inputs::make_folder(folder)?;
+        let _mine = Claim::of(folder, &format!("deployment {}", deployment.name))?;
         self.resolved.write(&file_of(deployment))?;
         let begin = Instant::now();
         let mut watcher = Watcher::new(&self.resolved, globals.quiet);

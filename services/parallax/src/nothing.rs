@@ -1,0 +1,88 @@
+//! Runs that gave nothing: why, in words.
+
+use std::process::ExitCode;
+
+use runtime::{ExitKind, Failure};
+use serde_json::Value;
+
+use crate::views::ViewReport;
+
+/// Ends a command that found nothing as degraded.
+pub(crate) fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
+    let failure = || Failure::new(ExitKind::Degraded, what);
+    is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)
+}
+
+/// Why a run has no result in space, if that is for a reason other than that nobody was to be seen.
+///
+/// * `summary`: of the recorder.
+pub(crate) fn why(summary: &Value, views: &[ViewReport]) -> Option<String> {
+    let count = |key: &str| summary[key].as_u64().unwrap_or(0);
+    if views.iter().all(|it| it.frames == 0) {
+        return Some("the footage has no frame".to_owned());
+    }
+    if count("frames") == 0 {
+        let views: Vec<String> = views.iter().map(ToString::to_string).collect();
+        return Some(format!(
+            "no frame got a result ({}); this machine may be too slow for so many views: fewer or smaller \
+             pictures, a lower capture.frame_rate_hz, or capture.mode = \"lossless\"",
+            views.join("; ")
+        ));
+    }
+    let has_people = views.iter().any(|it| it.used > 0);
+    if count("frames_with_pose") == 0 && views.len() > 1 && has_people {
+        return Some(format!(
+            "views show somebody, but none of {} results has a joint in space: see `calib check`, and \
+             whether the footage is of one moment",
+            count("frames")
+        ));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use serde_json::json;
+
+    use super::*;
+
+    fn view(frames: u64, used: u64) -> ViewReport {
+        ViewReport {
+            name: "a".to_owned(),
+            frames,
+            used,
+            empty: 0,
+            late: 0,
+            dropped: frames - used,
+            lost: 0,
+            unanswered: 0,
+            faults: BTreeMap::new(),
+            missing: Vec::new(),
+        }
+    }
+
+    fn why_of(frames: u64, with_pose: u64, views: &[ViewReport]) -> String {
+        let summary = json!({ "frames": frames, "frames_with_pose": with_pose });
+        why(&summary, views).unwrap_or_default()
+    }
+
+    #[test]
+    fn a_run_without_any_result_says_why() {
+        let dropped = why_of(0, 0, &[view(30, 0), view(30, 0)]);
+        assert!(dropped.contains("no frame got a result"), "{dropped}");
+        assert!(dropped.contains("a: 0 of 30 frames"), "{dropped}");
+        let none = why_of(0, 0, &[view(0, 0)]);
+        assert!(none.contains("no frame"), "{none}");
+        let flat = why_of(3, 0, &[view(3, 3), view(3, 3)]);
+        assert!(flat.contains("none of 3 results"), "{flat}");
+    }
+
+    #[test]
+    fn a_room_without_people_and_a_single_view_are_no_failure() {
+        assert_eq!(why_of(3, 0, &[view(3, 0), view(3, 0)]), "");
+        assert_eq!(why_of(3, 0, &[view(3, 3)]), "");
+        assert_eq!(why_of(3, 1, &[view(3, 3), view(3, 3)]), "");
+    }
+}
