@@ -330,9 +330,6 @@ impl Report {
             if let Some(px) = it["reprojection_px"].as_f64() {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
             }
-            if let Some(why) = self.why_nothing() {
-                writeln!(text, "  no results    {why}")?;
-            }
             self.write_views(text)?;
             self.write_misplaced(text)?;
             self.write_latency(text)?;
@@ -369,6 +366,9 @@ impl Report {
     }
 
     fn write_views(&self, text: &mut String) -> core::fmt::Result {
+        if let Some(why) = self.why_nothing() {
+            writeln!(text, "  no results    {why}")?;
+        }
         let used = &self.recorded["summary"]["views_used"];
         let used: Vec<String> = used
             .as_array()

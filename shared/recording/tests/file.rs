@@ -274,8 +274,11 @@ proptest! {
     }
 }
 
+/// Topic, entry and bytes of a message.
+type Given = (String, Vec<Entry>, Vec<u8>);
+
 /// All that a recording gives: what it says about itself, and of every topic the messages that can be read.
-fn given(file: &[u8]) -> Option<(Recording, Vec<(String, Vec<Entry>, Vec<u8>)>, usize)> {
+fn given(file: &[u8]) -> Option<(Recording, Vec<Given>, usize)> {
     let recording = scan(&mut Cursor::new(file)).ok()?;
     let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();
     let mut all = Vec::new();
@@ -322,7 +325,7 @@ fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
 }
 
 /// Where a message was found by the checksum of its chunk, its frame and its own checksum are not known.
-fn same(it: &mut (String, Vec<Entry>, Vec<u8>), other: &(String, Vec<Entry>, Vec<u8>)) -> bool {
+fn same(it: &mut Given, other: &Given) -> bool {
     for (entry, other) in it.1.iter_mut().zip(&other.1) {
         if entry.checksum.is_none() {
             (entry.frame, entry.checksum) = (other.frame, other.checksum);

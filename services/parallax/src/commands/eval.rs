@@ -217,6 +217,11 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         let failure = Failure::new(ExitKind::Interrupted, "interrupted");
         return Err(failure.with_hint("--resume goes on where it was"));
     }
+    outcome(&done)
+}
+
+/// Whether all that was asked for was judged.
+fn outcome(done: &job::Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
             let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
