@@ -59,7 +59,7 @@ impl Search {
     }
 
     /// Refuses a search that this machine has no memory for.
-    pub(crate) fn check_memory(&self, layout: &Layout) -> Result<(), TooLarge> {
+    pub(crate) fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
         let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
         let [width, height] = layout.image_size;
         match available_bytes() {

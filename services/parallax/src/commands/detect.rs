@@ -101,12 +101,8 @@ pub(crate) struct Arguments {
 
 /// A side that can be searched.
 fn side(text: &str) -> Result<usize, String> {
-    let wrong = || format!("expected 40 to 65535 pixels, got {text:?}");
-    let side: usize = text.parse().map_err(|_| wrong())?;
-    (40..=65535)
-        .contains(&side)
-        .then_some(side)
-        .ok_or_else(wrong)
+    let side = text.parse().ok().filter(|it| (40..=65535).contains(it));
+    side.ok_or_else(|| format!("expected 40 to 65535 pixels, got {text:?}"))
 }
 
 /// A precision that this machine has.
@@ -252,7 +248,8 @@ impl Detector<'_> {
         if [width, height] != [whole.width, whole.height] {
             notes.push(format!("searched at {width}x{height} of {whole}"));
         }
-        let notes: String = notes.iter().map(|it| format!("; {it}")).collect();
+        let notes = [String::new()].into_iter().chain(notes);
+        let notes = notes.collect::<Vec<_>>().join("; ");
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
         let frame = picture

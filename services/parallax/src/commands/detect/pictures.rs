@@ -126,7 +126,7 @@ impl Searched {
         let size = bounded(picture.size, longest);
         let layout = Layout::new(&search.model, size.width, size.height);
         let layout = layout.map_err(|error| inputs::in_file(&picture.path, &error))?;
-        search.check_memory(&layout).map_err(|needed| {
+        Search::check_memory(&layout).map_err(|needed| {
             let message = format!("{}: {needed}", picture.path.display());
             let hint = "leave --full out, or ask for a smaller --size";
             Failure::new(ExitKind::Input, message).with_hint(hint)
