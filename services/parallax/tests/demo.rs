@@ -46,6 +46,8 @@ fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
         "the same on standard output and in the file"
     );
 
+    assert_eq!(report["machine"], Value::Null, "who says a rate has it");
+    assert_eq!(report["frame_rate_hz"], 1.5);
     let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
     let killed = &report["killed"];
     assert_eq!(report["killed_camera"], "c3");
@@ -140,6 +142,18 @@ fn a_missed_limit_has_an_exit_code_of_its_own_and_is_named() {
         (&json!(false), &Value::Null)
     );
     assert_eq!(report["run"]["restarts"], json!([]), "nobody was killed");
+    // The machine was measured before and after; the slower of the two is told, and what it gives the cameras.
+    let machine = &report["machine"];
+    let [frame_ms, rate_hz, slowness] =
+        ["frame_ms", "rate_hz", "slowness"].map(|key| machine[key].as_f64().unwrap());
+    let cameras_hz = report["frame_rate_hz"].as_f64().unwrap();
+    assert!(frame_ms > 0.0 && slowness >= 1.0, "{machine:#}");
+    assert!((rate_hz..=5.0).contains(&cameras_hz), "{machine:#}");
+    assert!(
+        ended.stderr.contains("a frame of 4 cameras takes"),
+        "{}",
+        ended.stderr
+    );
     let page = fs::read_to_string(case.path("demo/report.html")).unwrap();
     assert!(page.contains("limits missed"));
 }

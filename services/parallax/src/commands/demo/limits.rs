@@ -24,10 +24,12 @@ pub(super) struct Asked {
     /// Least PCP3D at gamma 0.5 over all results, percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     min_pcp3d: f64,
-    /// Longest time until the killed camera has a frame in a result again, milliseconds.
+    /// Longest time until the killed camera has a frame in a result again, milliseconds on a machine that keeps up
+    /// with 5 frames a second.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest time without a result while the killed camera is away, milliseconds.
+    /// Longest time without a result while the killed camera is away, milliseconds on a machine that keeps up with
+    /// 5 frames a second.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }
@@ -45,6 +47,10 @@ pub(super) struct Measured<'a> {
     pub cost: Option<&'a Cost>,
     /// How long a stage waits for a view that is late.
     pub deadline_ms: f64,
+    /// How many times as long everything takes here as on a machine that keeps up with 5 frames a second.
+    pub slowness: f64,
+    /// How many times as far apart frames are as there.
+    pub spread: f64,
     /// The frames of every view.
     pub views: &'a [ViewReport],
     /// Processes that ended without being asked to, other than the one that was killed.
@@ -75,13 +81,13 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
         limits.extend([
             at_most(
                 "killed camera back after, ms",
-                asked.max_return_ms,
+                (it.spread * asked.max_return_ms).round(),
                 cost.back_ms,
             ),
             at_least("results of the others meanwhile", least, results),
             at_most(
                 "longest pause of results meanwhile, ms",
-                asked.max_pause_ms,
+                (it.slowness * asked.max_pause_ms).round(),
                 cost.longest_pause_ms,
             ),
         ]);
@@ -167,6 +173,8 @@ mod tests {
         views: Vec<ViewReport>,
         failed: Vec<String>,
         n_unwritten: u64,
+        slowness: f64,
+        spread: f64,
     }
 
     impl Run {
@@ -178,6 +186,8 @@ mod tests {
                 views: vec![view(1), view(1)],
                 failed: Vec::new(),
                 n_unwritten: 0,
+                slowness: 1.0,
+                spread: 1.0,
             };
             change(&mut run);
             run
@@ -194,6 +204,8 @@ mod tests {
                 score: &self.score,
                 cost: self.cost.as_ref(),
                 deadline_ms: 500.0,
+                slowness: self.slowness,
+                spread: self.spread,
                 views: &self.views,
                 failed: &self.failed,
                 n_unwritten: self.n_unwritten,
@@ -248,6 +260,33 @@ mod tests {
             assert_eq!(missed(change), [expected]);
         }
         assert_eq!(missed(|it| it.n_unwritten = 1), ["results not written"]);
+    }
+
+    #[test]
+    fn a_slower_machine_has_longer_by_the_clock_and_nothing_else() {
+        let slow = |it: &mut Run| (it.slowness, it.spread) = (3.0, 2.0);
+        for (back_ms, pause_ms, expected) in [
+            (16_000.0, 6000.0, &[][..]),
+            (16_001.0, 6000.0, &["killed camera back after, ms"]),
+            (
+                16_000.0,
+                6001.0,
+                &["longest pause of results meanwhile, ms"],
+            ),
+        ] {
+            let got = missed(|it| {
+                slow(it);
+                if let Some(cost) = &mut it.cost {
+                    (cost.back_ms, cost.longest_pause_ms) = (Some(back_ms), Some(pause_ms));
+                }
+            });
+            assert_eq!(got, expected);
+        }
+        let got = missed(|it| {
+            slow(it);
+            it.score = score(Some(49.9));
+        });
+        assert_eq!(got, ["PCP3D at 0.5, %"]);
     }
 
     #[test]

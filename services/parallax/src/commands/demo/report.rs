@@ -56,6 +56,8 @@ impl Report {
             score: &scores[0].1,
             cost: cost.as_ref(),
             deadline_ms: run.deadline_ms,
+            slowness: run.machine.map_or(1.0, |it| it.slowness()),
+            spread: run.machine.map_or(1.0, |it| it.spread()),
             views: run.ran.views(),
             failed: &run
                 .ran
@@ -87,6 +89,7 @@ impl Report {
             "frames_with_result": run.moments.len(),
             "frames_with_skeleton": run.moments.iter().filter(|it| it.is_posed()).count(),
             "frame_rate_hz": run.rate_hz,
+            "machine": run.machine.map(|it| it.json()),
             "processes": run.processes,
             "gamma": GAMMA,
             "accuracy": { "all": all.1, "every_camera": complete.1, "without_killed": without.1 },
