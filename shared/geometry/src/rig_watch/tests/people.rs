@@ -27,8 +27,9 @@ fn person(at: Vector3<f64>, turn: f64, arms: [f64; 2]) -> Vec<Point3<f64>> {
         let shoulder = Vector3::new(0.2 * side, 0.0, 0.45);
         let along = Vector3::new(side * raised.sin(), 0.3 * raised.sin(), -raised.cos());
         points.extend((0..ARM).map(|it| shoulder + along * (0.13 * it as f64)));
-        points.extend((0..3).map(|it| Vector3::new(0.17 * side, 0.0, 0.3 - 0.15 * it as f64)));
-        points.extend((0..4).map(|it| Vector3::new(0.12 * side, 0.03, -0.1 - 0.25 * it as f64)));
+        points.extend((0..3).map(|it| Vector3::new(0.17 * side, 0.0, 0.3 - 0.15 * f64::from(it))));
+        points
+            .extend((0..4).map(|it| Vector3::new(0.12 * side, 0.03, -0.1 - 0.25 * f64::from(it))));
     }
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
     points
