@@ -131,10 +131,8 @@ pub(crate) fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     });
     text.extend(named);
     if damaged.len() > MOST_NAMED {
-        text += &format!(
-            "\n    and {} more; --json names all",
-            damaged.len() - MOST_NAMED
-        );
+        let more = damaged.len() - MOST_NAMED;
+        text.extend([format!("\n    and {more} more; --json names all")]);
     }
     (!damaged.is_empty()).then_some(text)
 }
