@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 use std::io::Cursor;

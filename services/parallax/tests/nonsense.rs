@@ -1,7 +1,7 @@
 //! Footage, calibrations and settings that cannot belong together: refused before the start, or named, with numbers.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+use crate::common;
 
 use std::fs;
 
