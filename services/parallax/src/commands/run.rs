@@ -14,6 +14,7 @@ use tracing::Level;
 use crate::claim::Claim;
 use crate::cli::Globals;
 use crate::deployment::{Deployment, Loaded};
+use crate::inputs;
 use crate::plan::{self, Resolved};
 use crate::prepare::Prepared;
 use crate::summary::{Report, Watcher};

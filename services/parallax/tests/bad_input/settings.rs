@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::common::Case;
 
-use crate::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check, section};
+use super::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check, section};
 
 const fn config(
     what: &'static str,
@@ -398,7 +398,7 @@ const INPUTS: &[Mistake] = &[
     ),
     rig(
         "size as text",
-        |it| crate::replace_line(it, "size_px", "size_px = \"96x128\""),
+        |it| super::replace_line(it, "size_px", "size_px = \"96x128\""),
         &[
             "rig.toml",
             "size_px = \"96x128\"",
@@ -408,7 +408,7 @@ const INPUTS: &[Mistake] = &[
     ),
     rig(
         "negative focal length",
-        |it| crate::replace_line(it, "focal_px", "focal_px = [-170.0, 170.0]"),
+        |it| super::replace_line(it, "focal_px", "focal_px = [-170.0, 170.0]"),
         &["rig.toml", "camera \"a\"", "-170"],
         &["is not positive"],
     ),

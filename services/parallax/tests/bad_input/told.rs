@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use super::mistakes::{section, source};
 use crate::common::{Case, PLAIN};
-use crate::mistakes::{section, source};
 
 #[test]
 fn a_file_says_where_its_data_come_from() {
