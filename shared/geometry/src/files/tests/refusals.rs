@@ -340,8 +340,8 @@ fn formats_say_what_they_have_no_words_for() {
         let error = write(folder.path(), format, rig).expect_err("no words");
         error.source().map(ToString::to_string).unwrap_or_default()
     };
-    assert!(cause(Format::HumanEva, &fisheye).contains("KannalaBrandt"));
-    assert!(cause(Format::Umpm, &fisheye).contains("KannalaBrandt"));
+    assert!(cause(Format::HumanEva, &fisheye).contains("Kannala-Brandt"));
+    assert!(cause(Format::Umpm, &fisheye).contains("Kannala-Brandt"));
     assert!(cause(Format::Qualisys, &fisheye).contains("only read"));
     assert!(cause(Format::Panoptic, &fisheye).contains("only read"));
     let named = |name: &str| {
