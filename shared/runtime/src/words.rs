@@ -117,7 +117,8 @@ fn wanted(asked: &str) -> String {
     match asked {
         "u8" => "a whole number from 0 to 255",
         "u16" => "a whole number from 0 to 65535",
-        "u32" | "u64" | "usize" | "u128" => "a whole number of at least 0",
+        "u32" => "a whole number of at least 0 and at most 4294967295",
+        "u64" | "usize" | "u128" => "a whole number of at least 0",
         "i8" | "i16" | "i32" | "i64" | "isize" | "i128" => "a whole number",
         "f32" | "f64" => "a number",
         "a boolean" => "true or false",
@@ -144,7 +145,7 @@ mod tests {
         );
         check(
             "invalid type: integer `99999999999999999999` as i128, expected u32",
-            "expected a whole number of at least 0, found 99999999999999999999",
+            "expected a whole number of at least 0 and at most 4294967295, found 99999999999999999999",
         );
         check(
             "invalid type: map, expected a sequence",

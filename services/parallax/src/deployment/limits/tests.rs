@@ -37,7 +37,7 @@ const ROWS: &[Row] = &[
         &[
             ("[0, 480]", "is 0, expected 1 to 16384"),
             ("[480, 99999]", "is 99999"),
-            ("[-1, 2]", "invalid value"),
+            ("[-1, 2]", "expected a whole number"),
         ],
         &["[272, 480]"],
     ),
@@ -67,7 +67,7 @@ const ROWS: &[Row] = &[
     (
         "capture.start_frame",
         &[
-            ("-1", "invalid value"),
+            ("-1", "expected a whole number"),
             ("9223372036854775807", "expected 0 to"),
         ],
         &["0", "5000"],
@@ -87,7 +87,10 @@ const ROWS: &[Row] = &[
     ),
     (
         "capture.frozen_after",
-        &[("-1", "invalid value"), ("99999999999", "invalid value")],
+        &[
+            ("-1", "expected a whole number"),
+            ("99999999999", "invalid value"),
+        ],
         &["0", "10"],
     ),
     (
@@ -116,7 +119,10 @@ const ROWS: &[Row] = &[
     ),
     (
         "pose.tracked_levels",
-        &[("-1", "invalid value"), ("65536", "invalid value")],
+        &[
+            ("-1", "expected a whole number"),
+            ("65536", "invalid value"),
+        ],
         &["2"],
     ),
     (
@@ -146,7 +152,7 @@ const ROWS: &[Row] = &[
     (
         "quality.deadline_ms",
         &[
-            ("-1", "invalid value"),
+            ("-1", "expected a whole number"),
             ("9223372036854775807", "expected 0 to 3600000"),
         ],
         &["0", "50"],
@@ -240,7 +246,7 @@ const ROWS: &[Row] = &[
     ),
     (
         "record.overlay_every",
-        &[("-1", "invalid value")],
+        &[("-1", "expected a whole number")],
         &["0", "10"],
     ),
     (
