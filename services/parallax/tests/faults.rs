@@ -49,26 +49,18 @@ impl Struck {
         frames.collect()
     }
 
-    /// The frames that have a result, and those that are counted as missed, are all that there were.
-    fn assert_all_accounted_for(&self) {
-        let frames = self.frames();
-        assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
-        assert_eq!(frames.last(), Some(&(N_FRAMES - 1)), "{}", self.said);
-        let missed = N_FRAMES as usize - frames.len();
-        assert_eq!(self.summary["frames_missed"], json!(missed), "{frames:?}");
-        assert!(missed < 40, "it was not back soon: {frames:?}");
-    }
-
     fn assert_every_frame(&self) {
         let expected: Vec<u64> = (0..N_FRAMES).collect();
         assert_eq!(self.frames(), expected, "{}", self.said);
     }
 
     /// Frames without a result say why, are few, and are counted.
-    fn assert_reasons(&self, expected: &[&str]) {
+    ///
+    /// * `n`: there are fewer of them.
+    fn assert_reasons(&self, expected: &[&str], n: usize) {
         let without = self.lines.iter().filter(|it| it["status"] == "no result");
         let reasons: Vec<&str> = without.map(|it| it["reason"].as_str().unwrap()).collect();
-        assert!(reasons.len() < 20, "{reasons:?}");
+        assert!(reasons.len() < n, "{reasons:?}");
         let known = |it: &&str| expected.contains(it);
         assert!(reasons.iter().all(known), "{reasons:?}");
         assert_eq!(self.summary["frames_missed"], json!(reasons.len()));
@@ -104,21 +96,21 @@ fn told_to_end(name: &str, victim: &str) -> Struck {
     let number = HashMap::from([("TERM", 15), ("INT", 2), ("HUP", 1)])[name];
     let said = format!("ended by signal {number}");
     assert!(struck.said.contains(&said), "{}", struck.said);
-    struck.assert_all_accounted_for();
+    struck.assert_every_frame();
+    // It goes on for two seconds, then comes back as after a crash.
+    struck.assert_reasons(&["process lost", "recorder lost"], 40);
     struck
 }
 
 #[test]
 fn a_camera_that_is_told_to_end_comes_back_and_goes_on_where_it_was() {
     let struck = told_to_end("TERM", "capture --index 1");
-    struck.assert_every_frame();
     assert_eq!(struck.without_all(), Vec::<&Value>::new());
 }
 
 #[test]
 fn a_pose_process_that_is_told_to_end_comes_back() {
     let struck = told_to_end("HUP", "pose --index 1");
-    struck.assert_every_frame();
     assert!(struck.without_all().len() <= 2, "{}", struck.said);
 }
 
@@ -133,7 +125,6 @@ fn a_quality_process_that_is_told_to_end_comes_back() {
 #[test]
 fn a_fusion_worker_that_is_told_to_end_comes_back() {
     let struck = told_to_end("TERM", "fuse --index 0");
-    struck.assert_every_frame();
     assert_eq!(struck.lines.last().unwrap()["pairs"], json!(3));
 }
 
@@ -217,7 +208,7 @@ fn a_killed_triangulation_costs_the_frames_it_held_and_they_are_counted() {
     let struck = Struck::new(PACED, "KILL", "triangulate");
     // A line of every frame, in order and none twice: a result, or why there is none.
     struck.assert_every_frame();
-    struck.assert_reasons(&["process lost"]);
+    struck.assert_reasons(&["process lost"], 20);
 }
 
 #[test]

@@ -1,9 +1,7 @@
 //! What newcomers do wrong, and what they are told: what it is, where, and what to try.
 
 use std::fs;
-use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::Path;
 
 use crate::common::{Case, Ended, PLAIN};
 
@@ -254,15 +252,8 @@ const FOOTAGE: &[Mistake] = &[
         tries: &["apt-get install ffmpeg"],
     },
     Mistake {
-        what: "name that is not UTF-8",
-        made: |it| {
-            fs::rename(
-                it.path("b/0000.png"),
-                it.folder()
-                    .join(Path::new(std::ffi::OsStr::from_bytes(b"\xff.png"))),
-            )
-            .unwrap();
-        },
+        what: "absent, and its name is not UTF-8",
+        made: NOTHING,
         command: "detect \"$(printf '\\377.png')\"",
         code: 4,
         says: &["no such footage: \u{fffd}.png", "not UTF-8"],
