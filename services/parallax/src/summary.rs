@@ -1,5 +1,7 @@
 //! What a user sees of a run: its progress, and at the end what became of it.
 
+mod cameras;
+
 use core::fmt::Write as _;
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -226,6 +228,12 @@ impl Report {
         found.is_object().then_some(found)
     }
 
+    /// Cameras that do not see one person where the rig says.
+    fn contradicted(&self) -> Option<&Value> {
+        let found = &self.recorded["summary"]["contradicted"];
+        found.is_object().then_some(found)
+    }
+
     /// What the recorder wrote about the run; null if it did not.
     pub(crate) fn recorded(&self) -> &Value {
         &self.recorded
@@ -260,6 +268,7 @@ impl Report {
                 || !self.restarts.is_empty()
                 || self.recorded.is_null()
                 || self.exchanged().is_some()
+                || self.contradicted().is_some()
                 || (self.is_lossless && count("frames") < self.n_frames)
                 || lost.iter().any(|it| count(it) > 0)
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
@@ -385,22 +394,10 @@ impl Report {
 
     fn write_misplaced(&self, text: &mut String) -> core::fmt::Result {
         if let Some(it) = self.exchanged() {
-            let name = |nth: usize| it["cameras"][nth].as_str().unwrap_or_default();
-            let degrees = |key: &str| it[key].as_f64().unwrap_or(f64::NAN);
-            writeln!(
-                text,
-                "  calibration   {} and {} look exchanged: rays miss each other by {:.1} degrees, with the footage of the two \
-                 exchanged by {:.1}{}; exchange their `source` in the deployment",
-                name(0),
-                name(1),
-                degrees("degrees"),
-                degrees("exchanged_degrees"),
-                if it["sure"] == true {
-                    ""
-                } else {
-                    " (it may be other two)"
-                },
-            )?;
+            text.push_str(&cameras::exchanged(it));
+        }
+        if let Some(it) = self.contradicted() {
+            text.push_str(&cameras::contradicted(it));
         }
         for camera in self.misplaced() {
             let it = &self.recorded["summary"]["calibration"][&camera];

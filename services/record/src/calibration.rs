@@ -33,12 +33,24 @@ pub struct Exchanged {
     pub sure: bool,
 }
 
+/// Cameras that do not see one person where the rig says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Contradicted {
+    /// By how much rays to the same part miss each other, degrees: the median.
+    pub degrees: f64,
+    /// What is usual at most, degrees.
+    pub usual_degrees: f64,
+    /// The two cameras whose exchange fits best, if any fits better.
+    pub likely: Option<[String; 2]>,
+}
+
 /// Follows all cameras over a run.
 #[derive(Debug)]
 pub(crate) struct Calibration {
     watch: RigWatch,
     swaps: SwapWatch,
     exchanged: Option<Exchanged>,
+    is_contradiction_told: bool,
     fits: Vec<CameraFit>,
 }
 
@@ -51,6 +63,7 @@ impl Calibration {
             watch: RigWatch::new(cameras.collect()),
             swaps: SwapWatch::new(framings.collect(), scene.model.spec().mirror.clone()),
             exchanged: None,
+            is_contradiction_told: false,
             fits: vec![CameraFit::default(); n],
         }
     }
@@ -63,6 +76,7 @@ impl Calibration {
         self.watch.note(&points);
         self.swaps.note(&points);
         self.find_exchanged(scene);
+        self.tell_contradiction(scene);
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
@@ -106,6 +120,38 @@ impl Calibration {
             exchanged_degrees: it.exchanged_degrees,
             sure: it.is_sure,
         });
+    }
+
+    /// Says it once, at once.
+    fn tell_contradiction(&mut self, scene: &Scene) {
+        let names = || scene.views.iter().map(|it| it.name.clone());
+        let Some(it) = self
+            .contradicted(names())
+            .filter(|_| !self.is_contradiction_told)
+        else {
+            return;
+        };
+        self.is_contradiction_told = true;
+        tracing::warn!(
+            "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up to {:.1} \
+             are usual",
+            it.degrees,
+            it.usual_degrees
+        );
+    }
+
+    /// Whether the cameras contradict each other for another reason than that two are exchanged.
+    ///
+    /// * `names`: of the views, in their order.
+    pub(crate) fn contradicted(&self, names: impl Iterator<Item = String>) -> Option<Contradicted> {
+        let it = self.swaps.contradiction();
+        let it = it.filter(|_| self.exchanged.is_none())?;
+        let names: Vec<String> = names.collect();
+        Some(Contradicted {
+            degrees: it.degrees,
+            usual_degrees: it.usual_degrees,
+            likely: it.likely.map(|pair| pair.map(|view| names[view].clone())),
+        })
     }
 
     /// The two cameras that look exchanged.

@@ -30,7 +30,7 @@ mod gather;
 
 mod service;
 
-pub use calibration::{CameraFit, Exchanged};
+pub use calibration::{CameraFit, Contradicted, Exchanged};
 pub use config::Config;
 pub use folder::{Folder, FolderError, remove_pictures};
 pub use frame::{Absent, FrameRecord, Picture, ViewRecord};

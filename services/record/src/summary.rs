@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::calibration::Calibration;
 use crate::pose3d::{NO_RESULT, is_placed, joints, missing};
-use crate::{CameraFit, Exchanged, FrameRecord, Scene};
+use crate::{CameraFit, Contradicted, Exchanged, FrameRecord, Scene};
 
 /// What was seen and what was missed, over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -39,6 +39,8 @@ pub struct Summary {
     pub calibration: BTreeMap<String, CameraFit>,
     /// Two cameras that look as if each had the footage of the other.
     pub exchanged: Option<Exchanged>,
+    /// Cameras that do not see one person where the rig says, for another reason or one that is not clear.
+    pub contradicted: Option<Contradicted>,
     /// Frames of all views that the cameras' side dropped.
     pub frames_dropped_by_capture: u64,
     /// Frames without a result; each has a line that says why.
@@ -236,8 +238,9 @@ impl Tally {
         Summary {
             reprojection_px: (n > 0).then(|| (sum / n as f64).sqrt()),
             frames_dropped_by_capture: self.dropped.iter().sum(),
-            calibration: self.calibration.fits(names.cloned()),
+            calibration: self.calibration.fits(names.clone().cloned()),
             exchanged: self.calibration.exchanged().cloned(),
+            contradicted: self.calibration.contradicted(names.cloned()),
             ..self.summary.clone()
         }
     }

@@ -30,7 +30,7 @@ pub use camera::{Camera, Intrinsics, Ray};
 pub use framing::{Framing, FramingError, OutSize, upright_roll};
 pub use lens::{Lens, LensModel};
 pub use rig::{NotARotation, PLAIN_NAME, Rig, RigError, is_plain_name, rotation_from_matrix};
-pub use rig_watch::{RigWatch, Suspect, Swap, SwapWatch};
+pub use rig_watch::{Contradiction, RigWatch, Suspect, Swap, SwapWatch};
 pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };

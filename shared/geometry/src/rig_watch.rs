@@ -11,7 +11,7 @@ use nalgebra::{Point2, Point3};
 
 use crate::{Camera, Ray};
 
-pub use swap::{Swap, SwapWatch};
+pub use swap::{Contradiction, Swap, SwapWatch};
 
 /// Frames that the running median looks back on.
 const WINDOW: usize = 60;

@@ -19,6 +19,8 @@ const LEAST_DEGREES: f64 = 0.75;
 const MOST_DEGREES: f64 = 1.5;
 const FACTOR: f64 = 2.5;
 const AHEAD: f64 = 1.5;
+/// Rays to the same part that miss each other by more: what the cameras see is not one person where the rig says.
+const CONTRADICTION_DEGREES: f64 = 2.5;
 
 /// Tries, frame by frame, what rays of the cameras say if the footage of two of them is exchanged.
 ///
@@ -33,7 +35,19 @@ pub struct SwapWatch {
     mirror: Option<Vec<usize>>,
     /// By pair of views: of every frame the angle as it is, and with the two exchanged, degrees.
     tried: Vec<([usize; 2], Vec<[f64; 2]>)>,
-    n_frames: usize,
+    /// Of every frame the angle as it is, degrees.
+    as_it_is: Vec<f64>,
+}
+
+/// Cameras that do not see one person where the rig says, whatever the reason.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contradiction {
+    /// By how much rays to the same part miss each other, degrees: the median.
+    pub degrees: f64,
+    /// What is usual at most, degrees.
+    pub usual_degrees: f64,
+    /// The two views whose exchange fits best, if it fits better than what is.
+    pub likely: Option<[usize; 2]>,
 }
 
 /// Two cameras whose footage was exchanged.
@@ -61,7 +75,7 @@ impl SwapWatch {
             framings,
             mirror,
             tried: pairs.map(|it| (it, Vec::new())).collect(),
-            n_frames: 0,
+            as_it_is: Vec::new(),
         }
     }
 
@@ -71,7 +85,8 @@ impl SwapWatch {
     ///   pixels of the frame.
     pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
         let here = points_px.iter().flatten().count();
-        if self.n_frames >= MOST_FRAMES || here < 2 || points_px.len() != self.framings.len() {
+        if self.as_it_is.len() >= MOST_FRAMES || here < 2 || points_px.len() != self.framings.len()
+        {
             return;
         }
         let rays = self.rays(points_px);
@@ -79,7 +94,7 @@ impl SwapWatch {
         let Some(now) = self.miss(&rays, &as_it_is) else {
             return;
         };
-        self.n_frames += 1;
+        self.as_it_is.push(now);
         for nth in 0..self.tried.len() {
             let [a, b] = self.tried[nth].0;
             if points_px[a].is_none() || points_px[b].is_none() {
@@ -103,6 +118,23 @@ impl SwapWatch {
             && best.exchanged_degrees <= MOST_DEGREES
             && best.degrees >= FACTOR * best.exchanged_degrees;
         is_swap.then_some(Swap { is_sure, ..best })
+    }
+
+    /// What the cameras say together, if it cannot be: exchanged footage, the rig of other footage, other moments, or
+    /// single views that all find something else.
+    ///
+    /// Where an exchange is not clear enough for [`Self::swap`], this still holds: frames that were turned upright for
+    /// another camera show people askew, and what is found in them fits no camera.
+    pub fn contradiction(&self) -> Option<Contradiction> {
+        let degrees = median(self.as_it_is.clone())
+            .filter(|it| self.as_it_is.len() >= LEAST_FRAMES && *it > CONTRADICTION_DEGREES)?;
+        let best = self.best().into_iter().next();
+        let likely = best.filter(|it| it.exchanged_degrees < it.degrees);
+        Some(Contradiction {
+            degrees,
+            usual_degrees: CONTRADICTION_DEGREES,
+            likely: likely.map(|it| it.views),
+        })
     }
 
     /// What every two cameras would say, those first that fit best if they are exchanged.

@@ -257,7 +257,18 @@ fn where_nothing_was_exchanged_nobody_is_named() {
         for seed in 0..20_u64 {
             let watch = watched(&cameras, &footage, seed, seed % 2 == 0);
             assert_eq!(watch.swap(), None, "rig {rig}, seed {seed}");
+            assert_eq!(watch.contradiction(), None, "rig {rig}, seed {seed}");
         }
+    }
+}
+
+#[test]
+fn footage_of_three_cameras_passed_round_is_a_contradiction_that_no_two_explain() {
+    for seed in 0..8 {
+        let watch = watched(&around(4), &[1, 2, 0, 3], seed, seed % 2 == 0);
+        assert_eq!(watch.swap(), None, "seed {seed}");
+        let said = watch.contradiction().expect("a contradiction");
+        assert!(said.degrees > said.usual_degrees, "seed {seed}: {said:?}");
     }
 }
 
