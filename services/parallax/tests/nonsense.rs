@@ -63,115 +63,123 @@ fn add(case: &Case, line: &str) {
     case.edit("deployment.toml", "rig = ", &format!("{line}\nrig = "));
 }
 
+/// What may be wrong with a calibration.
+const CALIBRATIONS: &[Row] = &[
+    ("as it is", |_| (), CHECK, 0, &[]),
+    (
+        "a rig in millimetres",
+        |it| move_cameras(it, |metres| 1000.0 * metres),
+        CHECK,
+        5,
+        &[
+            "rig.toml: a and b are 1",
+            "m apart",
+            "`unit = \"mm\"` makes this 1.",
+        ],
+    ),
+    (
+        "the same, run",
+        |it| move_cameras(it, |metres| 1000.0 * metres),
+        RUN,
+        5,
+        &["unit = \"mm\""],
+    ),
+    (
+        "the same, with the unit",
+        |it| {
+            move_cameras(it, |metres| 1000.0 * metres);
+            add(it, "unit = \"mm\"");
+        },
+        CHECK,
+        0,
+        &[],
+    ),
+    (
+        "far away, and meant",
+        |it| {
+            move_cameras(it, |metres| 1000.0 * metres);
+            add(it, "unit = \"m\"");
+        },
+        CHECK,
+        0,
+        &["m apart: is the unit right?"],
+    ),
+    (
+        "cameras beyond the Earth",
+        |it| move_cameras(it, |metres| 3e307 * metres.signum()),
+        CHECK,
+        5,
+        &["3e307 m from the origin"],
+    ),
+    (
+        "cameras at one place",
+        |it| move_cameras(it, |_| 0.0),
+        RUN,
+        5,
+        &["3 cameras are at one place", "0.0 mm apart", "stand apart"],
+    ),
+];
+
+/// What may be wrong with a number of a deployment.
+const SETTINGS: &[Row] = &[
+    (
+        "a part that the model has not",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "[record]",
+                "[record]\nepipolar_part = 99",
+            );
+        },
+        CHECK,
+        3,
+        &["`record.epipolar_part` is 99", "parts 1 to 26"],
+    ),
+    (
+        "no deadline",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "[record]",
+                "[supervise]\ndeadline_ms = 0\n[record]",
+            );
+        },
+        CHECK,
+        3,
+        &["`supervise.deadline_ms` is 0, expected 1 to"],
+    ),
+    (
+        "no patience",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "[record]",
+                "[supervise]\nhang_limit_s = 0\n[record]",
+            );
+        },
+        CHECK,
+        3,
+        &["`supervise.hang_limit_s` is 0, expected 1 to"],
+    ),
+    (
+        "a doubtful deadline",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "[record]",
+                "[supervise]\ndeadline_ms = 5\n[record]",
+            );
+        },
+        CHECK,
+        0,
+        &["`supervise.deadline_ms` is 5", "10000 is usual"],
+    ),
+];
+
 #[test]
 fn what_cannot_be_is_refused_before_the_start() {
-    try_all(&[
-        ("as it is", |_| (), CHECK, 0, &[]),
-        (
-            "a rig in millimetres",
-            |it| move_cameras(it, |metres| 1000.0 * metres),
-            CHECK,
-            5,
-            &[
-                "rig.toml: a and b are 1",
-                "m apart",
-                "`unit = \"mm\"` makes this 1.",
-            ],
-        ),
-        (
-            "the same, run",
-            |it| move_cameras(it, |metres| 1000.0 * metres),
-            RUN,
-            5,
-            &["unit = \"mm\""],
-        ),
-        (
-            "the same, with the unit",
-            |it| {
-                move_cameras(it, |metres| 1000.0 * metres);
-                add(it, "unit = \"mm\"");
-            },
-            CHECK,
-            0,
-            &[],
-        ),
-        (
-            "far away, and meant",
-            |it| {
-                move_cameras(it, |metres| 1000.0 * metres);
-                add(it, "unit = \"m\"");
-            },
-            CHECK,
-            0,
-            &["m apart: is the unit right?"],
-        ),
-        (
-            "cameras beyond the Earth",
-            |it| move_cameras(it, |metres| 3e307 * metres.signum()),
-            CHECK,
-            5,
-            &["3e307 m from the origin"],
-        ),
-        (
-            "cameras at one place",
-            |it| move_cameras(it, |_| 0.0),
-            RUN,
-            5,
-            &["3 cameras are at one place", "0.0 mm apart", "stand apart"],
-        ),
-        (
-            "a part that the model has not",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "[record]",
-                    "[record]\nepipolar_part = 99",
-                )
-            },
-            CHECK,
-            3,
-            &["`record.epipolar_part` is 99", "parts 1 to 26"],
-        ),
-        (
-            "no deadline",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "[record]",
-                    "[supervise]\ndeadline_ms = 0\n[record]",
-                )
-            },
-            CHECK,
-            3,
-            &["`supervise.deadline_ms` is 0, expected 1 to"],
-        ),
-        (
-            "no patience",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "[record]",
-                    "[supervise]\nhang_limit_s = 0\n[record]",
-                )
-            },
-            CHECK,
-            3,
-            &["`supervise.hang_limit_s` is 0, expected 1 to"],
-        ),
-        (
-            "a doubtful deadline",
-            |it| {
-                it.edit(
-                    "deployment.toml",
-                    "[record]",
-                    "[supervise]\ndeadline_ms = 5\n[record]",
-                )
-            },
-            CHECK,
-            0,
-            &["`supervise.deadline_ms` is 5", "10000 is usual"],
-        ),
-    ]);
+    try_all(CALIBRATIONS);
+    try_all(SETTINGS);
 }
 
 #[test]

@@ -1,5 +1,4 @@
 //! Deployments whose processes behave.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 

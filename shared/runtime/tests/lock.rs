@@ -1,5 +1,4 @@
 //! A deployment runs once at a time, and leaves nothing behind.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! Those who look at a deployment see all of its processes, and are in nobody's way.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 

@@ -1,5 +1,4 @@
 //! Arrays are read where they were written, and what is copied is counted.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 
