@@ -155,9 +155,8 @@ impl OfPart {
 
     /// Where the types rest, `[x, y]` from the first neighbour, cells.
     fn anchors(&self) -> Vec<[i32; 2]> {
-        // The released program rounds anchors that count from 1, half away from zero.
         let anchor = |it: &Vec<f64>| match it[..] {
-            [x, y, ..] => [x, y].map(|it| (it + 1.0).round() as i32 - 1),
+            [x, y, ..] => [x, y].map(|it| it.round() as i32),
             _ => [0; 2],
         };
         self.centres.iter().map(anchor).collect()
