@@ -80,6 +80,10 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
     between("pose.tracked_margin", it.tracked_margin, 0.0, 100.0)?;
     let drop = f64::from(it.tracked_max_drop);
     between("pose.tracked_max_drop", drop, 0.0, 1e6)?;
+    between("pose.tracked_speed", it.tracked_speed, 0.0, 1e3)?;
+    let (gap, every) = (it.tracked_max_gap_ms, it.tracked_full_every_ms);
+    between("pose.tracked_max_gap_ms", gap, 0.0, 3.6e6)?;
+    between("pose.tracked_full_every_ms", every, 0.0, 3.6e6)?;
     let every = it.tracked_full_every;
     whole("pose.tracked_full_every", every, 1, 1_000_000)?;
     whole("pose.tracked_max_gap", it.tracked_max_gap, 1, 1_000_000)

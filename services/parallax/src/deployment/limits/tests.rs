@@ -89,7 +89,7 @@ const ROWS: &[Row] = &[
         "capture.frozen_after",
         &[
             ("-1", "expected a whole number"),
-            ("99999999999", "invalid value"),
+            ("99999999999", "expected a whole number"),
         ],
         &["0", "10"],
     ),
@@ -121,7 +121,7 @@ const ROWS: &[Row] = &[
         "pose.tracked_levels",
         &[
             ("-1", "expected a whole number"),
-            ("65536", "invalid value"),
+            ("65536", "expected a whole number"),
         ],
         &["2"],
     ),
@@ -148,6 +148,33 @@ const ROWS: &[Row] = &[
         "pose.tracked_max_drop",
         &[("-1", "is -1"), ("1e308", "is inf"), ("nan", "is NaN")],
         &["0.5"],
+    ),
+    (
+        "pose.tracked_speed",
+        &[
+            ("-1", "is -1"),
+            ("1e308", "expected 0 to 1000"),
+            ("nan", "is NaN"),
+        ],
+        &["0", "3"],
+    ),
+    (
+        "pose.tracked_max_gap_ms",
+        &[
+            ("-1", "is -1"),
+            ("1e308", "expected 0 to 3600000"),
+            ("nan", "is NaN"),
+        ],
+        &["0", "250"],
+    ),
+    (
+        "pose.tracked_full_every_ms",
+        &[
+            ("-1", "is -1"),
+            ("1e308", "expected 0 to 3600000"),
+            ("nan", "is NaN"),
+        ],
+        &["0", "500"],
     ),
     (
         "quality.deadline_ms",
