@@ -347,6 +347,7 @@ const ROWS: &[Row] = &[
 
 /// Keys without a number.
 const OTHERS: &[&str] = &[
+    "data",
     "name",
     "rig",
     "unit",
