@@ -82,6 +82,10 @@ impl Fault for SuperviseError {
     }
 }
 
+/// When processes are asked to end once more: so soon that they take it for the same wish (`runtime::Stop`).
+const ASK_AGAIN: core::ops::Range<Duration> =
+    Duration::from_millis(100)..Duration::from_millis(300);
+
 /// Runs a deployment until all its processes are done, `stop` is requested, or it fails.
 ///
 /// A process is done when it says in its signs of life that it has finished. It is asked to end once all are done,
@@ -377,9 +381,19 @@ impl Supervisor<'_> {
             .filter_map(Watch::child)
             .for_each(Child::terminate);
         let begin = Instant::now();
+        let mut is_asked_again = false;
         while self.watches.iter().any(|watch| watch.child().is_some()) {
             let now = Instant::now();
-            let patient = now.saturating_duration_since(begin) < self.plan.policy.grace;
+            let waited = now.saturating_duration_since(begin);
+            let patient = waited < self.plan.policy.grace;
+            // Who was told to end by somebody else at the same moment hears one signal of the two, maybe not ours.
+            if !is_asked_again && ASK_AGAIN.contains(&waited) {
+                is_asked_again = true;
+                self.watches
+                    .iter()
+                    .filter_map(Watch::child)
+                    .for_each(Child::terminate);
+            }
             for index in 0..self.watches.len() {
                 self.listen(index, now);
                 self.part(index, patient);
