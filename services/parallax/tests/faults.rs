@@ -260,11 +260,9 @@ fn a_live_run_goes_on_without_a_stopped_view_until_it_is_back() {
         .iter()
         .filter_map(|it| it["views_missing"]["b"].as_str())
         .collect();
-    // Whether frames of the short time between its death and the next life are lost or late depends on when the
-    // transport forgets the dead one; while it stands still they are late.
-    assert!(reasons.contains("late"), "{reasons:?}");
-    let known = |it: &&str| ["late", "process lost"].contains(it);
-    assert!(reasons.iter().all(known), "{reasons:?}");
+    for reason in ["late", "process lost"] {
+        assert!(reasons.contains(reason), "{reasons:?}");
+    }
     let last = |holds: fn(&Value) -> bool| struck.lines.iter().rposition(holds);
     let lost = last(|it| it["views_missing"]["b"] == "process lost");
     let there = last(|it| it["views_missing"]["b"].is_null());
