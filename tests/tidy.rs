@@ -37,7 +37,7 @@ const LAYERS: &[&[&str]] = &[
         "record",
         "replay",
         "supervise",
-        "tape",
+        "results",
     ],
     &["parallax"],
 ];

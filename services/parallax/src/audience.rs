@@ -84,7 +84,7 @@ impl<'a> Audience<'a> {
         if self.resolved.runs(stage) { n } else { 0 }
     }
 
-    /// Processes that take everything: `record`, and `tape` if there is one.
+    /// Processes that take everything: `results`, and `record` if there is one.
     pub(crate) fn n_recorders(self) -> usize {
         1 + usize::from(self.resolved.tape.is_some())
     }

@@ -15,7 +15,7 @@ Calibrated, synchronised cameras in, 3D human skeletons out.
 A run is described by a deployment file (ten lines: the cameras, their calibration, a model) and
 consists of one process per stage and camera, all started and watched by `parallax run`:
 
-    capture -> pose -> (quality) -> fuse -> triangulate -> record";
+    capture -> pose -> (quality) -> fuse -> triangulate -> results";
 
 const EXAMPLES: &str = "\
 Examples:

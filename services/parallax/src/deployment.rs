@@ -60,7 +60,7 @@ pub(crate) struct Deployment {
     pub triangulate: triangulate::Config,
     /// What is left behind.
     #[serde(default)]
-    pub record: record::Config,
+    pub results: results::Config,
     /// Deadlines and restarts.
     #[serde(default)]
     pub supervise: Supervision,
@@ -101,7 +101,7 @@ pub(crate) struct Supervision {
     /// not given.
     pub hang_limit_s: Option<u64>,
     /// How many signs of life, one every 150 ms, a process may miss that stands still because a signal
-    /// stopped it; where the latest frame wins also for how many a turn of any process but `record` and `tape` may
+    /// stopped it; where the latest frame wins also for how many a turn of any process but `results` and `record` may
     /// compute, however short those before it were.
     pub missed_beats: u32,
     /// Most restarts of one process within the window before it is given up.

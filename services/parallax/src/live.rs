@@ -259,7 +259,7 @@ pub(crate) mod tests {
             sighting("capture-10", None, None),
             sighting("capture-9", Some(4), None),
             sighting("pose-0", Some(17), Some(&pose)),
-            sighting("record", Some(18), Some(&record)),
+            sighting("results", Some(18), Some(&record)),
         ];
         Board::new("walk", 3, &seen, 11 * SECOND)
     }
@@ -272,7 +272,7 @@ pub(crate) mod tests {
     #[test]
     fn processes_stand_in_the_way_of_a_frame_and_by_number() {
         let names: Vec<String> = board().members.into_iter().map(|it| it.process).collect();
-        assert_eq!(names, ["capture-9", "capture-10", "pose-0", "record"]);
+        assert_eq!(names, ["capture-9", "capture-10", "pose-0", "results"]);
     }
 
     #[test]

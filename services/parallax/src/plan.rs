@@ -42,7 +42,7 @@ pub(crate) const SERVICES: [&str; 6] = [
     "quality",
     "fuse",
     "triangulate",
-    "record",
+    "results",
 ];
 
 /// How many times the work of any turn before it a turn may be, where turns are alike: frames, or levels of a pair.
@@ -217,11 +217,11 @@ pub(crate) fn processes(resolved: &Resolved, prepared: &Prepared, file: &Path) -
     let n_views = prepared.views.len();
     let n_quality = if resolved.has_quality() { n_views } else { 0 };
     let mut processes = vec![
-        process("record", None, Role::Optional, file),
+        process("results", None, Role::Optional, file),
         process("triangulate", None, Role::Essential, file),
     ];
     if resolved.tape.is_some() {
-        processes.insert(0, process("tape", None, Role::Optional, file));
+        processes.insert(0, process("record", None, Role::Optional, file));
     }
     for (service, count, role) in [
         ("fuse", dealing.n_workers, Role::Redundant),

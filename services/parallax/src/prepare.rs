@@ -224,10 +224,10 @@ fn settings(
         );
         return Err(Failure::new(ExitKind::Config, message));
     }
-    let part = deployment.record.epipolar_part;
+    let part = deployment.results.epipolar_part;
     if !(1..=model.n_parts()).contains(&part) {
         let message = format!(
-            "`record.epipolar_part` is {part}, the model has parts 1 to {}",
+            "`results.epipolar_part` is {part}, the model has parts 1 to {}",
             model.n_parts()
         );
         return Err(Failure::new(ExitKind::Config, message));

@@ -82,7 +82,7 @@ mod tests {
         let mut processes = [
             spec("pose-0", "fifo=50 cores=1"),
             spec("pose-1", "fifo=50 cores=1,7 spin"),
-            spec("record", ""),
+            spec("results", ""),
         ];
         let said = permit(&mut processes, rehearse);
         let [priority, cores] = &said[..] else {

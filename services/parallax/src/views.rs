@@ -4,7 +4,7 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use messages::Status;
-use record::Missing;
+use results::Missing;
 use serde::Serialize;
 use serde_json::Value;
 use supervise::{Counts, Outcome};

@@ -274,8 +274,8 @@ fn tables_of_expected_errors() {
             what: "expected errors with a NaN",
             broken: |it| {
                 let quality =
-                    "[quality]\ntable = \"q.csv\"\nsubject = \"s\"\naction = \"w\"\n[record]";
-                it.edit("deployment.toml", "[record]", quality);
+                    "[quality]\ntable = \"q.csv\"\nsubject = \"s\"\naction = \"w\"\n[results]";
+                it.edit("deployment.toml", "[results]", quality);
                 let row = |view, third| format!("s,w,0,{view},1,2,{third}{}\n", ",4".repeat(23));
                 it.write("q.csv", row('a', "3") + &row('b', "nan"));
             },
@@ -288,8 +288,8 @@ fn tables_of_expected_errors() {
             broken: |it| {
                 it.edit(
                     "deployment.toml",
-                    "[record]",
-                    "[quality]\ntable = \"q.csv\"\n[record]",
+                    "[results]",
+                    "[quality]\ntable = \"q.csv\"\n[results]",
                 );
                 let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
                 let (parts, row) = (parts.join(","), ",1".repeat(26));
@@ -305,8 +305,8 @@ fn tables_of_expected_errors() {
         Row {
             what: "a name for a camera that is not there",
             broken: |it| {
-                let quality = "[quality]\nviews = { z = \"C1\" }\n[record]";
-                it.edit("deployment.toml", "[record]", quality);
+                let quality = "[quality]\nviews = { z = \"C1\" }\n[results]";
+                it.edit("deployment.toml", "[results]", quality);
             },
             arguments: DRY,
             code: 3,

@@ -35,7 +35,7 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
     let case = Case::new("chaos", &[80; 3], PACED);
     let (ended, report) = chaos(
         &case,
-        "kill-pose,spin-capture,kill-supervisor,stall-record",
+        "kill-pose,spin-capture,kill-supervisor,stall-results",
         &PATIENT,
     );
     assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
@@ -102,7 +102,7 @@ fn where_the_latest_wins_who_computes_for_ever_is_found_out_by_the_work_of_its_f
 fn a_failing_camera_is_named_counted_and_back_and_a_stalled_recorder_holds_nobody_up() {
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
     let case = Case::new("chaos-camera", &[160; 3], &live);
-    let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-record", &PATIENT);
+    let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);
     let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {
         panic!("{}\n{report:#}", ended.stderr)
     };
@@ -168,7 +168,7 @@ fn scenarios_are_listed_and_those_that_cannot_be_are_refused() {
         "kill-random",
         "kill-supervisor",
         "camera-freeze",
-        "stall-record",
+        "stall-results",
     ] {
         assert!(ended.stdout.contains(name), "{name}: {}", ended.stdout);
     }

@@ -135,7 +135,7 @@ fn a_triangulation_that_is_told_to_end_comes_back() {
 
 #[test]
 fn a_recorder_that_is_told_to_end_comes_back() {
-    told_to_end("HUP", "record");
+    told_to_end("HUP", "results");
 }
 
 #[test]

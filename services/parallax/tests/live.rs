@@ -14,7 +14,7 @@ const PROCESSES: [&str; 7] = [
     "pose-1",
     "fuse-0",
     "triangulate",
-    "record",
+    "results",
 ];
 
 /// What `status` says of the processes of a case that runs.
@@ -171,7 +171,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_says_where_the_time_went() {
         );
     }
     // Sent at the very end: all frames are in it.
-    assert_eq!(report["processes"]["record"]["sent"], 6);
+    assert_eq!(report["processes"]["results"]["sent"], 6);
 
     let ended = budgeted(&case, "600000");
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

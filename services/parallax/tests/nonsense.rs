@@ -127,21 +127,21 @@ const SETTINGS: &[Row] = &[
         |it| {
             it.edit(
                 "deployment.toml",
-                "[record]",
-                "[record]\nepipolar_part = 99",
+                "[results]",
+                "[results]\nepipolar_part = 99",
             );
         },
         CHECK,
         3,
-        &["`record.epipolar_part` is 99", "parts 1 to 26"],
+        &["`results.epipolar_part` is 99", "parts 1 to 26"],
     ),
     (
         "no deadline",
         |it| {
             it.edit(
                 "deployment.toml",
-                "[record]",
-                "[supervise]\ndeadline_ms = 0\n[record]",
+                "[results]",
+                "[supervise]\ndeadline_ms = 0\n[results]",
             );
         },
         CHECK,
@@ -153,8 +153,8 @@ const SETTINGS: &[Row] = &[
         |it| {
             it.edit(
                 "deployment.toml",
-                "[record]",
-                "[supervise]\nhang_limit_s = 0\n[record]",
+                "[results]",
+                "[supervise]\nhang_limit_s = 0\n[results]",
             );
         },
         CHECK,
@@ -166,8 +166,8 @@ const SETTINGS: &[Row] = &[
         |it| {
             it.edit(
                 "deployment.toml",
-                "[record]",
-                "[supervise]\ndeadline_ms = 5\n[record]",
+                "[results]",
+                "[supervise]\ndeadline_ms = 5\n[results]",
             );
         },
         CHECK,

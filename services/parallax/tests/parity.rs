@@ -21,7 +21,7 @@ fn frames_as_they_are() {
 #[test]
 fn frames_that_are_turned_resized_and_distorted() {
     let rig = planted::tilted_rig(3);
-    let more = "[capture]\nsize = [120, 140]\n[record]\noverlay_every = 0\n";
+    let more = "[capture]\nsize = [120, 140]\n[results]\noverlay_every = 0\n";
     let case = Case::seen_by(&rig, "warped", &[20; 3], more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

@@ -139,17 +139,17 @@ fn a_view_that_ends_early_is_missing_from_there_on() {
 
 #[test]
 fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
-    let case = Case::new("kill-record", &[100; 2], PACED);
+    let case = Case::new("kill-results", &[100; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
-    let pid = started.pid_of("record");
+    let pid = started.pid_of("results");
     signal("KILL", pid.into());
     let ended = started.wait();
     case.assert_nothing_left();
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(
         report["restarts"],
-        json!([{ "process": "record", "restarts": 1 }]),
+        json!([{ "process": "results", "restarts": 1 }]),
         "{}",
         ended.stderr
     );

@@ -171,7 +171,7 @@ fn of_view(case: &Case, name: &str) -> Vec<Value> {
 #[test]
 fn no_frame_waits_for_a_network_that_stands_still() {
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
-                frame_rate_hz = 5\n[record]\noverlay_every = 0\n\
+                frame_rate_hz = 5\n[results]\noverlay_every = 0\n\
                 [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
                 [supervise]\nmissed_beats = 1000\n";
     let case = Case::new("stopped", &[100; 2], more);
@@ -252,7 +252,7 @@ fn who_asks_for_onnx_runtime_is_told_what_is_missing_before_anything_starts() {
 fn a_prediction_that_never_ends_is_found_out_by_the_work_of_those_before() {
     // The clock alone would leave it alone for ten minutes.
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
-                frame_rate_hz = 20\n[record]\noverlay_every = 0\n\
+                frame_rate_hz = 20\n[results]\noverlay_every = 0\n\
                 [quality]\nnetwork = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
     let case = Case::new("endless", &[240; 2], more);
     case.write("q.onnx", network(0.02).file());

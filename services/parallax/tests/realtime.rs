@@ -7,7 +7,7 @@ use common::started::signal;
 use common::{Case, Ended};
 use serde_json::{Value, json};
 
-const LIVE: &str = "[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
+const LIVE: &str = "[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
                     [capture]\nupright = false\nmode = \"realtime\"\n";
 const PACED: &str = "pace = \"realtime\"\nframe_rate_hz = 20\n";
 

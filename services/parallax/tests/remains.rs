@@ -35,7 +35,7 @@ fn a_run_is_shown_and_when_it_was_killed_removed() {
         "pose-1",
         "fuse-0",
         "triangulate",
-        "record",
+        "results",
     ] {
         assert!(processes.contains(name), "{name}: {processes}");
     }

@@ -108,7 +108,7 @@ fn a_file_that_may_not_grow_is_counted_and_ends_nobody() {
     let case = Case::new("limit", &[60; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
-    let record = started.pid_of("record").to_string();
+    let record = started.pid_of("results").to_string();
     // What it has written is larger already.
     let limit = "--fsize=1000:1000";
     let set = std::process::Command::new("prlimit")

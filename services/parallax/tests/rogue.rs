@@ -34,7 +34,7 @@ impl Rogue {
         let namespace = Namespace::new(&case.name).unwrap();
         let bus = Bus::open(&namespace, "rogue", &Stop::new().unwrap()).unwrap();
         let mut waiter = bus.waiter();
-        let signs = bus.subscriber::<Health>(&topic::health("record"), &mut waiter);
+        let signs = bus.subscriber::<Health>(&topic::health("results"), &mut waiter);
         let signs = signs.unwrap();
         let session = until(|| signs.latest().unwrap()).session;
         Self {
@@ -287,7 +287,7 @@ fn poses_and_evidence_of_nobody_are_refused() {
     drop((poses, evidence, rogue));
     let refused = refused(&case, &started.wait());
     let stamps = ["session", "sender", "time"];
-    assert_all(&refused, &["triangulate", "fuse-0", "record"], &stamps);
+    assert_all(&refused, &["triangulate", "fuse-0", "results"], &stamps);
     assert_all(&refused, &["triangulate"], &["size", "index", "number"]);
 }
 
@@ -329,7 +329,7 @@ fn frames_whose_sizes_do_not_match_are_refused() {
     drop((frames, rogue));
     let refused = refused(&case, &started.wait());
     let causes = ["session", "sender", "time", "size"];
-    assert_all(&refused, &["pose-0", "record"], &causes);
+    assert_all(&refused, &["pose-0", "results"], &causes);
 }
 
 #[test]
@@ -366,7 +366,7 @@ fn pairs_and_results_of_nobody_are_refused() {
     drop((pairs, rogue));
     let refused = refused(&case, &started.wait());
     let stamps = ["session", "time"];
-    assert_all(&refused, &["triangulate", "record"], &stamps);
+    assert_all(&refused, &["triangulate", "results"], &stamps);
     assert_all(&refused, &["triangulate"], &["index", "sender", "size"]);
 }
 
@@ -429,5 +429,5 @@ fn results_and_signs_of_life_of_nobody_are_refused() {
     drop((results, rogue));
     let refused = refused(&case, &started.wait());
     let causes = ["session", "sender", "time", "size", "number"];
-    assert_all(&refused, &["record"], &causes);
+    assert_all(&refused, &["results"], &causes);
 }

@@ -25,7 +25,7 @@ fn processes_run_on_the_cores_that_the_deployment_gives_them() {
     );
     let case = Case::new("cores", &[80; 2], &text);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
-    for (process, core) in [("pose-0", first), ("pose-1", last), ("record", last)] {
+    for (process, core) in [("pose-0", first), ("pose-1", last), ("results", last)] {
         let pid = started.pid_of(process);
         // It says so before it does anything else.
         let expected = core.to_string();
@@ -117,7 +117,7 @@ fn without_rights(case: &Case) -> Option<Output> {
 
 #[test]
 fn what_may_not_be_is_said_once_with_what_to_try_and_the_run_goes_on() {
-    let more = "[record]\noverlay_every = 0\n[capture]\nupright = false\n\
+    let more = "[results]\noverlay_every = 0\n[capture]\nupright = false\n\
                 [runtime]\nlock_memory = true\npriority = { pose = 50, triangulate = 50 }\n";
     let case = Case::new("rights", &[4; 2], more);
     let Some(output) = without_rights(&case) else {

@@ -43,7 +43,7 @@ fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
         "--set",
         "capture.size=[160,120]",
         "--set",
-        "record.overlay_every=0",
+        "results.overlay_every=0",
     ];
     let ended = case.start(&[&small, more].concat()).wait();
     case.assert_nothing_left();
@@ -117,7 +117,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     // A stage waits for a late view as long as a busy machine needs.
     let sets = [
         "capture.size=[160,120]",
-        "record.overlay_every=0",
+        "results.overlay_every=0",
         "supervise.deadline_ms=20000",
     ];
     let sets = sets.iter().flat_map(|it| ["--set", it]);

@@ -1,372 +1,371 @@
-//! The loop: take everything in at once, and write it on a thread of its own.
+//! The loop: take every message in at once, and leave the writing to a thread of its own.
 //!
-//! Whoever sends may wait for its receivers, so this process never lets them wait: it copies what
-//! comes and hands it on. If the disk cannot keep up, the newest results are missed and counted.
+//! Where the latest wins, nobody waits for the disk: what does not fit into the queue is counted.
+//! Where nothing may be lost, this process makes its senders wait while the queue is full, but not
+//! for ever.
 
 use core::time::Duration;
-use std::cell::Cell;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
 
-use messages::{Cause, FrameHeader, PairPose, Pose3d, Span, Status, ViewPose, ViewQuality, topic};
-use runtime::{
-    ExitKind, Failure, OrFail as _, Service, SliceSubscriber, Subscriber, Waiter, Woken, now_nanos,
-};
-use wire::{Expected, WireError};
+use messages::{Cause, Status, topic};
+use recording::{About, Entry, Kind, Without};
+use runtime::{Delivery, ExitKind, Failure, OrFail as _, Service, Waiter, Woken, now_nanos};
 
-use crate::gather::{Gather, Settled};
-use crate::{Absent, Config, Folder, FrameRecord, Output, Picture, Scene};
+use crate::ear::{Ear, Heard};
+use crate::queue::{Inlet, Item, queue};
+use crate::sent::Sent;
+use crate::writer::{Task, create, file_of_life, write_all};
 
-/// Results that may wait to be written.
-const QUEUE: usize = 256;
+/// How long room in the queue is waited for where nothing may be lost.
+const LONGEST_WAIT: Duration = Duration::from_mins(1);
+/// After the last result, the last signs of life take this long.
+const LAST_SIGNS: Duration = Duration::from_millis(500);
 
 /// What the process has to do.
 #[derive(Debug)]
 pub struct Job {
-    /// What the numbers in messages mean.
-    pub scene: Scene,
-    /// What to leave behind.
-    pub config: Config,
-    /// Where.
-    pub output: PathBuf,
-    /// First frame of the footage that is used.
-    pub start_frame: u64,
+    /// Where to.
+    pub file: PathBuf,
+    /// Of which run; the session is that of the service.
+    pub about: About,
+    /// What there is to be heard.
+    pub topics: Topics,
+    /// Bytes that may wait to be written.
+    pub queue_bytes: u64,
+}
+
+/// What decides the topics of a deployment.
+#[derive(Debug, Clone)]
+pub struct Topics {
+    /// Number of views.
+    pub n_views: usize,
     /// Number of fusion workers.
     pub n_workers: usize,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
+    /// Names of all processes.
+    pub processes: Vec<String>,
 }
 
-/// Writes what is published, until the footage ends or it is told to stop.
+/// A topic, and the process that sends there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Channel {
+    kind: Kind,
+    name: String,
+    /// None where its signs of life say nothing of this topic.
+    sender: Option<String>,
+}
+
+impl Topics {
+    /// All topics, signs of life first: who has heard of a message has it, if it came at all.
+    fn channels(&self, without: Without) -> Vec<Channel> {
+        let mut channels = Vec::new();
+        let mut add = |kind, name, sender| channels.push(Channel { kind, name, sender });
+        for process in &self.processes {
+            add(Kind::Health, topic::health(process), None);
+        }
+        for view in 0..self.n_views {
+            let from = |service: &str| Some(format!("{service}-{view}"));
+            add(Kind::Frame, topic::frame(view), from("capture"));
+            if !without.evidence {
+                add(Kind::Evidence, topic::evidence(view), None);
+            }
+            add(Kind::ViewPose, topic::view_pose(view), from("pose"));
+            if self.has_quality {
+                add(
+                    Kind::ViewQuality,
+                    topic::view_quality(view),
+                    from("quality"),
+                );
+            }
+        }
+        for worker in 0..self.n_workers {
+            let sender = Some(format!("fuse-{worker}"));
+            add(Kind::PairPose, topic::pair_pose(worker), sender);
+        }
+        add(
+            Kind::Pose3d,
+            topic::pose3d(),
+            Some("triangulate".to_owned()),
+        );
+        channels
+    }
+}
+
+/// Writes every message, until the last result has come or it is told to stop.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the output folder cannot be used, and what the transport says.
+/// [`ExitKind::Input`] if the file cannot be made, and what the transport says.
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
-    let n_views = job.scene.views.len();
-    let n_joints = job.scene.joints.joints.len();
-    if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
-        // Killed after its work was done: to begin anew would empty the files.
-        return Ports::open(service, &job, &mut waiter)?.rest(service, &waiter);
+    let epoch = service.epoch();
+    if epoch > 0 && is_complete(&file_of_life(&job.file, epoch - 1)) {
+        // Killed after its work was done.
+        return rest(service, &waiter, &[]);
     }
-    let ports = Ports::open(service, &job, &mut waiter)?;
-    let frame_step = job.scene.frame_step;
-    let writer = Writer::start(job, service)?;
-    let mut gather = Gather::new(n_views, writer.next, frame_step, service.epoch() > 0);
-    let mut is_over = false;
-    while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
-        ports.listen(service, &mut gather, &writer)?;
-        // The result last: what it was made of has been taken in by then.
-        while let Some(pose3d) = ports.pose3d.receive()? {
-            let check = |it: Expected| it.check(&pose3d.stamp, &pose3d.timing);
-            if !is_ours(service, ("pose3d", 0), check) {
-                continue;
-            }
-            if pose3d.status == Status::END {
-                ports.listen(service, &mut gather, &writer)?;
-                writer.rest(gather.rest());
-                is_over = true;
-                break;
-            }
-            service.health().received(1);
-            if let Err(error) = wire::check_pose3d(&pose3d, n_views, n_joints) {
-                service.health().refuse(error.refusal(), "pose3d", &error);
-                continue;
-            }
-            ports.listen(service, &mut gather, &writer)?;
-            let Some(settled) = gather.result(&pose3d) else {
-                // A frame has one line.
-                service.health().dropped(Cause::Late, 1);
-                continue;
-            };
-            note_times(service, &settled.record);
-            if writer.write(settled) {
-                service.health().sent(pose3d.stamp.frame);
-            } else {
-                service.health().dropped(Cause::QueueFull, 1);
-            }
-            service.health().queued(writer.n_waiting());
+    let kind = if epoch == 0 {
+        ExitKind::Input
+    } else {
+        ExitKind::Run
+    };
+    let name = file_of_life(&job.file, epoch);
+    let file = create(&name).map_err(|error| {
+        Failure::new(
+            kind,
+            format!("cannot make the recording {}: {error}", name.display()),
+        )
+    })?;
+    let channels = job.topics.channels(job.about.without);
+    let (inlet, outlet) = queue(channels.len(), job.queue_bytes);
+    let mut tape = Tape::open(service, &channels, job.about.without, &inlet, &mut waiter)?;
+    let task = Task {
+        file,
+        about: About {
+            session: service.session(),
+            ..job.about
+        },
+        topics: channels.iter().map(|it| it.name.clone()).collect(),
+    };
+    let thread = Builder::new()
+        .name("writer".to_owned())
+        .spawn(move || write_all(task, &outlet))
+        .or_fail(ExitKind::Run)?;
+    let mut over = None;
+    while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
+        tape.listen()?;
+        if tape.is_over && over.get_or_insert_with(Instant::now).elapsed() > LAST_SIGNS {
+            break;
         }
     }
-    writer.finish(service)?;
+    tape.listen()?;
+    tape.settle(&channels);
+    let Tape { ears, is_over, .. } = tape;
+    drop(inlet);
+    finish(service, thread)?;
     if !is_over {
-        // Told to end before the footage did: what was written is whole, but it is not all.
+        // Told to end before the run did: what the file holds is whole, but it is not all.
         return Ok(());
     }
-    ports.rest(service, &waiter)
+    rest(service, &waiter, &ears)
 }
 
-/// How old a result was when it was sent, over all and of every view that has a part in it; and how
-/// long ago that was.
-fn note_times(service: &Service, record: &FrameRecord) {
-    let (health, pose3d) = (service.health(), &record.pose3d);
-    if pose3d.status != Status::OK {
-        return;
+fn is_complete(file: &std::path::Path) -> bool {
+    let Ok(mut file) = std::fs::File::open(file) else {
+        return false;
+    };
+    recording::scan(&mut file).is_ok_and(|it| it.extent.is_complete)
+}
+
+/// Waits until everything is written.
+fn finish(service: &Service, thread: JoinHandle<()>) -> Result<(), Failure> {
+    while !thread.is_finished() {
+        service.progress().tick();
+        std::thread::sleep(Duration::from_millis(20));
     }
-    let sent_at = pose3d.timing.sent_at_nanos;
-    let since = |captured_at: u64| sent_at.saturating_sub(captured_at);
-    let captured_at = pose3d.stamp.captured_at_nanos;
-    health.spent(Span::END_TO_END, None, since(captured_at));
-    for (view, it) in record.views.iter().enumerate() {
-        if let Some(frame) = it.frame.filter(|_| it.missing.is_none()) {
-            let captured_at = frame.stamp.captured_at_nanos;
-            health.spent(Span::END_TO_END, Some(view), since(captured_at));
+    let panicked = |_| Failure::new(ExitKind::Run, "the writing thread panicked");
+    thread.join().map_err(panicked)
+}
+
+/// Says that all is done, and waits to be told so. What comes is taken in all the same: where nothing may be lost a
+/// sender that speaks after the last result waits for room, and to be heard before it begins.
+fn rest(service: &Service, waiter: &Waiter, ears: &[Ear]) -> Result<(), Failure> {
+    service.health().finished();
+    while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
+        for ear in ears {
+            while ear.hear(|_| false)?.is_some() {}
         }
     }
-    let waited = now_nanos().saturating_sub(sent_at);
-    health.spent(Span::WAITING, None, waited);
+    Ok(())
 }
 
-struct Ports {
-    frames: Vec<SliceSubscriber<u8, FrameHeader>>,
-    poses: Vec<Subscriber<ViewPose>>,
-    qualities: Vec<Subscriber<ViewQuality>>,
-    pairs: Vec<Subscriber<PairPose>>,
-    pose3d: Subscriber<Pose3d>,
+struct Tape<'a> {
+    service: &'a Service,
+    inlet: &'a Inlet,
+    ears: Vec<Ear>,
+    sent: Vec<Sent>,
+    /// Of every topic, those that its signs of life or poses tell of.
+    tells_of: Vec<Vec<usize>>,
+    n_evidence: Vec<u64>,
+    is_over: bool,
 }
 
-impl Ports {
-    fn open(service: &Service, job: &Job, waiter: &mut Waiter) -> Result<Self, Failure> {
-        let bus = service.bus();
-        let views = 0..job.scene.views.len();
-        let with_quality = if job.has_quality { views.clone() } else { 0..0 };
+impl<'a> Tape<'a> {
+    fn open(
+        service: &'a Service,
+        channels: &[Channel],
+        without: Without,
+        inlet: &'a Inlet,
+        waiter: &mut Waiter,
+    ) -> Result<Self, Failure> {
+        let mut ears = Vec::new();
+        for it in channels {
+            let heads_only = without.pixels && it.kind == Kind::Frame;
+            let ear = Ear::open(service.bus(), it.kind, &it.name, waiter, heads_only)?;
+            ears.push(ear);
+        }
         Ok(Self {
-            frames: views
-                .clone()
-                .map(|it| bus.slice_subscriber(&topic::frame(it), waiter))
-                .collect::<Result<_, _>>()?,
-            poses: views
-                .map(|it| bus.subscriber(&topic::view_pose(it), waiter))
-                .collect::<Result<_, _>>()?,
-            qualities: with_quality
-                .map(|it| bus.subscriber(&topic::view_quality(it), waiter))
-                .collect::<Result<_, _>>()?,
-            pairs: (0..job.n_workers)
-                .map(|it| bus.subscriber(&topic::pair_pose(it), waiter))
-                .collect::<Result<_, _>>()?,
-            pose3d: bus.subscriber(&topic::pose3d(), waiter)?,
+            service,
+            inlet,
+            ears,
+            sent: vec![Sent::default(); channels.len()],
+            tells_of: channels.iter().map(|it| told_by(it, channels)).collect(),
+            n_evidence: vec![0; channels.len()],
+            is_over: false,
         })
     }
 
-    /// Says that all is done, and waits to be told so. What comes is taken in all the same: a sender whose words have
-    /// no part in any result, such as frames when a replay begins behind them, waits for room where nothing may be lost,
-    /// and to be heard before it begins.
-    fn rest(&self, service: &Service, waiter: &Waiter) -> Result<(), Failure> {
-        service.health().finished();
-        while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
-            for it in &self.frames {
-                while it.receive()?.is_some() {}
-            }
-            for it in &self.poses {
-                while it.receive()?.is_some() {}
-            }
-            for it in &self.qualities {
-                while it.receive()?.is_some() {}
-            }
-            for it in &self.pairs {
-                while it.receive()?.is_some() {}
-            }
-            while self.pose3d.receive()?.is_some() {}
-        }
-        Ok(())
-    }
-
-    /// Takes in all that has come, but for results.
-    fn listen(
-        &self,
-        service: &Service,
-        gather: &mut Gather,
-        writer: &Writer,
-    ) -> Result<(), Failure> {
-        for (view, frames) in self.frames.iter().enumerate() {
-            while let Some(sample) = frames.receive()? {
-                let header = *sample.header();
-                let n_bytes = sample.payload().len();
-                let check = |it: Expected| wire::check_frame(&header, n_bytes, &it);
-                if is_ours(service, ("frame", view), check) {
-                    let size = [header.width as usize, header.height as usize];
-                    let wanted = header.status == Status::OK && writer.draws(header.stamp.frame);
-                    let picture = wanted.then(|| Picture {
-                        size,
-                        rgb: frames.copy_of(&sample),
-                    });
-                    gather.frame(view, &header, picture);
-                }
-            }
-        }
-        for (view, poses) in self.poses.iter().enumerate() {
-            gather.answerers(view, [self.frames[view].publishers(), poses.publishers()]);
-            while let Some(pose) = poses.receive()? {
-                let check = |it: Expected| it.check(&pose.stamp, &pose.timing);
-                if is_ours(service, ("view-pose", view), check) {
-                    gather.pose(view, &pose);
-                }
-            }
-        }
-        for (view, qualities) in self.qualities.iter().enumerate() {
-            while let Some(quality) = qualities.receive()? {
-                let check = |it: Expected| it.check(&quality.stamp, &quality.timing);
-                let is_ours = is_ours(service, ("view-quality", view), check);
-                if is_ours && quality.status != Status::END {
-                    gather.quality(view, &quality);
-                }
-            }
-        }
-        let n_workers = self.pairs.len();
-        for (worker, pairs) in self.pairs.iter().enumerate() {
-            while let Some(pair) = pairs.receive()? {
-                let check = |it: Expected| match pair.status {
-                    Status::END => it.check_end(&pair.stamp, &pair.timing),
-                    _ => it.check_pair(&pair.stamp, &pair.timing, n_workers),
-                };
-                let is_ours = is_ours(service, ("pair-pose", worker), check);
-                if is_ours && pair.status != Status::END {
-                    gather.pair(&pair);
+    /// Takes in all that has come.
+    fn listen(&mut self) -> Result<(), Failure> {
+        for topic in 0..self.ears.len() {
+            while let Some(heard) = self.ears[topic].hear(|n| self.has_room(n))? {
+                if heard.session == self.service.session() {
+                    self.take(topic, heard);
                 }
             }
         }
         Ok(())
     }
-}
 
-/// Whether a message is what its topic is for; counts it if it is not.
-///
-/// * `topic`: what it is about, and the number of its sender.
-fn is_ours(
-    service: &Service,
-    (topic, sender): (&str, usize),
-    check: impl FnOnce(Expected) -> Result<(), WireError>,
-) -> bool {
-    let checked = check(Expected {
-        session: service.session(),
-        view: sender,
-        now_nanos: now_nanos(),
-    });
-    if let Err(error) = &checked {
-        service.health().refuse(error.refusal(), topic, error);
+    /// Whether so many bytes may come in; where nothing may be lost, waits for it.
+    fn has_room(&self, n_bytes: usize) -> bool {
+        let begin = Instant::now();
+        while !self.inlet.has_room(n_bytes) {
+            let may_wait = self.service.delivery() == Delivery::Lossless
+                && !self.inlet.is_broken()
+                && !self.service.stop().is_requested()
+                && begin.elapsed() < LONGEST_WAIT;
+            if !may_wait {
+                return false;
+            }
+            self.service.progress().tick();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        true
     }
-    checked.is_ok()
-}
 
-/// What is to be written: frames without a result, and then one that has it.
-struct Lot {
-    absent: Vec<Absent>,
-    record: Option<FrameRecord>,
-}
-
-/// The thread that writes, and the queue before it.
-struct Writer {
-    queue: SyncSender<Lot>,
-    thread: JoinHandle<()>,
-    n_missed: Arc<AtomicU64>,
-    n_written: Arc<AtomicU64>,
-    n_handed_on: Cell<u64>,
-    /// The first frame that had no line when it began.
-    next: u64,
-    overlay_every: u64,
-    start_frame: u64,
-    frame_step: u64,
-}
-
-impl Writer {
-    fn start(job: Job, service: &Service) -> Result<Self, Failure> {
-        let (session, resume) = (service.session(), service.epoch() > 0);
-        // What was writable when the run began and is no longer does not stop the others.
-        let kind = if resume {
-            ExitKind::Run
-        } else {
-            ExitKind::Input
+    fn take(&mut self, topic: usize, heard: Heard) {
+        let kind = self.ears[topic].kind();
+        self.note(topic, kind, &heard);
+        let health = self.service.health();
+        health.received(1);
+        self.is_over |= kind == Kind::Pose3d && heard.status == Status::END;
+        let log_time = now_nanos();
+        // Some ends do not say when they were sent.
+        let said = Some(heard.sent_at).filter(|it| *it > 0);
+        let entry = Entry {
+            log_time,
+            publish_time: said.unwrap_or(log_time),
+            ..Entry::default()
         };
-        let folder = Folder::open(&job.output, resume).or_fail(kind)?;
-        let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
-        let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
-        let output = output.or_fail(kind)?;
-        let next = output.next_frame().unwrap_or(job.start_frame);
-        let (queue, lots) = sync_channel(QUEUE);
-        let n_missed = Arc::new(AtomicU64::new(0));
-        let missed = Arc::clone(&n_missed);
-        let n_written = Arc::new(AtomicU64::new(0));
-        let written = Arc::clone(&n_written);
-        let thread = Builder::new()
-            .name("writer".to_owned())
-            .spawn(move || write_all(output, &lots, [&missed, &written], session))
-            .or_fail(ExitKind::Run)?;
-        Ok(Self {
-            queue,
-            thread,
-            n_missed,
-            n_written,
-            n_handed_on: Cell::new(0),
-            next,
-            overlay_every,
-            start_frame: job.start_frame,
-            frame_step: frame_step.max(1),
-        })
+        let Some(data) = heard.data else {
+            self.inlet.lost(topic, 1);
+            health.dropped(Cause::QueueFull, 1);
+            return;
+        };
+        if self.inlet.push(Item { topic, entry, data }) {
+            health.sent(heard.frame);
+        } else {
+            health.dropped(Cause::QueueFull, 1);
+        }
     }
 
-    /// Whether the pixels of a frame are needed.
-    fn draws(&self, frame: u64) -> bool {
-        let nth = frame.saturating_sub(self.start_frame) / self.frame_step;
-        self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)
-    }
-
-    /// Hands a record on; `false` if it was missed, because too many wait already.
-    fn write(&self, Settled { absent, record }: Settled) -> bool {
-        let record = Some(record);
-        match self.queue.try_send(Lot { absent, record }) {
-            Ok(()) => {
-                self.n_handed_on.set(self.n_handed_on.get() + 1);
-                true
-            }
-            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
-                self.n_missed.fetch_add(1, Ordering::Relaxed);
-                false
+    /// Notes what a message says of others, and that it came itself.
+    fn note(&mut self, topic: usize, kind: Kind, heard: &Heard) {
+        if let Some([epoch, n_sent]) = heard.life {
+            for &other in &self.tells_of[topic] {
+                self.sent[other].said(epoch, n_sent);
             }
         }
-    }
-
-    /// Hands on frames that have no result, behind all others; waits for room, for nothing follows.
-    fn rest(&self, absent: Vec<Absent>) {
-        let record = None;
-        if let Err(error) = self.queue.send(Lot { absent, record }) {
-            tracing::debug!(%error, "the writing thread is gone");
+        if heard.has_evidence {
+            self.n_evidence[topic] += 1;
+            for &other in &self.tells_of[topic] {
+                self.sent[other].said(0, self.n_evidence[topic]);
+            }
+        }
+        // Senders do not count the end, and cameras not what they could not read.
+        let counts = match kind {
+            Kind::Frame => heard.status == Status::OK,
+            _ => heard.status != Status::END,
+        };
+        if counts {
+            self.sent[topic].came();
         }
     }
 
-    /// Results that wait to be written.
-    fn n_waiting(&self) -> usize {
-        let written = self.n_written.load(Ordering::Relaxed);
-        self.n_handed_on.get().saturating_sub(written) as usize
-    }
-
-    /// Waits until everything is written.
-    fn finish(self, service: &Service) -> Result<(), Failure> {
-        drop(self.queue);
-        while !self.thread.is_finished() {
-            service.progress().tick();
-            std::thread::sleep(Duration::from_millis(20));
+    /// Counts what was sent and never came, and says what of every topic is not in the file.
+    fn settle(&mut self, channels: &[Channel]) {
+        for (topic, it) in channels.iter().enumerate() {
+            let missed = self.sent[topic].lost();
+            self.inlet.lost(topic, missed);
+            self.service.health().dropped(Cause::Busy, missed);
+            let lost = self.inlet.n_lost(topic);
+            if lost > 0 {
+                tracing::warn!(topic = it.name, lost, "messages are not in the recording");
+            }
         }
-        let panicked = |_| Failure::new(ExitKind::Run, "the writing thread panicked");
-        self.thread.join().map_err(panicked)
     }
 }
 
-fn write_all(
-    mut output: Output,
-    lots: &Receiver<Lot>,
-    [n_missed, n_written]: [&AtomicU64; 2],
-    session: u64,
-) {
-    while let Ok(Lot { absent, record }) = lots.recv() {
-        output.absent(&absent);
-        let Some(record) = record else { continue };
-        output.frame(&record);
-        n_written.fetch_add(1, Ordering::Relaxed);
+/// The topics that a topic tells of: a process of what it sends, poses of the evidence they go with.
+fn told_by(it: &Channel, channels: &[Channel]) -> Vec<usize> {
+    let is_told = |other: &Channel| match it.kind {
+        Kind::Health => {
+            let sender = other.sender.as_ref();
+            sender.is_some_and(|sender| topic::health(sender) == it.name)
+        }
+        Kind::ViewPose => {
+            let view = |name: &str| name.rsplit('/').next().map(str::to_owned);
+            other.kind == Kind::Evidence && view(&other.name) == view(&it.name)
+        }
+        _ => false,
+    };
+    let numbered = channels.iter().enumerate();
+    numbered.filter(|it| is_told(it.1)).map(|it| it.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channels(without: Without) -> Vec<Channel> {
+        let topics = Topics {
+            n_views: 2,
+            n_workers: 1,
+            has_quality: true,
+            processes: ["results", "pose-1", "fuse-0"].map(str::to_owned).into(),
+        };
+        topics.channels(without)
     }
-    output.missed(n_missed.load(Ordering::Relaxed));
-    output.finish(session);
+
+    #[test]
+    fn every_topic_is_heard_and_known_by_its_kind() {
+        let all = channels(Without::default());
+        assert_eq!(all.len(), 3 + 2 * 4 + 1 + 1);
+        for it in &all {
+            assert_eq!(Kind::of_topic(&it.name), Some(it.kind));
+        }
+        let without = channels(Without {
+            evidence: true,
+            pixels: true,
+        });
+        assert!(without.iter().all(|it| it.kind != Kind::Evidence));
+        assert_eq!(without.len(), all.len() - 2);
+    }
+
+    #[test]
+    fn a_process_tells_of_what_it_sends_and_poses_of_their_evidence() {
+        let all = channels(Without::default());
+        let told = |name: &str| {
+            let it = all.iter().find(|it| it.name == name).unwrap();
+            let told = told_by(it, &all).into_iter();
+            told.map(|it| all[it].name.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(told(&topic::health("pose-1")), [topic::view_pose(1)]);
+        assert_eq!(told(&topic::health("fuse-0")), [topic::pair_pose(0)]);
+        assert_eq!(told(&topic::view_pose(1)), [topic::evidence(1)]);
+        assert_eq!(told(&topic::health("results")), Vec::<String>::new());
+    }
 }

@@ -321,14 +321,14 @@ fn a_recorder_that_keeps_dying_does_not_stop_the_run() {
         Delivery::Lossless,
         &[
             ("sink", "receive 0", Role::Essential),
-            ("record", "fail 1", Role::Optional),
+            ("results", "fail 1", Role::Optional),
             ("source", "send 50 1 1", Role::Essential),
         ],
     );
     case.plan.policy.max_restarts = 2;
     let run = case.run(|_, _| {});
     assert_eq!(run.got("sink").len(), 50);
-    assert_eq!(state_of(&run, "record"), State::GivenUp);
+    assert_eq!(state_of(&run, "results"), State::GivenUp);
     assert!(run.outcome().is_degraded());
 }
 

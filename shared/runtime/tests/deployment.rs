@@ -34,7 +34,7 @@ fn plan(delivery: Delivery) -> DeploymentPlan {
         held_frames: 2,
         processes: per_view
             .chain((0..N_WORKERS).map(|worker| format!("fuse-{worker}")))
-            .chain(["triangulate".to_owned(), "record".to_owned()])
+            .chain(["triangulate".to_owned(), "results".to_owned()])
             .collect(),
     }
 }
@@ -80,7 +80,7 @@ impl Ports {
                     .push(bus.publisher(&topic::view_quality(index)).unwrap());
             }
             "fuse" => self.open_fuse(&bus, &mut waiter, index),
-            _ => self.open_last(&bus, &mut waiter, stage == "record"),
+            _ => self.open_last(&bus, &mut waiter, stage == "results"),
         }
         self.kept.push((waiter, bus));
     }

@@ -53,10 +53,10 @@ processes end by themselves within a second, and the next start of the same depl
 With camera-... a camera fails for a fifth of the footage (its source does what `fault` says in a deployment): frames \
 are called what is wrong with them, the others' results go on (--max-pause-ms), and the camera has a part in results again within \
 --max-return-ms. With camera-moved one camera of the rig is turned by two degrees: it must be named, and no other, which \
-takes four cameras and some seconds of results. With stall-record the record process stands still for three seconds and is left alone: where the latest frame \
+takes four cameras and some seconds of results. With stall-results the results process stands still for three seconds and is left alone: where the latest frame \
 wins, results are made at no less than half the rate meanwhile; where nothing may be lost, nothing is.
 
-`back` is when the process sent what the first result of its new life is made of; of fuse, quality and record, which no \
+`back` is when the process sent what the first result of its new life is made of; of fuse, quality and results, which no \
 result names, when it gave a sign of having worked. Restarts are not limited here (supervise.max_restarts), and no \
 pictures are drawn.
 
@@ -283,14 +283,14 @@ mod tests {
         assert_eq!(trace_of("capture-2"), Trace::Camera(2));
         assert_eq!(trace_of("pose-11"), Trace::Pose(11));
         assert_eq!(trace_of("triangulate"), Trace::Result);
-        for process in ["fuse-0", "quality-1", "record"] {
+        for process in ["fuse-0", "quality-1", "results"] {
             assert_eq!(trace_of(process), Trace::Nowhere, "{process}");
         }
     }
 
     #[test]
     fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
-        let processes = ["capture-0", "pose-0", "triangulate", "record"].map(str::to_owned);
+        let processes = ["capture-0", "pose-0", "triangulate", "results"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
         assert_eq!(all.len(), 20);
         let quality = Scenario::Once(Blow::Kill, "quality");

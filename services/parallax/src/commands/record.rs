@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let mut growth = Growth::new(&file, &forecast);
     let report = planned.carry_out(globals, &stop, &mut |_| growth.note())?;
     let recording = taped::open(&file)?;
-    let later = (1..MOST_LIVES).map(|it| tape::file_of_life(&file, it));
+    let later = (1..MOST_LIVES).map(|it| record::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
     if arguments.json {
         let mut value = report.json();
@@ -139,7 +139,7 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
 
 /// Sees that no file is in the way.
 fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
-    let lives = (0..MOST_LIVES).map(|it| tape::file_of_life(file, it));
+    let lives = (0..MOST_LIVES).map(|it| record::file_of_life(file, it));
     for file in lives.filter(|it| it.exists()) {
         if file.is_dir() {
             let message = format!("{} is a folder", file.display());

@@ -251,8 +251,8 @@ mod tests {
     fn a_stage_is_known_by_its_service() {
         for (service, stage) in [
             ("pose", Some(Stage::Pose)),
+            ("results", None),
             ("record", None),
-            ("tape", None),
         ] {
             assert_eq!(Stage::of_service(service), stage);
         }

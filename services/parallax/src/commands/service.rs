@@ -33,9 +33,9 @@ pub(crate) enum Name {
     /// Joints in the world.
     Triangulate,
     /// The output folder.
-    Record,
+    Results,
     /// Every message into one file.
-    Tape,
+    Record,
     /// What a recording holds of another process.
     Replay,
 }
@@ -105,8 +105,8 @@ fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
         Name::Quality => quality(service, &resolved, own.index),
         Name::Fuse => fuse(service, &resolved, own.index),
         Name::Triangulate => triangulate(service, &resolved),
+        Name::Results => results(service, &resolved),
         Name::Record => record(service, &resolved),
-        Name::Tape => tape(service, &resolved),
         Name::Replay => replay(service, &resolved, own),
     }
 }
@@ -234,16 +234,16 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     triangulate::run(service, &job, step)
 }
 
-fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
+fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let deployment = &resolved.deployment;
     let dealing = Dealing::new(&prepared.pairs, deployment.fuse.most_workers());
-    let views = prepared.views.iter().map(|it| record::View {
+    let views = prepared.views.iter().map(|it| results::View {
         name: it.name.clone(),
         framing: it.framing.clone(),
         layout: Arc::new(it.plan.layout().clone()),
     });
-    let scene = record::Scene {
+    let scene = results::Scene {
         views: views.collect(),
         model: prepared.model,
         joints: prepared.settings.skeleton.joints,
@@ -251,18 +251,18 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         frame_step: deployment.capture.frame_step,
         up_in_world: prepared.up_in_world,
     };
-    let job = record::Job {
+    let job = results::Job {
         scene,
-        config: deployment.record.clone(),
+        config: deployment.results.clone(),
         output: deployment.output.clone(),
         start_frame: deployment.capture.start_frame,
         n_workers: dealing.n_workers,
         has_quality: resolved.has_quality(),
     };
-    record::run(service, job)
+    results::run(service, job)
 }
 
-fn tape(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
+fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let tape = resolved.tape.as_ref();
     let tape = tape
@@ -270,10 +270,10 @@ fn tape(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         .or_fail(ExitKind::Config)?;
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let processes = plan::processes(resolved, &prepared, Path::new(""));
-    let job = tape::Job {
+    let job = record::Job {
         file: tape.file.clone(),
         about: taped::about(resolved, tape)?,
-        topics: tape::Topics {
+        topics: record::Topics {
             n_views: prepared.views.len(),
             n_workers: dealing.n_workers,
             has_quality: resolved.has_quality(),
@@ -281,7 +281,7 @@ fn tape(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         },
         queue_bytes: tape.queue_mb.saturating_mul(1_000_000),
     };
-    tape::run(service, job)
+    record::run(service, job)
 }
 
 fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {

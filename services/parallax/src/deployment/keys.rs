@@ -271,13 +271,13 @@ pub(super) const KEYS: &[(&str, &str)] = &[
         "triangulate.error_weight",
         "how much of its expected error makes a view uncertain about a joint, with [quality]; 0 none",
     ),
-    ("record.trc", "write pose3d.trc for OpenSim"),
+    ("results.trc", "write pose3d.trc for OpenSim"),
     (
-        "record.overlay_every",
+        "results.overlay_every",
         "draw every n-th frame of every view; 0 draws none",
     ),
     (
-        "record.epipolar_part",
+        "results.epipolar_part",
         "part whose epipolar lines are drawn, from 1",
     ),
     (
@@ -291,7 +291,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     (
         "supervise.missed_beats",
         "signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed; realtime: and \
-         for how many of them a turn of any but record and tape may compute, however short those before it were",
+         for how many of them a turn of any but results and record may compute, however short those before it were",
     ),
     (
         "supervise.max_restarts",

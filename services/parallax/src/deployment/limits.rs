@@ -43,8 +43,8 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
         0.0,
         1e3,
     )?;
-    let part = it.record.epipolar_part as u64;
-    whole("record.epipolar_part", part, 1, 1000)?;
+    let part = it.results.epipolar_part as u64;
+    whole("results.epipolar_part", part, 1, 1000)?;
     supervise(it)
 }
 

@@ -77,7 +77,7 @@ mod tests {
         assert_eq!(of(text, "pose-0"), "cores=0,1");
         assert_eq!(of(text, "pose-2"), "cores=3 fifo=9");
         assert_eq!(of(text, "fuse-0"), "fifo=4");
-        assert_eq!(of(text, "record"), "");
+        assert_eq!(of(text, "results"), "");
     }
 
     #[test]
@@ -87,6 +87,6 @@ mod tests {
             assert_eq!(of(text, process), "spin");
         }
         assert_eq!(of(text, "capture-0"), "round-robin=2");
-        assert_eq!(of(text, "record"), "");
+        assert_eq!(of(text, "results"), "");
     }
 }

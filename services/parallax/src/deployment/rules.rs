@@ -288,7 +288,7 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
         ("quality", n_views),
         ("fuse", deployment.fuse.most_workers()),
         ("triangulate", 0),
-        ("record", 0),
+        ("results", 0),
     ];
     let is_one = services.iter().any(|&(service, n)| {
         name == service || (0..n).any(|index| name == format!("{service}-{index}"))
@@ -297,7 +297,7 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
         is_one,
         key,
         &format!("{name:?}"),
-        "capture, pose, quality, fuse, triangulate, record, or one process of these, such as pose-0",
+        "capture, pose, quality, fuse, triangulate, results, or one process of these, such as pose-0",
     )
 }
 

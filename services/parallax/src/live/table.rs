@@ -195,14 +195,14 @@ PROCESS     VIEW  STATE   UP s  SENT  SENT/s  RESTARTS  QUEUE of MOST  MEMORY MB
 capture-9   -     begins     -     -       -         -              -          -            -  -
 capture-10  -     dead       -     -       -         -              -          -            -  -
 pose-0      left  runs       6   100    20.0         1         2 of 2       48.2          7.3  3 late
-record      -     runs       6   100    20.0         1         2 of 2       48.2          7.3  3 late
+results     -     runs       6   100    20.0         1         2 of 2       48.2          7.3  3 late
 
 PROCESS  STAGE       VIEW    COUNT  PER s  p50 ms  p99 ms  p99.9 ms  max ms
 pose-0   waiting     left      100   20.0   0.060   0.060     0.060   0.060
          waiting     view 1      1   20.0  3003.1  3003.1    3003.1  3003.1
          computing   left      100   20.0    50.1    99.1     100.1   100.1
          publishing  left      100   20.0   0.003   0.003     0.003   0.003
-record   waiting     all       100   20.0  ";
+results  waiting     all       100   20.0  ";
         let text = table(&board());
         let same = text
             .chars()

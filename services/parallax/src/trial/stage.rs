@@ -114,7 +114,7 @@ impl Stage {
              [capture]\nmode = \"realtime\"       # keep up with the clock; what there is no time for is dropped and counted\n\
              pace = \"realtime\"\nframe_rate_hz = {:?}\n\n\
              [pose]\nsearch = \"tracked\"       # near the last pose, and everywhere now and then\n\n\
-             [record]\noverlay_every = {OVERLAY_EVERY}\n\n\
+             [results]\noverlay_every = {OVERLAY_EVERY}\n\n\
              [supervise]\ndeadline_ms = {}        # how long a stage waits for a view that is late\n\
              hang_limit_s = 60        # a machine that is busy is slow, not hung\n",
             cast.command,

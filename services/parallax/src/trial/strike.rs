@@ -180,7 +180,7 @@ impl Strike {
 ///
 /// * `life`: how often it had been restarted when it began.
 pub(crate) fn is_at_work(process: &str, health: &Health, life: u32) -> bool {
-    let has_worked = health.n_sent > 0 || (process == "record" && health.n_received > 0);
+    let has_worked = health.n_sent > 0 || (process == "results" && health.n_received > 0);
     health.epoch >= life && has_worked
 }
 
@@ -338,8 +338,8 @@ mod tests {
             ..health(1, 0, 0)
         };
         assert!(!is_at_work("pose-0", &received, 1));
-        assert!(is_at_work("record", &received, 1));
-        assert!(!is_at_work("record", &received, 2), "an earlier life");
+        assert!(is_at_work("results", &received, 1));
+        assert!(!is_at_work("results", &received, 2), "an earlier life");
         assert!(is_at_work("pose-0", &health(2, 1, 0), 1));
     }
 }

@@ -53,7 +53,11 @@ pub(crate) fn capture(case: &Case, line: &str) {
 }
 
 pub(crate) fn section(case: &Case, text: &str) {
-    case.edit("deployment.toml", "[record]", &format!("{text}\n[record]"));
+    case.edit(
+        "deployment.toml",
+        "[results]",
+        &format!("{text}\n[results]"),
+    );
 }
 
 fn forbid(case: &Case, name: &str) {

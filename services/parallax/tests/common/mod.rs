@@ -20,11 +20,11 @@ pub(crate) use started::{Ended, Started};
 
 /// No overlays and no turning, so that frames are the pictures as they were planted.
 pub(crate) const PLAIN: &str =
-    "[capture]\nupright = false\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+    "[capture]\nupright = false\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
 /// The same at a pace that leaves time to interfere.
 pub(crate) const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\n\
-     frame_rate_hz = 20\n[record]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
+     frame_rate_hz = 20\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
 /// Footage, rig, model and deployment file in a folder.
 pub(crate) struct Case {

@@ -144,7 +144,7 @@ impl Course {
         inputs::make_folder(&folder)?;
         let name = toml::Value::from(arguments.name.clone());
         let mut set = arguments.set.clone();
-        set.extend([format!("name={name}"), "record.overlay_every=0".to_owned()]);
+        set.extend([format!("name={name}"), "results.overlay_every=0".to_owned()]);
         if arguments.spin {
             set.push("runtime.spin=true".to_owned());
         }

@@ -56,7 +56,7 @@ fn draw_view(
     folder: &Path,
     is_enough: &mut dyn FnMut() -> bool,
 ) -> Result<(), Failure> {
-    record::remove_pictures(folder).or_fail(ExitKind::Input)?;
+    results::remove_pictures(folder).or_fail(ExitKind::Input)?;
     inputs::make_folder(folder)?;
     let size = view.size();
     let mut rgb = vec![0; size.rgb_bytes()];

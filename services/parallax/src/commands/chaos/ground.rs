@@ -71,7 +71,7 @@ impl Ground {
         if let Some(name) = name {
             ground.set.push(format!("name={}", toml::Value::from(name)));
         }
-        let more = ["record.overlay_every=0", "supervise.max_restarts=1000"];
+        let more = ["results.overlay_every=0", "supervise.max_restarts=1000"];
         ground.set.extend(more.map(str::to_owned));
         Ok(ground)
     }

@@ -30,7 +30,7 @@ impl Scenario {
         all.push(Self::Random);
         all.extend(once(Blow::Stop));
         // The recorder works for nobody, and is as slow as its disk.
-        let spinning = SERVICES.into_iter().filter(|it| *it != "record");
+        let spinning = SERVICES.into_iter().filter(|it| *it != "results");
         all.extend(spinning.map(|it| Self::Once(Blow::Spin, it)));
         all.push(Self::Supervisor);
         all.extend(CameraFault::ALL.map(Self::Camera));
@@ -77,7 +77,7 @@ impl Scenario {
             Self::Camera(it) => it.words()[1].to_owned(),
             Self::Moved => "a camera was turned by two degrees after the calibration".to_owned(),
             Self::Stall => {
-                "the record process stands still for three seconds, and goes on".to_owned()
+                "the results process stands still for three seconds, and goes on".to_owned()
             }
         }
     }
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn who_is_not_there_cannot_be_struck() {
-        let processes = ["pose-0", "pose-1", "record"].map(str::to_owned);
+        let processes = ["pose-0", "pose-1", "results"].map(str::to_owned);
         let names: Vec<String> = Scenario::all()
             .into_iter()
             .filter(|it| it.is_possible(&processes))
@@ -128,10 +128,10 @@ mod tests {
             .collect();
         let expected = [
             "kill-pose",
-            "kill-record",
+            "kill-results",
             "kill-random",
             "hang-pose",
-            "hang-record",
+            "hang-results",
             "spin-pose",
             "kill-supervisor",
             "camera-unplug",
@@ -140,7 +140,7 @@ mod tests {
             "camera-size",
             "camera-slow",
             "camera-damage",
-            "stall-record",
+            "stall-results",
         ];
         assert_eq!(names, expected);
     }

@@ -21,7 +21,7 @@ const PATIENT: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit
 /// Where the latest frame wins, results go on at no less than this share of the rate before.
 const SHARE: f64 = 0.5;
 /// What is tried.
-pub(super) const NAME: &str = "stall-record";
+pub(super) const NAME: &str = "stall-results";
 
 /// A recorder that is to stand still, or has.
 #[derive(Debug, Default)]
@@ -65,14 +65,14 @@ impl Stall {
     ) -> Option<String> {
         match *event {
             Event::Started {
-                process: "record",
+                process: "results",
                 pid,
                 ..
             } => self.pid = Some(pid),
             Event::Died {
-                process: "record", ..
+                process: "results", ..
             }
-            | Event::Finished { process: "record" } => self.pid = None,
+            | Event::Finished { process: "results" } => self.pid = None,
             Event::Health {
                 process: "triangulate",
                 health,
@@ -93,9 +93,9 @@ impl Stall {
         self.first.get_or_insert(state);
         let pid = self.pid?;
         let (stops, said) = match (self.stopped, self.freed) {
-            (None, _) if frame >= self.at_frame => (true, "stopping record on purpose"),
+            (None, _) if frame >= self.at_frame => (true, "stopping results on purpose"),
             (Some([at, _]), None) if state[0] - at >= STALL_NANOS => {
-                (false, "letting record go on")
+                (false, "letting results go on")
             }
             _ => return None,
         };
@@ -169,7 +169,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     Ok(Verdict {
         scenario: NAME.to_owned(),
         measured: format!(
-            "record stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
+            "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
             ms(it.map(|it| it.stall_ms)),
             after.n_results
         ),
@@ -212,7 +212,7 @@ mod tests {
     fn it_is_stopped_once_and_let_go_once_and_rates_are_told_apart() {
         let mut stall = Stall::new(10);
         let started = Event::Started {
-            process: "record",
+            process: "results",
             pid: 7,
             epoch: 0,
         };

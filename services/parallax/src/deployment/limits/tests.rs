@@ -272,12 +272,12 @@ const ROWS: &[Row] = &[
         &["0.0", "1.0"],
     ),
     (
-        "record.overlay_every",
+        "results.overlay_every",
         &[("-1", "expected a whole number")],
         &["0", "10"],
     ),
     (
-        "record.epipolar_part",
+        "results.epipolar_part",
         &[
             ("0", "is 0, expected 1 to 1000"),
             ("9223372036854775807", "expected 1 to 1000"),
@@ -376,7 +376,7 @@ const OTHERS: &[&str] = &[
     "fuse.pairs",
     "triangulate.joints",
     "triangulate.combine",
-    "record.trc",
+    "results.trc",
     "runtime.spin",
     "runtime.policy",
     "runtime.lock_memory",

@@ -1,0 +1,45 @@
+//! Writes what a deployment leaves behind.
+//!
+//! Reading order: [`Scene`] (what the numbers in messages mean), [`FrameRecord`] (all messages about
+//! one frame), the writers of one format each, and [`Output`], which puts them together.
+#![forbid(unsafe_code)]
+
+mod config;
+
+mod scene;
+
+mod frame;
+mod missing;
+
+mod latency;
+mod overlay;
+mod pose2d;
+mod pose3d;
+mod times;
+mod trc;
+
+mod folder;
+mod lines;
+
+mod calibration;
+mod summary;
+
+mod output;
+
+mod gather;
+
+mod service;
+
+pub use calibration::{CameraFit, Contradicted, Exchanged};
+pub use config::Config;
+pub use folder::{Folder, FolderError, remove_pictures};
+pub use frame::{Absent, FrameRecord, Picture, ViewRecord};
+pub use latency::{Latency, Percentiles, Report};
+pub use missing::Missing;
+pub use output::{Output, OutputError};
+pub use scene::{Scene, View};
+pub use service::{Job, run};
+pub use summary::Summary;
+
+#[cfg(test)]
+mod testing;
