@@ -1,13 +1,13 @@
 //! The command line, as `--help` shows it.
 
-use clap::{ArgAction, Args, Parser, Subcommand};
-use tracing::Level;
+use clap::{Parser, Subcommand};
 
 use crate::commands::{
     bench, calib, chaos, config, demo, deployments, detect, eval, fuse_frame, model, record,
     replay, run, service, synth, top, train,
 };
 use crate::exit::EXIT_CODES;
+use crate::globals::Globals;
 
 const LONG_ABOUT: &str = "\
 Calibrated, synchronised cameras in, 3D human skeletons out.
@@ -58,30 +58,6 @@ pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// Options of every command.
-#[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct Globals {
-    /// Say less: errors only.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
-    pub quiet: bool,
-    /// Say more; twice says everything.
-    #[arg(short, long, global = true, action = ArgAction::Count)]
-    pub verbose: u8,
-}
-
-impl Globals {
-    /// The least important events that are logged.
-    pub(crate) fn level(self) -> Level {
-        match (self.quiet, self.verbose) {
-            (true, _) => Level::ERROR,
-            (false, 0) => Level::WARN,
-            (false, 1) => Level::INFO,
-            (false, 2) => Level::DEBUG,
-            (false, _) => Level::TRACE,
-        }
-    }
 }
 
 /// What to do.

@@ -9,6 +9,7 @@ mod commands;
 mod deployment;
 mod describe;
 mod exit;
+mod globals;
 mod inputs;
 mod judged;
 mod live;

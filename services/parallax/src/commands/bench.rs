@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 use runtime::Failure;
 
-use crate::cli::Globals;
+use crate::globals::Globals;
 use load::Kind;
 
 /// What to measure.

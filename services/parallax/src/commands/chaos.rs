@@ -22,7 +22,7 @@ use runtime::{Delivery, ExitKind, Failure, now_nanos};
 use serde_json::{Value, json};
 
 use super::run::Planned;
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::trial::cost::{Cost, Trace};
 use crate::trial::strike::{Blow, Strike};
 use crate::{inputs, output};

@@ -14,8 +14,8 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 
 use super::run::Planned;
-use crate::cli::Globals;
 use crate::deployment::Loaded;
+use crate::globals::Globals;
 use crate::trial::Point;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};

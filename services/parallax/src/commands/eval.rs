@@ -19,8 +19,8 @@ use viewquality::Forecaster;
 
 use super::judge::selection;
 use crate::claim::Claim;
-use crate::cli::Globals;
 use crate::deployment::fuse_numbers;
+use crate::globals::Globals;
 use crate::inputs;
 use crate::nothing;
 use crate::shipped::{self, Shipped};

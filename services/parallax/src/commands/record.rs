@@ -10,9 +10,9 @@ use clap::{Args, ValueEnum};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use crate::audience::Tape;
-use crate::cli::Globals;
 use crate::commands::run::Planned;
 use crate::deployment::Loaded;
+use crate::globals::Globals;
 use crate::plan::Resolved;
 use crate::{output, taped};
 use room::{Forecast, Growth, PerFrame};

@@ -8,9 +8,9 @@ use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use crate::audience::{Replay, Stage};
-use crate::cli::Globals;
 use crate::commands::run::Planned;
 use crate::deployment::Loaded;
+use crate::globals::Globals;
 use crate::plan::Resolved;
 use crate::shipped::Shipped;
 use crate::taped::{self, Settings};

@@ -12,8 +12,8 @@ use supervise::{Event, Plan};
 use tracing::Level;
 
 use crate::claim::Claim;
-use crate::cli::Globals;
 use crate::deployment::{Deployment, Loaded};
+use crate::globals::Globals;
 use crate::inputs;
 use crate::plan::{self, Resolved};
 use crate::prepare::Prepared;

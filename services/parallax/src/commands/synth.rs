@@ -16,7 +16,7 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Action, Flaws, Recording, RigChoice, Settings};
 use serde_json::{Value, json};
 
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 pub(crate) use chosen::rate;
 use chosen::{actions, rig, subjects};

@@ -21,7 +21,7 @@ use datasets::SkeletonTable;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use training::{CheckpointError, Plan, Settings, TrainError, Trainer, Tree};
 
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 use album::Gallery;
 use data::Data;

@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 
 use super::load::Arguments;
 use super::pictures;
-use crate::cli::Globals;
 use crate::commands::run::Planned;
 use crate::deployment::{Deployment, Loaded};
+use crate::globals::Globals;
 use crate::inputs;
 use crate::spread::Spread;
 use crate::summary::Report;

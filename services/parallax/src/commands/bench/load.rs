@@ -13,7 +13,7 @@ use super::course::{Case, Course, Measured};
 use super::occasion::Occasion;
 use super::report::Report;
 use super::{EXITS, Output};
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::output;
 use crate::spread::Spread;
 use crate::trial::limit;

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Scene, Settings, View};
 
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 /// Writes the first pictures of every camera into a folder of its name; false if it was stopped.

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::Output;
 use super::occasion::Occasion;
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 /// What was measured.

@@ -12,7 +12,7 @@ use super::hop::{self, Measured, Series};
 use super::occasion::Occasion;
 use super::report::Report;
 use super::{EXITS, Output};
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::output;
 use crate::spread::Spread;
 use crate::trial::limit;

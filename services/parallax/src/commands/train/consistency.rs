@@ -11,8 +11,8 @@ use clap::Args;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::Sequence;
 
-use crate::cli::Globals;
 use crate::commands::eval::{size, unread};
+use crate::globals::Globals;
 use crate::inputs;
 use work::Work;
 

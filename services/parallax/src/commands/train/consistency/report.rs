@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::Arguments;
 use super::work::Done;
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::output;
 use ::consistency::{Appearance, Point};
 

@@ -13,8 +13,8 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 
 use super::Arguments;
-use crate::cli::Globals;
 use crate::commands::eval::no_film;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 /// Numbers of bins that are compared.

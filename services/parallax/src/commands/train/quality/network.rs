@@ -8,7 +8,7 @@ use qualitytraining::network::Kind;
 use qualitytraining::settings::Settings;
 use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 const HELP: &str = "\

@@ -15,7 +15,7 @@ use viewquality::TileShape;
 use super::super::{data::unread, per_dataset::deal};
 use super::observer::Observer;
 use super::scenes;
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 const HELP: &str = "\

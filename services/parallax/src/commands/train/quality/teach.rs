@@ -17,7 +17,7 @@ use serde_json::json;
 
 use super::network::Arguments;
 use super::replace;
-use crate::cli::Globals;
+use crate::globals::Globals;
 use crate::{inputs, output};
 
 /// Trains until the network is written, or it is told to stop.

@@ -1,0 +1,28 @@
+//! Options of every command.
+
+use clap::{ArgAction, Args};
+use tracing::Level;
+
+/// Options of every command.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct Globals {
+    /// Say less: errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice says everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+}
+
+impl Globals {
+    /// The least important events that are logged.
+    pub(crate) fn level(self) -> Level {
+        match (self.quiet, self.verbose) {
+            (true, _) => Level::ERROR,
+            (false, 0) => Level::WARN,
+            (false, 1) => Level::INFO,
+            (false, 2) => Level::DEBUG,
+            (false, _) => Level::TRACE,
+        }
+    }
+}
