@@ -27,7 +27,7 @@ const LAYERS: &[&[&str]] = &[
         "runpage",
     ],
     &["wire", "training", "qualitytraining", "sequences"],
-    &["experiment"],
+    &["experiment", "stage"],
     &[
         "capture",
         "pose",

@@ -2,9 +2,11 @@
 #![forbid(unsafe_code)]
 
 mod config;
-mod evidence;
-mod seen;
+mod input;
+mod job;
 mod service;
+mod worker;
 
 pub use config::{Compatibility, Config, Energy, Switch, Tau, TauFile, TauName, Views};
-pub use service::{Job, run};
+pub use job::Job;
+pub use service::run;

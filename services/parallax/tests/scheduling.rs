@@ -21,7 +21,7 @@ fn processes_run_on_the_cores_that_the_deployment_gives_them() {
     let cores = runtime::own_cores().unwrap();
     let (first, last) = (cores[0], cores[cores.len() - 1]);
     let text = format!(
-        "{PACED}[runtime]\nspin = true\ncores = {{ pose = [{first}], pose-1 = [{last}], record = [{last}] }}\n"
+        "{PACED}[runtime]\nspin = true\ncores = {{ pose = [{first}], pose-1 = [{last}], results = [{last}] }}\n"
     );
     let case = Case::new("cores", &[80; 2], &text);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);

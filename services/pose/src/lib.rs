@@ -2,8 +2,10 @@
 #![forbid(unsafe_code)]
 
 mod config;
-mod intake;
+mod job;
 mod service;
+mod view;
 
 pub use config::{All, Config, Search, Window};
-pub use service::{Job, run};
+pub use job::Job;
+pub use service::run;

@@ -2,9 +2,8 @@
 #![forbid(unsafe_code)]
 
 mod config;
-mod frames;
 mod service;
 
 pub use config::{Config, Device};
-pub use frames::HELD_REALTIME;
 pub use service::{Job, Looking, Source, run};
+pub use stage::HELD_REALTIME;

@@ -1,19 +1,15 @@
-//! The loop: take the candidates of a frame, predict their errors, send them.
+//! Predicts the errors of a frame's candidates, and sends them.
 
 use core::time::Duration;
 use std::sync::Arc;
 
 use fmp::{Layout, LocalScore, Model, Pose};
 use kernels::Rgb8View;
-use messages::{FrameHeader, Stamp, Status, Timing, ViewPose, ViewQuality, topic};
-use metrics::Passage;
-use runtime::{
-    ExitKind, Failure, OrFail as _, Publisher, Sample, Service, Waiter, Woken, now_nanos,
-};
+use messages::{FrameHeader, ViewPose, ViewQuality, topic};
+use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
+use stage::{Context, Stage};
 use viewquality::{Forecaster, Predictor, Seen};
 use wire::WireError;
-
-use crate::frames::Frames;
 
 /// What one view's process has to do.
 #[derive(Debug)]
@@ -52,125 +48,59 @@ pub struct Looking {
     pub layout: Arc<Layout>,
 }
 
-/// Answers every message of one view, until the footage ends or it is told to stop.
+/// Predicts the expected errors of every frame of one view, until the footage ends or the process is to stop.
 ///
 /// # Errors
 ///
-/// What the transport says.
+/// What the transport reports.
 pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
-    let bus = service.bus();
-    let mut waiter = bus.waiter();
-    let poses = bus.subscriber::<ViewPose>(&topic::view_pose(job.view), &mut waiter)?;
-    let mut frames = match &job.source {
+    let view = job.view;
+    let frame_scale = job.frame_scale;
+    let mut stage = Stage::new(service, job.patience);
+    let poses = stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| Ok(*pose))?;
+    let frames = match &job.source {
         Source::Table(_) => None,
-        Source::Network(_) => {
-            let frames = bus.slice_subscriber(&topic::frame(job.view), &mut waiter)?;
-            Some(Frames::new(frames, service, job.view, job.frame_step))
-        }
+        Source::Network(_) => Some(stage.hold_frames(view, job.frame_step)?),
     };
-    let publisher = bus.publisher::<ViewQuality>(&topic::view_quality(job.view))?;
-    publisher.wait_for_subscribers(job.n_consumers, service.patience_at_start(job.patience));
-    while waiter.wait(Duration::from_millis(100))? != Woken::Stop {
-        if let Some(frames) = &mut frames {
-            frames.listen()?;
-        }
-        while let Some(pose) = poses.receive()? {
-            let expected = wire::Expected {
-                session: service.session(),
-                view: job.view,
-                now_nanos: now_nanos(),
-            };
-            if let Err(error) = expected.check(&pose.stamp, &pose.timing) {
-                service
-                    .health()
-                    .refuse(error.refusal(), "view-pose", &error);
-                continue;
+    let output = stage.view_output(&topic::view_quality(view), job.n_consumers)?;
+    stage.run(|frame| {
+        let Some(pose) = frame.item(poses) else {
+            return Ok(());
+        };
+        let mut message = match (&mut job.source, &frames) {
+            (Source::Table(predictor), _) => from_table(predictor, frame.number(), frame_scale)?,
+            (Source::Network(network), Some(frames)) => {
+                let sample = frames.of(frame.number());
+                let picture = (frame.number(), sample.as_deref());
+                match candidates(network, &pose.value) {
+                    Ok(read) => predict(network, read, picture, frame_scale)?,
+                    Err(error) => {
+                        Context::of(service).refuse("view-pose", &error);
+                        nothing()?
+                    }
+                }
             }
-            if pose.status == Status::END {
-                // Their sender is to wait for nobody who reads no more.
-                drop(frames);
-                return end(service, &publisher, &waiter, pose.stamp);
-            }
-            let received_at_nanos = now_nanos();
-            service.health().received(1);
-            service.progress().tick();
-            let mut message = answer(service, job, &pose, frames.as_mut())?;
-            message.stamp = Stamp {
-                epoch: service.epoch(),
-                ..pose.stamp
-            };
-            message.took_nanos = now_nanos() - received_at_nanos;
-            let computing = message.took_nanos;
-            message.timing = Timing {
-                received_at_nanos,
-                sent_at_nanos: now_nanos(),
-            };
-            publisher.send(&message)?;
-            service.health().sent(pose.stamp.frame);
-            let sent_at = message.timing.sent_at_nanos;
-            service.health().passed(&Passage {
-                waiting: Some(received_at_nanos.saturating_sub(pose.timing.sent_at_nanos)),
-                computing,
-                publishing: now_nanos() - sent_at,
-                since_capture: Some(sent_at.saturating_sub(pose.stamp.captured_at_nanos)),
-            });
-        }
-    }
-    Ok(())
+            (Source::Network(_), None) => nothing()?,
+        };
+        message.took_nanos = now_nanos() - frame.turn().received_at();
+        output.send_and_account(frame.turn(), view, message)
+    })
 }
 
-fn end(
-    service: &Service,
-    publisher: &Publisher<ViewQuality>,
-    waiter: &Waiter,
-    stamp: Stamp,
-) -> Result<(), Failure> {
-    let end = ViewQuality {
-        stamp,
-        status: Status::END,
-        ..ViewQuality::default()
-    };
-    let say = || -> Result<(), Failure> {
-        publisher.send(&end)?;
-        Ok(())
-    };
-    say()?;
-    service.health().finished();
-    waiter.linger(|| publisher.n_connected(), say)
-}
-
-fn answer(
-    service: &Service,
-    job: &mut Job,
-    pose: &ViewPose,
-    frames: Option<&mut Frames<'_>>,
+fn from_table(
+    predictor: &mut Predictor,
+    frame: u64,
+    frame_scale: f32,
 ) -> Result<ViewQuality, Failure> {
-    let frame = pose.stamp.frame;
-    match (&mut job.source, frames) {
-        (Source::Table(predictor), _) => {
-            let sigma = predictor.sigma_px(frame);
-            let sigma = sigma.map(|it| it.iter().map(|px| px * job.frame_scale).collect());
-            let sigma: Option<Vec<f32>> = sigma;
-            wire::sigma_to_message(sigma.as_deref()).or_fail(ExitKind::Run)
-        }
-        (Source::Network(looking), Some(frames)) => {
-            frames.listen()?;
-            frames.advance(frame)?;
-            let read = candidates(looking, pose).map_err(|error| {
-                service
-                    .health()
-                    .refuse(error.refusal(), "view-pose", &error);
-            });
-            let message = match read {
-                Ok(read) => look(looking, read, (frame, frames.of(frame)), job.frame_scale),
-                Err(()) => wire::sigma_to_message(None).or_fail(ExitKind::Run),
-            };
-            // What is done with goes back to the camera.
-            frames.advance(frame + 1)?;
-            message
-        }
-        (Source::Network(_), None) => wire::sigma_to_message(None).or_fail(ExitKind::Run),
-    }
+    let sigma_px = predictor.sigma_px(frame);
+    let sigma_px: Option<Vec<f32>> =
+        sigma_px.map(|parts| parts.iter().map(|px| px * frame_scale).collect());
+    wire::sigma_to_message(sigma_px.as_deref()).or_fail(ExitKind::Run)
+}
+
+/// The message that there is no prediction.
+fn nothing() -> Result<ViewQuality, Failure> {
+    wire::sigma_to_message(None).or_fail(ExitKind::Run)
 }
 
 /// The candidates of a view, and how well the parts of the first one fit.
@@ -184,14 +114,13 @@ fn candidates(looking: &Looking, pose: &ViewPose) -> Result<Read, WireError> {
 
 /// Runs the network on the best candidate, on the frame where it lies in shared memory. What cannot be
 /// predicted is said to be so, and why goes to the log: a view is worth more than its expected errors.
-fn look(
+fn predict(
     looking: &mut Looking,
     (candidates, scores): Read,
     (frame_number, frame): (u64, Option<&Sample<u8, FrameHeader>>),
     frame_scale: f32,
 ) -> Result<ViewQuality, Failure> {
     let (model, layout) = (&looking.model, &looking.layout);
-    let nothing = || wire::sigma_to_message(None).or_fail(ExitKind::Run);
     if candidates.is_empty() {
         return nothing();
     }

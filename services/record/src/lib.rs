@@ -1,11 +1,12 @@
 //! Every message of a deployment into one file.
 #![forbid(unsafe_code)]
 
-mod ear;
 mod queue;
 mod sent;
 mod service;
+mod topics;
 mod writer;
 
-pub use service::{Job, Topics, run};
+pub use service::{Job, run};
+pub use topics::Topics;
 pub use writer::file_of_life;

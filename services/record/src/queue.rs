@@ -1,10 +1,10 @@
-//! What waits to be written: bounded by its bytes, and nothing that does not fit is forgotten.
+//! What waits to be written: bounded by its bytes; what does not fit is counted.
 
 use core::time::Duration;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use recording::Entry;
 
 /// Messages that may wait, however small.
@@ -25,7 +25,7 @@ pub(crate) struct Item {
 struct Shared {
     n_bytes: AtomicU64,
     n_items: AtomicU64,
-    /// Nobody writes any more.
+    /// The file cannot be written any more.
     is_broken: AtomicBool,
     lost: Vec<AtomicU64>,
 }
@@ -48,15 +48,15 @@ impl Shared {
     }
 }
 
-/// The end where messages come in.
+/// The sending end.
 #[derive(Debug)]
 pub(crate) struct Inlet {
-    sender: SyncSender<Item>,
+    sender: Sender<Item>,
     shared: Arc<Shared>,
     most_bytes: u64,
 }
 
-/// The end where they are written.
+/// The receiving end, of the writing thread.
 #[derive(Debug)]
 pub(crate) struct Outlet {
     receiver: Receiver<Item>,
@@ -67,7 +67,7 @@ pub(crate) struct Outlet {
 ///
 /// * `most_bytes`: that may wait; one message may be larger, alone.
 pub(crate) fn queue(n_topics: usize, most_bytes: u64) -> (Inlet, Outlet) {
-    let (sender, receiver) = sync_channel(MOST_MESSAGES);
+    let (sender, receiver) = bounded(MOST_MESSAGES);
     let shared = Arc::new(Shared {
         n_bytes: AtomicU64::new(0),
         n_items: AtomicU64::new(0),
@@ -92,7 +92,7 @@ impl Inlet {
             && (waiting == 0 || waiting + n_bytes as u64 <= self.most_bytes)
     }
 
-    /// Whether nobody writes any more.
+    /// Whether the file cannot be written any more.
     pub(crate) fn is_broken(&self) -> bool {
         self.shared.is_broken.load(Ordering::Acquire)
     }
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn once_nobody_writes_there_is_no_room_and_what_waits_is_counted() {
+    fn once_the_file_cannot_be_written_there_is_no_room_and_what_waits_is_counted() {
         let (inlet, outlet) = queue(2, 100);
         assert!(inlet.push(item(0, 1)) && inlet.push(item(1, 1)));
         outlet.lose(&outlet.next(Duration::ZERO).unwrap().unwrap());

@@ -1,25 +1,25 @@
-//! How many messages were sent that never came here: what their senders say they sent, less what came.
+//! How many messages were sent that never came: what their senders report, less what came.
 
 use std::collections::BTreeMap;
 
 /// What was sent and what came of one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Sent {
-    /// By life of the sender.
-    said: BTreeMap<u64, u64>,
+    /// By epoch of the sender.
+    reported: BTreeMap<u64, u64>,
     n_came: u64,
     /// Of these lost, what was counted before.
     n_known: u64,
 }
 
 impl Sent {
-    /// Hears from the sender.
+    /// Takes a report of the sender.
     ///
-    /// * `life`: how often it has been restarted.
-    /// * `n_sent`: what it has sent since.
-    pub(crate) fn said(&mut self, life: u64, n_sent: u64) {
-        let said = self.said.entry(life).or_default();
-        *said = n_sent.max(*said);
+    /// * `epoch`: of the sender.
+    /// * `n_sent`: what it has sent in that epoch.
+    pub(crate) fn reported(&mut self, epoch: u64, n_sent: u64) {
+        let reported = self.reported.entry(epoch).or_default();
+        *reported = n_sent.max(*reported);
     }
 
     /// One came.
@@ -31,7 +31,7 @@ impl Sent {
     ///
     /// Ask where nothing is on its way any more: what was sent and has not come yet looks lost.
     pub(crate) fn lost(&mut self) -> u64 {
-        let sent = self.said.values().copied().fold(0, u64::saturating_add);
+        let sent = self.reported.values().copied().fold(0, u64::saturating_add);
         let lost = sent.saturating_sub(self.n_came);
         let new = lost.saturating_sub(self.n_known);
         self.n_known = self.n_known.max(lost);
@@ -49,21 +49,21 @@ mod tests {
         for _ in 0..7 {
             sent.came();
         }
-        sent.said(0, 9);
+        sent.reported(0, 9);
         assert_eq!((sent.lost(), sent.lost()), (2, 0));
     }
 
     #[test]
-    fn lives_add_up_and_an_old_sign_of_life_takes_nothing_back() {
+    fn epochs_add_up_and_an_old_heartbeat_changes_nothing() {
         let mut sent = Sent::default();
-        sent.said(0, 5);
-        sent.said(1, 3);
-        sent.said(0, 4);
+        sent.reported(0, 5);
+        sent.reported(1, 3);
+        sent.reported(0, 4);
         assert_eq!(sent.lost(), 8);
     }
 
     #[test]
-    fn what_came_before_its_sender_said_so_is_not_lost() {
+    fn what_came_before_its_sender_reported_it_is_not_lost() {
         let mut sent = Sent::default();
         sent.came();
         assert_eq!(sent.lost(), 0);

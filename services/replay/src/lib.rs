@@ -2,7 +2,6 @@
 #![forbid(unsafe_code)]
 
 mod clock;
-mod mouth;
 mod service;
 
 pub use clock::Pace;

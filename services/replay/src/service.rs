@@ -12,7 +12,7 @@ use runtime::{
 
 use crate::Pace;
 use crate::clock::Clock;
-use crate::mouth::Mouth;
+use stage::any::Sender;
 
 /// What the process has to do.
 #[derive(Debug)]
@@ -133,7 +133,7 @@ fn after(
 struct Speaker<'a> {
     service: &'a Service,
     job: &'a Job,
-    mouths: Vec<Mouth>,
+    senders: Vec<Sender>,
     clock: Clock,
     waiter: Waiter,
 }
@@ -146,14 +146,14 @@ impl<'a> Speaker<'a> {
         recording: &Recording,
     ) -> Result<Self, Failure> {
         let lines = job.lines.iter().filter(|it| it.n_consumers > 0);
-        let mouths = lines
+        let senders = lines
             .zip(tracks)
-            .map(|(line, track)| Mouth::open(service.bus(), track.kind, &line.topic));
+            .map(|(line, track)| Sender::open(service.bus(), track.kind, &line.topic));
         let [recorded, ended] = recording.span().unwrap_or([0; 2]);
         Ok(Self {
             service,
             job,
-            mouths: mouths.collect::<Result<_, _>>()?,
+            senders: senders.collect::<Result<_, _>>()?,
             clock: Clock {
                 recorded,
                 length: ended.saturating_sub(recorded),
@@ -172,8 +172,8 @@ impl<'a> Speaker<'a> {
     fn wait_for_all(&self) {
         let patience = self.service.patience_at_start(self.job.patience);
         let lines = self.job.lines.iter().filter(|it| it.n_consumers > 0);
-        for (line, mouth) in lines.zip(&self.mouths) {
-            let n = mouth.wait_for_subscribers(line.n_consumers, patience);
+        for (line, sender) in lines.zip(&self.senders) {
+            let n = sender.wait_for_subscribers(line.n_consumers, patience);
             if n < line.n_consumers {
                 let expected = line.n_consumers;
                 tracing::warn!(
@@ -213,7 +213,7 @@ impl<'a> Speaker<'a> {
         envelope: &Envelope,
     ) -> Result<(), Failure> {
         let health = self.service.health();
-        match self.mouths[line].say(message, &self.rebased(envelope)) {
+        match self.senders[line].send(message, &self.rebased(envelope)) {
             Ok(()) if line == 0 => health.sent(envelope.stamp.frame),
             Ok(()) => {}
             Err(error @ SendError::TooLong { .. }) => {
@@ -228,14 +228,14 @@ impl<'a> Speaker<'a> {
     fn end(&self, it: &Envelope) -> Result<(), Failure> {
         let say = || -> Result<(), Failure> {
             let end = self.rebased(it);
-            for mouth in &self.mouths {
-                mouth.end(&end)?;
+            for sender in &self.senders {
+                sender.end(&end)?;
             }
             Ok(())
         };
         say()?;
         self.service.health().finished();
-        let n_connected = || self.mouths.first().map_or(0, Mouth::n_connected);
+        let n_connected = || self.senders.first().map_or(0, Sender::n_connected);
         self.waiter.linger(n_connected, say)
     }
 }

@@ -7,31 +7,31 @@ use messages::{
 use recording::{Envelope, Kind, encode};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
 
-/// A message, and what is to be known of it.
+/// A message as bytes, and what its envelope tells.
 #[derive(Debug)]
-pub(crate) struct Heard {
-    /// Its run.
+pub struct Received {
+    /// Its session.
     pub session: u64,
-    /// Its frame; 0 for signs of life.
+    /// Its frame; 0 for heartbeats.
     pub frame: u64,
     /// When it was sent.
     pub sent_at: u64,
-    /// Whether it carries a result; signs of life always do.
+    /// Whether it carries a result; heartbeats always do.
     pub status: Status,
-    /// Signs of life: how often the process was restarted, and how many messages it has sent since.
+    /// Heartbeats: the epoch of the process, and how many messages it has sent in it.
     pub life: Option<[u64; 2]>,
-    /// Poses: whether evidence was sent with it.
+    /// Poses: whether evidence was sent with them.
     pub has_evidence: bool,
-    /// The message as it goes into the file; nothing if there was no room for it.
+    /// The message as it is written into a recording; none if there was no room for it.
     pub data: Option<Vec<u8>>,
 }
 
 /// The receiving end of one topic.
 #[derive(Debug)]
-pub(crate) struct Ear {
+pub struct Receiver {
     kind: Kind,
     port: Port,
-    /// Arrays are left out.
+    /// Arrays are omitted.
     heads_only: bool,
 }
 
@@ -46,9 +46,15 @@ enum Port {
     Health(Subscriber<Health>),
 }
 
-impl Ear {
-    /// * `heads_only`: leaves arrays out.
-    pub(crate) fn open(
+impl Receiver {
+    /// Subscribes to a topic.
+    ///
+    /// * `heads_only`: omits arrays.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn open(
         bus: &Bus,
         kind: Kind,
         topic: &str,
@@ -71,19 +77,23 @@ impl Ear {
         })
     }
 
-    /// What travels there.
-    pub(crate) fn kind(&self) -> Kind {
+    /// The kind of its messages.
+    pub fn kind(&self) -> Kind {
         self.kind
     }
 
     /// Takes the oldest message that waits, if one does.
     ///
     /// * `room`: whether there is room for so many bytes.
-    pub(crate) fn hear(
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive(
         &self,
         room: impl FnOnce(usize) -> bool,
-    ) -> Result<Option<Heard>, ReceiveError> {
-        let of = |head: &[u8], elements: &[u8]| Some(self.heard(head, elements, room));
+    ) -> Result<Option<Received>, ReceiveError> {
+        let of = |head: &[u8], elements: &[u8]| Some(self.received(head, elements, room));
         Ok(match &self.port {
             Port::Frame(it) => it
                 .receive()?
@@ -92,28 +102,28 @@ impl Ear {
                 .receive()?
                 .and_then(|it| of(bytes_of(it.header()), cast_slice(it.payload()))),
             Port::ViewPose(it) => it.receive()?.and_then(|it| {
-                let heard = of(bytes_of(&it), &[])?;
-                Some(Heard {
+                let received = of(bytes_of(&it), &[])?;
+                Some(Received {
                     has_evidence: it.evidence_bytes > 0,
-                    ..heard
+                    ..received
                 })
             }),
             Port::ViewQuality(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
             Port::PairPose(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
             Port::Pose3d(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
             Port::Health(it) => it.receive()?.and_then(|it| {
-                let heard = of(bytes_of(&it), &[])?;
-                Some(Heard {
+                let received = of(bytes_of(&it), &[])?;
+                Some(Received {
                     session: it.session,
                     sent_at: it.at_nanos,
                     life: Some([u64::from(it.epoch), it.n_sent]),
-                    ..heard
+                    ..received
                 })
             }),
         })
     }
 
-    fn heard(&self, head: &[u8], elements: &[u8], room: impl FnOnce(usize) -> bool) -> Heard {
+    fn received(&self, head: &[u8], elements: &[u8], room: impl FnOnce(usize) -> bool) -> Received {
         let elements = if self.heads_only { &[] } else { elements };
         let envelope = Envelope::of(self.kind, head);
         let n_bytes = head.len() + elements.len();
@@ -122,7 +132,7 @@ impl Ear {
             encode(self.kind, head, elements, &mut data);
             data
         });
-        Heard {
+        Received {
             session: envelope.map_or(0, |it| it.stamp.session),
             frame: envelope.map_or(0, |it| it.stamp.frame),
             sent_at: envelope.map_or(0, |it| it.timing.sent_at_nanos),

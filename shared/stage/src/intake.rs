@@ -1,13 +1,13 @@
-//! Which of the frames that come are answered, and how many never were.
+//! Which frames of a stream are processed, and how many were lost.
 
 use join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 
-/// Most frames that are lost at once: hours of them, or a sender that counts wrong.
+/// Most frames that are lost at once; a larger gap is a sender's error.
 const MOST_LOST: u64 = 1 << 16;
 
-/// Looks at the frames of one view as they come.
+/// Chooses and counts the frames of one view as they come.
 #[derive(Debug)]
 pub(crate) struct Intake {
     delivery: Delivery,
@@ -18,14 +18,14 @@ pub(crate) struct Intake {
     last_frame: Option<u64>,
 }
 
-/// How far a view has come; outlives the process.
+/// How far a view has come; kept in a file, for the next epoch of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Past {
     /// Number of the frame that is expected next.
     next: u64,
-    /// Frames that the camera has left out.
+    /// Frames that the camera has dropped.
     n_dropped: u64,
-    /// How often the camera's process had been restarted, which counts anew then.
+    /// The epoch of the camera's process, whose count begins at 0 in each.
     camera_epoch: u32,
 }
 
@@ -46,7 +46,7 @@ impl Past {
 }
 
 impl Intake {
-    /// * `past`: what earlier lives of this process have answered or counted.
+    /// * `past`: what earlier epochs of this process have processed or counted.
     pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], past: Past) -> Self {
         Self {
             delivery,
@@ -63,8 +63,8 @@ impl Intake {
         self.past
     }
 
-    /// Whether a frame is to be answered: not one that came again for the sake of another receiver,
-    /// and not one that there is no time for.
+    /// Whether a frame is to be processed: not one that was sent again for another receiver, and not one that there is no
+    /// time for.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
         self.last_frame != Some(frame)
@@ -73,8 +73,7 @@ impl Intake {
                 || self.cadence.takes(self.nth(frame)))
     }
 
-    /// Counts the frames before one that is taken, or before the end, that were never seen and that
-    /// the camera did not leave out.
+    /// The number of frames before this one, or before the end, that never came and that the camera did not drop.
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
         let skipped = nth.saturating_sub(self.past.next);
@@ -96,8 +95,8 @@ impl Intake {
         skipped.saturating_sub(left_out)
     }
 
-    /// Notes that a frame was answered, and how long that took.
-    pub(crate) fn answered(&mut self, header: &FrameHeader, busy_nanos: u64) {
+    /// Notes that a frame was processed, and how long that took.
+    pub(crate) fn processed(&mut self, header: &FrameHeader, busy_nanos: u64) {
         let frame = header.stamp.frame;
         self.last_frame = Some(frame);
         let stride = self.cadence.stride();
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_is_answered_dropped_by_the_camera_or_lost() {
+    fn every_frame_is_processed_dropped_by_the_camera_or_lost() {
         let mut intake = intake(Delivery::Realtime);
         // 0 and 1 are lost, the camera leaves 3 and 4 out, 5 is lost, 7 and 8 are lost before the end.
         assert_eq!(intake.n_lost_before(&header(2, 0)), 2);
@@ -147,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restarted_process_counts_what_came_since_its_earlier_life_answered() {
+    fn a_restarted_process_counts_the_frames_since_its_last_epoch() {
         let mut first = intake(Delivery::Realtime);
         assert_eq!(first.n_lost_before(&header(20, 18)), 2);
         let past = Past::from_numbers(first.past().numbers());
@@ -158,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restarted_camera_counts_anew() {
+    fn a_restarted_camera_counts_from_0() {
         let mut intake = intake(Delivery::Realtime);
         let again = |nth, n_dropped| {
             let mut header = header(nth, n_dropped);
@@ -173,32 +172,32 @@ mod tests {
     }
 
     #[test]
-    fn who_once_counted_wrong_is_heard_again_and_costs_no_count() {
+    fn a_wrong_frame_number_once_costs_no_count() {
         let mut intake = intake(Delivery::Lossless);
         assert_eq!(intake.n_lost_before(&header(0, 0)), 0);
-        intake.answered(&header(0, 0), 1);
+        intake.processed(&header(0, 0), 1);
         assert_eq!(intake.n_lost_before(&header(1 << 38, 0)), 0);
-        intake.answered(&header(1 << 38, 0), 1);
+        intake.processed(&header(1 << 38, 0), 1);
         assert!(intake.takes(&header(1, 0)));
         assert_eq!(intake.n_lost_before(&header(1, 0)), 0);
         assert_eq!(intake.n_lost_before(&header(3, 0)), 1);
     }
 
     #[test]
-    fn a_frame_that_comes_again_is_answered_once() {
+    fn a_frame_that_is_sent_again_is_processed_once() {
         let mut intake = intake(Delivery::Lossless);
         assert!(intake.takes(&header(0, 0)));
-        intake.answered(&header(0, 0), 1);
+        intake.processed(&header(0, 0), 1);
         assert!(!intake.takes(&header(0, 0)));
         assert!(intake.takes(&header(1, 0)));
     }
 
     #[test]
-    fn who_is_too_slow_takes_fewer_frames_only_where_frames_may_be_lost() {
+    fn a_slow_stage_skips_frames_only_where_frames_may_be_lost() {
         for (delivery, expected) in [(Delivery::Realtime, false), (Delivery::Lossless, true)] {
             let mut intake = intake(delivery);
             for nth in [0, 2, 4, 6] {
-                intake.answered(&header(nth, 0), 150_000_000);
+                intake.processed(&header(nth, 0), 150_000_000);
             }
             assert_eq!(intake.takes(&header(7, 0)), expected);
             assert!(intake.takes(&header(8, 0)));

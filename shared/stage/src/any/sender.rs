@@ -6,12 +6,12 @@ use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
 use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 use recording::{Envelope, Kind, Message};
 use runtime::{
-    Bus, Element, Header, Message as Sendable, PortError, Publisher, SendError, SlicePublisher,
+    Bus, Element, Header, Message as PlainMessage, PortError, Publisher, SendError, SlicePublisher,
 };
 
 /// The sending end of one topic.
 #[derive(Debug)]
-pub(crate) struct Mouth {
+pub struct Sender {
     kind: Kind,
     port: Port,
 }
@@ -24,12 +24,17 @@ enum Port {
     ViewQuality(Publisher<ViewQuality>),
     PairPose(Publisher<PairPose>),
     Pose3d(Publisher<Pose3d>),
-    /// Signs of life are every process's own.
+    /// Every process sends its own heartbeats.
     Health,
 }
 
-impl Mouth {
-    pub(crate) fn open(bus: &Bus, kind: Kind, topic: &str) -> Result<Self, PortError> {
+impl Sender {
+    /// Publishes a topic.
+    ///
+    /// # Errors
+    ///
+    /// [`PortError`].
+    pub fn open(bus: &Bus, kind: Kind, topic: &str) -> Result<Self, PortError> {
         let port = match kind {
             Kind::Frame => Port::Frame(bus.slice_publisher(topic)?),
             Kind::Evidence => Port::Evidence(bus.slice_publisher(topic)?),
@@ -43,7 +48,7 @@ impl Mouth {
     }
 
     /// See [`SlicePublisher::wait_for_subscribers`].
-    pub(crate) fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
         match &self.port {
             Port::Frame(it) => it.wait_for_subscribers(n, limit),
             Port::Evidence(it) => it.wait_for_subscribers(n, limit),
@@ -56,7 +61,7 @@ impl Mouth {
     }
 
     /// Processes that are subscribed.
-    pub(crate) fn n_connected(&self) -> usize {
+    pub fn n_connected(&self) -> usize {
         match &self.port {
             Port::Frame(it) => it.n_connected(),
             Port::Evidence(it) => it.n_connected(),
@@ -68,8 +73,12 @@ impl Mouth {
         }
     }
 
-    /// Sends a message in another envelope. One without its array goes with one element of zero.
-    pub(crate) fn say(&self, message: &Message<'_>, it: &Envelope) -> Result<(), SendError> {
+    /// Sends a message in another envelope. One without its array is sent with one element of zero.
+    ///
+    /// # Errors
+    ///
+    /// [`SendError`].
+    pub fn send(&self, message: &Message<'_>, it: &Envelope) -> Result<(), SendError> {
         let mut head = message.head.to_vec();
         it.put(self.kind, &mut head);
         match &self.port {
@@ -83,8 +92,12 @@ impl Mouth {
         }
     }
 
-    /// Says that nothing follows.
-    pub(crate) fn end(&self, it: &Envelope) -> Result<(), SendError> {
+    /// Sends the end of the stream.
+    ///
+    /// # Errors
+    ///
+    /// [`SendError`].
+    pub fn end(&self, it: &Envelope) -> Result<(), SendError> {
         let head = match self.kind {
             Kind::Evidence | Kind::Health => return Ok(()),
             kind => vec![0; kind.head_bytes()],
@@ -97,11 +110,11 @@ impl Mouth {
             head: &head,
             elements: &[],
         };
-        self.say(&message, &end)
+        self.send(&message, &end)
     }
 }
 
-fn plain<T: Sendable + Pod>(port: &Publisher<T>, head: &[u8]) -> Result<(), SendError> {
+fn plain<T: PlainMessage + Pod>(port: &Publisher<T>, head: &[u8]) -> Result<(), SendError> {
     let mut message = T::zeroed();
     bytemuck::bytes_of_mut(&mut message).copy_from_slice(head);
     port.send(&message).map(drop)

@@ -1,0 +1,225 @@
+//! Waits until a frame is due, warps it into shared memory, sends.
+
+use core::time::Duration;
+use std::rc::Rc;
+
+use footage::{Fill, Pacer, Size, Warp};
+use messages::{Cause, FrameHeader, Stamp, Status, Timing, topic};
+use metrics::Passage;
+use runtime::{ExitKind, Failure, OrFail as _, Place, Service, SlicePublisher, Woken, now_nanos};
+use stage::Stage;
+
+use crate::job::Job;
+use crate::supply::{Step, Supply};
+use crate::{Mode, Pace};
+
+/// Real-time footage begins this much later than the run, so that every process is there.
+const LEAD_NANOS: u64 = 2_000_000_000;
+
+/// One camera, and the topic of its frames.
+pub(crate) struct Camera<'a> {
+    service: &'a Service,
+    job: &'a Job,
+    stage: Stage<'a, ()>,
+    publisher: Rc<SlicePublisher<u8, FrameHeader>>,
+    warp: Warp,
+    pacer: Pacer,
+    place: Place,
+    n_dropped: u64,
+    /// Fewer than the job's receivers once some did not come in time.
+    n_expected: usize,
+    /// Why there is no picture at the moment, if there is none.
+    trouble: Option<Status>,
+}
+
+impl<'a> Camera<'a> {
+    pub(crate) fn open(
+        service: &'a Service,
+        job: &'a Job,
+        supply: &Supply,
+    ) -> Result<Self, Failure> {
+        let mut stage = Stage::new(service, job.patience);
+        let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
+        let [width, height] = job.framing.out_size().map(|it| it as usize);
+        // Beside a rotated picture there is nothing; beside another its border is repeated, as in the reference program.
+        let fill = if job.framing.roll() == 0.0 {
+            Fill::Replicate
+        } else {
+            Fill::Black
+        };
+        let map = job.framing.source_from_output();
+        let output = Size::new(width, height);
+        let warp = Warp::new(supply.info().size, output, &map, fill).or_fail(ExitKind::Input)?;
+        let pacer = match (job.pace, supply.info().frame_rate_hz) {
+            (Pace::Realtime, Some(rate)) => Pacer::realtime(service.session() + LEAD_NANOS, rate),
+            _ => Pacer::as_fast_as_possible(),
+        };
+        Ok(Self {
+            service,
+            job,
+            stage,
+            publisher,
+            warp,
+            pacer,
+            place: Place::of(service.bus()),
+            n_dropped: 0,
+            n_expected: job.n_consumers,
+            trouble: None,
+        })
+    }
+
+    /// Waits for the receivers, then skips what an earlier epoch of this process has sent.
+    pub(crate) fn resume(&mut self, supply: &mut Supply) -> u64 {
+        let patience = self.service.patience_at_start(self.job.patience);
+        let n = self
+            .publisher
+            .wait_for_subscribers(self.n_expected, patience);
+        if n < self.n_expected {
+            tracing::warn!(
+                n,
+                expected = self.n_expected,
+                "beginning without all receivers"
+            );
+            self.n_expected = n;
+        }
+        if self.service.epoch() == 0 {
+            return 0;
+        }
+        let [sent] = self.place.noted().unwrap_or([0]);
+        supply.skip(sent)
+    }
+
+    /// Logs once that the camera gives no pictures, and once that it does again.
+    pub(crate) fn log_trouble(&mut self, frame: u64, step: Step) {
+        let trouble = match step {
+            Step::Nothing(status) => Some(status),
+            Step::Picture | Step::End => None,
+        };
+        if trouble == self.trouble {
+            return;
+        }
+        let view = self.job.view;
+        if let Some(it) = trouble {
+            tracing::warn!(view, frame, cause = it.reason(), "without a picture");
+        } else {
+            tracing::info!(view, frame, "pictures again");
+        }
+        self.trouble = trouble;
+    }
+
+    /// Waits until frame `at` is due; where frames may be dropped, skips those that are past.
+    ///
+    /// Returns how many were skipped.
+    pub(crate) fn wait_until_due(&mut self, supply: &mut Supply, at: u64) -> Result<u64, Failure> {
+        while self.pacer.wait_nanos(at, now_nanos()) > 0 {
+            let nanos = self.pacer.wait_nanos(at, now_nanos());
+            if self.stage.wait(Duration::from_nanos(nanos))? == Woken::Stop {
+                return Ok(0);
+            }
+        }
+        let latest = self.pacer.latest_due(now_nanos()).unwrap_or(at);
+        if self.job.mode == Mode::Lossless || latest <= at {
+            return Ok(0);
+        }
+        let n = supply.skip(latest - at);
+        self.n_dropped += n;
+        self.service.health().dropped(Cause::BehindClock, n);
+        Ok(n)
+    }
+
+    /// Sends a frame; where nothing may be lost, again to a receiver that was restarted.
+    pub(crate) fn send_frame(
+        &mut self,
+        index: u64,
+        rgb: &[u8],
+        asked_at: u64,
+    ) -> Result<(), Failure> {
+        let mut computing = now_nanos() - asked_at;
+        loop {
+            let [width, height] = self.job.framing.out_size();
+            let mut loan = self.publisher.loan((width * height * 3) as usize)?;
+            let begin = now_nanos();
+            self.warp.apply(rgb, loan.payload_mut());
+            computing += now_nanos() - begin;
+            *loan.header_mut() = FrameHeader {
+                width,
+                height,
+                ..self.header(index, Status::OK, asked_at)
+            };
+            let n = loan.send()?;
+            if self.job.mode == Mode::Realtime || n >= self.n_expected {
+                break;
+            }
+            let n = self
+                .publisher
+                .wait_for_subscribers(self.n_expected, self.job.patience);
+            if self.service.stop().is_requested() {
+                break;
+            }
+            if n < self.n_expected {
+                tracing::warn!(
+                    n,
+                    expected = self.n_expected,
+                    "going on without all receivers"
+                );
+                self.n_expected = n;
+                break;
+            }
+        }
+        self.n_expected = self
+            .n_expected
+            .max(self.publisher.n_connected().min(self.job.n_consumers));
+        let health = self.service.health();
+        health.sent(index);
+        health.passed(&Passage {
+            waiting: None,
+            computing,
+            publishing: (now_nanos() - asked_at).saturating_sub(computing),
+            since_capture: None,
+        });
+        Ok(())
+    }
+
+    /// Sends that there is no picture of a frame, and why; or that there are no more frames.
+    pub(crate) fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
+        let mut loan = self.publisher.loan(1)?;
+        loan.payload_mut().fill(0);
+        *loan.header_mut() = self.header(frame, status, now_nanos());
+        loan.send()?;
+        Ok(())
+    }
+
+    fn header(&self, frame: u64, status: Status, asked_at: u64) -> FrameHeader {
+        FrameHeader {
+            stamp: Stamp {
+                session: self.service.session(),
+                frame,
+                captured_at_nanos: asked_at,
+                view: self.job.view as u32,
+                epoch: self.service.epoch(),
+            },
+            timing: Timing {
+                received_at_nanos: asked_at,
+                sent_at_nanos: now_nanos(),
+            },
+            status,
+            n_dropped: self.n_dropped,
+            ..FrameHeader::default()
+        }
+    }
+
+    /// Notes where a restarted process is to continue.
+    pub(crate) fn note(&mut self, n_sent: u64) {
+        if let Err(error) = self.place.note([n_sent]) {
+            tracing::debug!(%error, "cannot note the place in the footage");
+        }
+    }
+
+    /// Sends that the footage is over, and how many frames it had.
+    pub(crate) fn end(&self, n_frames: u64) -> Result<(), Failure> {
+        let beyond = self.job.source.start + n_frames * self.job.source.step;
+        let n_connected = || self.publisher.n_connected();
+        let send_end = || self.send_empty(beyond, Status::END);
+        self.stage.end_with(n_connected, send_end)
+    }
+}

@@ -1,0 +1,31 @@
+//! What the process has to do.
+
+use core::time::Duration;
+
+use footage::SourceSpec;
+use geometry::Framing;
+
+use crate::{Faults, Mode, Pace};
+
+/// What one camera's process has to do.
+#[derive(Debug)]
+pub struct Job {
+    /// The view.
+    pub view: usize,
+    /// The footage.
+    pub source: SourceSpec,
+    /// What goes wrong with it on purpose.
+    pub faults: Faults,
+    /// Repetitions from which on a picture is called frozen; 0 for never.
+    pub frozen_after: u32,
+    /// From the footage to the frames of the pipeline.
+    pub framing: Framing,
+    /// Whether frames may be dropped.
+    pub mode: Mode,
+    /// How fast frames are handed out.
+    pub pace: Pace,
+    /// Processes that take the frames.
+    pub n_consumers: usize,
+    /// How long they are waited for.
+    pub patience: Duration,
+}

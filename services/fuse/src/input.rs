@@ -1,0 +1,27 @@
+//! What the messages that fusion receives mean.
+
+use fmp::Pose;
+use messages::ViewQuality;
+use wire::WireError;
+
+/// What a message means.
+#[derive(Debug, Clone)]
+pub(crate) enum Input {
+    Candidates(Vec<Pose>),
+    Errors(Errors),
+}
+
+/// The expected errors of the parts, and the thresholds that came with them.
+#[derive(Debug, Clone)]
+pub(crate) struct Errors {
+    pub(crate) sigma_px: Option<Vec<f32>>,
+    pub(crate) tau_px: Option<Vec<f32>>,
+}
+
+/// Reads the expected errors of a view.
+pub(crate) fn expected_errors(message: &ViewQuality, n_parts: usize) -> Result<Errors, WireError> {
+    Ok(Errors {
+        sigma_px: wire::sigma_from_message(message, n_parts)?,
+        tau_px: wire::tau_from_message(message, n_parts)?,
+    })
+}

@@ -1,0 +1,182 @@
+//! Searches a frame, writes the responses into shared memory, sends candidates and evidence.
+
+use std::rc::Rc;
+
+use fmp::{Moment, Scope, Tracker};
+use kernels::Rgb8View;
+use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
+use metrics::Passage;
+use pipeline::ViewEstimate;
+use runtime::{ExitKind, Failure, Loan, OrFail as _, Sample, Service, SlicePublisher, now_nanos};
+use stage::{Output, StreamFrame, Turn};
+
+use crate::job::Job;
+
+/// What is kept from frame to frame.
+pub(crate) struct Memory {
+    pub(crate) tracker: Tracker,
+    /// Responses that do not lie in shared memory.
+    pub(crate) responses: Vec<f32>,
+}
+
+/// What was found in a frame, and its evidence if a process receives it.
+struct Found<'a> {
+    estimate: ViewEstimate,
+    /// How long the stage waited for the memory of the evidence.
+    loan_nanos: u64,
+    /// The responses of the scope that was searched.
+    evidence: Option<Loan<'a, f32, EvidenceHeader>>,
+}
+
+/// The search of one view, and its outputs.
+pub(crate) struct View<'a> {
+    pub(crate) service: &'a Service,
+    pub(crate) job: &'a Job,
+    pub(crate) poses: Output<'a, ViewPose>,
+    pub(crate) evidence: Rc<SlicePublisher<f32, EvidenceHeader>>,
+}
+
+impl View<'_> {
+    /// Searches a frame, and sends what was found.
+    pub(crate) fn process(&self, frame: StreamFrame, memory: &mut Memory) -> Result<(), Failure> {
+        let StreamFrame { nth, sample, turn } = frame;
+        let outcome = self.solve(&sample, nth, memory)?;
+        // The frame goes back to the camera before any receiver is waited for.
+        drop(sample);
+        let message = match &outcome {
+            Ok(found) => self.message(found)?,
+            Err(status) => ViewPose {
+                status: *status,
+                ..ViewPose::default()
+            },
+        };
+        let solved = now_nanos();
+        let loan_nanos = outcome.as_ref().map_or(0, |found| found.loan_nanos);
+        // The evidence is sent first: a receiver of the candidates may count on it.
+        if let Ok(found) = outcome
+            && let Some(loan) = found.evidence
+        {
+            self.send_evidence(&turn, &found.estimate, loan)?;
+            let n_bytes = message.evidence_bytes;
+            self.service.health().sent_evidence(n_bytes);
+        }
+        let sent_at = self.poses.send(&turn, self.job.view, message)?;
+        let computing = solved - turn.received_at();
+        self.service.health().passed(&Passage {
+            waiting: turn.waited(),
+            computing: computing.saturating_sub(loan_nanos),
+            publishing: now_nanos() - solved + loan_nanos,
+            since_capture: Some(sent_at.saturating_sub(turn.stamp().captured_at_nanos)),
+        });
+        Ok(())
+    }
+
+    fn send_evidence(
+        &self,
+        turn: &Turn,
+        estimate: &ViewEstimate,
+        mut loan: Loan<'_, f32, EvidenceHeader>,
+    ) -> Result<(), Failure> {
+        let (layout, found) = (self.job.step.layout(), estimate);
+        let header = wire::evidence_to_message(&found.levels, &found.bounds, &found.scope, layout);
+        *loan.header_mut() = EvidenceHeader {
+            stamp: *turn.stamp(),
+            timing: Timing {
+                received_at_nanos: turn.received_at(),
+                sent_at_nanos: now_nanos(),
+            },
+            ..header.or_fail(ExitKind::Run)?
+        };
+        loan.send()?;
+        Ok(())
+    }
+
+    /// The candidates, how they were looked for, and how much goes with them.
+    fn message(&self, found: &Found<'_>) -> Result<ViewPose, Failure> {
+        let layout = self.job.step.layout();
+        let Found {
+            estimate, evidence, ..
+        } = found;
+        let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
+        let mut message = message.or_fail(ExitKind::Run)?;
+        wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
+        let n_values = evidence
+            .as_ref()
+            .map_or(0, |_| layout.n_values(&estimate.scope));
+        Ok(ViewPose {
+            searched: if estimate.scope == Scope::whole(layout) {
+                Searched::FULL
+            } else {
+                Searched::TRACKED
+            },
+            evidence_bytes: (n_values * size_of::<f32>()) as u64,
+            ..message
+        })
+    }
+
+    /// The estimate and its evidence, or why there is none.
+    fn solve(
+        &self,
+        sample: &Sample<u8, FrameHeader>,
+        nth: u64,
+        memory: &mut Memory,
+    ) -> Result<Result<Found<'_>, Status>, Failure> {
+        let header = sample.header();
+        if header.status != Status::OK {
+            return Ok(Err(header.status));
+        }
+        let layout = self.job.step.layout();
+        let size = [header.width as usize, header.height as usize];
+        let image = match Rgb8View::new(size[0], size[1], sample.payload()) {
+            Ok(image) if size == layout.image_size => image,
+            _ => {
+                tracing::warn!(?size, expected = ?layout.image_size, "a frame of another size");
+                return Ok(Err(Status::BAD_INPUT));
+            }
+        };
+        let rate = self.job.frame_rate_hz;
+        let at = Moment {
+            frame: nth,
+            seconds: rate.map(|it| header.stamp.frame as f64 / it),
+        };
+        let scope = memory.tracker.scope(layout, at);
+        let mut found = self.find(image, scope, &mut memory.responses)?;
+        if self.job.step.gives_up(&memory.tracker, &found.estimate) {
+            // Its room for evidence goes back first.
+            drop(found);
+            found = self.find(image, Scope::whole(layout), &mut memory.responses)?;
+        }
+        let step = &self.job.step;
+        step.follow(&mut memory.tracker, at, &found.estimate);
+        Ok(Ok(found))
+    }
+
+    /// Searches a frame. Responses that a process receives are written into shared memory directly.
+    fn find(
+        &self,
+        image: Rgb8View<'_>,
+        scope: Scope,
+        responses: &mut Vec<f32>,
+    ) -> Result<Found<'_>, Failure> {
+        let (step, layout) = (&self.job.step, self.job.step.layout());
+        let n_values = layout.n_values(&scope);
+        if self.job.n_evidence_consumers == 0 {
+            responses.resize(responses.len().max(n_values), 0.0);
+            return Ok(Found {
+                estimate: step.run(image, scope, responses),
+                loan_nanos: 0,
+                evidence: None,
+            });
+        }
+        let begin = now_nanos();
+        let mut loan = self.evidence.loan(n_values)?;
+        let loan_nanos = now_nanos() - begin;
+        let estimate = step.run(image, scope, loan.payload_mut());
+        let is_there = !estimate.candidates.is_empty();
+        Ok(Found {
+            evidence: is_there.then_some(loan),
+            estimate,
+            loan_nanos,
+        })
+    }
+}

@@ -1,0 +1,128 @@
+//! The thread that writes, and the queue before it.
+
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use runtime::{ExitKind, Failure, OrFail as _, Service};
+use stage::WriterThread;
+
+use crate::gather::Settled;
+use crate::job::Job;
+use crate::{Absent, Folder, FrameRecord, Output};
+
+/// Results that may wait to be written.
+const QUEUE: usize = 256;
+
+/// What is to be written: frames without a result, and then one that has it.
+struct Lot {
+    absent: Vec<Absent>,
+    record: Option<FrameRecord>,
+}
+
+/// The writing thread, and the sending end of its queue.
+pub(crate) struct Writer {
+    queue: Sender<Lot>,
+    thread: WriterThread,
+    n_missed: Arc<AtomicU64>,
+    n_written: Arc<AtomicU64>,
+    n_handed_on: Cell<u64>,
+    /// The first frame that had no line when it began.
+    pub(crate) next: u64,
+    overlay_every: u64,
+    start_frame: u64,
+    frame_step: u64,
+}
+
+impl Writer {
+    pub(crate) fn start(job: Job, service: &Service) -> Result<Self, Failure> {
+        let (session, resume) = (service.session(), service.epoch() > 0);
+        // What was writable when the run began and is no longer does not stop the others.
+        let kind = if resume {
+            ExitKind::Run
+        } else {
+            ExitKind::Input
+        };
+        let folder = Folder::open(&job.output, resume).or_fail(kind)?;
+        let (overlay_every, frame_step) = (job.config.overlay_every, job.scene.frame_step);
+        let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
+        let output = output.or_fail(kind)?;
+        let next = output.next_frame().unwrap_or(job.start_frame);
+        let (queue, lots) = bounded(QUEUE);
+        let n_missed = Arc::new(AtomicU64::new(0));
+        let missed = Arc::clone(&n_missed);
+        let n_written = Arc::new(AtomicU64::new(0));
+        let written = Arc::clone(&n_written);
+        let thread =
+            WriterThread::start(move || write_all(output, &lots, [&missed, &written], session))?;
+        Ok(Self {
+            queue,
+            thread,
+            n_missed,
+            n_written,
+            n_handed_on: Cell::new(0),
+            next,
+            overlay_every,
+            start_frame: job.start_frame,
+            frame_step: frame_step.max(1),
+        })
+    }
+
+    /// Whether the pixels of a frame are needed.
+    pub(crate) fn draws(&self, frame: u64) -> bool {
+        let nth = frame.saturating_sub(self.start_frame) / self.frame_step;
+        self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)
+    }
+
+    /// Hands a record on; `false` if it was missed, because too many wait already.
+    pub(crate) fn write(&self, Settled { absent, record }: Settled) -> bool {
+        let record = Some(record);
+        match self.queue.try_send(Lot { absent, record }) {
+            Ok(()) => {
+                self.n_handed_on.set(self.n_handed_on.get() + 1);
+                true
+            }
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
+                self.n_missed.fetch_add(1, Ordering::Relaxed);
+                false
+            }
+        }
+    }
+
+    /// Hands on frames that have no result, behind all others; waits for room, for nothing follows.
+    pub(crate) fn rest(&self, absent: Vec<Absent>) {
+        let record = None;
+        if let Err(error) = self.queue.send(Lot { absent, record }) {
+            tracing::debug!(%error, "the writing thread is gone");
+        }
+    }
+
+    /// Results that wait to be written.
+    pub(crate) fn n_waiting(&self) -> usize {
+        let written = self.n_written.load(Ordering::Relaxed);
+        self.n_handed_on.get().saturating_sub(written) as usize
+    }
+
+    /// Waits until everything is written.
+    pub(crate) fn finish(self, service: &Service) -> Result<(), Failure> {
+        drop(self.queue);
+        self.thread.finish(service)
+    }
+}
+
+fn write_all(
+    mut output: Output,
+    lots: &Receiver<Lot>,
+    [n_missed, n_written]: [&AtomicU64; 2],
+    session: u64,
+) {
+    while let Ok(Lot { absent, record }) = lots.recv() {
+        output.absent(&absent);
+        let Some(record) = record else { continue };
+        output.frame(&record);
+        n_written.fetch_add(1, Ordering::Relaxed);
+    }
+    output.missed(n_missed.load(Ordering::Relaxed));
+    output.finish(session);
+}

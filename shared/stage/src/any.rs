@@ -1,0 +1,7 @@
+//! Topics of any kind, as bytes: what `record` receives and `replay` sends.
+
+mod receiver;
+mod sender;
+
+pub use receiver::{Received, Receiver};
+pub use sender::Sender;

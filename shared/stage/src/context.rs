@@ -1,0 +1,87 @@
+//! What a stage needs of its process: the session, the clock, and where counts go.
+
+use messages::{Cause, Refusal};
+use runtime::{Health, Service, now_nanos};
+use wire::{Expected, WireError};
+
+/// Where a stage counts what happens. A process reports these counts in its heartbeats.
+pub trait Account {
+    /// Counts a message that was received and accepted.
+    fn received(&self);
+    /// Counts messages or frames that were lost.
+    fn dropped(&self, cause: Cause, n: u64);
+    /// Counts a message that was refused, and logs why.
+    fn refused(&self, cause: Refusal, topic: &str, error: &WireError);
+}
+
+impl Account for Health {
+    fn received(&self) {
+        Self::received(self, 1);
+    }
+
+    fn dropped(&self, cause: Cause, n: u64) {
+        Self::dropped(self, cause, n);
+    }
+
+    fn refused(&self, cause: Refusal, topic: &str, error: &WireError) {
+        self.refuse(cause, topic, error);
+    }
+}
+
+/// The session, the clock and the account of a stage. Tests bring their own.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    session: u64,
+    now: &'a dyn Fn() -> u64,
+    account: &'a dyn Account,
+}
+
+impl core::fmt::Debug for Context<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Context")
+            .field("session", &self.session)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Context<'a> {
+    /// * `now`: nanoseconds of a clock that never goes back.
+    pub fn new(session: u64, now: &'a dyn Fn() -> u64, account: &'a dyn Account) -> Self {
+        Self {
+            session,
+            now,
+            account,
+        }
+    }
+
+    /// Of a process.
+    pub fn of(service: &'a Service) -> Self {
+        Self::new(service.session(), &now_nanos, service.health())
+    }
+
+    /// Nanoseconds of the clock.
+    pub fn now(&self) -> u64 {
+        (self.now)()
+    }
+
+    /// Where counts go.
+    pub fn account(&self) -> &'a dyn Account {
+        self.account
+    }
+
+    /// What a message is checked against.
+    ///
+    /// * `view`: of the topic; a worker's number for a topic of pairs.
+    pub fn expected(&self, view: usize) -> Expected {
+        Expected {
+            session: self.session,
+            view,
+            now_nanos: self.now(),
+        }
+    }
+
+    /// Counts and logs a refused message.
+    pub fn refuse(&self, topic: &str, error: &WireError) {
+        self.account.refused(error.refusal(), topic, error);
+    }
+}

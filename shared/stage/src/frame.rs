@@ -1,0 +1,98 @@
+//! One frame on its way through a stage.
+
+use std::cell::Cell;
+
+use join::Last;
+use messages::{Stamp, Timing};
+
+/// A decoded message.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Item<T> {
+    /// Of the message.
+    pub stamp: Stamp,
+    /// Of the message.
+    pub timing: Timing,
+    /// What it means.
+    pub value: T,
+}
+
+/// What a stage does for one frame: the stamp of its messages, and the times that they are measured by.
+#[derive(Debug)]
+pub struct Turn {
+    stamp: Stamp,
+    received_at: Cell<u64>,
+    /// When the last message that belongs to the frame was sent.
+    last_sent_at: Option<u64>,
+}
+
+impl Turn {
+    pub(crate) fn new(stamp: Stamp, received_at: u64, last_sent_at: Option<u64>) -> Self {
+        Self {
+            stamp,
+            received_at: Cell::new(received_at),
+            last_sent_at,
+        }
+    }
+
+    /// The stamp of the messages to be sent; the view is still 0.
+    pub fn stamp(&self) -> &Stamp {
+        &self.stamp
+    }
+
+    /// When work on the next message began, nanoseconds.
+    pub fn received_at(&self) -> u64 {
+        self.received_at.get()
+    }
+
+    /// Notes that work on the next message begins: a stage may send several for a frame.
+    pub fn restart(&self, now: u64) {
+        self.received_at.set(now);
+    }
+
+    /// How long the frame waited in this process, nanoseconds.
+    pub fn waited(&self) -> Option<u64> {
+        let sent_at = self.last_sent_at?;
+        Some(self.received_at.get().saturating_sub(sent_at))
+    }
+}
+
+/// The decoded messages of one frame, by slot.
+#[derive(Debug)]
+pub struct Frame<'a, T> {
+    pub(crate) number: u64,
+    pub(crate) turn: Turn,
+    pub(crate) items: Vec<Option<Item<T>>>,
+    pub(crate) last: &'a Last<T>,
+}
+
+impl<T> Frame<'_, T> {
+    /// Number of the frame.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// For the messages to be sent.
+    pub fn turn(&self) -> &Turn {
+        &self.turn
+    }
+
+    /// The message of a slot, if it came in time.
+    pub fn item(&self, slot: usize) -> Option<&Item<T>> {
+        self.items.get(slot)?.as_ref()
+    }
+
+    /// The same, by value.
+    pub fn take(&mut self, slot: usize) -> Option<Item<T>> {
+        self.items.get_mut(slot)?.take()
+    }
+
+    /// The message of an optional input, else its last one while that is fresh; and how many frames old it is.
+    ///
+    /// * `captured_at`: of the view's frame, nanoseconds.
+    pub fn latest(&self, slot: usize, captured_at: u64) -> Option<(u64, &T)> {
+        match self.item(slot) {
+            Some(item) => Some((0, &item.value)),
+            None => self.last.of(slot, self.number, captured_at),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! The inputs of a stage, joined frame by frame. Pure: messages, clock and counts are given.
+
+use core::time::Duration;
+
+use join::{Cadence, Joined, Joiner, Last};
+use messages::{Cause, Stamp};
+use runtime::{Delivery, ReceiveError};
+
+use crate::input::Input;
+use crate::joins::{Copier, Joins};
+use crate::{Context, Item};
+
+/// How frames are joined.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rules {
+    pub(crate) delivery: Delivery,
+    /// How long an input may be silent while others wait for it.
+    pub(crate) patience: Duration,
+    /// Distance between the frames used, where frames may be skipped: the stage then follows a [`Cadence`].
+    pub(crate) skips: Option<u64>,
+}
+
+/// What a frame of one slot waits for at most, and how long the slot's last message serves instead.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Optional {
+    pub(crate) slot: usize,
+    pub(crate) deadline: Duration,
+}
+
+/// Joins the messages of several inputs.
+pub(crate) struct Inbox<'a, T> {
+    inputs: Vec<Box<dyn Input<T> + 'a>>,
+    joins: Joins<T>,
+    rules: Rules,
+    cadence: Cadence,
+}
+
+impl<'a, T> Inbox<'a, T> {
+    /// * `remember`: by slot, how a value is copied that serves later frames; for at most `max_age`.
+    pub(crate) fn new(
+        inputs: Vec<Box<dyn Input<T> + 'a>>,
+        rules: Rules,
+        optional: &[Optional],
+        remember: Vec<Copier<T>>,
+        max_age: Duration,
+    ) -> Self {
+        let n_slots = remember.len();
+        let patience = nanos(rules.patience);
+        let mut joiner = match rules.delivery {
+            Delivery::Lossless => Joiner::lossless(n_slots, patience),
+            Delivery::Realtime => Joiner::new(n_slots, patience),
+        };
+        if rules.delivery == Delivery::Realtime {
+            for input in optional {
+                joiner.hurry(input.slot, nanos(input.deadline));
+            }
+        }
+        Self {
+            inputs,
+            joins: Joins {
+                joiner,
+                last: Last::new(n_slots, nanos(max_age)),
+                remember,
+                end: None,
+            },
+            rules,
+            cadence: Cadence::default(),
+        }
+    }
+
+    /// Receives all that waits on all inputs.
+    pub(crate) fn poll(&mut self, context: &Context<'_>) -> Result<(), ReceiveError> {
+        for input in &mut self.inputs {
+            input.poll(context, &mut self.joins)?;
+        }
+        Ok(())
+    }
+
+    /// Discards all that waits on all inputs.
+    pub(crate) fn drain(&self) -> Result<(), ReceiveError> {
+        self.inputs.iter().try_for_each(|input| input.drain())
+    }
+
+    /// The next complete frame; the latest one of the cadence where frames may be skipped.
+    pub(crate) fn next(&mut self, context: &Context<'_>) -> Option<Joined<Item<T>>> {
+        let now = context.now();
+        let Some(step) = self.skip_step() else {
+            return self.joins.joiner.next(now);
+        };
+        let cadence = &self.cadence;
+        let joiner = &mut self.joins.joiner;
+        let (joined, n_skipped) = joiner.latest(now, |frame| cadence.takes(frame.frame / step));
+        context.account().dropped(Cause::Busy, n_skipped);
+        joined
+    }
+
+    /// Notes that a frame was processed.
+    pub(crate) fn processed(&mut self, stamp: &Stamp, busy_nanos: u64) {
+        if let Some(step) = self.skip_step() {
+            let nth = stamp.frame / step;
+            self.cadence
+                .answered(nth, stamp.captured_at_nanos, busy_nanos);
+        }
+    }
+
+    fn skip_step(&self) -> Option<u64> {
+        let is_realtime = self.rules.delivery == Delivery::Realtime;
+        self.rules
+            .skips
+            .filter(|_| is_realtime)
+            .map(|step| step.max(1))
+    }
+
+    /// What is remembered of every slot.
+    pub(crate) fn last(&self) -> &Last<T> {
+        &self.joins.last
+    }
+
+    /// Frames that wait for a message.
+    pub(crate) fn n_pending(&self) -> usize {
+        self.joins.joiner.n_pending()
+    }
+
+    /// Whether no frame will follow.
+    pub(crate) fn is_over(&self, now: u64) -> bool {
+        self.joins.joiner.is_over(now)
+    }
+
+    /// The stamp of the last end of a stream that was received.
+    pub(crate) fn end_stamp(&self) -> Option<Stamp> {
+        self.joins.end
+    }
+}
+
+fn nanos(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests;

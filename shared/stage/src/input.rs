@@ -1,0 +1,63 @@
+//! An input of a stage: receive, check, decode once, hand to the joiner.
+
+use messages::Status;
+use runtime::ReceiveError;
+use wire::WireError;
+
+use crate::joins::Joins;
+use crate::slots::Slots;
+use crate::{Context, Item, Port, Receive, Stamped};
+
+/// An input of any message type.
+pub(crate) trait Input<T> {
+    /// Receives all that waits.
+    fn poll(&mut self, context: &Context<'_>, joins: &mut Joins<T>) -> Result<(), ReceiveError>;
+    /// Discards all that waits.
+    fn drain(&self) -> Result<(), ReceiveError>;
+}
+
+pub(crate) struct Typed<M, R, D> {
+    pub(crate) port: Port<R>,
+    pub(crate) slots: Slots,
+    pub(crate) decode: D,
+    pub(crate) message: core::marker::PhantomData<fn() -> M>,
+}
+
+impl<M, T, R, D> Input<T> for Typed<M, R, D>
+where
+    M: Stamped,
+    R: Receive<M>,
+    D: FnMut(&M) -> Result<T, WireError>,
+{
+    fn poll(&mut self, context: &Context<'_>, joins: &mut Joins<T>) -> Result<(), ReceiveError> {
+        if self.port.n_senders() > 0 {
+            let now = context.now();
+            self.slots.all().for_each(|slot| joins.alive(slot, now));
+        }
+        while let Some(message) = self.port.receive(context)? {
+            let stamp = *message.stamp();
+            if message.status() == Status::END {
+                joins.end(self.slots, stamp);
+                continue;
+            }
+            match (self.decode)(&message) {
+                Err(error) => context.refuse(M::NAME, &error),
+                Ok(value) => {
+                    let timing = *message.timing();
+                    let item = Item {
+                        stamp,
+                        timing,
+                        value,
+                    };
+                    let slot = self.slots.of(stamp.view as usize);
+                    joins.take(slot, item, message.status(), context);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn drain(&self) -> Result<(), ReceiveError> {
+        self.port.drain()
+    }
+}

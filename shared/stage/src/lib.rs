@@ -1,0 +1,46 @@
+//! The loop of every service: wait, receive, check, join, compute, send, account, end.
+//!
+//! A service declares its inputs and outputs on a [`Stage`] and gives the step that turns one frame into messages. The
+//! stage alone knows when a frame is complete, what the end of a stream means, how lateness is counted, and how a process
+//! ends. Every message is checked and decoded once, when it is received.
+//!
+//! | input | method | a frame waits for it |
+//! |---|---|---|
+//! | one sender for each view | [`Stage::view_input`] | yes |
+//! | one sender for several slots: a worker and its pairs | [`Stage::pair_inputs`] | yes |
+//! | welcome, not necessary: expected errors | [`Stage::optional_input`] | up to a deadline; then the last value serves while it is fresh |
+//! | bulk data, read where it lies in shared memory | [`Stage::hold_evidence`], [`Stage::hold_frames`] | no |
+//! | a stream of bulk data, one sample a frame | [`Stage::run_stream`] | - |
+//!
+//! A service that makes its frames itself has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A
+//! service that takes every message as it comes uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as
+//! bytes.
+#![forbid(unsafe_code)]
+
+pub mod any;
+mod context;
+mod frame;
+mod held;
+mod inbox;
+mod input;
+mod intake;
+mod joins;
+mod message;
+mod output;
+mod port;
+mod shelf;
+mod slots;
+mod stage;
+mod stream;
+mod thread;
+
+pub use context::{Account, Context};
+pub use frame::{Frame, Item, Turn};
+pub use held::Held;
+pub use message::Stamped;
+pub use output::Output;
+pub use port::{Port, Receive, Sender};
+pub use shelf::HELD_REALTIME;
+pub use stage::Stage;
+pub use stream::{Range, StreamFrame};
+pub use thread::WriterThread;

@@ -1,0 +1,84 @@
+//! The fields that all messages share.
+
+use messages::{
+    EvidenceHeader, FrameHeader, PairPose, Pose3d, Stamp, Status, Timing, ViewPose, ViewQuality,
+};
+
+/// A message with a stamp, a timing and a status.
+pub trait Stamped: Copy {
+    /// What refusals call it.
+    const NAME: &'static str;
+
+    /// Session, frame, capture time, view, epoch.
+    fn stamp(&self) -> &Stamp;
+    /// When its sender received and sent.
+    fn timing(&self) -> &Timing;
+    /// Whether it carries a result, or is the end of the stream.
+    fn status(&self) -> Status;
+    /// The same message with another stamp and timing.
+    #[must_use]
+    fn with(self, stamp: Stamp, timing: Timing) -> Self;
+    /// The message that ends a stream.
+    #[must_use]
+    fn end(stamp: Stamp) -> Self;
+}
+
+macro_rules! stamped {
+    ($($message:ty => $name:literal, $end:expr);* $(;)?) => {$(
+        impl Stamped for $message {
+            const NAME: &'static str = $name;
+
+            fn stamp(&self) -> &Stamp {
+                &self.stamp
+            }
+
+            fn timing(&self) -> &Timing {
+                &self.timing
+            }
+
+            fn status(&self) -> Status {
+                self.status
+            }
+
+            fn with(self, stamp: Stamp, timing: Timing) -> Self {
+                Self { stamp, timing, ..self }
+            }
+
+            fn end(stamp: Stamp) -> Self {
+                Self { stamp, status: Status::END, ..$end }
+            }
+        }
+    )*};
+}
+
+stamped! {
+    ViewPose => "view-pose", Self::default();
+    ViewQuality => "view-quality", Self::default();
+    PairPose => "pair-pose", Self::default();
+    Pose3d => "pose3d", wire::end_of_results(0);
+}
+
+/// The header of bulk data.
+pub trait BulkHeader: runtime::Header {
+    /// What refusals call it.
+    const NAME: &'static str;
+
+    /// Session, frame, capture time, view, epoch.
+    fn stamp(&self) -> &Stamp;
+}
+
+impl BulkHeader for FrameHeader {
+    const NAME: &'static str = "frame";
+
+    fn stamp(&self) -> &Stamp {
+        &self.stamp
+    }
+}
+
+impl BulkHeader for EvidenceHeader {
+    const NAME: &'static str = "evidence";
+
+    fn stamp(&self) -> &Stamp {
+        &self.stamp
+    }
+}

@@ -1,0 +1,142 @@
+//! A topic whose messages are checked as they are received.
+
+use messages::Status;
+use runtime::{Failure, Message, ReceiveError, Service, Subscriber, Waiter};
+use wire::WireError;
+
+use crate::{Context, Stamped};
+
+/// Where messages come from: a subscriber, or a list in tests.
+pub trait Receive<M> {
+    /// The oldest message that waits.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    fn receive(&self) -> Result<Option<M>, ReceiveError>;
+
+    /// Number of connected senders.
+    fn n_senders(&self) -> usize;
+}
+
+impl<M: Message> Receive<M> for Subscriber<M> {
+    fn receive(&self) -> Result<Option<M>, ReceiveError> {
+        Self::receive(self)
+    }
+
+    fn n_senders(&self) -> usize {
+        self.n_publishers()
+    }
+}
+
+/// Whose messages a topic carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sender {
+    /// One view's.
+    View(usize),
+    /// One fusion worker's; pairs are dealt to the workers in turn.
+    Worker {
+        /// Its number.
+        worker: usize,
+        /// Number of workers.
+        n_workers: usize,
+    },
+    /// The process that sends the result of all views.
+    All,
+}
+
+impl Sender {
+    /// Checks the session, the sender and the times of a message. The end of a worker's stream names no pair.
+    pub(crate) fn check<M: Stamped>(
+        self,
+        message: &M,
+        context: &Context<'_>,
+    ) -> Result<(), WireError> {
+        let (stamp, timing) = (message.stamp(), message.timing());
+        match self {
+            Self::View(view) => context.expected(view).check(stamp, timing),
+            Self::All => context.expected(0).check(stamp, timing),
+            Self::Worker { worker, .. } if message.status() == Status::END => {
+                context.expected(worker).check_end(stamp, timing)
+            }
+            Self::Worker { worker, n_workers } => {
+                let expected = context.expected(worker);
+                expected.check_pair(stamp, timing, n_workers)
+            }
+        }
+    }
+}
+
+/// The receiving end of a topic: gives the messages of this session and sender; others are counted and logged.
+#[derive(Debug)]
+pub struct Port<R> {
+    receiver: R,
+    sender: Sender,
+}
+
+impl<M: Message + Stamped> Port<Subscriber<M>> {
+    /// Subscribes to a topic.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn open(
+        service: &Service,
+        waiter: &mut Waiter,
+        topic: &str,
+        sender: Sender,
+    ) -> Result<Self, Failure> {
+        Ok(Self::new(service.bus().subscriber(topic, waiter)?, sender))
+    }
+
+    /// The identifiers of the ports that may send; a restarted sender has a new one.
+    pub fn publishers(&self) -> Vec<u128> {
+        self.receiver.publishers()
+    }
+}
+
+impl<R> Port<R> {
+    /// * `receiver`: where messages come from.
+    pub fn new(receiver: R, sender: Sender) -> Self {
+        Self { receiver, sender }
+    }
+
+    /// The oldest message that waits and is accepted, the end of the stream included.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn receive<M: Stamped>(&self, context: &Context<'_>) -> Result<Option<M>, ReceiveError>
+    where
+        R: Receive<M>,
+    {
+        while let Some(message) = self.receiver.receive()? {
+            match self.sender.check(&message, context) {
+                Ok(()) => return Ok(Some(message)),
+                Err(error) => context.refuse(M::NAME, &error),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Number of connected senders.
+    pub fn n_senders<M>(&self) -> usize
+    where
+        R: Receive<M>,
+    {
+        self.receiver.n_senders()
+    }
+
+    /// Discards what waits, so that no sender waits for room.
+    ///
+    /// # Errors
+    ///
+    /// [`ReceiveError`].
+    pub fn drain<M>(&self) -> Result<(), ReceiveError>
+    where
+        R: Receive<M>,
+    {
+        while self.receiver.receive()?.is_some() {}
+        Ok(())
+    }
+}

@@ -1,0 +1,145 @@
+//! Bulk samples that are held until the frame comes that needs them.
+
+/// Frames that are held at the same time where the latest wins: three that wait, and one that is being received.
+pub const HELD_REALTIME: usize = 4;
+
+/// A frame number this far ahead of the current frame is a sender's error, frames of the footage that are used.
+const FAR: u64 = 4096;
+
+/// Samples of one topic with their frame numbers.
+#[derive(Debug)]
+pub(crate) struct Shelf<S> {
+    held: Vec<(u64, S)>,
+    capacity: usize,
+    frame_step: u64,
+}
+
+impl<S> Shelf<S> {
+    /// * `capacity`: 1 to receive a sample only when the one before has been released, because its sender waits for it;
+    ///   else all that come are received, and those kept that are likeliest to be needed.
+    /// * `frame_step`: distance between the frames used.
+    pub(crate) fn new(capacity: usize, frame_step: u64) -> Self {
+        Self {
+            held: Vec::with_capacity(capacity),
+            capacity: capacity.max(1),
+            frame_step: frame_step.max(1),
+        }
+    }
+
+    /// Receives what waits, as far as there is room.
+    ///
+    /// * `receive`: the oldest sample that waits.
+    pub(crate) fn fill<E>(
+        &mut self,
+        mut receive: impl FnMut() -> Result<Option<(u64, S)>, E>,
+    ) -> Result<(), E> {
+        while self.capacity > 1 || self.held.is_empty() {
+            let Some(sample) = receive()? else {
+                return Ok(());
+            };
+            self.held.push(sample);
+            if self.capacity > 1 && self.held.len() == self.capacity {
+                let steps: Vec<u64> = self
+                    .held
+                    .iter()
+                    .map(|(frame, _)| frame / self.frame_step)
+                    .collect();
+                self.held.remove(least_needed(&steps));
+            }
+        }
+        Ok(())
+    }
+
+    /// Releases the samples before `frame`, and receives those up to it.
+    pub(crate) fn advance<E>(
+        &mut self,
+        frame: u64,
+        mut receive: impl FnMut() -> Result<Option<(u64, S)>, E>,
+    ) -> Result<(), E> {
+        let wanted = frame..=frame.saturating_add(FAR.saturating_mul(self.frame_step));
+        self.held.retain(|(held, _)| wanted.contains(held));
+        while self.capacity == 1 && self.held.is_empty() {
+            match receive()? {
+                Some(sample) if wanted.contains(&sample.0) => self.held.push(sample),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// The sample of a frame, if it is held.
+    pub(crate) fn of(&self, frame: u64) -> Option<&S> {
+        let found = self.held.iter().find(|(held, _)| *held == frame);
+        found.map(|(_, sample)| sample)
+    }
+
+    /// Releases all samples.
+    pub(crate) fn clear(&mut self) {
+        self.held.clear();
+    }
+}
+
+/// Which of several frames is released first. A slow stage takes every n-th frame, n a power of two: so it is the frame
+/// that is divided by the smallest power, and of these the oldest.
+fn least_needed(steps: &[u64]) -> usize {
+    let keys = steps.iter().enumerate();
+    let least = keys.min_by_key(|(_, step)| (step.trailing_zeros(), **step));
+    least.map_or(0, |(index, _)| index)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+    use std::convert::Infallible;
+
+    use super::*;
+
+    /// A topic on which these frames wait.
+    fn topic(
+        frames: impl IntoIterator<Item = u64>,
+    ) -> impl FnMut() -> Result<Option<(u64, char)>, Infallible> {
+        let mut waiting: VecDeque<u64> = frames.into_iter().collect();
+        move || Ok(waiting.pop_front().map(|frame| (frame, 'x')))
+    }
+
+    #[test]
+    fn the_frames_of_every_stride_are_kept_longest() {
+        assert_eq!(least_needed(&[4, 5, 6]), 1);
+        assert_eq!(least_needed(&[4, 6, 8]), 1);
+        assert_eq!(least_needed(&[3, 4, 5]), 0, "the oldest of odd ones");
+        assert_eq!(least_needed(&[0, 8, 12]), 2);
+    }
+
+    #[test]
+    fn with_capacity_1_the_next_sample_is_received_when_the_one_before_is_released() {
+        let mut shelf = Shelf::new(1, 1);
+        let mut receive = topic(0..5);
+        shelf.fill(&mut receive).unwrap();
+        shelf.fill(&mut receive).unwrap();
+        assert!(shelf.of(0).is_some() && shelf.of(1).is_none());
+        shelf.advance(3, &mut receive).unwrap();
+        assert!(shelf.of(3).is_some() && shelf.of(0).is_none());
+        shelf.advance(4, &mut receive).unwrap();
+        shelf.advance(5, &mut receive).unwrap();
+        assert!(shelf.of(4).is_none());
+    }
+
+    #[test]
+    fn with_more_capacity_all_are_received_and_the_likeliest_kept() {
+        let mut shelf = Shelf::new(4, 1);
+        shelf.fill(topic(0..7)).unwrap();
+        let held: Vec<u64> = (0..7).filter(|frame| shelf.of(*frame).is_some()).collect();
+        assert_eq!(held, [0, 4, 6]);
+        shelf.advance(5, topic([])).unwrap();
+        assert!(shelf.of(4).is_none() && shelf.of(6).is_some());
+    }
+
+    #[test]
+    fn a_frame_number_far_ahead_is_released() {
+        let mut shelf = Shelf::new(1, 2);
+        shelf.fill(topic([u64::MAX])).unwrap();
+        shelf.advance(4, topic([4 + 2 * FAR + 2, 4])).unwrap();
+        assert!(shelf.of(4).is_some());
+    }
+}

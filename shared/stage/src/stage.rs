@@ -1,0 +1,444 @@
+//! A stage: its inputs and outputs, and the loop that joins frames.
+
+use core::fmt;
+use core::marker::PhantomData;
+use core::time::Duration;
+use std::rc::Rc;
+
+use join::Joined;
+use messages::{EvidenceHeader, FrameHeader, PairPose, Stamp, topic};
+use runtime::{
+    Delivery, Element, Failure, Message, Service, SlicePublisher, Subscriber, WaitError, Waiter,
+    Woken, now_nanos,
+};
+use wire::WireError;
+
+use crate::held::Bulk;
+use crate::inbox::{Inbox, Optional, Rules};
+use crate::input::{Input, Typed};
+use crate::joins::Copier;
+use crate::message::BulkHeader;
+use crate::output::{Arrays, EndStamp, Messages, Outgoing};
+use crate::shelf::{HELD_REALTIME, Shelf};
+use crate::slots::Slots;
+use crate::{Context, Frame, Held, Item, Output, Port, Sender, Stamped, Turn};
+
+/// How often deadlines are checked while no message comes.
+const TICK: Duration = Duration::from_millis(20);
+
+/// The inputs and outputs of a process, and its loop.
+///
+/// * `T`: what a message means to the service; an enum where inputs differ.
+pub struct Stage<'a, T> {
+    pub(crate) service: &'a Service,
+    pub(crate) waiter: Waiter,
+    patience: Duration,
+    inputs: Vec<Box<dyn Input<T> + 'a>>,
+    remember: Vec<Copier<T>>,
+    optional: Vec<Optional>,
+    max_age: Duration,
+    held: Vec<Rc<dyn Bulk>>,
+    outgoing: Vec<Box<dyn Outgoing>>,
+    skips: Option<u64>,
+}
+
+impl<T> fmt::Debug for Stage<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Stage")
+            .field("n_inputs", &self.inputs.len())
+            .field("n_outputs", &self.outgoing.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a, T: 'a> Stage<'a, T> {
+    /// A stage without inputs and outputs.
+    ///
+    /// * `patience`: how long an input may be silent while others wait for it, and how long receivers are waited for.
+    pub fn new(service: &'a Service, patience: Duration) -> Self {
+        Self {
+            service,
+            waiter: service.bus().waiter(),
+            patience,
+            inputs: Vec::new(),
+            remember: Vec::new(),
+            optional: Vec::new(),
+            max_age: Duration::ZERO,
+            held: Vec::new(),
+            outgoing: Vec::new(),
+            skips: None,
+        }
+    }
+
+    /// Lets the stage skip frames where the latest frame wins and it cannot keep up.
+    ///
+    /// * `frame_step`: distance between the frames used.
+    pub fn skip_when_behind(&mut self, frame_step: u64) {
+        self.skips = Some(frame_step.max(1));
+    }
+
+    /// Adds the topic of a view; every frame waits for it. Returns its slot.
+    ///
+    /// * `decode`: what a message means; an error is counted and logged, and the message is dropped.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn view_input<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        view: usize,
+        decode: impl FnMut(&M) -> Result<T, WireError> + 'a,
+    ) -> Result<usize, Failure> {
+        let slot = self.slots(1);
+        self.add(topic, Sender::View(view), Slots::one(slot), decode)?;
+        Ok(slot)
+    }
+
+    /// Adds the topic of a view whose messages are welcome but not necessary. Where the latest frame wins, no frame waits
+    /// for them longer than `deadline`; the last value then serves while it is fresh ([`Frame::latest`]).
+    ///
+    /// * `max_age`: beyond which a value is not used, from capture to capture; the same for all optional inputs.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn optional_input<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        view: usize,
+        [deadline, max_age]: [Duration; 2],
+        decode: impl FnMut(&M) -> Result<T, WireError> + 'a,
+    ) -> Result<usize, Failure>
+    where
+        T: Clone,
+    {
+        let slot = self.view_input(topic, view, decode)?;
+        self.remember[slot] = Some(T::clone);
+        self.optional.push(Optional { slot, deadline });
+        self.max_age = max_age;
+        Ok(slot)
+    }
+
+    /// Adds the topics of all fusion workers: one slot for each pair, in the order of pairs. A worker sends for its pairs,
+    /// which are dealt in turn. Returns the slot of the first pair.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn pair_inputs(
+        &mut self,
+        n_workers: usize,
+        n_pairs: usize,
+        decode: impl FnMut(&PairPose) -> Result<T, WireError> + Clone + 'a,
+    ) -> Result<usize, Failure> {
+        let base = self.slots(n_pairs);
+        for worker in 0..n_workers {
+            let slots = Slots {
+                first: base + worker,
+                end: base + n_pairs,
+                step: n_workers,
+                base: Some(base),
+            };
+            let sender = Sender::Worker { worker, n_workers };
+            self.add(&topic::pair_pose(worker), sender, slots, decode.clone())?;
+        }
+        Ok(base)
+    }
+
+    fn slots(&mut self, n: usize) -> usize {
+        let first = self.remember.len();
+        self.remember.resize_with(first + n, || None);
+        first
+    }
+
+    fn add<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        sender: Sender,
+        slots: Slots,
+        decode: impl FnMut(&M) -> Result<T, WireError> + 'a,
+    ) -> Result<(), Failure> {
+        let port = Port::<Subscriber<M>>::open(self.service, &mut self.waiter, topic, sender)?;
+        self.inputs.push(Box::new(Typed {
+            port,
+            slots,
+            decode,
+            message: PhantomData,
+        }));
+        Ok(())
+    }
+
+    /// Holds the evidence of a view where it lies: one frame, released when that frame has been processed.
+    ///
+    /// * `frame_step`: distance between the frames used.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn hold_evidence(
+        &mut self,
+        view: usize,
+        frame_step: u64,
+    ) -> Result<Held<f32, EvidenceHeader>, Failure> {
+        let topic = topic::evidence(view);
+        let subscriber = self
+            .service
+            .bus()
+            .slice_subscriber(&topic, &mut self.waiter)?;
+        let shelf = Shelf::new(1, frame_step);
+        let held = Held::<f32, EvidenceHeader>::new(subscriber, view, shelf, |sample, expected| {
+            expected.check(&sample.header().stamp, &sample.header().timing)
+        });
+        self.held.push(held.bulk());
+        Ok(held)
+    }
+
+    /// Holds the frames of a view where they lie: one where nothing may be lost, else up to [`HELD_REALTIME`].
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn hold_frames(
+        &mut self,
+        view: usize,
+        frame_step: u64,
+    ) -> Result<Held<u8, FrameHeader>, Failure> {
+        let topic = topic::frame(view);
+        let subscriber = self
+            .service
+            .bus()
+            .slice_subscriber(&topic, &mut self.waiter)?;
+        let capacity = match self.service.delivery() {
+            Delivery::Lossless => 1,
+            Delivery::Realtime => HELD_REALTIME,
+        };
+        let shelf = Shelf::new(capacity, frame_step);
+        let held = Held::<u8, FrameHeader>::new(subscriber, view, shelf, |sample, expected| {
+            wire::check_frame(sample.header(), sample.payload().len(), expected)
+        });
+        self.held.push(held.bulk());
+        Ok(held)
+    }
+
+    /// Adds a topic about all views that the stage publishes.
+    ///
+    /// * `n_receivers`: processes that subscribe to it.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn output<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        n_receivers: usize,
+    ) -> Result<Output<'a, M>, Failure> {
+        self.publish(topic, n_receivers, EndStamp::Session)
+    }
+
+    /// Adds a topic about one view: the end of its stream has the stamp of the input's end.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn view_output<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        n_receivers: usize,
+    ) -> Result<Output<'a, M>, Failure> {
+        self.publish(topic, n_receivers, EndStamp::Input)
+    }
+
+    fn publish<M: Message + Stamped>(
+        &mut self,
+        topic: &str,
+        n_receivers: usize,
+        end_stamp: EndStamp,
+    ) -> Result<Output<'a, M>, Failure> {
+        let publisher = Rc::new(self.service.bus().publisher::<M>(topic)?);
+        self.outgoing.push(Box::new(Messages {
+            publisher: Rc::clone(&publisher),
+            n_receivers,
+            end_stamp,
+        }));
+        Ok(Output::new(self.service, publisher))
+    }
+
+    /// Adds a topic of arrays that the stage publishes.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports.
+    pub fn bulk_output<E: Element, H: BulkHeader>(
+        &mut self,
+        topic: &str,
+        n_receivers: usize,
+    ) -> Result<Rc<SlicePublisher<E, H>>, Failure> {
+        let publisher = Rc::new(self.service.bus().slice_publisher(topic)?);
+        self.outgoing.push(Box::new(Arrays {
+            publisher: Rc::clone(&publisher),
+            n_receivers,
+        }));
+        Ok(publisher)
+    }
+
+    /// Waits until the receivers of all outputs are there, but not for ever.
+    pub fn wait_for_receivers(&self) {
+        let patience = self.service.patience_at_start(self.patience);
+        for output in &self.outgoing {
+            let [n, expected] = output.wait(patience);
+            if n < expected {
+                tracing::warn!(n, expected, "beginning without all receivers");
+            }
+        }
+        tracing::info!("begins");
+    }
+
+    /// Processes every frame until all inputs have ended, or the process is to stop; then sends the end of the stream.
+    ///
+    /// * `step`: turns the messages of one frame into messages.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports, and the errors of `step`.
+    pub fn run(
+        mut self,
+        mut step: impl FnMut(&mut Frame<'_, T>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let context = Context::of(self.service);
+        self.wait_for_receivers();
+        let rules = Rules {
+            delivery: self.service.delivery(),
+            patience: self.patience,
+            skips: self.skips,
+        };
+        let inputs = core::mem::take(&mut self.inputs);
+        let remember = core::mem::take(&mut self.remember);
+        let mut inbox = Inbox::new(inputs, rules, &self.optional, remember, self.max_age);
+        while self.waiter.wait(TICK)? != Woken::Stop {
+            self.listen(&mut inbox, &context)?;
+            while let Some(joined) = inbox.next(&context) {
+                self.process(&mut inbox, joined, &context, &mut step)?;
+                if self.service.stop().is_requested() {
+                    return Ok(());
+                }
+                self.listen(&mut inbox, &context)?;
+            }
+            if inbox.is_over(now_nanos()) {
+                return self.end(&inbox);
+            }
+        }
+        Ok(())
+    }
+
+    fn listen(&self, inbox: &mut Inbox<'_, T>, context: &Context<'_>) -> Result<(), Failure> {
+        for held in &self.held {
+            held.fill(context)?;
+        }
+        Ok(inbox.poll(context)?)
+    }
+
+    fn process(
+        &self,
+        inbox: &mut Inbox<'_, T>,
+        joined: Joined<Item<T>>,
+        context: &Context<'_>,
+        step: &mut impl FnMut(&mut Frame<'_, T>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let Joined { frame, items } = joined;
+        let received_at = now_nanos();
+        self.service.health().queued(inbox.n_pending());
+        self.service.progress().tick();
+        for held in &self.held {
+            held.fill(context)?;
+            held.advance(frame, context)?;
+        }
+        let here = || items.iter().flatten();
+        let captured = here().map(|item| item.stamp.captured_at_nanos).min();
+        let stamp = Stamp {
+            session: self.service.session(),
+            frame,
+            captured_at_nanos: captured.unwrap_or(0),
+            view: 0,
+            epoch: self.service.epoch(),
+        };
+        let last_sent_at = here().map(|item| item.timing.sent_at_nanos).max();
+        step(&mut Frame {
+            number: frame,
+            turn: Turn::new(stamp, received_at, last_sent_at),
+            items,
+            last: inbox.last(),
+        })?;
+        // Room for the next, whatever its sender has left undone: it may have died half-way.
+        for held in &self.held {
+            held.advance(frame.saturating_add(1), context)?;
+        }
+        inbox.processed(&stamp, now_nanos() - received_at);
+        Ok(())
+    }
+
+    fn end(self, inbox: &Inbox<'_, T>) -> Result<(), Failure> {
+        let session = self.service.session();
+        self.linger(
+            || -> Result<(), Failure> {
+                for output in &self.outgoing {
+                    output.end(inbox.end_stamp(), session)?;
+                }
+                Ok(())
+            },
+            || {
+                // An input that was given up as silent may send again; it must not wait for room here.
+                let drained = self.held.iter().try_for_each(|held| held.drain());
+                drained.and_then(|()| inbox.drain())
+            },
+        )
+    }
+
+    /// Sends the end of the stream, and again to every receiver that was restarted, until the process is to stop.
+    ///
+    /// * `send_end`: sends it on all outputs.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports, and the errors of `send_end`.
+    pub fn end_with(
+        &self,
+        n_connected: impl Fn() -> usize,
+        mut send_end: impl FnMut() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        send_end()?;
+        self.service.health().finished();
+        self.waiter.linger(n_connected, send_end)
+    }
+
+    pub(crate) fn linger(
+        &self,
+        send_end: impl FnMut() -> Result<(), Failure>,
+        drain: impl Fn() -> Result<(), runtime::ReceiveError>,
+    ) -> Result<(), Failure> {
+        let n_connected = || {
+            if let Err(error) = drain() {
+                tracing::debug!(%error, "cannot discard what comes after the end");
+            }
+            let outputs = self.outgoing.iter();
+            outputs.map(|output| output.n_connected()).sum()
+        };
+        self.end_with(n_connected, send_end)
+    }
+
+    /// Waits for messages or for time to pass.
+    ///
+    /// # Errors
+    ///
+    /// [`WaitError`].
+    pub fn wait(&self, limit: Duration) -> Result<Woken, WaitError> {
+        self.waiter.wait(limit)
+    }
+
+    pub(crate) fn send_ends(&self, of_input: Stamp) -> Result<(), Failure> {
+        for output in &self.outgoing {
+            output.end(Some(of_input), self.service.session())?;
+        }
+        Ok(())
+    }
+}

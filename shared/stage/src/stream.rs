@@ -1,0 +1,114 @@
+//! The loop of a stage with one stream of frames, each processed as it comes.
+
+use messages::{Cause, FrameHeader, Stamp, Status, topic};
+use runtime::{Delivery, Failure, Place, Sample, SliceSubscriber, Woken, now_nanos};
+
+use crate::intake::{Intake, Past};
+use crate::stage::Stage;
+use crate::{Context, Turn};
+
+/// The frames of a view that are used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Range {
+    /// The first.
+    pub start: u64,
+    /// Distance between them.
+    pub step: u64,
+}
+
+/// A frame of a stream.
+#[derive(Debug)]
+pub struct StreamFrame {
+    /// Which of the frames that are used this is, from 0.
+    pub nth: u64,
+    /// Pixels and header, where they lie.
+    pub sample: Sample<u8, FrameHeader>,
+    /// For the messages to be sent.
+    pub turn: Turn,
+}
+
+impl Stage<'_, ()> {
+    /// Processes the frames of a view until the footage ends or the process is to stop; then sends the end of the stream.
+    ///
+    /// Where the latest frame wins, frames that there is no time for are skipped and counted. A restarted process counts
+    /// the frames that were lost with its earlier life.
+    ///
+    /// # Errors
+    ///
+    /// What the transport reports, and the errors of `step`.
+    pub fn run_stream(
+        mut self,
+        view: usize,
+        range: Range,
+        mut step: impl FnMut(StreamFrame) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let service = self.service;
+        let context = Context::of(service);
+        let bus = service.bus();
+        let frames: SliceSubscriber<u8, FrameHeader> =
+            bus.slice_subscriber(&topic::frame(view), &mut self.waiter)?;
+        self.wait_for_receivers();
+        let mut place = Place::of(bus);
+        let past = place.noted().filter(|_| service.epoch() > 0);
+        let past = past.map(Past::from_numbers).unwrap_or_default();
+        let mut intake = Intake::new(service.delivery(), [range.start, range.step], past);
+        while self.waiter.wait(core::time::Duration::from_millis(100))? != Woken::Stop {
+            while let Some(sample) = match service.delivery() {
+                Delivery::Lossless => frames.receive()?,
+                Delivery::Realtime => frames.latest()?,
+            } {
+                let header = *sample.header();
+                let expected = context.expected(view);
+                if let Err(error) = wire::check_frame(&header, sample.payload().len(), &expected) {
+                    context.refuse("frame", &error);
+                    continue;
+                }
+                let is_end = header.status == Status::END;
+                if !is_end && !intake.takes(&header) {
+                    continue;
+                }
+                let n_lost = intake.n_lost_before(&header);
+                service.health().dropped(Cause::Busy, n_lost);
+                if is_end {
+                    drop(sample);
+                    return self.end_stream(header.stamp, &frames);
+                }
+                service.health().received(1);
+                let begin = now_nanos();
+                step(StreamFrame {
+                    nth: intake.nth(header.stamp.frame),
+                    turn: self.turn_of(&header, begin),
+                    sample,
+                })?;
+                intake.processed(&header, now_nanos() - begin);
+                if let Err(error) = place.note(intake.past().numbers()) {
+                    tracing::debug!(%error, "cannot note how far this view has come");
+                }
+                if service.stop().is_requested() {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn turn_of(&self, header: &FrameHeader, received_at: u64) -> Turn {
+        let stamp = Stamp {
+            epoch: self.service.epoch(),
+            ..header.stamp
+        };
+        Turn::new(stamp, received_at, Some(header.timing.sent_at_nanos))
+    }
+
+    fn end_stream(
+        &self,
+        stamp: Stamp,
+        frames: &SliceSubscriber<u8, FrameHeader>,
+    ) -> Result<(), Failure> {
+        let drain = || {
+            while frames.receive()?.is_some() {}
+            Ok(())
+        };
+        self.linger(|| self.send_ends(stamp), drain)
+    }
+}

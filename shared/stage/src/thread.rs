@@ -1,0 +1,39 @@
+//! The thread of a service that writes, so that no sender waits for the disk.
+
+use core::time::Duration;
+use std::thread::{Builder, JoinHandle};
+
+use runtime::{ExitKind, Failure, OrFail as _, Service};
+
+/// A thread that ends when its queue is closed.
+#[derive(Debug)]
+pub struct WriterThread {
+    handle: JoinHandle<()>,
+}
+
+impl WriterThread {
+    /// Starts it.
+    ///
+    /// # Errors
+    ///
+    /// [`ExitKind::Run`] if the system has no thread for it.
+    pub fn start(write: impl FnOnce() + Send + 'static) -> Result<Self, Failure> {
+        let builder = Builder::new().name("writer".to_owned());
+        let handle = builder.spawn(write).or_fail(ExitKind::Run)?;
+        Ok(Self { handle })
+    }
+
+    /// Waits until everything is written; the sending end of the queue must have been dropped. The heartbeats go on.
+    ///
+    /// # Errors
+    ///
+    /// [`ExitKind::Run`] if the thread panicked.
+    pub fn finish(self, service: &Service) -> Result<(), Failure> {
+        while !self.handle.is_finished() {
+            service.progress().tick();
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let panicked = |_| Failure::new(ExitKind::Run, "the writing thread panicked");
+        self.handle.join().map_err(panicked)
+    }
+}
