@@ -172,6 +172,7 @@ fn only_the_agreed_entries_lie_at_the_top() {
         "LICENSE-MIT",
         "README.md",
         "configs",
+        "docs",
         "scripts",
         "services",
         "shared",
