@@ -1,4 +1,22 @@
-//! Entry point: parse the command line, then become what it names.
+//! Parallax: calibrated, synchronised cameras in, 3D human skeletons out. This is the start page of the API.
+//!
+//! The executable parses the command line, then becomes what it names: a command, or a process of a deployment
+//! (`parallax service <name>`). `docs/` is the book: guide, reference, the method, and `docs/architecture.md`, which
+//! says where to change what. The crates, by layer; each may depend only on those in rows below its own:
+//!
+//! | layer | crates |
+//! |---|---|
+//! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
+//! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
+//! | offline | [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
+//! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html), [`modelpage`](../modelpage/index.html), [`runpage`](../runpage/index.html) |
+//! | method | [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`fmp`](../fmp/index.html): the paper |
+//! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html) |
+//! | tools | [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
+//! | ground | [`skeleton`](../skeleton/index.html); for tests only: [`testkit`](../testkit/index.html) |
+//!
+//! Begin with [`pipeline`](../pipeline/index.html) for the way of a frame, [`multiview`](../multiview/index.html) for the
+//! energy, [`messages`](../messages/index.html) for what travels between processes.
 #![forbid(unsafe_code)]
 
 mod audience;
