@@ -4,6 +4,7 @@ mod common;
 
 mod bad_input;
 mod bench;
+mod book;
 mod chaos;
 mod demo;
 mod detect;

@@ -1,0 +1,60 @@
+//! Fenced blocks of a Markdown file.
+
+/// A fenced block.
+#[derive(Debug)]
+pub(crate) struct Block {
+    /// Line of its first fence, from 1.
+    pub(crate) line: usize,
+    /// Words of its info string: language, then marks.
+    pub(crate) info: Vec<String>,
+    /// What lies between the fences.
+    pub(crate) text: String,
+}
+
+impl Block {
+    /// Whether it is of a language and carries a mark.
+    pub(crate) fn is(&self, language: &str, mark: &str) -> bool {
+        self.info.first().is_some_and(|it| it == language) && self.info.iter().any(|it| it == mark)
+    }
+}
+
+/// All fenced blocks of a text.
+pub(crate) fn blocks(text: &str) -> Vec<Block> {
+    let mut found: Vec<Block> = Vec::new();
+    let mut is_open = false;
+    for (nth, line) in text.lines().enumerate() {
+        match line.trim_start().strip_prefix("```") {
+            Some(_) if is_open => is_open = false,
+            Some(info) => {
+                is_open = true;
+                found.push(Block {
+                    line: nth + 1,
+                    info: info.split_whitespace().map(str::to_owned).collect(),
+                    text: String::new(),
+                });
+            }
+            None => {
+                if let Some(block) = found.last_mut().filter(|_| is_open) {
+                    block.text.push_str(line);
+                    block.text.push('\n');
+                }
+            }
+        }
+    }
+    found
+}
+
+/// A text without its fenced blocks: their lines are empty.
+pub(crate) fn prose(text: &str) -> String {
+    let mut is_open = false;
+    let mut prose = String::new();
+    for line in text.lines() {
+        let is_fence = line.trim_start().starts_with("```");
+        if !is_open && !is_fence {
+            prose.push_str(line);
+        }
+        prose.push('\n');
+        is_open ^= is_fence;
+    }
+    prose
+}

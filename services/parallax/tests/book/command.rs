@@ -1,0 +1,261 @@
+//! Command lines of the book, and whether the executable takes them.
+
+use core::fmt;
+use std::collections::BTreeMap;
+use std::fs;
+use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+
+/// Folders of the repository that a command may name.
+const FOLDERS: [&str; 6] = [
+    "configs/",
+    "docs/",
+    "scripts/",
+    "services/",
+    "shared/",
+    "tests/",
+];
+
+/// One command of a block.
+#[derive(Debug)]
+pub(crate) struct Line(Vec<String>);
+
+impl fmt::Display for Line {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(&self.0.join(" "))
+    }
+}
+
+impl Line {
+    /// The arguments, if it is a command of the executable.
+    pub(crate) fn parallax(&self) -> Option<&[String]> {
+        match self.0.first()?.as_str() {
+            "parallax" | "target/release/parallax" => Some(&self.0[1..]),
+            "cargo" if self.0.get(1)? == "run" => {
+                let at = self.0.iter().position(|word| word == "--")?;
+                Some(&self.0[at + 1..])
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether what it asks of cargo is not there: a package or a feature.
+    pub(crate) fn cargo_problem(&self) -> Option<String> {
+        if self.0.first()? != "cargo" {
+            return None;
+        }
+        let own = self.0.iter().take_while(|word| *word != "--");
+        let own: Vec<&str> = own.map(String::as_str).collect();
+        let value = |names: [&str; 2]| {
+            let at = own.iter().position(|word| names.contains(word))?;
+            own.get(at + 1).copied()
+        };
+        let folders = match value(["-p", "--package"]) {
+            None => vec!["services/parallax".to_owned()],
+            Some("system-tests") => vec!["tests".to_owned()],
+            Some(name) => vec![format!("shared/{name}"), format!("services/{name}")],
+        };
+        let manifests = folders
+            .iter()
+            .map(|it| super::root().join(it).join("Cargo.toml"));
+        let Some(manifest) = manifests
+            .into_iter()
+            .find_map(|it| fs::read_to_string(it).ok())
+        else {
+            return Some("there is no such package".to_owned());
+        };
+        let feature = value(["--features", "-F"])?;
+        let declared = manifest
+            .lines()
+            .any(|line| line.starts_with(&format!("{feature} = ")));
+        (!declared).then(|| format!("there is no feature {feature}"))
+    }
+
+    /// What it names in the repository.
+    pub(crate) fn repository_paths(&self) -> Vec<String> {
+        let words = self.0.iter().map(|word| word.trim_end_matches('/'));
+        words
+            .filter(|word| FOLDERS.iter().any(|folder| word.starts_with(folder)))
+            .map(str::to_owned)
+            .collect()
+    }
+}
+
+/// The commands of a block: without remarks, joined where a line goes on, apart at `&&`, up to a pipe or a file.
+pub(crate) fn lines(text: &str) -> Vec<Line> {
+    let joined = text.replace("\\\n", " ");
+    let commands = joined.lines().flat_map(|line| {
+        let words = words(line);
+        let parts = words.split(|word| word == "&&").map(|part| {
+            let end = part
+                .iter()
+                .position(|word| ["|", ">", "<", ";"].contains(&word.as_str()));
+            Line(part[..end.unwrap_or(part.len())].to_vec())
+        });
+        parts.collect::<Vec<_>>()
+    });
+    commands.filter(|line| !line.0.is_empty()).collect()
+}
+
+/// Words of a line as a shell has them, up to a remark.
+fn words(line: &str) -> Vec<String> {
+    let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
+    for letter in line.chars() {
+        match (quote, letter) {
+            (Some(mark), _) if mark == letter => quote = None,
+            (None, '"' | '\'') => {
+                quote = Some(letter);
+                word.get_or_insert_default();
+            }
+            (None, '#') if word.is_none() => break,
+            (None, _) if letter.is_whitespace() => words.extend(word.take()),
+            _ => word.get_or_insert_default().push(letter),
+        }
+    }
+    words.extend(word);
+    words
+}
+
+/// Whether the executable takes these arguments.
+///
+/// It parses them itself, `--help` behind them: what it does not know, and values of another kind, it refuses
+/// before it comes to that. What is missing it would not notice; that is compared with its usage line.
+pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
+    let mut asked = arguments.to_vec();
+    asked.push("--help".to_owned());
+    let (succeeded, said) = run(&asked);
+    if !succeeded {
+        return Err(said);
+    }
+    if arguments.iter().any(|word| word == "--help") {
+        return Ok(());
+    }
+    let mut path: Vec<String> = Vec::new();
+    let mut help = help_of(&path)?;
+    let mut rest = arguments;
+    while help.lines().any(|line| line == "Commands:") {
+        let (name, others) = rest.split_first().ok_or("a subcommand is missing")?;
+        if name.starts_with('-') {
+            return Ok(()); // `parallax --version` and the like
+        }
+        path.push(name.clone());
+        (help, rest) = (help_of(&path)?, others);
+    }
+    let usage = Usage::parse(&help, path.len())?;
+    usage.compare(rest)
+}
+
+/// What the usage line of a command asks for.
+struct Usage<'a> {
+    help: &'a str,
+    /// Fewest arguments that are no options, and most.
+    n_arguments: [usize; 2],
+    required: Vec<&'a str>,
+}
+
+impl<'a> Usage<'a> {
+    fn parse(help: &'a str, depth: usize) -> Result<Self, String> {
+        let line = help.lines().find_map(|line| line.strip_prefix("Usage: "));
+        let mut words = line
+            .ok_or("there is no usage line")?
+            .split(' ')
+            .skip(1 + depth)
+            .peekable();
+        let (mut least, mut most, mut required) = (0, 0_usize, Vec::new());
+        while let Some(word) = words.next() {
+            let n = if word.ends_with("...") { usize::MAX } else { 1 };
+            if word == "[OPTIONS]" {
+                continue;
+            }
+            if word.starts_with("--") {
+                required.push(word);
+                words.next_if(|next| next.starts_with('<'));
+            } else {
+                least += usize::from(word.starts_with('<'));
+                most = most.saturating_add(n);
+            }
+        }
+        Ok(Self {
+            help,
+            n_arguments: [least, most],
+            required,
+        })
+    }
+
+    fn compare(&self, arguments: &[String]) -> Result<(), String> {
+        let mut n = 0;
+        let mut words = arguments.iter().peekable();
+        while let Some(word) = words.next() {
+            let is_option = word.starts_with("--") || (word.len() == 2 && word.starts_with('-'));
+            if !is_option {
+                n += 1;
+            } else if !word.contains('=') {
+                for _ in 0..self.n_values(word) {
+                    words.next();
+                }
+            }
+        }
+        let [least, most] = self.n_arguments;
+        if !(least..=most).contains(&n) {
+            return Err(format!(
+                "{n} arguments, but the command takes {least} to {most}"
+            ));
+        }
+        let is_given = |option: &&&str| {
+            arguments
+                .iter()
+                .any(|word| word == **option || word.starts_with(&format!("{option}=")))
+        };
+        match self.required.iter().find(|option| !is_given(option)) {
+            Some(option) => Err(format!("{option} is missing")),
+            None => Ok(()),
+        }
+    }
+
+    /// How many values an option takes, as the help shows it.
+    fn n_values(&self, option: &str) -> usize {
+        let shown = self.help.lines().find_map(|line| {
+            let line = line.trim_start();
+            let long = line.split_once(", ").map_or(line, |(_, long)| long);
+            let rest = [line, long]
+                .into_iter()
+                .find_map(|it| it.strip_prefix(option))?;
+            rest.starts_with([' ', '\n']).then_some(rest)
+        });
+        let shown = shown.unwrap_or_default().trim_start_matches(' ');
+        let values = shown.split(' ').take_while(|word| word.starts_with('<'));
+        values.count()
+    }
+}
+
+/// The short help of a command; asked for once.
+fn help_of(path: &[String]) -> Result<String, String> {
+    static KNOWN: Mutex<BTreeMap<Vec<String>, String>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(help) = known.get(path) {
+        return Ok(help.clone());
+    }
+    let (succeeded, said) = run(&[path, &["-h".to_owned()]].concat());
+    if !succeeded {
+        return Err(said);
+    }
+    known.insert(path.to_vec(), said.clone());
+    Ok(said)
+}
+
+/// Whether it succeeded, and what it printed: on success to standard output, else to standard error.
+fn run(arguments: &[String]) -> (bool, String) {
+    let ended = Command::new(env!("CARGO_BIN_EXE_parallax"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    let said = if ended.status.success() {
+        ended.stdout
+    } else {
+        ended.stderr
+    };
+    (
+        ended.status.success(),
+        String::from_utf8_lossy(&said).into_owned(),
+    )
+}
