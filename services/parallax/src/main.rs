@@ -2,7 +2,7 @@
 //!
 //! The executable parses the command line, then becomes what it names: a command, or a process of a deployment
 //! (`parallax service <name>`). `docs/` is the book: guide, reference, the method, and `docs/architecture.md`, which
-//! says where to change what. The crates, by layer; each may depend only on those in rows below its own:
+//! says where to change what. The crates, by layer (dependencies go downwards):
 //!
 //! | layer | crates |
 //! |---|---|
