@@ -83,6 +83,24 @@ fn only_the_runtime_knows_the_transport() {
 }
 
 #[test]
+fn examples_in_the_documentation_are_run_and_no_empty_runs_are_made() {
+    for (name, dir) in crates() {
+        let manifest = fs::read_to_string(dir.join("Cargo.toml")).unwrap();
+        let is_off = manifest.contains("doctest = false");
+        let is_example = |line: &str| ["/// ```", "//! ```"].contains(&line.trim());
+        let has_examples = rust_files(&dir.join("src")).iter().any(|file| {
+            let text = fs::read_to_string(file).unwrap();
+            text.lines().any(is_example)
+        });
+        let is_library = dir.join("src/lib.rs").exists();
+        assert!(
+            !is_library || has_examples != is_off,
+            "{name}: set `doctest = false` in [lib] where no doc comment has an example, and only there"
+        );
+    }
+}
+
+#[test]
 fn unsafe_stays_where_it_is_allowed() {
     for (name, dir) in crates() {
         if MAY_BE_UNSAFE.contains(&name.as_str()) {

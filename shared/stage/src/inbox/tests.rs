@@ -1,3 +1,5 @@
+//! Joining, with made-up messages, a clock of its own and counts that can be read.
+
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
 use std::marker::PhantomData;
