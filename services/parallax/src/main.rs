@@ -7,6 +7,7 @@
 //! | layer | crates |
 //! |---|---|
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
+//! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
 //! | offline | [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
 //! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html), [`modelpage`](../modelpage/index.html), [`runpage`](../runpage/index.html) |
