@@ -82,7 +82,7 @@ impl Calibration {
             fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
             fit.without_px = self.watch.without_px(view).map(|it| it * scale);
             // With the footage of another camera none of them stands where it says.
-            let is_named = self.watch.is_named(view) && self.exchanged.is_none();
+            let is_named = self.watch.is_reported(view) && self.exchanged.is_none();
             if is_named && !fit.suspected {
                 tracing::warn!(
                     camera = scene.views[view].name,

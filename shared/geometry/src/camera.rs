@@ -10,7 +10,7 @@ use crate::Lens;
 /// Points nearer to the plane of the camera than this (metres, along its axis) have no image.
 const NEAREST: f64 = 1e-9;
 
-/// What happens inside a camera: focal lengths, principal point, image size and lens.
+/// The intrinsic parameters of a camera: focal lengths, principal point, image size and lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intrinsics {
     /// Focal length along the rows, in pixels.
@@ -52,7 +52,7 @@ impl Intrinsics {
 pub struct Ray {
     /// Where it begins: the centre of a camera, in metres.
     pub origin: Point3<f64>,
-    /// Where it goes.
+    /// Its direction.
     pub direction: UnitVector3<f64>,
 }
 
@@ -61,7 +61,7 @@ pub struct Ray {
 pub struct Camera {
     /// Name of the view, unique in a rig.
     pub name: String,
-    /// The camera's inside.
+    /// Focal lengths, principal point, image size and lens.
     pub intrinsics: Intrinsics,
     /// Takes a point of the world (metres) to the camera's frame: x right, y down, z forward.
     pub camera_from_world: Isometry3<f64>,

@@ -1,4 +1,4 @@
-//! What one view says about another: fundamental matrices, epipolar lines and curves.
+//! The epipolar geometry of two views: fundamental matrices, epipolar lines and curves.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
@@ -15,7 +15,7 @@ const SAME_PLACE: f64 = 1e-9;
 ///
 /// `F = K_b⁻ᵀ [t]ₓ R K_a⁻¹` with `R`, `t` = B from A (Hartley & Zisserman, 2nd ed., §9.2), scaled to
 /// a Frobenius norm of 1. It is the zero matrix if both cameras stand in one place (to a nanometre):
-/// then no view says anything about the other, and [`epipolar_line`] returns `None`.
+/// then there is no epipolar constraint, and [`epipolar_line`] returns `None`.
 pub fn fundamental(a: &Camera, b: &Camera) -> Matrix3<f64> {
     let b_from_a = b.camera_from_world * a.camera_from_world.inverse();
     if b_from_a.translation.vector.norm() < SAME_PLACE {

@@ -55,7 +55,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its name for people.
+    /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Own => "Parallax rig",
@@ -81,7 +81,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// How many of it make a metre.
+    /// How many units make a metre.
     pub fn per_metre(self) -> f64 {
         match self {
             Self::Metres => 1.0,
@@ -91,14 +91,14 @@ impl Unit {
     }
 }
 
-/// What a file may leave out.
+/// Values that a file may leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Unit of lengths, where it is not the format's own.
+    /// Unit of lengths, where it is not the usual one of the format.
     pub unit: Option<Unit>,
-    /// Direction against gravity, where the file does not say.
+    /// Direction against gravity, where the file does not state it.
     pub up: Option<UnitVector3<f64>>,
-    /// Image size, where the file does not say.
+    /// Image size, where the file does not state it.
     pub size: Option<[u32; 2]>,
 }
 
@@ -106,7 +106,7 @@ pub struct ReadOptions {
 ///
 /// # Errors
 ///
-/// See [`RigFileError`]; every one names the file, and below it the field.
+/// See [`RigFileError`]; each names the file, and its source the field.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Rig, RigFileError> {
     read_many(&[path], options)
 }
@@ -153,7 +153,7 @@ pub fn read_many(paths: &[&Path], options: &ReadOptions) -> Result<Rig, RigFileE
 ///
 /// # Errors
 ///
-/// [`RigFileError::Unwritable`] where the format has no words for the rig, [`RigFileError::Write`]
+/// [`RigFileError::Unwritable`] where the format cannot describe the rig, [`RigFileError::Write`]
 /// where the file cannot be written.
 pub fn write(path: &Path, format: Format, rig: &Rig) -> Result<(), RigFileError> {
     let unwritable = |source| RigFileError::Unwritable {

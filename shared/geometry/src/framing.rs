@@ -11,7 +11,7 @@ const LARGEST: f64 = 32768.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OutSize {
     /// Exactly this width and height, in pixels. The whole calibrated image fits in, centred, in its
-    /// own aspect; what is over is padding.
+    /// own aspect; the rest is padding.
     Exact([u32; 2]),
     /// The calibrated size times this factor, rounded to whole pixels (which crops or pads less than a pixel).
     Scale(f64),
@@ -78,7 +78,7 @@ impl Framing {
     ///
     /// # Errors
     ///
-    /// One [`FramingError`] for each argument; a source of another size is never guessed at.
+    /// One [`FramingError`] for each argument. A source of another size is an error; no offset is guessed.
     pub fn new(
         camera: &Camera,
         source_size: [u32; 2],
@@ -90,23 +90,24 @@ impl Framing {
         if !roll.is_finite() {
             return Err(FramingError::Roll { roll });
         }
-        let inside = &camera.intrinsics;
-        let (size, scale) = output(inside.size, out_size)?;
-        let full = Vector2::from(inside.size.map(f64::from));
+        let intrinsics = &camera.intrinsics;
+        let (size, scale) = output(intrinsics.size, out_size)?;
+        let full = Vector2::from(intrinsics.size.map(f64::from));
         let out = Vector2::from(size.map(f64::from));
         let half = Vector2::repeat(0.5);
-        let centre = Vector2::new(inside.cx, inside.cy);
+        let centre = Vector2::new(intrinsics.cx, intrinsics.cy);
         let out_centre = (centre + half - full / 2.0) * scale + out / 2.0 - half;
 
         let (focal, linear, constant);
         if roll == 0.0 {
-            focal = Vector2::new(inside.fx, inside.fy) * scale;
+            focal = Vector2::new(intrinsics.fx, intrinsics.fy) * scale;
             linear = Matrix2::from_diagonal_element(1.0 / scale);
             // Free of the principal point, so that a plain copy is the identity to the last bit.
             constant = (half - out / 2.0) / scale + full / 2.0 - half;
         } else {
-            focal = Vector2::repeat((inside.fx * inside.fy).sqrt() * scale);
-            let calibrated_focal = Matrix2::from_diagonal(&Vector2::new(inside.fx, inside.fy));
+            focal = Vector2::repeat((intrinsics.fx * intrinsics.fy).sqrt() * scale);
+            let calibrated_focal =
+                Matrix2::from_diagonal(&Vector2::new(intrinsics.fx, intrinsics.fy));
             linear = calibrated_focal * Rotation2::new(-roll).matrix() / focal.x;
             constant = centre - linear * out_centre;
         }
@@ -117,7 +118,7 @@ impl Framing {
         [framed.intrinsics.fx, framed.intrinsics.fy] = focal.into();
         [framed.intrinsics.cx, framed.intrinsics.cy] = out_centre.into();
         if roll != 0.0 {
-            framed.intrinsics.lens = Lens::new(inside.lens.model().rotated(roll));
+            framed.intrinsics.lens = Lens::new(intrinsics.lens.model().rotated(roll));
             let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
             framed.camera_from_world = turn * camera.camera_from_world;
         }
@@ -201,16 +202,16 @@ fn output(calibrated: [u32; 2], wanted: OutSize) -> Result<([u32; 2], f64), Fram
 ///
 /// The direction from half a metre below to half a metre above the rig's focus is projected with the
 /// lens; [`Framing`] with the returned angle shows it vertical. Where the focus is not in view, a
-/// point on the camera's own axis stands in. Radians in (-π, π], clockwise as seen.
+/// point on the camera's own axis is used. Radians in (-π, π], clockwise as seen.
 ///
-/// `None` if the rig does not say which way is up, or the camera looks straight up or down.
+/// `None` if the rig has no up direction, or the camera looks straight up or down.
 pub fn upright_roll(camera: &Camera, rig: &Rig) -> Option<f64> {
     let up = rig.up_in_world()?.into_inner();
     let on_axis = camera.centre_in_world() + camera.axis_in_world().into_inner() * 4.0;
     let towards = |middle: Point3<f64>| {
         let [low, high] = [-0.5, 0.5].map(|metres| camera.project(&(middle + up * metres)));
-        let inside = &camera.intrinsics;
-        Some(inside.normalised(&high?) - inside.normalised(&low?))
+        let intrinsics = &camera.intrinsics;
+        Some(intrinsics.normalised(&high?) - intrinsics.normalised(&low?))
     };
     let direction = rig.focus().and_then(towards).or_else(|| towards(on_axis))?;
     if direction.norm() < 1e-6 {

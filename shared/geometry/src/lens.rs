@@ -1,4 +1,4 @@
-//! What a lens does to a ray: the distortion models, their derivatives and their inverses.
+//! Lens distortion: the models, their derivatives and their inverses.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -29,14 +29,16 @@ pub enum LensModel {
 }
 
 impl std::fmt::Display for LensModel {
-    /// For people: its name, and the coefficients that are not 0.
+    /// The name of the model, and the coefficients that are not 0.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let listed = |name: &str, values: &[f64]| {
-            let numbered = values.iter().enumerate().filter(|it| *it.1 != 0.0);
-            let said: Vec<String> = numbered
-                .map(|(nth, it)| format!(", {name}{} {it}", nth + 1))
-                .collect();
-            said.concat()
+            let nonzero = values
+                .iter()
+                .enumerate()
+                .filter(|(_, value)| **value != 0.0);
+            nonzero
+                .map(|(index, value)| format!(", {name}{} {value}", index + 1))
+                .collect::<String>()
         };
         match self {
             Self::Pinhole => write!(out, "pinhole, no distortion"),
@@ -50,7 +52,7 @@ impl std::fmt::Display for LensModel {
 
 /// A lens: its model and the part of the image in which that model can be inverted.
 ///
-/// Distortion polynomials turn back on themselves somewhere outside the image they were fitted to.
+/// Distortion polynomials stop being monotonic somewhere outside the image they were fitted to.
 /// A lens refuses every ray beyond the first such turning point, and beyond 87 degrees off the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {

@@ -4,7 +4,7 @@
 //! down (`OpenCV`), and are stored as `camera_from_world`. The centre of the top-left pixel is (0, 0).
 //! A *pixel* is a point of the recorded, distorted image; an *ideal pixel* is where the same ray
 //! would fall through a pinhole with the same focal lengths and principal point.
-//! No clock and no threads; the only input and output is in [`files::read`] and its kin.
+//! No clock and no threads; only [`files::read`], [`files::read_many`] and [`files::write`] do input or output.
 #![forbid(unsafe_code)]
 
 mod lens;

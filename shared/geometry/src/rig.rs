@@ -8,7 +8,7 @@ use crate::{Camera, Intrinsics};
 const FOCAL_LIMIT: f64 = 1e4;
 /// The largest lens coefficient: calibrations that fit noise have some of thousands.
 const COEFFICIENT_LIMIT: f64 = 1e7;
-/// The furthest place of a camera: worlds that begin in the centre of the Earth are within it.
+/// The largest distance of a camera from the origin: geocentric coordinates are within it.
 const PLACE_LIMIT_METRES: f64 = 1e7;
 
 /// Why a set of cameras is no rig.
@@ -23,7 +23,7 @@ pub enum RigError {
         /// Position in the list, from 0.
         index: usize,
     },
-    /// A name that cannot be that of a folder.
+    /// A name that cannot be used as the name of a folder.
     #[error("camera {index} is named {name:?}; expected {PLAIN_NAME}")]
     Name {
         /// Position in the list, from 0.
@@ -31,7 +31,7 @@ pub enum RigError {
         /// The name.
         name: String,
     },
-    /// Two cameras of one name.
+    /// Two cameras have the same name.
     #[error("two cameras are named {name:?}")]
     DuplicateName {
         /// The name.
@@ -77,7 +77,7 @@ pub enum RigError {
         /// Width or height of the image.
         extent: u32,
     },
-    /// A focal length so long that the whole image is one direction.
+    /// A focal length so long that all rays of the image are parallel to working precision.
     #[error(
         "camera {camera:?}: focal length {value} px is more than {limit:e} times the image, which is {extent} px"
     )]
@@ -91,7 +91,7 @@ pub enum RigError {
         /// The longest accepted, as a multiple of it.
         limit: f64,
     },
-    /// A lens coefficient that no lens has.
+    /// A lens coefficient larger than that of any real lens.
     #[error(
         "camera {camera:?}: lens coefficient {value:e} exceeds {limit:e}: is the order that of the format?"
     )]
@@ -103,7 +103,7 @@ pub enum RigError {
         /// The largest accepted.
         limit: f64,
     },
-    /// A camera that is further away than the ends of the Earth.
+    /// A camera further from the origin than any place on the Earth.
     #[error(
         "camera {camera:?}: it stands {metres:e} m from the origin of the world (limit {limit:e} m): is the unit right?"
     )]
@@ -115,7 +115,7 @@ pub enum RigError {
         /// The largest accepted.
         limit: f64,
     },
-    /// The rotation is none.
+    /// The rotation is not a rotation.
     #[error("camera {camera:?}: rotation")]
     Rotation {
         /// Name of the camera.
@@ -150,7 +150,7 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
         .abs()
         .max();
     let determinant = matrix.determinant();
-    // `Matrix::max` passes over NaN, so the entries are asked too.
+    // `Matrix::max` ignores NaN, so the entries are checked too.
     let finite = matrix.iter().all(|entry| entry.is_finite());
     if !finite || deviation > LIMIT || determinant <= 0.0 {
         return Err(NotARotation {
@@ -172,7 +172,7 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     ))
 }
 
-/// Calibrated cameras of one world, checked when they are put together.
+/// Calibrated cameras in one world frame, validated on construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
     cameras: Vec<Camera>,
@@ -181,14 +181,14 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Puts cameras together.
+    /// Makes a rig of cameras.
     ///
     /// * `up_in_world`: the direction against gravity, where it is known.
-    /// * `source`: where the numbers come from, for people.
+    /// * `source`: where the numbers come from; free text.
     ///
     /// # Errors
     ///
-    /// One [`RigError`] for each thing that a camera of a rig cannot have.
+    /// A [`RigError`] for the first invalid camera.
     pub fn new(
         cameras: Vec<Camera>,
         up_in_world: Option<UnitVector3<f64>>,
@@ -255,7 +255,7 @@ impl Rig {
             right += across * (camera.centre_in_world() - origin);
         }
         let eigen = normal.symmetric_eigenvalues();
-        // About half a degree between two axes; less is no meeting point.
+        // About half a degree between two axes; with less they are taken as parallel.
         if eigen.min() < 1e-4 {
             return None;
         }
@@ -326,7 +326,7 @@ fn check_finite(camera: &Camera) -> Result<(), RigError> {
     }
 }
 
-/// Refuses what would leave no digits to compute with.
+/// Refuses magnitudes that would leave no digits to compute with.
 fn check_size(camera: &Camera) -> Result<(), RigError> {
     let Intrinsics {
         fx, fy, size, lens, ..
@@ -334,7 +334,7 @@ fn check_size(camera: &Camera) -> Result<(), RigError> {
     let name = || camera.name.clone();
     let extent = size[0].max(size[1]);
     let longest = FOCAL_LIMIT * f64::from(extent);
-    if let Some(value) = [fx, fy].into_iter().find(|&it| it > longest) {
+    if let Some(value) = [fx, fy].into_iter().find(|&focal| focal > longest) {
         return Err(RigError::LongFocal {
             camera: name(),
             value,
@@ -343,14 +343,14 @@ fn check_size(camera: &Camera) -> Result<(), RigError> {
         });
     }
     let mut coefficients = lens.model().coefficients();
-    if let Some(value) = coefficients.find(|it| it.abs() > COEFFICIENT_LIMIT) {
+    if let Some(value) = coefficients.find(|value| value.abs() > COEFFICIENT_LIMIT) {
         return Err(RigError::LensCoefficient {
             camera: name(),
             value,
             limit: COEFFICIENT_LIMIT,
         });
     }
-    // As long as the translation, and finite where its square is not.
+    // `amax` stays finite where the square of the norm overflows.
     let translation = camera.camera_from_world.translation.vector;
     let metres = translation.amax().max(translation.norm());
     if metres.is_nan() || metres > PLACE_LIMIT_METRES {
@@ -402,11 +402,11 @@ fn check_image(camera: &Camera) -> Result<(), RigError> {
 #[cfg(test)]
 mod tests;
 
-/// What [`is_plain_name`] asks for, in words.
+/// What [`is_plain_name`] requires, as text for error messages.
 pub const PLAIN_NAME: &str = "1 to 64 bytes that begin with neither a dot nor a space, without / \\ , \" and control \
                               characters: the name of a camera becomes that of a folder";
 
-/// Whether a name can be that of a folder, and stand in a line of a table.
+/// Whether a name can be the name of a folder and a field of a table.
 pub fn is_plain_name(name: &str) -> bool {
     (1..=64).contains(&name.len())
         && !name.starts_with(['.', ' '])

@@ -1,4 +1,4 @@
-//! Whether every camera stands where the calibration says, from what the cameras see of a person.
+//! Detects cameras that were moved after calibration, from the points of a person seen by several cameras.
 
 mod swap;
 
@@ -13,168 +13,167 @@ use crate::{Camera, Ray};
 
 pub use swap::{Contradiction, Swap, SwapWatch};
 
-/// Frames that the running median looks back on.
+/// Frames of the running median.
 const WINDOW: usize = 60;
-/// Frames without which nothing is said.
-const LEAST_FRAMES: usize = 12;
-/// A camera is named once it has been suspected for so many frames in a row that told something.
+/// The fewest frames for a result.
+const MIN_FRAMES: usize = 12;
+/// A camera is reported once it has been suspected in this many usable frames in a row.
 const PERSISTENT: u32 = 8;
-/// Points of a frame without which it says nothing.
-const LEAST_POINTS: usize = 5;
+/// The fewest points of a usable frame.
+const MIN_POINTS: usize = 5;
 /// Sine of the angle between two rays below which their meeting point is too uncertain.
-const LEAST_SINE: f64 = 0.2;
-/// A camera is suspected if cameras disagree so many times more with it than without it, and by at least
-/// so many degrees, and pixels: where people stand in a grid of cells of four, half a cell may always be
-/// missing in the same direction.
+const MIN_SINE: f64 = 0.2;
+/// A camera is suspected if the residual with it is at least this many times the residual without it, and at
+/// least this many degrees and pixels: detections lie on a grid of cells of four pixels, and may always be off
+/// by half a cell in the same direction.
 const FACTOR: f64 = 2.5;
-const LEAST_DEGREES: f64 = 0.5;
-const LEAST_PX: f64 = 4.0;
-/// Nothing is said where the others disagree by more among themselves.
-const MOST_DEGREES: f64 = 1.5;
+const MIN_DEGREES: f64 = 0.5;
+const MIN_PX: f64 = 4.0;
+/// No camera is suspected where the others disagree by more among themselves.
+const MAX_DEGREES: f64 = 1.5;
 
-/// Follows how far apart the cameras see the same points, with each camera and without it.
+/// Tracks the residual between the cameras on the same points, with each camera and without it.
 ///
-/// From four cameras on, every two others meet in a point of space, which is projected into the camera:
-/// the way from there to what it sees itself counts. Of a frame that is the median over all points, in x
-/// and in y; of such a group of cameras the length of the median over the last frames: what is found
-/// wrongly goes now this way and now that, and what a camera that was moved sees always goes the same way.
-/// Of a camera it is the median over all groups that it is in: one wrong camera spoils those, and none of
-/// the others. With three, the length of the way to the ray of one other camera counts (the epipolar
-/// distance), which a camera that is turned along its epipolar lines hardly shows; its direction does not,
-/// since the only two that are left without a camera may agree by chance. With two cameras nobody can tell
-/// which of them is wrong.
+/// With four or more cameras, the rays of every two others are triangulated and the point is projected into the
+/// camera; the offset of the camera's own observation from there is the residual. It is reduced by medians: over
+/// the points of a frame, in x and in y; over the last frames of such a group of three cameras, as a vector whose
+/// length is taken. (Detection errors change direction, the offset of a moved camera keeps it.) The residual of a
+/// camera is the median over all groups that contain it: one wrong camera affects those, and no others.
 ///
-/// Not a calibration: it names a camera that was moved, and does not say where it stands.
+/// With three cameras the epipolar distance to the ray of one other camera is used, without its direction, because
+/// the two cameras that are left may agree by chance. It hardly shows a camera that is turned along its epipolar
+/// lines. With two cameras it is undecidable which of them is wrong.
+///
+/// Not a calibration: it detects that a camera was moved, not where it is now.
 #[derive(Debug, Clone)]
 pub struct RigWatch {
     cameras: Vec<Camera>,
     groups: Vec<Group>,
-    /// By camera: frames in a row in which it was suspected.
+    /// By camera: usable frames in a row in which it was suspected.
     streaks: Vec<u32>,
-    /// By camera: whether it was named, at any time.
-    named: Vec<bool>,
+    /// By camera: whether it was ever reported.
+    reported: Vec<bool>,
 }
 
-/// Some cameras, and how far apart they saw the same points.
+/// Some cameras, and their residuals on the same points.
 #[derive(Debug, Clone)]
 struct Group {
-    /// The camera into which is projected, and the two others, or twice the one other.
+    /// The camera that is projected into, and the two others, or the one other twice.
     views: [usize; 3],
-    /// Of the last frames: the median way from where a point should be to where it was seen, pixels.
-    px: VecDeque<[f64; 2]>,
+    /// Of the last frames: the median offset of the observed from the predicted points, pixels.
+    offsets_px: VecDeque<[f64; 2]>,
 }
 
-/// A camera that does not stand where the calibration says.
+/// A camera that is not where the calibration says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Suspect {
     /// The camera.
     pub view: usize,
-    /// How far apart cameras see the same points if it is one of them, pixels.
+    /// Residual of the groups with this camera, pixels.
     pub residual_px: f64,
-    /// The same without it, pixels.
+    /// Residual of the groups without it, pixels.
     pub without_px: f64,
 }
 
 impl RigWatch {
-    /// Begins to watch cameras.
+    /// Starts without observations.
     pub fn new(cameras: Vec<Camera>) -> Self {
         let n = cameras.len();
         let counts = |[view, a, b]: &[usize; 3]| {
             let is_new = if n > 3 { a < b } else { n == 3 && a == b };
             is_new && view != a && view != b
         };
-        let all = (0..n).flat_map(|view| (0..n * n).map(move |it| [view, it / n, it % n]));
+        let all = (0..n).flat_map(|view| (0..n * n).map(move |pair| [view, pair / n, pair % n]));
         let groups = all.filter(counts).map(|views| Group {
             views,
-            px: VecDeque::new(),
+            offsets_px: VecDeque::new(),
         });
         Self {
             groups: groups.collect(),
             streaks: vec![0; n],
-            named: vec![false; n],
+            reported: vec![false; n],
             cameras,
         }
     }
 
-    /// Takes in what the cameras see of one frame.
+    /// Adds the observations of one frame.
     ///
-    /// * `points_px`: one entry a camera, `None` where it saw nothing; the same points of the world in the
+    /// * `points_px`: one entry per camera, `None` without a detection; the same points of the world in the
     ///   same order, pixels of the recorded image.
     pub fn note(&mut self, points_px: &[Option<Vec<[f64; 2]>>]) {
         let views = self.cameras.iter().zip(points_px);
-        let see = |(camera, points): (&Camera, &Option<Vec<[f64; 2]>>)| -> Vec<Option<Seen>> {
-            let points = points.iter().flatten();
-            points.map(|at| Seen::new(camera, *at)).collect()
-        };
-        let seen: Vec<Vec<Option<Seen>>> = views.map(see).collect();
-        let mut tells = false;
+        let observe =
+            |(camera, points): (&Camera, &Option<Vec<[f64; 2]>>)| -> Vec<Option<ObservedPoint>> {
+                let points = points.iter().flatten();
+                points.map(|px| ObservedPoint::new(camera, *px)).collect()
+            };
+        let observed: Vec<Vec<Option<ObservedPoint>>> = views.map(observe).collect();
+        let mut is_usable = false;
         for group in &mut self.groups {
-            let [Some(own), Some(a), Some(b)] = group.views.map(|it| seen.get(it)) else {
+            let [Some(own), Some(a), Some(b)] = group.views.map(|view| observed.get(view)) else {
                 continue;
             };
             let camera = &self.cameras[group.views[0]];
             let is_one = group.views[1] == group.views[2];
             let points = own.iter().zip(a).zip(b);
-            let px = points.filter_map(|((own, a), b)| {
+            let offsets_px = points.filter_map(|((own, a), b)| {
                 let (own, a, b) = (own.as_ref()?, a.as_ref()?, b.as_ref()?);
                 if is_one {
-                    let way = own.px_to_ray(camera, &a.ray)?;
-                    Some([way[0].hypot(way[1]), 0.0])
+                    let offset = own.offset_from_ray(camera, &a.ray)?;
+                    Some([offset[0].hypot(offset[1]), 0.0])
                 } else {
-                    own.px_to_meeting(camera, &a.ray, &b.ray)
+                    own.offset_from_meeting_point(camera, &a.ray, &b.ray)
                 }
             });
-            let px: Vec<[f64; 2]> = px.collect();
-            tells |= group.note(&px);
+            let offsets_px: Vec<[f64; 2]> = offsets_px.collect();
+            is_usable |= group.note(&offsets_px);
         }
-        if tells {
-            self.follow();
+        if is_usable {
+            self.update_streaks();
         }
     }
 
-    /// Names who has been suspected long enough.
-    fn follow(&mut self) {
+    /// Reports cameras that have been suspected long enough.
+    fn update_streaks(&mut self) {
         let suspects = self.suspects();
         for (view, streak) in self.streaks.iter_mut().enumerate() {
-            let is_suspect = suspects.iter().any(|it| it.view == view);
+            let is_suspect = suspects.iter().any(|suspect| suspect.view == view);
             *streak = if is_suspect { *streak + 1 } else { 0 };
-            self.named[view] |= *streak >= PERSISTENT;
+            self.reported[view] |= *streak >= PERSISTENT;
         }
     }
 
-    /// Whether a camera was found, at any time, not to stand where the calibration says: suspected for
-    /// several frames in a row.
-    pub fn is_named(&self, view: usize) -> bool {
-        self.named.get(view).copied().unwrap_or(false)
+    /// Whether a camera was ever suspected for several usable frames in a row.
+    pub fn is_reported(&self, view: usize) -> bool {
+        self.reported.get(view).copied().unwrap_or(false)
     }
 
-    /// How far apart cameras see the same points if a camera is one of them, pixels; `None` while too
-    /// little was seen.
+    /// Residual of the groups with a camera, pixels; `None` while there are too few observations.
     pub fn residual_px(&self, view: usize) -> Option<f64> {
-        self.apart(|it| it.views.contains(&view))
+        self.median_residual(|group| group.views.contains(&view))
     }
 
-    /// The same of the others without it, pixels.
+    /// Residual of the groups without a camera, pixels.
     pub fn without_px(&self, view: usize) -> Option<f64> {
-        self.apart(|it| !it.views.contains(&view))
+        self.median_residual(|group| !group.views.contains(&view))
     }
 
     /// The median over some groups.
-    fn apart(&self, counts: impl Fn(&Group) -> bool) -> Option<f64> {
-        let groups = self.groups.iter().filter(|it| counts(it));
-        median(groups.filter_map(Group::apart).collect())
+    fn median_residual(&self, counts: impl Fn(&Group) -> bool) -> Option<f64> {
+        let groups = self.groups.iter().filter(|group| counts(group));
+        median(groups.filter_map(Group::residual).collect())
     }
 
-    /// The cameras that do not stand where the calibration says.
+    /// The cameras that are not where the calibration says.
     ///
-    /// One at a time: the one without which the others agree best. A wrong camera spoils what the others say of each
-    /// other, so that a second is sought among those that are left, of which there must be four.
+    /// One at a time: the one without which the others agree best. A wrong camera affects the residuals of the
+    /// others, so a second one is searched for among those that are left, of which there must be four.
     pub fn suspects(&self) -> Vec<Suspect> {
         let mut left_out = Vec::new();
         let mut found = Vec::new();
-        while let Some(it) = self.worst(&left_out) {
-            left_out.push(it.view);
-            found.push(it);
+        while let Some(suspect) = self.worst(&left_out) {
+            left_out.push(suspect.view);
+            found.push(suspect);
             if self.cameras.len() < 4 + left_out.len() {
                 break;
             }
@@ -184,21 +183,24 @@ impl RigWatch {
 
     /// Of the cameras that are not left out, the one without which the others agree best, if it is wrong.
     fn worst(&self, left_out: &[usize]) -> Option<Suspect> {
-        let views = (0..self.cameras.len()).filter(|it| !left_out.contains(it));
+        let views = (0..self.cameras.len()).filter(|view| !left_out.contains(view));
         let suspects = views.filter_map(|view| self.suspect(view, left_out));
-        let gain = |it: &Suspect| it.residual_px / it.without_px.max(1e-9);
+        let gain = |suspect: &Suspect| suspect.residual_px / suspect.without_px.max(1e-9);
         suspects.max_by(|a, b| gain(a).total_cmp(&gain(b)))
     }
 
     fn suspect(&self, view: usize, left_out: &[usize]) -> Option<Suspect> {
-        let counts = |it: &Group| !left_out.iter().any(|out| it.views.contains(out));
-        let residual_px = self.apart(|it| counts(it) && it.views.contains(&view))?;
-        let without_px = self.apart(|it| counts(it) && !it.views.contains(&view))?;
-        let it = &self.cameras[view].intrinsics;
-        let px = |degrees: f64| it.fx.min(it.fy).abs() * degrees.to_radians().tan();
-        let least_px = px(LEAST_DEGREES).max(LEAST_PX);
+        let counts = |group: &Group| !left_out.iter().any(|out| group.views.contains(out));
+        let residual_px =
+            self.median_residual(|group| counts(group) && group.views.contains(&view))?;
+        let without_px =
+            self.median_residual(|group| counts(group) && !group.views.contains(&view))?;
+        let intrinsics = &self.cameras[view].intrinsics;
+        let focal = intrinsics.fx.min(intrinsics.fy).abs();
+        let px = |degrees: f64| focal * degrees.to_radians().tan();
+        let min_px = px(MIN_DEGREES).max(MIN_PX);
         let is_wrong =
-            residual_px > least_px.max(FACTOR * without_px) && without_px < px(MOST_DEGREES);
+            residual_px > min_px.max(FACTOR * without_px) && without_px < px(MAX_DEGREES);
         is_wrong.then_some(Suspect {
             view,
             residual_px,
@@ -208,64 +210,64 @@ impl RigWatch {
 }
 
 impl Group {
-    /// Notes the ways between where the points of a frame should be and were seen; whether they were enough.
-    fn note(&mut self, px: &[[f64; 2]]) -> bool {
-        if px.len() < LEAST_POINTS {
+    /// Adds the offsets of one frame. Returns whether there were enough of them.
+    fn note(&mut self, offsets_px: &[[f64; 2]]) -> bool {
+        if offsets_px.len() < MIN_POINTS {
             return false;
         }
-        self.px.extend(median_way(px));
-        if self.px.len() > WINDOW {
-            self.px.pop_front();
+        self.offsets_px.extend(median_offset(offsets_px));
+        if self.offsets_px.len() > WINDOW {
+            self.offsets_px.pop_front();
         }
         true
     }
 
-    fn apart(&self) -> Option<f64> {
-        let frames: Vec<_> = self.px.iter().copied().collect();
-        let way = median_way(&frames).filter(|_| frames.len() >= LEAST_FRAMES)?;
-        Some(way[0].hypot(way[1]))
+    fn residual(&self) -> Option<f64> {
+        let frames: Vec<_> = self.offsets_px.iter().copied().collect();
+        let offset = median_offset(&frames).filter(|_| frames.len() >= MIN_FRAMES)?;
+        Some(offset[0].hypot(offset[1]))
     }
 }
 
-/// A point that a camera sees.
+/// A point observed by a camera.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct ObservedPoint {
     at_px: Point2<f64>,
     ray: Ray,
 }
 
-impl Seen {
+impl ObservedPoint {
     fn new(camera: &Camera, at: [f64; 2]) -> Option<Self> {
         let at_px = Point2::from(at);
         let ray = camera.ray(&at_px)?;
         Some(Self { at_px, ray })
     }
 
-    /// The way to it from the point in which two rays meet, pixels of its camera.
-    fn px_to_meeting(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<[f64; 2]> {
+    /// Its offset from the projection of the point where two rays meet, pixels.
+    fn offset_from_meeting_point(&self, camera: &Camera, a: &Ray, b: &Ray) -> Option<[f64; 2]> {
         let [on_a, on_b] = closest(a, b)?;
-        self.px_to_point(camera, &nalgebra::center(&on_a, &on_b))
+        self.offset_from_point(camera, &nalgebra::center(&on_a, &on_b))
     }
 
-    /// The way to it from a ray, pixels of its camera: from where the ray comes closest to its own.
-    fn px_to_ray(&self, camera: &Camera, ray: &Ray) -> Option<[f64; 2]> {
+    /// Its offset from the projection of the point of a ray that is closest to its own ray, pixels.
+    fn offset_from_ray(&self, camera: &Camera, ray: &Ray) -> Option<[f64; 2]> {
         let [on_ray, _] = closest(ray, &self.ray)?;
-        self.px_to_point(camera, &on_ray)
+        self.offset_from_point(camera, &on_ray)
     }
 
-    fn px_to_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<[f64; 2]> {
-        let way = self.at_px - camera.project(in_world)?;
-        let is_finite = way.iter().all(|it| it.is_finite());
-        is_finite.then_some([way.x, way.y])
+    fn offset_from_point(&self, camera: &Camera, in_world: &Point3<f64>) -> Option<[f64; 2]> {
+        let offset = self.at_px - camera.project(in_world)?;
+        let is_finite = offset.iter().all(|value| value.is_finite());
+        is_finite.then_some([offset.x, offset.y])
     }
 }
 
-/// Where two rays come closest, a point on either; `None` if they are almost parallel, or come closest
-/// behind a camera.
+/// The closest points of two rays, one on each; `None` if the rays are almost parallel, or a point lies behind
+/// its camera.
 fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
     let across = a.direction.cross(&b.direction);
     let squared_sine = across.norm_squared();
-    if squared_sine.is_nan() || squared_sine < LEAST_SINE.powi(2) {
+    if squared_sine.is_nan() || squared_sine < MIN_SINE.powi(2) {
         return None;
     }
     let between = b.origin - a.origin;
@@ -280,13 +282,13 @@ fn closest(a: &Ray, b: &Ray) -> Option<[Point3<f64>; 2]> {
     })
 }
 
-/// The median in x and in y; none of nothing.
-fn median_way(all: &[[f64; 2]]) -> Option<[f64; 2]> {
-    let along = |axis: usize| median(all.iter().map(|it| it[axis]).collect());
+/// The median in x and in y; `None` of an empty list.
+fn median_offset(all: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let along = |axis: usize| median(all.iter().map(|offset| offset[axis]).collect());
     Some([along(0)?, along(1)?])
 }
 
-/// The lower of the two in the middle; none of nothing.
+/// The lower of the two in the middle; `None` of an empty list.
 fn median(mut all: Vec<f64>) -> Option<f64> {
     all.sort_by(f64::total_cmp);
     all.get(all.len().saturating_sub(1) / 2).copied()

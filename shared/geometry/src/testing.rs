@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::{Camera, Intrinsics, Lens, LensModel, Rig};
 
-/// Lenses from none to wide: mild and strong barrels, cushions, tangential, rational and fisheye.
+/// Lens models: pinhole, mild and strong barrel, pincushion, tangential, rational and fisheye.
 pub(crate) fn lens_model() -> impl Strategy<Value = LensModel> {
     let brown = |k: [f64; 6], p: [f64; 2]| LensModel::BrownConrady { k, p };
     prop_oneof![
@@ -37,7 +37,7 @@ pub(crate) fn lens() -> impl Strategy<Value = Lens> {
     lens_model().prop_map(Lens::new)
 }
 
-/// Cameras of 640x480 or so, 4 to 6 m from the origin, on any side, looking at it, rolled at will.
+/// Cameras of 640x480, 4 to 6 m from the origin, on any side, looking at it, with some roll.
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     let inside = (500.0..900.0, 0.9..1.1, 300.0..340.0, 220.0..260.0, lens());
     let place = (0.0..std::f64::consts::TAU, 4.0..6.0, -0.5..1.5, -0.6..0.6);
@@ -71,7 +71,7 @@ pub(crate) fn looking_at_origin(
     Isometry3::rotation(Vector3::z() * roll) * opencv * upright
 }
 
-/// `n` cameras spread over the circle, all of one lens.
+/// `n` cameras spread over the circle, all with the same lens.
 pub(crate) fn ring(n: usize, model: LensModel) -> Vec<Camera> {
     (0..n)
         .map(|i| Camera {
@@ -103,7 +103,7 @@ pub(crate) fn point() -> impl Strategy<Value = Point3<f64>> {
     (-0.8..0.8, -0.8..0.8, -0.8..0.8).prop_map(|(x, y, z)| Point3::new(x, y, z))
 }
 
-/// Largest coordinate difference.
+/// Euclidean distance.
 pub(crate) fn distance(a: &Point2<f64>, b: &Point2<f64>) -> f64 {
     (a - b).norm()
 }

@@ -17,22 +17,21 @@ use views::Views;
 /// The most observations of one point: as many as `views_used` has bits.
 pub const MAX_VIEWS: usize = 32;
 
-/// A point seen by a camera.
+/// The observation of a point by a camera.
 #[derive(Debug, Clone, Copy)]
 pub struct Observation<'a> {
-    /// The camera that saw it.
+    /// The camera.
     pub camera: &'a Camera,
-    /// Where, in pixels of the recorded (distorted) image.
+    /// The position, in pixels of the recorded (distorted) image.
     pub point_px: Point2<f64>,
     /// Standard deviation of that position along each axis, in pixels.
     pub sigma_px: f64,
 }
 
-/// How observations are weighed and refused.
+/// How observations are weighted and rejected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Reprojection error, in pixels, beyond which an observation pulls less and less (Cauchy).
-    /// Infinite for plain least squares.
+    /// Width of the Cauchy loss on the reprojection error, in pixels. Infinite for plain least squares.
     pub loss_px: f64,
     /// Observations that end further than this, in pixels, from the point's image are left out.
     pub max_reprojection_px: Option<f64>,
@@ -64,13 +63,13 @@ pub enum TriangulateError {
         /// Observations asked for.
         needed: usize,
     },
-    /// More observations than there are bits for.
+    /// More observations than [`MAX_VIEWS`].
     #[error("at most {MAX_VIEWS} views, got {views}")]
     TooManyViews {
         /// Observations given.
         views: usize,
     },
-    /// A position or a deviation that is no number, or a deviation that is not positive.
+    /// A position or a deviation that is not finite, or a deviation that is not positive.
     #[error("view {view}: position ({x}, {y}) px with deviation {sigma_px} px is not usable")]
     BadObservation {
         /// Which observation.
@@ -114,7 +113,7 @@ pub enum TriangulateError {
         /// Which observation.
         view: usize,
     },
-    /// The refinement left the numbers.
+    /// The refinement reached values that are not finite.
     #[error("refinement diverged after {iterations} iterations")]
     Diverged {
         /// Iterations done.
@@ -149,17 +148,17 @@ impl Triangulated {
 ///
 /// The refinement (Levenberg & Marquardt) minimises `Σ ρ(‖e‖²) / σ²` over the distorted pixel errors
 /// `e` with the Cauchy loss `ρ(s) = c² ln(1 + s / c²)`, c = `loss_px`, whose width shrinks from the
-/// worst error of the start down to c, so that one wild view does not decide where it ends. If a view
-/// ends further off than `max_reprojection_px`, every view is left out in turn, the subset whose worst
+/// worst initial error down to c, so that one outlier does not determine the minimum that is found. If the
+/// error of a view exceeds `max_reprojection_px`, every view is left out in turn, the subset whose worst
 /// error is least is kept, and so on down to `min_views`.
 ///
 /// The covariance is the inverse of the normal matrix `Σ ρ' Jᵀ J / σ²`: as good as the `sigma_px` given.
-/// The answer depends on nothing but the arguments and their order; nothing is allocated.
-/// An observation that no ray of its camera reaches (beyond the lens's valid range) is not used.
+/// The result depends only on the arguments and their order; nothing is allocated.
+/// An observation beyond the valid range of its camera's lens is not used.
 ///
 /// # Errors
 ///
-/// See [`TriangulateError`]; a point is never returned behind a view that it uses.
+/// See [`TriangulateError`]. A point is never behind a view that it uses.
 ///
 /// # Examples
 ///

@@ -1,4 +1,4 @@
-//! Projection, its slope and its inverse belong together.
+//! Projection, its derivative and its inverse agree.
 
 use proptest::prelude::*;
 
@@ -11,8 +11,8 @@ proptest! {
     fn the_ray_of_a_pixel_goes_through_its_point(camera in camera(), point in point()) {
         if let Some(pixel) = camera.project(&point) {
             let ray = camera.ray(&pixel).expect("inside the lens");
-            let away = (point - ray.origin).cross(&ray.direction).norm();
-            prop_assert!(away < 1e-7, "{away} m");
+            let distance = (point - ray.origin).cross(&ray.direction).norm();
+            prop_assert!(distance < 1e-7, "{distance} m");
         }
     }
 
@@ -27,7 +27,7 @@ proptest! {
     }
 
     #[test]
-    fn the_jacobian_is_the_slope(camera in camera(), point in point()) {
+    fn the_jacobian_equals_the_numerical_derivative(camera in camera(), point in point()) {
         let Some((pixel, jacobian)) = camera.project_with_jacobian(&point) else { return Ok(()) };
         prop_assert_eq!(Some(pixel), camera.project(&point));
         for axis in 0..3 {
@@ -45,7 +45,7 @@ proptest! {
     }
 
     #[test]
-    fn a_camera_sees_nothing_behind_itself(camera in camera(), point in point()) {
+    fn a_point_behind_the_camera_has_no_image(camera in camera(), point in point()) {
         let mirrored = camera.centre_in_world() + (camera.centre_in_world() - point);
         prop_assert_eq!(camera.project(&mirrored), None);
     }

@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector2, Vector3};
 
 use crate::Camera;
 
-/// Samples among which the visible part is looked for.
+/// Samples of the scan for the visible part.
 const SCAN: usize = 512;
 
 /// The curve in the recorded image of B on which the point seen in a pixel of A must lie.
@@ -13,7 +13,7 @@ const SCAN: usize = 512;
 /// image of B. Made for drawing; distances are better measured on ideal pixels ([`super::epipolar_line`]).
 ///
 /// * `point_in_a`: pixel of the recorded image of A.
-/// * Returns `n` pixels in order along the ray, or none if B sees nothing of the ray or `n` < 2.
+/// * Returns `n` pixels in order along the ray, or none if no part of the ray is in the image of B or `n` < 2.
 pub fn epipolar_curve(
     a: &Camera,
     b: &Camera,

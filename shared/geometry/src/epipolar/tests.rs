@@ -21,7 +21,7 @@ proptest! {
     }
 
     #[test]
-    fn the_way_back_is_the_transpose(a in camera(), b in camera()) {
+    fn exchanging_the_cameras_transposes_the_matrix(a in camera(), b in camera()) {
         prop_assume!((a.centre_in_world() - b.centre_in_world()).norm() > 0.1);
         let (there, back) = (fundamental(&a, &b), fundamental(&b, &a).transpose());
         prop_assert!((there - back).norm().min((there + back).norm()) < 1e-9);
@@ -62,7 +62,7 @@ fn the_curve_stays_in_the_image_and_reaches_its_border() {
 }
 
 #[test]
-fn cameras_in_one_place_say_nothing_of_each_other() {
+fn cameras_in_one_place_have_no_epipolar_geometry() {
     let camera = &ring(1, LensModel::Pinhole)[0];
     let f = fundamental(camera, camera);
     assert_eq!(f, Matrix3::zeros());

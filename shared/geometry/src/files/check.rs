@@ -1,4 +1,4 @@
-//! Whether a rig is plausible: what a reader cannot know but a person would notice.
+//! Plausibility checks of a rig that was read without error.
 
 mod agreement;
 mod finding;
@@ -10,20 +10,20 @@ use crate::{Camera, Rig, upright_roll};
 pub use agreement::{CameraError, EpipolarReport, PairError, epipolar_check};
 pub use finding::{Finding, Severity};
 
-/// Cameras that are all nearer to each other are at one place, metres.
+/// Cameras whose distances are all smaller are at one place, metres.
 const ONE_PLACE: f64 = 0.01;
 /// Distance from the origin beyond which a camera is far away, metres.
 const FAR_AWAY: f64 = 10_000.0;
 
-/// Looks for what is odd about a rig. An empty list says that nothing was found, not that all is right.
+/// Looks for implausible values in a rig. An empty list means that nothing was found, not that the rig is right.
 pub fn check(rig: &Rig) -> Vec<Finding> {
     let mut findings = Vec::new();
     let cameras = rig.cameras();
     for (i, a) in cameras.iter().enumerate() {
-        inside(a, &mut findings);
+        check_intrinsics(a, &mut findings);
         findings.extend(far_away(a));
         for b in &cameras[i + 1..] {
-            findings.extend(apart(a, b));
+            findings.extend(pair_distance(a, b));
         }
     }
     findings.extend(one_place(cameras).or_else(|| nothing_shared(cameras)));
@@ -47,18 +47,18 @@ pub fn check(rig: &Rig) -> Vec<Finding> {
     findings
 }
 
-fn inside(camera: &Camera, findings: &mut Vec<Finding>) {
-    let inside = &camera.intrinsics;
+fn check_intrinsics(camera: &Camera, findings: &mut Vec<Finding>) {
+    let intrinsics = &camera.intrinsics;
     let name = || camera.name.clone();
-    let [width, height] = inside.size.map(f64::from);
-    let fraction = [inside.cx / width, inside.cy / height];
+    let [width, height] = intrinsics.size.map(f64::from);
+    let fraction = [intrinsics.cx / width, intrinsics.cy / height];
     if fraction.iter().any(|part| !(0.3..=0.7).contains(part)) {
         findings.push(Finding::PrincipalPoint {
             camera: name(),
             fraction,
         });
     }
-    let ratio = inside.fy / inside.fx;
+    let ratio = intrinsics.fy / intrinsics.fx;
     if !(0.9..=1.1).contains(&ratio) {
         findings.push(Finding::Aspect {
             camera: name(),
@@ -66,7 +66,7 @@ fn inside(camera: &Camera, findings: &mut Vec<Finding>) {
         });
     }
     let angle = |extent: f64, focal: f64| 2.0 * (0.5 * extent / focal).atan().to_degrees();
-    let degrees = angle(width, inside.fx).max(angle(height, inside.fy));
+    let degrees = angle(width, intrinsics.fx).max(angle(height, intrinsics.fy));
     if !(3.0..=150.0).contains(&degrees) {
         findings.push(Finding::FieldOfView {
             camera: name(),
@@ -76,7 +76,7 @@ fn inside(camera: &Camera, findings: &mut Vec<Finding>) {
     findings.extend(lens_range(camera).or_else(|| lens_strength(camera)));
 }
 
-/// Whether every pixel has a ray: asked of a grid, and of the corners.
+/// Whether every pixel has a ray: checked on a grid and in the corners.
 fn lens_range(camera: &Camera) -> Option<Finding> {
     const STEPS: usize = 16;
     let [width, height] = camera.intrinsics.size.map(f64::from);
@@ -84,8 +84,8 @@ fn lens_range(camera: &Camera) -> Option<Finding> {
         let at = Point2::new(x * (width - 1.0), y * (height - 1.0));
         camera.undistort(&at).is_some()
     };
-    let middle = |nth: usize| (nth as f64 + 0.5) / STEPS as f64;
-    let grid = (0..STEPS * STEPS).map(|it| [middle(it % STEPS), middle(it / STEPS)]);
+    let middle = |index: usize| (index as f64 + 0.5) / STEPS as f64;
+    let grid = (0..STEPS * STEPS).map(|cell| [middle(cell % STEPS), middle(cell / STEPS)]);
     let n_without = grid.filter(|[x, y]| !has_ray(*x, *y)).count();
     let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
     let is_whole = n_without == 0 && corners.iter().all(|[x, y]| has_ray(*x, *y));
@@ -95,7 +95,7 @@ fn lens_range(camera: &Camera) -> Option<Finding> {
     })
 }
 
-/// Whether the distortion moves a corner further than to half, or twice, its angle to the axis.
+/// Whether the distortion changes the angle of a corner to the axis by more than a factor of two.
 fn lens_strength(camera: &Camera) -> Option<Finding> {
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let ratio = |[bent, straight]: [f64; 2]| bent / straight;
@@ -109,11 +109,11 @@ fn lens_strength(camera: &Camera) -> Option<Finding> {
         let at = Point2::new(x, y);
         let straight = camera.intrinsics.normalised(&at).coords.norm();
         let bent = camera.undistort(&at)?.coords.norm();
-        Some([bent, straight].map(|it| it.atan().to_degrees()))
+        Some([bent, straight].map(|tangent| tangent.atan().to_degrees()))
     });
-    let odd = |it: &[f64; 2]| it[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*it));
+    let is_implausible = |it: &[f64; 2]| it[1] > 0.1 && !(0.5..=2.0).contains(&ratio(*it));
     let worst = angles
-        .filter(odd)
+        .filter(is_implausible)
         .min_by(|a, b| ratio(*a).total_cmp(&ratio(*b)));
     worst.map(|[bent_degrees, straight_degrees]| Finding::LensStrength {
         camera: camera.name.clone(),
@@ -128,7 +128,7 @@ fn far_away(camera: &Camera) -> Option<Finding> {
     (metres > FAR_AWAY).then_some(Finding::FarAway { camera, metres })
 }
 
-fn apart(a: &Camera, b: &Camera) -> Option<Finding> {
+fn pair_distance(a: &Camera, b: &Camera) -> Option<Finding> {
     let cameras = [a.name.clone(), b.name.clone()];
     let metres = (a.centre_in_world() - b.centre_in_world()).norm();
     let angle = a
@@ -154,14 +154,14 @@ fn one_place(cameras: &[Camera]) -> Option<Finding> {
     })
 }
 
-/// Whether no place that one camera sees, up to twenty times the size of the rig away, is seen by another.
+/// Whether no two cameras see a common place, up to twenty times the size of the rig away.
 fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
     const STEPS: usize = 8;
     const DEPTHS: usize = 40;
     let first = cameras.first()?.centre_in_world();
     let far = cameras
         .iter()
-        .map(|it| (it.centre_in_world() - first).norm());
+        .map(|camera| (camera.centre_in_world() - first).norm());
     let size = far.fold(0.0, f64::max);
     let depth = |nth: usize| 0.02 * size * 1000_f64.powf(nth as f64 / DEPTHS as f64);
     let is_shared = |camera: &Camera, pixel: &Point2<f64>| {
@@ -170,16 +170,16 @@ fn nothing_shared(cameras: &[Camera]) -> Option<Finding> {
         };
         (0..DEPTHS).any(|nth| {
             let point = ray.origin + depth(nth) * *ray.direction;
-            let others = cameras.iter().filter(|it| it.name != camera.name);
-            others.into_iter().any(|it| sees(it, &point))
+            let mut others = cameras.iter().filter(|other| other.name != camera.name);
+            others.any(|other| sees(other, &point))
         })
     };
     let shares = |camera: &Camera| {
         let [width, height] = camera.intrinsics.size.map(f64::from);
         let at = |nth: usize| (nth as f64 + 0.5) / STEPS as f64;
         let mut pixels = (0..STEPS * STEPS)
-            .map(|it| Point2::new(at(it % STEPS) * width, at(it / STEPS) * height));
-        pixels.any(|it| is_shared(camera, &it))
+            .map(|cell| Point2::new(at(cell % STEPS) * width, at(cell / STEPS) * height));
+        pixels.any(|pixel| is_shared(camera, &pixel))
     };
     let is_none = cameras.len() > 1 && !cameras.iter().any(shares);
     is_none.then_some(Finding::NothingShared {

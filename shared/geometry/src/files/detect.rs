@@ -1,12 +1,12 @@
-//! Which format a calibration file is of.
+//! Detection of the format of a calibration file.
 
 use std::path::Path;
 
 use super::{Format, own, panoptic, pose2sim};
 
-/// Tells the format by content, and by extension where the content is only numbers.
+/// Detects the format by content, and by extension where the content is only numbers.
 ///
-/// `None` for anything that no reader would take.
+/// `None` for anything that no reader accepts.
 pub fn detect(path: &Path, text: &str) -> Option<Format> {
     let extension = path
         .extension()

@@ -18,7 +18,7 @@ pub enum RigFileError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file is no calibration.
+    /// The file is too large for a calibration.
     #[error("{path} is too large for a calibration: {bytes} bytes, limit {limit}", path = .path.display())]
     TooLarge {
         /// The file.
@@ -28,7 +28,7 @@ pub enum RigFileError {
         /// The largest size that is read.
         limit: u64,
     },
-    /// Neither content nor extension tell what the file is.
+    /// Neither content nor extension identify the format.
     #[error("{path} is no calibration file of a known format (Parallax, Pose2Sim or anipose TOML, Qualisys XML, OpenCV YAML, HumanEva .cal, UMPM .ini, Panoptic JSON)", path = .path.display())]
     UnknownFormat {
         /// The file.
@@ -44,7 +44,7 @@ pub enum RigFileError {
         /// Format of the first file.
         first: &'static str,
     },
-    /// The content is wrong.
+    /// The content is invalid.
     #[error("{path}", path = .path.display())]
     Parse {
         /// The file.
@@ -52,12 +52,12 @@ pub enum RigFileError {
         /// What is wrong with it.
         source: ParseError,
     },
-    /// The format has no words for the rig.
+    /// The format cannot describe the rig.
     #[error("cannot write {path}", path = .path.display())]
     Unwritable {
         /// The file.
         path: PathBuf,
-        /// What it has no words for.
+        /// What it cannot describe.
         source: UnwritableRig,
     },
     /// The file could not be written.
@@ -78,7 +78,7 @@ pub enum ParseError {
     Syntax {
         /// Name of the format.
         format: &'static str,
-        /// What its parser says, with line and column.
+        /// The error of its parser, with line and column.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A field that must be there is not.
@@ -87,7 +87,7 @@ pub enum ParseError {
         /// The field.
         field: String,
     },
-    /// A field holds something else than it should.
+    /// A field of the wrong type or length.
     #[error("{field}: expected {expected}, found {found}")]
     Shape {
         /// The field.
@@ -97,7 +97,7 @@ pub enum ParseError {
         /// What it holds.
         found: String,
     },
-    /// A number that the format cannot mean, or that is not supported.
+    /// A number that is invalid in the format, or not supported.
     #[error("{field} is {value}, but {requirement}")]
     Value {
         /// The field.
@@ -107,7 +107,7 @@ pub enum ParseError {
         /// What it must be.
         requirement: &'static str,
     },
-    /// Nine numbers that are no rotation.
+    /// Nine numbers that are not a rotation.
     #[error("{field}")]
     Rotation {
         /// The field.
@@ -118,34 +118,34 @@ pub enum ParseError {
     /// The file has no camera.
     #[error("no camera found: {expected}")]
     NoCameras {
-        /// What a camera would look like.
+        /// What describes a camera in this format.
         expected: &'static str,
     },
-    /// The cameras make no rig.
+    /// The cameras cannot be combined into a rig.
     #[error("the cameras make no rig")]
     Rig(#[source] RigError),
 }
 
-/// What a format has no words for.
+/// What a format cannot describe.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnwritableRig {
-    /// We only read this format.
+    /// This format is only read.
     #[error("{format} files are only read")]
     ReadOnly {
         /// The format.
         format: &'static str,
     },
-    /// The lens is of another kind.
+    /// The format has no such lens model.
     #[error("camera {camera:?}: a {format} file cannot describe its lens ({lens})")]
     Lens {
         /// Name of the camera.
         camera: String,
         /// The format.
         format: &'static str,
-        /// The lens, for people.
+        /// The lens, as text.
         lens: String,
     },
-    /// The name cannot be a file's, or a key's.
+    /// The name cannot be used as a file name or a key.
     #[error("camera {camera:?}: the name cannot be written in a {format} file")]
     Name {
         /// Name of the camera.

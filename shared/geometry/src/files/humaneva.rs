@@ -61,8 +61,8 @@ fn count(found: usize) -> ParseError {
 ///
 /// [`UnwritableRig::Lens`] for a fisheye or a rational lens.
 pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
-    let inside = &camera.intrinsics;
-    let kc = match *inside.lens.model() {
+    let intrinsics = &camera.intrinsics;
+    let kc = match *intrinsics.lens.model() {
         LensModel::Pinhole => [0.0; 5],
         LensModel::BrownConrady {
             k: [k1, k2, k3, 0.0, 0.0, 0.0],
@@ -80,7 +80,13 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
     let pose = &camera.camera_from_world;
     let rotation = numbers::rows(pose.rotation.to_rotation_matrix().matrix());
     let millimetres = pose.translation.vector * Unit::Millimetres.per_metre();
-    let head = [inside.fx, inside.fy, inside.cx, inside.cy, 0.0];
+    let head = [
+        intrinsics.fx,
+        intrinsics.fy,
+        intrinsics.cx,
+        intrinsics.cy,
+        0.0,
+    ];
     let all = head
         .iter()
         .chain(&kc)

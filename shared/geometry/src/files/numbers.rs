@@ -1,4 +1,4 @@
-//! What calibration formats share: matrices, distortion lists, rotations and translations.
+//! Shared by the calibration formats: matrices, distortion lists, rotations and translations.
 
 use std::fmt::Debug;
 
@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use super::{ParseError, Unit};
 use crate::{Intrinsics, Lens, LensModel, rotation_from_matrix};
 
-/// Refuses a number that is none.
+/// Refuses a number that is not finite.
 pub(super) fn finite(field: &str, value: f64) -> Result<f64, ParseError> {
     if value.is_finite() {
         return Ok(value);
@@ -48,7 +48,7 @@ pub(super) fn direction(
         })
 }
 
-/// Checks the form of K and takes it apart.
+/// Validates the calibration matrix K and splits it into intrinsics.
 pub(super) fn intrinsics(
     field: &str,
     k: &Matrix3<f64>,
@@ -59,7 +59,7 @@ pub(super) fn intrinsics(
         finite(field, entry)?;
     }
     let place = |row: usize, column: usize| format!("{field}[{row}][{column}]");
-    // Skew is not modelled: refuse what would move a point at the border by a hundredth of a pixel.
+    // Skew is not modelled. Refuse it where it would move a point at the border by a hundredth of a pixel.
     if k[(0, 1)].abs() > 1e-5 * k[(0, 0)].abs() {
         let requirement = "skew is not supported: it must be 0";
         return Err(ParseError::Value {
@@ -200,7 +200,7 @@ pub(super) fn blank_separated(text: &str) -> Result<Vec<f64>, ParseError> {
         .collect()
 }
 
-/// Numbers in the fewest digits that read back the same, separated by `between`.
+/// Numbers with the fewest digits that parse back to the same value, separated by `between`.
 pub(super) fn joined(numbers: impl IntoIterator<Item = impl Debug>, between: &str) -> String {
     let words: Vec<String> = numbers
         .into_iter()

@@ -14,7 +14,7 @@ mod storage;
 
 use storage::Storage;
 
-/// Reads cameras from one or more files, each with the name that a camera gets which has none.
+/// Reads cameras from one or more files; each has a name for a camera without one.
 ///
 /// Files after `EasyMocap` are read as one; every other file is a camera.
 ///
@@ -43,7 +43,7 @@ pub fn parse(files: &[(&str, &str)], options: &ReadOptions) -> Result<Rig, Parse
     Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
 }
 
-/// What the entries of a camera may be called.
+/// The possible names of the entries of a camera.
 struct Keys {
     matrix: Vec<String>,
     distortion: Vec<String>,
@@ -152,7 +152,7 @@ fn sized<const N: usize>(
 
 /// Writes all cameras into one storage with the names of `EasyMocap`, in metres.
 ///
-/// What the rig says about up and source is lost.
+/// The up direction and the source of the rig are lost.
 ///
 /// # Errors
 ///
@@ -176,14 +176,14 @@ pub fn write(rig: &Rig) -> Result<String, UnwritableRig> {
     }
     for camera in rig.cameras() {
         let name = &camera.name;
-        let inside = &camera.intrinsics;
+        let intrinsics = &camera.intrinsics;
         let pose = &camera.camera_from_world;
-        let (coefficients, fisheye) = numbers::distortion(inside.lens.model());
-        let k = numbers::rows(&inside.matrix());
+        let (coefficients, fisheye) = numbers::distortion(intrinsics.lens.model());
+        let k = numbers::rows(&intrinsics.matrix());
         let rotation = numbers::rows(pose.rotation.to_rotation_matrix().matrix());
         lines.extend([
-            format!("W_{name}: {}", inside.size[0]),
-            format!("H_{name}: {}", inside.size[1]),
+            format!("W_{name}: {}", intrinsics.size[0]),
+            format!("H_{name}: {}", intrinsics.size[1]),
             matrix(&format!("K_{name}"), 3, 3, k.as_flattened()),
             matrix(
                 &format!("dist_{name}"),

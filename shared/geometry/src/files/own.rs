@@ -1,8 +1,8 @@
 //! Parallax's own rig file: TOML, metres, world to camera.
 //!
 //! ```toml
-//! format = "parallax-rig"            # says what this file is
-//! source = "refined on detections"   # for people; may be left out
+//! format = "parallax-rig"            # identifies the format
+//! source = "refined on detections"   # free text; may be left out
 //! up = [0.0, 0.0, 1.0]               # against gravity, in the world; left out where unknown
 //!
 //! [[camera]]                         # one for each view; the order is kept
@@ -63,7 +63,7 @@ enum LensKind {
     KannalaBrandt,
 }
 
-/// Whether a text says that it is a rig of ours.
+/// Whether a text is a rig file of this format.
 pub(super) fn is_own(text: &str) -> bool {
     text.parse::<toml::Table>()
         .is_ok_and(|table| table.get("format").and_then(toml::Value::as_str) == Some(FORMAT))
@@ -72,8 +72,8 @@ pub(super) fn is_own(text: &str) -> bool {
             .any(|line| line.starts_with("format = \"parallax-rig\""))
 }
 
-/// Reads a rig file. The image size of `options` is not asked: the file knows. A unit in `options` says that the
-/// file was written wrongly, in another unit than metres.
+/// Reads a rig file. The image size of `options` is ignored: the file has it. A unit in `options` overrides metres,
+/// for a file that was written in a wrong unit.
 ///
 /// # Errors
 ///
@@ -103,7 +103,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     let cameras = file
         .camera
         .into_iter()
-        .map(|it| camera(it, options.unit.unwrap_or(Unit::Metres)))
+        .map(|fields| camera(fields, options.unit.unwrap_or(Unit::Metres)))
         .collect::<Result<_, _>>()?;
     Rig::new(cameras, up, file.source.unwrap_or_default()).map_err(ParseError::Rig)
 }
@@ -187,15 +187,18 @@ pub fn write(rig: &Rig) -> String {
         lines.push(format!("up = {}", list(up.iter())));
     }
     for camera in rig.cameras() {
-        let inside = &camera.intrinsics;
+        let intrinsics = &camera.intrinsics;
         lines.extend([
             "\n[[camera]]".to_owned(),
             format!("name = {}", quoted(&camera.name)),
-            format!("size_px = {:?}", inside.size),
-            format!("focal_px = {}", list([inside.fx, inside.fy])),
-            format!("principal_point_px = {}", list([inside.cx, inside.cy])),
+            format!("size_px = {:?}", intrinsics.size),
+            format!("focal_px = {}", list([intrinsics.fx, intrinsics.fy])),
+            format!(
+                "principal_point_px = {}",
+                list([intrinsics.cx, intrinsics.cy])
+            ),
         ]);
-        match inside.lens.model() {
+        match intrinsics.lens.model() {
             LensModel::Pinhole => {}
             LensModel::BrownConrady { k, p } => lines.extend([
                 "lens = \"brown-conrady\"".to_owned(),

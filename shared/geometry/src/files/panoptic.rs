@@ -42,7 +42,7 @@ enum Translation {
     Column([[f64; 1]; 3]),
 }
 
-/// Whether a text begins as JSON and speaks of cameras as these files do.
+/// Whether a text is JSON with the keys of these files.
 pub(super) fn is_panoptic(text: &str) -> bool {
     let start = text.trim_start_matches('\u{feff}').trim_start();
     start.starts_with('{') && text.contains("\"cameras\"") && text.contains("\"distCoef\"")
@@ -65,7 +65,10 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
             expected: "an object with K, R and t in the list cameras for each view",
         });
     }
-    let cameras = file.cameras.into_iter().map(|it| camera(it, options));
+    let cameras = file
+        .cameras
+        .into_iter()
+        .map(|fields| camera(fields, options));
     let cameras = cameras.collect::<Result<Vec<_>, _>>()?;
     let down = UnitVector3::new_unchecked(-Vector3::y());
     Rig::new(cameras, options.up.or(Some(down)), "").map_err(ParseError::Rig)
@@ -82,8 +85,8 @@ fn camera(file: CameraFile, options: &ReadOptions) -> Result<Camera, ParseError>
     let intrinsics = numbers::intrinsics(&field("K"), &k, size, lens)?;
     let rotation = numbers::rotation(&field("R"), &numbers::matrix(file.rotation))?;
     let translation = match file.t {
-        Translation::List(it) => it,
-        Translation::Column(it) => it.map(|[it]| it),
+        Translation::List(list) => list,
+        Translation::Column(column) => column.map(|[value]| value),
     };
     let unit = options.unit.unwrap_or(Unit::Centimetres);
     let camera_from_world = numbers::pose(&field("t"), rotation, translation, unit)?;

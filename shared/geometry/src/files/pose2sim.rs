@@ -1,7 +1,7 @@
 //! Camera tables in TOML, as Pose2Sim, anipose, Caliscope and `FreeMoCap` write them.
 //!
 //! A table with a `matrix` is a camera, at the top level (`[cam_01]`) or under `cameras`
-//! (`[cameras.0]`, Caliscope, named `cam_0` unless it says otherwise); the order of the file is kept.
+//! (`[cameras.0]`, Caliscope, named `cam_0` if it has no `name`); the order of the file is kept.
 //! `rotation` is Rodrigues' vector or a 3x3 matrix, world to camera; `translation` is in metres for
 //! Pose2Sim and Caliscope but in the unit of the board for anipose and `FreeMoCap` (millimetres as a
 //! rule): ask for it with [`ReadOptions::unit`]. The files do not say which way is up (Pose2Sim: z).
@@ -11,7 +11,7 @@ use toml::{Table, Value};
 use super::{ParseError, ReadOptions, Unit, UnwritableRig, numbers, toml_fields::Fields};
 use crate::{Camera, Rig};
 
-/// Whether a text is TOML with a camera in it.
+/// Whether a text is TOML with at least one camera.
 pub(super) fn is_pose2sim(text: &str) -> bool {
     text.parse::<Table>()
         .is_ok_and(|table| !camera_tables(&table).is_empty())
@@ -41,7 +41,7 @@ pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     Rig::new(cameras, options.up, "").map_err(ParseError::Rig)
 }
 
-/// The tables that are cameras, with the name each has if it does not say.
+/// The tables that are cameras, each with its default name.
 fn camera_tables(table: &Table) -> Vec<(String, Fields<'_>)> {
     let top = table
         .iter()
@@ -117,7 +117,7 @@ fn camera(key: String, fields: &Fields<'_>, options: &ReadOptions) -> Result<Cam
     })
 }
 
-/// Writes a Pose2Sim file, in metres. What the rig says about up and source is lost.
+/// Writes a Pose2Sim file, in metres. The up direction and the source of the rig are lost.
 ///
 /// # Errors
 ///
@@ -134,10 +134,11 @@ fn camera_table(camera: &Camera) -> Result<String, UnwritableRig> {
             format: "Pose2Sim",
         });
     }
-    let inside = &camera.intrinsics;
-    let [width, height] = inside.size;
-    let k = numbers::rows(&inside.matrix()).map(|row| format!("[{}]", numbers::joined(row, ", ")));
-    let (coefficients, fisheye) = numbers::distortion(inside.lens.model());
+    let intrinsics = &camera.intrinsics;
+    let [width, height] = intrinsics.size;
+    let k =
+        numbers::rows(&intrinsics.matrix()).map(|row| format!("[{}]", numbers::joined(row, ", ")));
+    let (coefficients, fisheye) = numbers::distortion(intrinsics.lens.model());
     let pose = &camera.camera_from_world;
     Ok(format!(
         "[{key}]\nname = {name}\nsize = [{width}.0, {height}.0]\nmatrix = [{k}]\n\

@@ -1,11 +1,11 @@
 //! Calibration files of Qualisys (`.qca.txt`, XML): millimetres, and pixels in 64ths.
 //!
-//! Read as the file means it, established on a file whose cameras are also known in `OpenCV` terms:
+//! The conventions, established on a file whose cameras are also known in `OpenCV` terms:
 //! `x y z` is the centre of the camera and `r11..r33`, row by row, takes the world to a frame with x
 //! to the right, y up and z backward, so y and z change sign; focal lengths and principal point are in
 //! 1/64 px, from the top-left of the sensor, of which `fov_video` is the part in the image; the
-//! distortion coefficients are plain numbers in `OpenCV`'s sense. (Pose2Sim divides those by 64 too,
-//! which makes them vanish: files that it converted have lost their distortion.)
+//! distortion coefficients are those of `OpenCV`, not divided. (Pose2Sim divides them by 64 too, so
+//! files that it converted have lost their distortion.)
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
@@ -13,15 +13,15 @@ use roxmltree::{Document, Node};
 use super::{ParseError, ReadOptions, Unit, numbers};
 use crate::{Camera, Rig};
 
-/// Steps of the file to a pixel.
+/// Units of the file per pixel.
 const SUBPIXELS: f64 = 64.0;
 
 /// Reads a calibration.
 ///
 /// # Errors
 ///
-/// See [`ParseError`]. A camera that is turned in the viewer (`viewrotation`) is refused: how the
-/// file counts its pixels then is not known to us.
+/// See [`ParseError`]. A camera that is turned in the viewer (`viewrotation`) is refused: its pixel
+/// convention is not documented.
 pub fn parse(text: &str, options: &ReadOptions) -> Result<Rig, ParseError> {
     // Files of older versions start with a byte order mark.
     let document = Document::parse(text.trim_start_matches('\u{feff}')).map_err(|error| {
@@ -134,7 +134,7 @@ fn pose(transform: &Element<'_, '_>, unit: Unit) -> Result<nalgebra::Isometry3<f
     )
 }
 
-/// An element and how errors call it.
+/// An element and its name in errors.
 struct Element<'a, 'input> {
     node: Node<'a, 'input>,
     field: String,

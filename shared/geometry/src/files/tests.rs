@@ -1,4 +1,4 @@
-//! Every format writes what it reads, and refuses what it cannot read.
+//! Every format reads back what it wrote, and refuses invalid files.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ const BARREL: LensModel = LensModel::BrownConrady {
     p: [0.001, -0.002],
 };
 
-/// Two cameras as CMU Panoptic writes them, with numbers that are made up.
+/// Two cameras in the format of CMU Panoptic, with invented numbers.
 const PANOPTIC: &str = r#"{ "calibDataSource": "made up", "cameras": [
     { "name": "00_00", "type": "hd", "resolution": [1920, 1080], "panel": 0, "node": 0,
       "K": [[1500.5, 0, 950.25], [0, 1498.5, 545.75], [0, 0, 1]],
@@ -57,7 +57,7 @@ fn panoptic_is_in_centimetres_with_y_down() {
         "{x}"
     );
     assert_eq!(rig.up_in_world(), Some(-Vector3::y_axis()));
-    // A camera that is held level sees up as up.
+    // A level camera needs no roll.
     assert!(crate::upright_roll(a, &rig).expect("up").abs() < 0.02);
     let metres = ReadOptions {
         unit: Some(Unit::Metres),
@@ -71,7 +71,7 @@ fn panoptic_is_in_centimetres_with_y_down() {
 fn rig() -> impl Strategy<Value = Rig> {
     prop::collection::vec((camera(), 1_u32..5000, 1_u32..5000), 1..4).prop_map(|cameras| {
         let named = |(i, (mut camera, width, height)): (usize, (Camera, u32, u32))| {
-            // Descending, so that a reader that sorts is found out.
+            // Descending, so that a reader that sorts fails.
             camera.name = format!("cam_{:02}", 10 - i);
             camera.intrinsics.size = [width.max(400), height.max(300)];
             camera
@@ -81,7 +81,7 @@ fn rig() -> impl Strategy<Value = Rig> {
     })
 }
 
-/// The lens with nothing in it and the pinhole are one; the numbers of a pose are equal to rounding.
+/// Compares cameras. A lens without distortion equals a pinhole; poses are equal up to rounding.
 fn assert_same_cameras(read: &Rig, written: &Rig) {
     assert_eq!(read.cameras().len(), written.cameras().len());
     for (read, written) in read.cameras().iter().zip(written.cameras()) {
@@ -95,17 +95,17 @@ fn assert_same_cameras(read: &Rig, written: &Rig) {
             }
         };
         assert_eq!(plain(read), plain(written));
-        let mut inside = read.intrinsics;
-        inside.lens = written.intrinsics.lens;
-        assert_eq!(inside, written.intrinsics);
+        let mut intrinsics = read.intrinsics;
+        intrinsics.lens = written.intrinsics.lens;
+        assert_eq!(intrinsics, written.intrinsics);
         let difference = read.camera_from_world.inverse() * written.camera_from_world;
         assert!(difference.translation.vector.norm() < 1e-12, "{difference}");
         assert!(difference.rotation.angle() < 1e-7, "{difference}");
     }
 }
 
-/// The camera with a lens that a format of few coefficients can write.
-fn plainer(mut camera: Camera, n: usize) -> Camera {
+/// The camera with at most `n` radial coefficients.
+fn with_simpler_lens(mut camera: Camera, n: usize) -> Camera {
     let lens = match *camera.intrinsics.lens.model() {
         LensModel::BrownConrady { mut k, p } => {
             k[n..].fill(0.0);
@@ -119,7 +119,7 @@ fn plainer(mut camera: Camera, n: usize) -> Camera {
 
 proptest! {
     #[test]
-    fn our_own_format_reads_what_it_wrote(rig in rig()) {
+    fn own_format_reads_back_what_was_written(rig in rig()) {
         let read = own::parse(&own::write(&rig), &ReadOptions::default()).expect("our own");
         assert_same_cameras(&read, &rig);
         prop_assert_eq!(read.up_in_world(), rig.up_in_world());
@@ -127,29 +127,29 @@ proptest! {
     }
 
     #[test]
-    fn pose2sim_reads_what_was_written(rig in rig()) {
+    fn pose2sim_reads_back_what_was_written(rig in rig()) {
         let read = pose2sim::parse(&pose2sim::write(&rig).expect("writable"), &ReadOptions::default());
         assert_same_cameras(&read.expect("as written"), &rig);
     }
 
     #[test]
-    fn opencv_reads_what_was_written(rig in rig()) {
+    fn opencv_reads_back_what_was_written(rig in rig()) {
         let text = opencv::write(&rig).expect("writable");
         let read = opencv::parse(&[("", &text)], &ReadOptions::default());
         assert_same_cameras(&read.expect("as written"), &rig);
     }
 
     #[test]
-    fn humaneva_reads_what_was_written(camera in camera()) {
-        let camera = plainer(camera, 3);
+    fn humaneva_reads_back_what_was_written(camera in camera()) {
+        let camera = with_simpler_lens(camera, 3);
         let text = humaneva::write(&camera).expect("writable");
         let read = humaneva::parse("a", &text, &ReadOptions::default()).expect("as written");
         assert_same_cameras(&read, &Rig::new(vec![camera], None, "").expect("a rig"));
     }
 
     #[test]
-    fn umpm_reads_what_was_written(camera in camera()) {
-        let camera = plainer(camera, 2);
+    fn umpm_reads_back_what_was_written(camera in camera()) {
+        let camera = with_simpler_lens(camera, 2);
         let text = umpm::write(&camera).expect("writable");
         let options = ReadOptions { size: Some([640, 480]), ..ReadOptions::default() };
         let read = umpm::parse("a", &text, &options).expect("as written");
@@ -157,7 +157,7 @@ proptest! {
     }
 
     #[test]
-    fn any_name_survives_in_toml(name in "\\PC{1,12}|[\\x00-\\x7f]{1,6}") {
+    fn any_plain_name_is_read_back_from_toml(name in "\\PC{1,12}|[\\x00-\\x7f]{1,6}") {
         prop_assume!(!["metadata", "cameras"].contains(&name.as_str()));
         prop_assume!(crate::is_plain_name(&name));
         let mut cameras = ring_rig(1, BARREL).cameras().to_vec();
@@ -250,7 +250,7 @@ fn the_pair_of_easymocap_is_one_rig() {
 }
 
 #[test]
-fn a_file_of_opencvs_own_program_is_read() {
+fn a_file_of_the_opencv_calibration_program_is_read() {
     let text = "%YAML:1.0\n---\ncalibration_time: \"Mon 01 Jan 2024\"\nimage_width: 640\nimage_height: 480\n\
         flags: 0\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 700., 0., 320., 0.,\n       \
         705., 240., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   \
@@ -274,7 +274,7 @@ fn a_file_of_opencvs_own_program_is_read() {
 }
 
 #[test]
-fn qualisys_counts_64ths_of_pixels_but_not_in_its_distortion() {
+fn qualisys_lengths_are_in_64ths_of_a_pixel_but_distortion_is_not() {
     let text = r#"<?xml version='1.0'?><calibration><cameras>
         <camera active="1" serial="one" viewrotation="0">
         <fov_video left="0" top="0" right="1087" bottom="1919"/>
@@ -284,17 +284,17 @@ fn qualisys_counts_64ths_of_pixels_but_not_in_its_distortion() {
         </camera></cameras></calibration>"#;
     let rig = qualisys::parse(text, &ReadOptions::default()).expect("a file");
     let camera = rig.camera("one").expect("named after its serial");
-    let inside = &camera.intrinsics;
+    let intrinsics = &camera.intrinsics;
     assert_eq!(
-        [inside.fx, inside.fy, inside.cx, inside.cy],
+        [intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy],
         [1000.0, 1010.0, 544.0, 960.0]
     );
-    assert_eq!(inside.size, [1088, 1920]);
+    assert_eq!(intrinsics.size, [1088, 1920]);
     let lens = LensModel::BrownConrady {
         k: [-0.05, 0.1, 0.0, 0.0, 0.0, 0.0],
         p: [0.001, 0.002],
     };
-    assert_eq!(inside.lens.model(), &lens);
+    assert_eq!(intrinsics.lens.model(), &lens);
     let centre = camera.centre_in_world();
     assert!((centre.coords - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-12);
     // Right is x, the picture's up is the world's z, and so it looks along y.
@@ -306,7 +306,7 @@ fn qualisys_counts_64ths_of_pixels_but_not_in_its_distortion() {
 }
 
 #[test]
-fn caliscope_keeps_cameras_under_one_table() {
+fn caliscope_cameras_in_a_nested_table_are_read() {
     let text = "[cameras.10]\nsize = [1280, 720]\nmatrix = [[900, 0, 620], [0, 900, 390], [0, 0, 1]]\ndistortions = [0, 0, 0, 0, 0]\n\
         rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\ntranslation = [0, 0, 1]\n\
         [cameras.2]\nname = \"two\"\nsize = [1280, 720]\nmatrix = [[900, 0, 620], [0, 900, 390], [0, 0, 1]]\ndistortions = []\n\
@@ -334,7 +334,7 @@ fn caliscope_keeps_cameras_under_one_table() {
 }
 
 #[test]
-fn a_planted_rig_is_plausible_and_agrees_with_its_points() {
+fn a_correct_rig_has_no_findings_and_no_epipolar_error() {
     let rig = ring_rig(4, BARREL);
     assert_eq!(check(&rig), []);
     let points: Vec<Vec<_>> = (0..20)
@@ -357,7 +357,7 @@ fn a_planted_rig_is_plausible_and_agrees_with_its_points() {
 }
 
 #[test]
-fn the_camera_that_moved_stands_out() {
+fn a_moved_camera_has_the_largest_epipolar_error() {
     let rig = ring_rig(4, BARREL);
     let points: Vec<Vec<_>> = (0..20)
         .map(|i| nalgebra::Point3::new(0.05 * f64::from(i) - 0.5, 0.3, 0.02 * f64::from(i)))
@@ -380,46 +380,47 @@ fn the_camera_that_moved_stands_out() {
     assert_eq!(worst.map(|worst| worst.camera), Some(2));
 }
 
-/// What is found after `spoil` has been at the second of three cameras.
-fn found(spoil: impl FnOnce(&mut Camera)) -> Vec<Finding> {
+/// The findings where the second of three cameras is changed by `spoil`.
+fn findings(spoil: impl FnOnce(&mut Camera)) -> Vec<Finding> {
     let mut cameras = ring_rig(3, BARREL).cameras().to_vec();
     spoil(&mut cameras[1]);
     check(&Rig::new(cameras, Some(z_up()), "").expect("a rig"))
 }
 
 #[test]
-fn what_a_person_would_notice_is_found() {
+fn implausible_rigs_have_findings() {
     let name = || "cam1".to_owned();
-    let cropped = found(|camera| camera.intrinsics.cx = 60.0);
+    let cropped = findings(|camera| camera.intrinsics.cx = 60.0);
     assert!(
         cropped
             .iter()
             .any(|f| matches!(f, Finding::PrincipalPoint { camera, .. } if *camera == name()))
     );
-    let millimetres = found(|camera| camera.camera_from_world.translation.vector *= 1000.0);
+    let millimetres = findings(|camera| camera.camera_from_world.translation.vector *= 1000.0);
     assert!(
         millimetres
             .iter()
             .any(|f| matches!(f, Finding::Distance { metres, .. } if *metres > 4000.0))
     );
-    let stretched = found(|camera| camera.intrinsics.fy *= 2.0);
+    let stretched = findings(|camera| camera.intrinsics.fy *= 2.0);
     assert!(
         stretched
             .iter()
             .any(|f| matches!(f, Finding::Aspect { .. }))
     );
-    let long = found(|camera| (camera.intrinsics.fx, camera.intrinsics.fy) = (70_000.0, 70_000.0));
+    let long =
+        findings(|camera| (camera.intrinsics.fx, camera.intrinsics.fy) = (70_000.0, 70_000.0));
     assert!(
         long.iter()
             .any(|f| matches!(f, Finding::FieldOfView { degrees, .. } if *degrees < 1.0))
     );
-    let inverted = found(|camera| camera.camera_from_world = camera.camera_from_world.inverse());
+    let inverted = findings(|camera| camera.camera_from_world = camera.camera_from_world.inverse());
     assert!(
         inverted
             .iter()
             .any(|f| matches!(f, Finding::LooksElsewhere { .. }))
     );
-    let turned = found(|camera| {
+    let turned = findings(|camera| {
         let turn = nalgebra::Isometry3::rotation(Vector3::z() * 3.0);
         camera.camera_from_world = turn * camera.camera_from_world;
     });
@@ -428,7 +429,7 @@ fn what_a_person_would_notice_is_found() {
             .iter()
             .any(|f| matches!(f, Finding::UpsideDown { camera, .. } if *camera == name()))
     );
-    let folded = found(|camera| {
+    let folded = findings(|camera| {
         let k = [-1.5, 0.0, 0.0, 0.0, 0.0, 0.0];
         camera.intrinsics.lens = Lens::new(LensModel::BrownConrady { k, p: [0.0; 2] });
     });

@@ -1,4 +1,4 @@
-//! Numbers out of a TOML table, with errors that name the place.
+//! Numbers from a TOML table, with errors that name the key.
 
 use nalgebra::Matrix3;
 use toml::{Table, Value};

@@ -1,4 +1,4 @@
-//! `.ini` files of UMPM, which are no INI: 19 numbers on 6 lines, one camera, millimetres.
+//! `.ini` files of UMPM (not in INI syntax): 19 numbers on 6 lines, one camera, millimetres.
 //!
 //! Three rows of K, then k1 k2 p1 p2, then Rodrigues' vector and the translation, both world to
 //! camera. Line breaks do not matter. The file does not name its camera nor say how large its image
@@ -45,8 +45,8 @@ pub fn parse(name: &str, text: &str, options: &ReadOptions) -> Result<Rig, Parse
 ///
 /// [`UnwritableRig::Lens`] for any lens with more than k1 k2 p1 p2.
 pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
-    let inside = &camera.intrinsics;
-    let distortion = match *inside.lens.model() {
+    let intrinsics = &camera.intrinsics;
+    let distortion = match *intrinsics.lens.model() {
         LensModel::Pinhole => [0.0; 4],
         LensModel::BrownConrady {
             k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
@@ -62,7 +62,7 @@ pub fn write(camera: &Camera) -> Result<String, UnwritableRig> {
         }
     };
     let pose = &camera.camera_from_world;
-    let mut lines: Vec<Vec<f64>> = numbers::rows(&inside.matrix())
+    let mut lines: Vec<Vec<f64>> = numbers::rows(&intrinsics.matrix())
         .map(|row| row.to_vec())
         .into();
     lines.push(distortion.to_vec());

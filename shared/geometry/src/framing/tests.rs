@@ -24,7 +24,7 @@ fn out_size() -> impl Strategy<Value = OutSize> {
 
 proptest! {
     #[test]
-    fn the_framed_camera_sees_what_the_framed_picture_shows(
+    fn the_framed_camera_projects_where_the_framed_picture_shows_the_point(
         camera in camera(), point in point(), size in out_size(),
         roll in prop_oneof![Just(0.0), -3.1..3.1], offset in prop_oneof![Just(None), Just(Some([7, 3]))],
     ) {
@@ -39,7 +39,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_up_in_the_world_is_up_in_an_upright_frame(model in lens_model(), extra in -1.4..1.4) {
+    fn an_upright_frame_shows_the_up_direction_vertical(model in lens_model(), extra in -1.4..1.4) {
         let mut cameras = ring(3, model);
         for camera in &mut cameras {
             camera.intrinsics.fy *= 1.07;
@@ -49,8 +49,8 @@ proptest! {
         for camera in rig.cameras() {
             let roll = upright_roll(camera, &rig).expect("up is known");
             let framing = Framing::new(camera, [640, 480], None, OutSize::Scale(0.5), roll).expect("sizes fit");
-            let see = |z: f64| framing.camera().project(&Point3::new(0.0, 0.0, z));
-            if let (Some(low), Some(high)) = (see(-0.5), see(0.5)) {
+            let image = |z: f64| framing.camera().project(&Point3::new(0.0, 0.0, z));
+            if let (Some(low), Some(high)) = (image(-0.5), image(0.5)) {
                 prop_assert!((low.x - high.x).abs() < 1e-8 && high.y < low.y - 10.0, "{low} {high}");
             }
         }
@@ -59,14 +59,14 @@ proptest! {
     #[test]
     fn the_picture_turns_about_the_principal_point(camera in camera(), size in out_size(), roll in -3.0..3.0) {
         let turned = Framing::new(&camera, [640, 480], None, size, roll).expect("sizes fit");
-        let inside = &turned.camera().intrinsics;
-        let centre = apply(&turned.source_from_output(), &Point2::new(inside.cx, inside.cy));
+        let intrinsics = &turned.camera().intrinsics;
+        let centre = apply(&turned.source_from_output(), &Point2::new(intrinsics.cx, intrinsics.cy));
         prop_assert!(distance(&centre, &Point2::new(camera.intrinsics.cx, camera.intrinsics.cy)) < 1e-9);
     }
 }
 
 #[test]
-fn a_quarter_keeps_pixel_edges_on_pixel_edges() {
+fn scaling_by_a_quarter_keeps_pixel_edges_aligned() {
     let mut camera = ring(1, LensModel::Pinhole).remove(0);
     camera.intrinsics.size = [1088, 1920];
     let framing = Framing::new(
@@ -132,7 +132,7 @@ fn a_source_of_another_size_is_refused_with_both_sizes() {
 }
 
 #[test]
-fn an_output_or_roll_that_cannot_be_is_refused() {
+fn invalid_output_sizes_and_rolls_are_refused() {
     let camera = ring(1, LensModel::Pinhole).remove(0);
     let plan = |size, roll| Framing::new(&camera, [640, 480], None, size, roll);
     for size in [
@@ -154,7 +154,7 @@ fn an_output_or_roll_that_cannot_be_is_refused() {
 }
 
 #[test]
-fn no_roll_is_given_where_up_is_unknown_or_a_point() {
+fn there_is_no_upright_roll_where_up_is_unknown_or_along_the_axis() {
     let cameras = ring(2, LensModel::Pinhole);
     let unknown = Rig::new(cameras.clone(), None, "").expect("a rig");
     assert_eq!(upright_roll(&cameras[0], &unknown), None);

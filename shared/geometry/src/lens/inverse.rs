@@ -1,4 +1,4 @@
-//! The inverse of a distortion: radius first, safely; then Newton's method in the plane.
+//! The inverse of a distortion: first the radius within a bracket, then Newton's method in the plane.
 
 use nalgebra::{Point2, Vector2};
 
@@ -22,7 +22,7 @@ pub(super) fn undistort(lens: &Lens, distorted: &Point2<f64>) -> Option<Point2<f
     ((reached.coords - target).norm() <= tolerance).then_some(point.into())
 }
 
-/// Inverts the radial part, which grows over the valid range, by Newton's method kept inside a bracket.
+/// Inverts the radial part, which is monotonic over the valid range, by Newton's method kept inside a bracket.
 fn start(lens: &Lens, target: Vector2<f64>) -> Vector2<f64> {
     let wanted = target.norm();
     if wanted < 1e-14 {

@@ -1,4 +1,4 @@
-//! How far from the axis a distortion model keeps its order.
+//! The radius up to which a distortion model is monotonic.
 
 use super::LensModel;
 

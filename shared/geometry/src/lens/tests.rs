@@ -1,4 +1,4 @@
-//! Distorting and undistorting are inverse as far as a lens reaches, and no further.
+//! Distorting and undistorting are inverse within the valid range of a lens, and refused outside it.
 
 use proptest::prelude::*;
 
@@ -19,12 +19,12 @@ proptest! {
         // Close to the turning point the inverse is ill-conditioned: stay 1 % inside.
         prop_assume!(radius < 0.99 * lens.max_radius());
         let Some(distorted) = lens.distort(&point) else { return Ok(()) };
-        let back = lens.undistort(&distorted).expect("what a lens shows it can invert");
+        let back = lens.undistort(&distorted).expect("a distorted point can be undistorted");
         prop_assert!((back - point).norm() < 1e-8, "{back} is not {point}");
     }
 
     #[test]
-    fn what_undistorts_distorts_back(lens in lens(), x in -1.5..1.5, y in -1.5..1.5) {
+    fn distorting_inverts_undistorting(lens in lens(), x in -1.5..1.5, y in -1.5..1.5) {
         let wanted = Point2::new(x, y);
         if let Some(point) = lens.undistort(&wanted) {
             let reached = lens.distort(&point).expect("inside the valid range");
@@ -33,7 +33,7 @@ proptest! {
     }
 
     #[test]
-    fn the_jacobian_is_the_slope(lens in lens(), x in -0.5..0.5, y in -0.5..0.5) {
+    fn the_jacobian_equals_the_numerical_derivative(lens in lens(), x in -0.5..0.5, y in -0.5..0.5) {
         let step = 1e-6;
         let at = |x: f64, y: f64| lens.distort(&Point2::new(x, y));
         let Some((_, jacobian)) = lens.distort_with_jacobian(&Point2::new(x, y)) else { return Ok(()) };
@@ -62,7 +62,7 @@ proptest! {
 }
 
 #[test]
-fn a_barrel_ends_where_its_polynomial_turns_back() {
+fn a_barrel_lens_ends_where_its_polynomial_stops_growing() {
     // d/dr (r - 0.3 r³) = 0 at r = sqrt(1 / 0.9).
     let lens = brown(-0.3, 0.0);
     let turning = (1.0_f64 / 0.9).sqrt();
@@ -83,7 +83,7 @@ fn a_barrel_ends_where_its_polynomial_turns_back() {
 }
 
 #[test]
-fn the_lenses_of_humaneva_and_umpm_keep_their_order_beyond_60_degrees() {
+fn the_lenses_of_humaneva_and_umpm_are_monotonic_beyond_60_degrees() {
     for lens in [
         brown(-0.289415, 0.105962),
         brown(-0.4, 0.106),
@@ -95,7 +95,7 @@ fn the_lenses_of_humaneva_and_umpm_keep_their_order_beyond_60_degrees() {
 }
 
 #[test]
-fn a_pole_of_the_rational_model_ends_it() {
+fn a_pole_of_the_rational_model_ends_its_range() {
     let lens = Lens::new(LensModel::BrownConrady {
         k: [0.0, 0.0, 0.0, -0.5, 0.0, 0.0],
         p: [0.0; 2],
@@ -104,7 +104,7 @@ fn a_pole_of_the_rational_model_ends_it() {
 }
 
 #[test]
-fn is_the_formula_of_opencv() {
+fn brown_conrady_equals_the_formula_of_opencv() {
     // The formula of cv::projectPoints, written out at (0.3, -0.2).
     let lens = Lens::new(LensModel::BrownConrady {
         k: [0.1, -0.2, 0.3, 0.0, 0.0, 0.0],
@@ -120,7 +120,7 @@ fn is_the_formula_of_opencv() {
 }
 
 #[test]
-fn nothing_is_made_of_numbers_that_are_none() {
+fn points_that_are_not_finite_are_refused() {
     for bad in [f64::NAN, f64::INFINITY] {
         assert_eq!(brown(-0.1, 0.0).distort(&Point2::new(bad, 0.0)), None);
         assert_eq!(brown(-0.1, 0.0).undistort(&Point2::new(0.0, bad)), None);

@@ -1,4 +1,4 @@
-//! What a rig refuses, and where its cameras look.
+//! Which cameras a rig refuses, and where its optical axes meet.
 
 use nalgebra::Quaternion;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use crate::{
 
 use super::*;
 
-/// What a rig says to the second of two cameras after `spoil`.
+/// The error of a rig whose second camera is changed by `spoil`.
 fn refusal(spoil: impl FnOnce(&mut Camera)) -> RigError {
     let mut cameras = ring(2, LensModel::Pinhole);
     spoil(&mut cameras[1]);
@@ -37,7 +37,7 @@ fn refuses_empty_and_repeated_names() {
 }
 
 #[test]
-fn refuses_names_that_lead_out_of_a_folder_or_break_a_line() {
+fn refuses_names_that_leave_a_folder_or_break_a_line() {
     let long = "c".repeat(65);
     for name in [
         "../x", "..", ".", "/", "a/b", "a\\b", "a\nb", "a,b", " a", "\0", &long,
@@ -60,7 +60,7 @@ fn refuses_names_that_lead_out_of_a_folder_or_break_a_line() {
 }
 
 #[test]
-fn refuses_numbers_that_are_none() {
+fn refuses_numbers_that_are_not_finite() {
     let nan = LensModel::KannalaBrandt {
         k: [0.0, f64::NAN, 0.0, 0.0],
     };
@@ -74,7 +74,7 @@ fn refuses_numbers_that_are_none() {
 }
 
 #[test]
-fn refuses_images_and_lenses_that_cannot_be() {
+fn refuses_empty_images_and_impossible_lenses() {
     assert!(matches!(
         refusal(|c| c.intrinsics.size = [640, 0]),
         RigError::EmptyImage { size: [640, 0], .. }

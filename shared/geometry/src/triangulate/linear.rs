@@ -7,10 +7,10 @@ use super::{
     views::{Subset, Views},
 };
 
-/// Solves `(x r₃ - r₁) · X = t₁ - x t₃` and its like for y, all views together, for a finite point.
+/// Solves `(x r₃ - r₁) · X = t₁ - x t₃` and the same for y, all views together, for a finite point.
 ///
 /// The direct linear transform with the point's last coordinate set to 1 (Hartley & Sturm 1997,
-/// "Linear-LS"), so that moving the world's origin moves the answer and nothing else. The second
+/// "Linear-LS"), so that the result does not depend on the origin of the world. The second
 /// round divides every equation by the depth and multiplies it by f / σ: pixels instead of metres.
 /// The point may lie behind a camera; the refinement refuses that.
 pub(super) fn triangulate(

@@ -65,7 +65,7 @@ pub(super) fn refine(
     })
 }
 
-/// Moves `point` downhill until steps no longer help. Returns the number of steps tried.
+/// Minimises from `point` until steps no longer lower the cost. Returns the number of steps tried.
 fn descend(
     views: &Views<'_>,
     used: Subset,
@@ -86,7 +86,7 @@ fn descend(
         };
         let step = factor.solve(&here.gradient);
         let candidate = *point - step;
-        // A step behind a camera, or out of its lens, is a step that does not help.
+        // A step behind a camera, or outside the range of its lens, is rejected.
         match evaluate(views, used, &candidate, loss_px) {
             Ok(there) if there.cost < here.cost => {
                 *point = candidate;

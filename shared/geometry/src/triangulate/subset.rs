@@ -1,4 +1,4 @@
-//! Which views to believe: all, or the largest subset found that agrees.
+//! Which views to use: all, or the largest subset found that agrees.
 
 use super::{
     Settings, TriangulateError, linear,
@@ -39,7 +39,7 @@ pub(super) fn search(
     }
 }
 
-/// The fit with one view fewer whose worst error is least; the first of equals.
+/// The fit with one view fewer whose worst error is least; the first of several equal ones.
 fn leave_one_out(views: &Views<'_>, used: Subset, settings: &Settings) -> Option<(Subset, Fit)> {
     let mut best: Option<(Subset, Fit)> = None;
     for view in used.iter() {

@@ -65,7 +65,7 @@ impl<'a> Views<'a> {
         })
     }
 
-    /// Those whose pixel a ray reaches.
+    /// The observations whose pixel is in the valid range of the lens.
     pub(super) fn usable(&self) -> Subset {
         let bits = self.normalised.iter().enumerate();
         Subset(bits.fold(0, |bits, (view, n)| bits | (u32::from(n.is_some()) << view)))

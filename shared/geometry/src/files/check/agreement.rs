@@ -1,10 +1,10 @@
-//! How well a rig agrees with points that several cameras saw.
+//! The epipolar errors of a rig on points seen by several cameras.
 
 use nalgebra::Point2;
 
 use crate::{Camera, Rig, epipolar};
 
-/// How well a pair of cameras agrees on what both have seen.
+/// The epipolar error of a pair of cameras on the points that both saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairError {
     /// Positions of the two in the rig.
@@ -15,18 +15,18 @@ pub struct PairError {
     pub median_px: f64,
 }
 
-/// How well a camera agrees with all others.
+/// The epipolar error of a camera with all others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraError {
     /// Position in the rig.
     pub camera: usize,
-    /// Pairs of observations in which it took part.
+    /// Pairs of observations with this camera.
     pub n_points: usize,
     /// Median over those, ideal pixels.
     pub median_px: f64,
 }
 
-/// How well a rig agrees with correspondences.
+/// The epipolar errors of a rig on correspondences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpipolarReport {
     /// One for each pair that saw a point.
@@ -38,7 +38,7 @@ pub struct EpipolarReport {
 /// Measures the epipolar error of a rig.
 ///
 /// * `points`: for each point the pixel (recorded, distorted) in every camera of the rig, in its
-///   order, `None` where it was not seen. Shorter lists are taken as not seen.
+///   order, `None` where it was not seen. Missing entries at the end count as not seen.
 ///
 /// A camera whose median stands out is the one to calibrate again.
 pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> EpipolarReport {

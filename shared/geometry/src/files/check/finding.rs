@@ -1,19 +1,19 @@
-//! What may be odd about a rig, in numbers and in words.
+//! What may be wrong with a rig, in numbers and as text.
 
 use std::fmt;
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Worth knowing.
+    /// For information.
     Note,
     /// Probably a mistake.
     Warning,
-    /// With this nothing in space can be found: a run refuses it.
+    /// Nothing can be located in space with this rig: a run refuses it.
     Error,
 }
 
-/// Something odd about a rig.
+/// An implausible property of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Finding {
     /// Two cameras are so near or far from each other that the unit is probably wrong.
@@ -23,7 +23,7 @@ pub enum Finding {
         /// How far they are apart.
         metres: f64,
     },
-    /// All cameras are at one place: no two of their rays meet at an angle.
+    /// All cameras are at one place, so that nothing can be triangulated.
     OnePlace {
         /// How many.
         n_cameras: usize,
@@ -35,7 +35,7 @@ pub enum Finding {
         /// Names of the two.
         cameras: [String; 2],
     },
-    /// A camera is so far from the origin of the world that little is left of the digits.
+    /// A camera is so far from the origin of the world that precision is lost.
     FarAway {
         /// Name of the camera.
         camera: String,
@@ -70,7 +70,7 @@ pub enum Finding {
         /// The share of the image, 0 to 1; 0 if only corners.
         share: f64,
     },
-    /// The distortion moves the corner of the image by more than any lens does.
+    /// The distortion moves the corner of the image by more than that of any real lens.
     LensStrength {
         /// Name of the camera.
         camera: String,
@@ -79,9 +79,9 @@ pub enum Finding {
         /// The same with it.
         bent_degrees: f64,
     },
-    /// The rig does not say which way is up, so that pictures cannot be turned upright.
+    /// The rig has no up direction, so that pictures cannot be turned upright.
     UpUnknown,
-    /// A camera is upside down, or up is.
+    /// A camera is upside down, or the up direction is wrong.
     UpsideDown {
         /// Name of the camera.
         camera: String,
@@ -100,8 +100,8 @@ pub enum Finding {
     },
 }
 
-/// Most degrees that a camera can see by its focal length, and least.
-const FIELDS: core::ops::RangeInclusive<f64> = 0.3..=170.0;
+/// The fields of view that a camera can have, degrees.
+const FIELDS_OF_VIEW: core::ops::RangeInclusive<f64> = 0.3..=170.0;
 
 impl Finding {
     /// How bad it is.
@@ -109,7 +109,7 @@ impl Finding {
         let (error, warning) = match self {
             Self::Distance { metres, .. } => (*metres > 100.0, true),
             Self::OnePlace { .. } | Self::NothingShared { .. } => (true, true),
-            Self::FieldOfView { degrees, .. } => (!FIELDS.contains(degrees), true),
+            Self::FieldOfView { degrees, .. } => (!FIELDS_OF_VIEW.contains(degrees), true),
             Self::Aspect { ratio, .. } => (!(0.4..=2.5).contains(ratio), true),
             Self::LensRange { share, .. } => (*share > 0.5, *share > 0.1),
             Self::LensStrength {
@@ -118,7 +118,7 @@ impl Finding {
                 ..
             } => (*bent_degrees < 0.1 * straight_degrees, true),
             Self::PrincipalPoint { fraction, .. } => {
-                let is_outside = fraction.iter().any(|it| !(0.0..=1.0).contains(it));
+                let is_outside = fraction.iter().any(|part| !(0.0..=1.0).contains(part));
                 (false, is_outside)
             }
             Self::UpUnknown => (false, false),
@@ -134,7 +134,7 @@ impl Finding {
         }
     }
 
-    /// Whether another unit of length would mend it.
+    /// Whether a wrong unit of length would explain it.
     pub fn is_of_unit(&self) -> bool {
         matches!(
             self,
@@ -149,12 +149,12 @@ impl fmt::Display for Finding {
             Self::Distance { .. }
             | Self::OnePlace { .. }
             | Self::SamePose { .. }
-            | Self::FarAway { .. } => self.place(f),
+            | Self::FarAway { .. } => self.fmt_place(f),
             Self::PrincipalPoint { .. }
             | Self::Aspect { .. }
             | Self::FieldOfView { .. }
             | Self::LensRange { .. }
-            | Self::LensStrength { .. } => self.inside(f),
+            | Self::LensStrength { .. } => self.fmt_intrinsics(f),
             Self::UpUnknown => {
                 write!(
                     f,
@@ -178,8 +178,8 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    /// What is said of where cameras stand.
-    fn place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// The text of a finding about the places of cameras.
+    fn fmt_place(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Distance {
                 cameras: [a, b],
@@ -203,8 +203,8 @@ impl Finding {
         }
     }
 
-    /// What is said of a camera without regard to others.
-    fn inside(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// The text of a finding about the intrinsics of a camera.
+    fn fmt_intrinsics(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PrincipalPoint {
                 camera,
@@ -243,7 +243,7 @@ impl Finding {
     }
 }
 
-/// Metres to the millimetre, or as a power of ten where they are many.
+/// Metres with three digits, or with a power of ten from a million on.
 struct Metres(f64);
 
 impl fmt::Display for Metres {

@@ -16,7 +16,7 @@ pub(super) enum Entry {
     Number(f64),
     Text(String),
     List(Vec<Self>),
-    /// A matrix has rows, cols and data.
+    /// A matrix, with rows, cols and data.
     Map(BTreeMap<String, Self>),
 }
 
@@ -158,7 +158,7 @@ impl Storage {
         serde_saphyr::from_str(text).map(Self).map_err(syntax)
     }
 
-    /// Takes over the entries of another storage; the earlier of two with one name stays.
+    /// Adds the entries of another storage; an entry that exists already is kept.
     pub(super) fn extend(&mut self, other: Self) {
         for (key, entry) in other.0 {
             self.0.entry(key).or_insert(entry);
@@ -170,7 +170,7 @@ impl Storage {
         self.0.get("names")
     }
 
-    /// Whether an entry is named as those of one camera among several.
+    /// Whether an entry has the name of a camera as its suffix.
     pub(super) fn has_suffixed(&self) -> bool {
         self.0
             .keys()

@@ -1,8 +1,8 @@
-//! No input makes a reader panic: arbitrary text, and good files with a few bytes changed.
+//! No input makes a reader panic: arbitrary text, and valid files with a few bytes changed.
 
 use super::*;
 
-/// Gives a text to every reader.
+/// Reads a text with every reader.
 fn read_with_all(text: &str) {
     let options = ReadOptions {
         size: Some([640, 480]),
@@ -22,11 +22,11 @@ fn read_with_all(text: &str) {
     ];
     for rig in rigs.into_iter().flatten() {
         std::hint::black_box(check(&rig));
-        own::parse(&own::write(&rig), &options).expect("what is a rig can be written and read");
+        own::parse(&own::write(&rig), &options).expect("a rig can be written and read back");
     }
 }
 
-fn good_files() -> Vec<String> {
+fn valid_files() -> Vec<String> {
     let rig = ring_rig(2, BARREL);
     let camera = &rig.cameras()[0];
     vec![
@@ -45,9 +45,9 @@ fn good_files() -> Vec<String> {
 }
 
 #[test]
-fn every_good_file_is_good() {
+fn the_valid_files_are_read() {
     let options = ReadOptions::default();
-    let files = good_files();
+    let files = valid_files();
     assert_eq!(
         own::parse(&files[0], &options)
             .expect("own")
@@ -75,7 +75,7 @@ proptest! {
         file in 0_usize..7,
         edits in prop::collection::vec((any::<prop::sample::Index>(), "[-0-9.eEnaif\\[\\]\"=,\n<>/: ]{0,3}", 0_usize..4), 1..5),
     ) {
-        let mut text: Vec<char> = good_files()[file].chars().collect();
+        let mut text: Vec<char> = valid_files()[file].chars().collect();
         for (at, put, drop) in edits {
             let start = at.index(text.len().max(1)).min(text.len());
             let end = (start + drop).min(text.len());

@@ -1,4 +1,4 @@
-//! Broken files: every error names the file, the field and the number.
+//! Invalid files: every error names the file, the field and the number.
 
 use std::error::Error as _;
 
@@ -15,11 +15,11 @@ fn chain(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// Asserts that a text is refused with an error that holds all of `words`.
-fn refused(result: Result<Rig, ParseError>, words: &[&str]) {
+/// Asserts that the error contains all of `parts`.
+fn refused(result: Result<Rig, ParseError>, parts: &[&str]) {
     let text = chain(&result.expect_err("must be refused"));
-    for word in words {
-        assert!(text.contains(word), "{word:?} is not in {text:?}");
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in {text:?}");
     }
 }
 
@@ -42,7 +42,7 @@ fn edited(text: &str, key: &str, line: &str) -> String {
 }
 
 #[test]
-fn our_own_format_names_what_is_wrong() {
+fn errors_of_the_own_format_name_the_field() {
     let with = |key: &str, line: &str| {
         own::parse(&edited(&own_text(), key, line), &ReadOptions::default())
     };
@@ -88,14 +88,14 @@ fn our_own_format_names_what_is_wrong() {
     );
 }
 
-/// A Pose2Sim file of which one line is exchanged.
+/// A Pose2Sim file with one line replaced.
 fn pose2sim_with(key: &str, line: &str) -> Result<Rig, ParseError> {
     let text = pose2sim::write(&ring_rig(2, BARREL)).expect("writable");
     pose2sim::parse(&edited(&text, key, line), &ReadOptions::default())
 }
 
 #[test]
-fn pose2sim_names_what_is_wrong_inside_a_camera() {
+fn errors_of_pose2sim_intrinsics_name_the_field() {
     let with = pose2sim_with;
     refused(with("size", ""), &["cam0.size is missing"]);
     refused(with("size", "size = [640.5, 480]"), &["cam0.size", "640.5"]);
@@ -130,7 +130,7 @@ fn pose2sim_names_what_is_wrong_inside_a_camera() {
 }
 
 #[test]
-fn pose2sim_names_what_is_wrong_with_its_place() {
+fn errors_of_pose2sim_poses_name_the_field() {
     let with = pose2sim_with;
     refused(
         with("rotation", "rotation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]"),
@@ -156,7 +156,7 @@ fn pose2sim_names_what_is_wrong_with_its_place() {
 }
 
 #[test]
-fn files_of_bare_numbers_name_the_count_and_the_line() {
+fn errors_of_number_lists_name_the_count_and_the_line() {
     let cal = humaneva::write(&ring_rig(1, BARREL).cameras()[0]).expect("writable");
     let read = |text: &str| humaneva::parse("C1", text, &ReadOptions::default());
     refused(read(&(cal.clone() + "1\n")), &["22 numbers", "23 numbers"]);
@@ -185,7 +185,7 @@ fn files_of_bare_numbers_name_the_count_and_the_line() {
 }
 
 #[test]
-fn opencv_names_what_is_wrong() {
+fn errors_of_opencv_name_the_field() {
     let text = opencv::write(&ring_rig(1, BARREL)).expect("writable");
     let read = |text: &str| opencv::parse(&[("x", text)], &ReadOptions::default());
     refused(read(&edited(&text, "W_cam0", "")), &["W_cam0 is missing"]);
@@ -206,7 +206,7 @@ fn opencv_names_what_is_wrong() {
 }
 
 #[test]
-fn qualisys_names_what_is_wrong() {
+fn errors_of_qualisys_name_the_field() {
     let text = |transform: &str, rest: &str| {
         format!(
             r#"<calibration><cameras><camera active="1" serial="one" viewrotation="0"><fov_video left="0" top="0" right="1087" bottom="1919"/>
@@ -248,7 +248,7 @@ fn qualisys_names_what_is_wrong() {
 }
 
 #[test]
-fn panoptic_names_what_is_wrong() {
+fn errors_of_panoptic_name_the_field() {
     let with = |from: &str, to: &str| {
         assert!(PANOPTIC.contains(from), "{from}");
         panoptic::parse(&PANOPTIC.replacen(from, to, 1), &ReadOptions::default())
@@ -333,11 +333,11 @@ fn errors_name_the_file() {
 }
 
 #[test]
-fn formats_say_what_they_have_no_words_for() {
+fn writing_a_rig_that_the_format_cannot_describe_is_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let fisheye = ring_rig(1, LensModel::KannalaBrandt { k: [0.1; 4] });
     let cause = |format: Format, rig: &Rig| {
-        let error = write(folder.path(), format, rig).expect_err("no words");
+        let error = write(folder.path(), format, rig).expect_err("cannot be described");
         error.source().map(ToString::to_string).unwrap_or_default()
     };
     assert!(cause(Format::HumanEva, &fisheye).contains("Kannala-Brandt"));
@@ -353,7 +353,7 @@ fn formats_say_what_they_have_no_words_for() {
     assert!(cause(Format::Pose2Sim, &named("metadata")).contains("metadata"));
     let mut cameras = ring_rig(1, BARREL).cameras().to_vec();
     "../C1".clone_into(&mut cameras[0].name);
-    let refused = Rig::new(cameras, None, "").expect_err("it leads out of a folder");
+    let refused = Rig::new(cameras, None, "").expect_err("the name leaves the folder");
     assert!(refused.to_string().contains("../C1"));
     let absent = folder.path().join("no/such/folder.toml");
     assert!(matches!(
