@@ -72,7 +72,7 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
-        if !Address::is_one(&spec.path) {
+        if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
         }
         let address = address(spec)?;
@@ -93,7 +93,7 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
-        if !Address::is_one(&spec.path) {
+        if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)));
         }
         let address = address(spec)?;

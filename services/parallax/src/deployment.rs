@@ -180,7 +180,7 @@ impl Deployment {
 
 /// Footage as it is named in a file of the folder `base`; what is no file stays as it is, and is refused later.
 fn source(named: &str, base: &Path) -> String {
-    if Address::is_one(named) {
+    if Address::is_address(named) {
         return Address::relative_to(named, base);
     }
     let on_disk = base.join(named);

@@ -58,7 +58,7 @@ fn several(deployment: &Deployment) -> Result<(), Failure> {
 fn sources(deployment: &Deployment) -> Result<(), Failure> {
     let same = |source: &str| -> PathBuf {
         let path = PathBuf::from(source);
-        if Address::is_one(source) {
+        if Address::is_address(source) {
             return path;
         }
         path.canonicalize().unwrap_or(path)
@@ -226,7 +226,7 @@ struct Pictures {
 impl Pictures {
     /// Unless all pixels are alike, as of a camera without light. Scenes are not made for it.
     fn of(camera: &capture::Camera, capture: &capture::Config) -> Option<Self> {
-        if Address::is_one(&camera.source) {
+        if Address::is_address(&camera.source) {
             return None;
         }
         let spec = SourceSpec {

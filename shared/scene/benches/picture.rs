@@ -1,7 +1,7 @@
-//! One picture of one camera, 640x480, four samples a pixel: walking before the cameras of HumanEva, one thread; and
-//! what is made once, the person and a camera's background.
+//! One picture of one camera, 640x480, four samples per pixel: walking in front of the cameras of HumanEva, one
+//! thread; and what is made once, the person and a camera's background.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its measurements")]
 
 use std::hint::black_box;
 use std::sync::Arc;

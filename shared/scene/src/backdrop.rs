@@ -1,4 +1,4 @@
-//! Everything but the person, as one camera sees it: made once, for it does not move.
+//! The background of one camera: everything but the person. Rendered once, because it does not move.
 
 use footage::Size;
 use geometry::Camera;
@@ -9,7 +9,7 @@ use crate::photo::Photo;
 use crate::raster::{SUB, Samples};
 use crate::room::{Hit, Room};
 
-/// Pixels of the background with what is needed to put a person and the person's shadow into it.
+/// The pixels of the background, with the data needed to add a person and the person's shadow.
 #[derive(Debug, Clone)]
 pub(crate) struct Backdrop {
     pub(crate) size: Size,
@@ -26,7 +26,7 @@ pub(crate) struct Pixel {
     /// Light that reaches the camera without the key lamp, and that of the key lamp.
     pub(crate) base: Linear,
     pub(crate) key: Linear,
-    /// Where it lies across the rays of the key lamp, and how near to it, metres.
+    /// Coordinates perpendicular to the rays of the key lamp, and along them towards it, metres.
     pub(crate) across: Vector2<f32>,
     pub(crate) to_lamp: f32,
 }
@@ -35,13 +35,13 @@ impl Backdrop {
     /// Casts rays through every sample.
     ///
     /// * `camera`: in the frame of the stage.
-    /// * `photo`: stands in the place of the room, which still takes the shadow and hides the person.
+    /// * `photo`: replaces the picture of the room, which still receives the shadow and occludes the person.
     pub(crate) fn new(camera: &Camera, room: &Room, photo: Option<&Photo>) -> Self {
         let [width, height] = camera.intrinsics.size.map(|it| it as usize);
         let eye: Point3<f32> = camera.centre_in_world().cast();
         let view = View { camera, room, eye };
         let normalised = view.directions(width, height);
-        let mut it = Self {
+        let mut backdrop = Self {
             size: Size::new(width, height),
             pixels: Vec::with_capacity(width * height),
             near: vec![0.0; width * height * SUB * SUB],
@@ -54,7 +54,7 @@ impl Backdrop {
                 let corners = [at(x, y), at(x + 1, y), at(x, y + 1)];
                 let mut pixel = view.pixel(corners, |sub: usize, near: f32| {
                     let (column, row) = (x * SUB + sub % SUB, y * SUB + sub / SUB);
-                    it.near[row * width * SUB + column] = near;
+                    backdrop.near[row * width * SUB + column] = near;
                 });
                 if let Some(photo) = photo {
                     let share = Vector2::new(
@@ -66,11 +66,11 @@ impl Backdrop {
                     pixel.key = colour * 0.5;
                 }
                 let bytes = curve.bytes(&(pixel.base + pixel.key));
-                it.bytes[3 * (y * width + x)..][..3].copy_from_slice(&bytes);
-                it.pixels.push(pixel);
+                backdrop.bytes[3 * (y * width + x)..][..3].copy_from_slice(&bytes);
+                backdrop.pixels.push(pixel);
             }
         }
-        it
+        backdrop
     }
 }
 
@@ -82,7 +82,7 @@ struct View<'a> {
 
 impl View<'_> {
     /// Undistorted normalised points of a lattice of pixel centres, one more than the picture has to the right
-    /// and below; NaN where the lens sees nothing.
+    /// and below; NaN outside the valid range of the lens.
     fn directions(&self, width: usize, height: usize) -> Vec<Point2<f32>> {
         let nothing = Point2::new(f32::NAN, f32::NAN);
         let at = |it: usize| {
@@ -97,11 +97,11 @@ impl View<'_> {
     /// The mean of the samples of a pixel.
     ///
     /// * `here`, right and below: normalised points, between which the samples are placed.
-    /// * `tell`: gets 1 / depth of every sample.
+    /// * `set_near`: receives 1 / depth of every sample.
     fn pixel(
         &self,
         [here, right, below]: [Point2<f32>; 3],
-        mut tell: impl FnMut(usize, f32),
+        mut set_near: impl FnMut(usize, f32),
     ) -> Pixel {
         let back = self
             .camera
@@ -115,11 +115,11 @@ impl View<'_> {
             let off = Samples::place(sub % SUB, sub / SUB);
             let at = here + (right - here) * off.x + (below - here) * off.y;
             if !(at.x.is_finite() && at.y.is_finite()) {
-                tell(sub, 0.0);
+                set_near(sub, 0.0);
                 continue;
             }
             let hit = self.room.cast(&self.eye, &(back * at.coords.push(1.0)));
-            tell(sub, 1.0 / hit.along.max(1e-3));
+            set_near(sub, 1.0 / hit.along.max(1e-3));
             let (b, k) = lit(self.room, &hit, sub);
             base += b;
             key += k;
@@ -136,14 +136,14 @@ impl View<'_> {
     }
 }
 
-/// Light of the surroundings and of the key lamp that a place sends to the camera.
+/// Ambient light and light of the key lamp that a place reflects to the camera.
 fn lit(room: &Room, hit: &Hit, sub: usize) -> (Linear, Linear) {
     if hit.shines {
         return (hit.colour, Linear::zeros());
     }
     let around = room.light.around(&hit.normal) * (1.0 - hit.dim);
     let direct = room.light.direct(&hit.normal);
-    // Every sample asks another part of the lamp, which makes the edges of shadows soft.
+    // Every sample uses another part of the lamp, which makes the edges of shadows soft.
     let spread = 0.05;
     let [u, v] = [(sub % SUB) as f32 - 0.5, (sub / SUB) as f32 - 0.5];
     let towards = room.light.to_key + Vector3::new(u + v, u - v, 0.0) * spread;

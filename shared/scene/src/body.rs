@@ -1,4 +1,4 @@
-//! The anatomical skeleton: bones, how far joints turn, and where everything is for given angles.
+//! The anatomical skeleton: bones, joint limits and forward kinematics.
 //!
 //! The frame of the body: x forward, y to the person's left, z up. With all angles at 0 the person
 //! stands with hanging arms, and the frame of every bone is that of the body, at the bone's joint.
@@ -32,7 +32,7 @@ pub(crate) const LEFT: usize = 0;
 /// Index of the right side in the pairs above.
 pub(crate) const RIGHT: usize = 1;
 
-/// The bone that a bone hangs on; the pelvis on none.
+/// The parent of every bone; the pelvis has none.
 pub(crate) const PARENT: [Option<usize>; N_BONES] = [
     None,
     Some(PELVIS),
@@ -64,7 +64,7 @@ pub(crate) fn side_of(bone: usize) -> f64 {
     }
 }
 
-/// Degrees of flexion, abduction and twist of every joint; the root's are not asked.
+/// Degrees of flexion, abduction and twist of every joint; those of the root are ignored.
 ///
 /// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold,
 /// toes rise. Abduction: limbs away from the middle, collars up, the trunk bends to the right. Twist:
@@ -102,7 +102,7 @@ pub(crate) struct Bones {
     pub(crate) fingertip: Vector3<f64>,
 }
 
-/// What makes one person's skeleton differ from another's.
+/// The individual proportions of a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Proportions {
     /// Standing height, metres.
@@ -120,7 +120,7 @@ impl Bones {
     pub(crate) fn new(of: &Proportions) -> Self {
         let h = of.height;
         let leg = of.legs;
-        // What the legs gain the trunk loses.
+        // The height stays the same: longer legs mean a shorter trunk.
         let trunk = (0.818 - 0.53 * leg - 0.0) / (0.818 - 0.53);
         let v = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * h;
         let mut offset = [Vector3::zeros(); N_BONES];
@@ -165,7 +165,7 @@ impl Bones {
         let soles = FOOT
             .iter()
             .flat_map(|&foot| self.sole.map(|it| (frames[foot] * Point3::from(it)).z));
-        // Radii of the flesh around the joints, metres of a man of 1.75 m.
+        // Radii of the body around the joints, metres for a man of 1.75 m.
         let round = [(PELVIS, 0.105), (CHEST, 0.112), (HEAD, 0.09)].into_iter();
         let limbs = [
             (UPPER_ARM, 0.05),
@@ -185,7 +185,7 @@ impl Bones {
     /// The 14 joints of `skeleton::PARSE14`, in its order.
     pub(crate) fn joints(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; 14] {
         let joint = |bone: usize| Point3::from(frames[bone].translation.vector);
-        // The neck lies between the shoulders as much as on the spine.
+
         [
             joint(FOOT[RIGHT]),
             joint(SHIN[RIGHT]),
@@ -205,12 +205,13 @@ impl Bones {
     }
 }
 
-/// The turn of a joint: twist about the bone first, then abduction, then flexion.
+/// The rotation of a joint: twist about the bone first, then abduction, then flexion.
 fn rotation(bone: usize, degrees: [f64; 3]) -> UnitQuaternion<f64> {
     let [flexion, abduction, twist] = degrees.map(f64::to_radians);
     let side = side_of(bone);
     let mirror = if side < 0.0 { -1.0 } else { 1.0 };
-    // About +y, z turns to x: the trunk nods, a knee folds backwards; all else swings forward.
+    // A positive rotation about y bends the trunk forward and a knee backward; the other joints swing forward with a
+    // negative one.
     let forward = match bone {
         ABDOMEN | CHEST | NECK | HEAD | 14 | 17 => flexion,
         _ => -flexion,

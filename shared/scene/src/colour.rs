@@ -1,11 +1,11 @@
-//! Colours: light is added up as it is, and written with the curve of sRGB.
+//! Colours: computed as linear light, written with the sRGB transfer curve.
 
 use nalgebra::Vector3;
 
-/// Red, green and blue as shares of the light, not of the byte.
+/// Red, green and blue as linear light.
 pub(crate) type Linear = Vector3<f32>;
 
-/// A colour given as it would be written, `[r, g, b]` of 0 to 255.
+/// Linear light of an sRGB colour, `[r, g, b]` of 0 to 255.
 pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
     Vector3::from(bytes.map(|it| {
         let share = f32::from(it) / 255.0;
@@ -17,7 +17,7 @@ pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
     }))
 }
 
-/// Bytes of light shares by table: to the nearest byte, half a byte off at most (see the test).
+/// sRGB bytes of linear light by table, exact to one grey level (see the test).
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
     table: Vec<u8>,
@@ -46,7 +46,7 @@ impl Curve {
     }
 }
 
-/// A share of light as a share of the byte (IEC 61966-2-1).
+/// The sRGB transfer curve (IEC 61966-2-1), from and to 0..1.
 pub(crate) fn written(share: f32) -> f32 {
     if share <= 0.003_130_8 {
         12.92 * share
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_read_is_written_again() {
+    fn converting_to_linear_light_and_back_gives_the_same_byte() {
         let curve = Curve::new();
         for byte in 0..=255 {
             let [got, ..] = curve.bytes(&srgb([byte; 3]));

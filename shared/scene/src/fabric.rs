@@ -3,15 +3,15 @@
 use nalgebra::{Vector2, Vector3};
 
 use crate::colour::{Linear, srgb};
-use crate::dice::{Dice, noise};
+use crate::random::{Random, noise};
 
-/// What is printed or woven.
+/// The pattern of a fabric.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Pattern {
     Plain,
-    /// Around the body, so many a metre.
+    /// Around the body; number per metre.
     Stripes(f32),
-    /// Along the body, so many a metre.
+    /// Along the body; number per metre.
     Bars(f32),
     Checks(f32),
     /// Threads of two colours.
@@ -22,7 +22,7 @@ pub(crate) enum Pattern {
 }
 
 impl Pattern {
-    /// Plain ones more often.
+    /// The choice for tops; plain ones are more frequent.
     pub(crate) const ON_TOPS: &'static [Self] = &[
         Self::Plain,
         Self::Plain,
@@ -83,19 +83,19 @@ impl Fabric {
         [44, 60, 50],
     ];
 
-    pub(crate) fn any(dice: &mut Dice, colours: &[[u8; 3]], patterns: &[Pattern]) -> Self {
-        let colour = srgb(*dice.pick(colours)) * dice.range(0.85, 1.15) as f32;
-        let second = if dice.chance(0.5) {
-            srgb(*dice.pick(colours))
+    pub(crate) fn any(random: &mut Random, colours: &[[u8; 3]], patterns: &[Pattern]) -> Self {
+        let colour = srgb(*random.pick(colours)) * random.range(0.85, 1.15) as f32;
+        let second = if random.chance(0.5) {
+            srgb(*random.pick(colours))
         } else {
-            colour * dice.range(0.35, 0.7) as f32
+            colour * random.range(0.35, 0.7) as f32
         };
         Self {
             colour,
             second,
-            pattern: *dice.pick(patterns),
-            folds: dice.range(0.25, 0.6) as f32,
-            seed: dice.bits() as u32,
+            pattern: *random.pick(patterns),
+            folds: random.range(0.25, 0.6) as f32,
+            seed: random.bits() as u32,
         }
     }
 
@@ -107,13 +107,15 @@ impl Fabric {
         let odd = |it: f32| it.rem_euclid(1.0) < 0.5;
         let second = match self.pattern {
             Pattern::Plain => 0.0,
-            Pattern::Stripes(a_metre) => f32::from(odd(at.y * a_metre)),
-            Pattern::Bars(a_metre) => f32::from(odd(at.x * a_metre)),
-            Pattern::Checks(a_metre) => {
-                0.5 * (f32::from(odd(at.x * a_metre)) + f32::from(odd(at.y * a_metre)))
+            Pattern::Stripes(per_metre) => f32::from(odd(at.y * per_metre)),
+            Pattern::Bars(per_metre) => f32::from(odd(at.x * per_metre)),
+            Pattern::Checks(per_metre) => {
+                0.5 * (f32::from(odd(at.x * per_metre)) + f32::from(odd(at.y * per_metre)))
             }
             Pattern::Melange => 0.25 + 0.25 * noise(&(place * 250.0), self.seed),
-            Pattern::Blotches(a_metre) => f32::from(noise(&(place * a_metre), self.seed) > 0.15),
+            Pattern::Blotches(per_metre) => {
+                f32::from(noise(&(place * per_metre), self.seed) > 0.15)
+            }
             Pattern::Band(height) => f32::from((at.y - height).abs() < 0.06),
         };
         let worn = 1.0 + 0.08 * noise(&(place * 9.0), self.seed ^ 1);

@@ -1,39 +1,38 @@
-//! What goes wrong with cameras: noise, blur, exposure, clocks that differ, frames that are lost, calibrations that
-//! are off. All off by default.
+//! Flaws of cameras: noise, blur, exposure, clock offsets, dropped frames, calibration errors. None by default.
 
 use footage::Size;
 use geometry::{Camera, Rig, RigError};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::colour::srgb;
-use crate::dice::Dice;
+use crate::random::Random;
 
-/// How bad the cameras are.
+/// The flaws of the cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flaws {
-    /// Deviation of the noise of every value of a pixel, grey levels.
+    /// Standard deviation of the noise of every value of a pixel, grey levels.
     pub noise: f64,
-    /// Deviation of the blur, pixels.
+    /// Standard deviation of the Gaussian blur, pixels.
     pub blur_px: f64,
-    /// Doublings of the light; negative is darker.
+    /// Exposure in stops (doublings of the light); negative is darker.
     pub exposure_stops: f64,
-    /// A camera's clock is off by at most this, either way, seconds; the first camera's is right.
+    /// Largest clock offset of a camera, either way, seconds; the first camera has none.
     pub desync_s: f64,
     /// Probability that a camera drops a frame.
     pub drop: f64,
-    /// The written rig turns every camera by this angle about an axis by chance, degrees.
+    /// The written rig turns every camera by this angle about a random axis, degrees.
     pub calibration_degrees: f64,
-    /// The written rig moves every camera this far in a direction by chance, millimetres.
+    /// The written rig moves every camera this far in a random direction, millimetres.
     pub calibration_mm: f64,
 }
 
-/// A flaw that cannot be.
+/// A flaw that is out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{what} is {got}, expected {low} to {high}")]
 pub struct FlawError {
     /// Which.
     pub what: &'static str,
-    /// What was asked for.
+    /// The value.
     pub got: f64,
     /// Least.
     pub low: f64,
@@ -71,11 +70,11 @@ impl Flaws {
             .map(|it| it.1)
     }
 
-    /// Refuses what cannot be.
+    /// Checks the ranges.
     ///
     /// # Errors
     ///
-    /// [`FlawError`], the first.
+    /// [`FlawError`] of the first value out of range.
     pub fn check(mut self) -> Result<(), FlawError> {
         let limits = [
             (0.0, 128.0),
@@ -101,33 +100,33 @@ impl Flaws {
     }
 
     /// Whether a camera's frame is dropped. The first never is.
-    pub(crate) fn drops(&self, dice: Dice, camera: usize, frame: u64) -> bool {
+    pub(crate) fn drops(&self, random: Random, camera: usize, frame: u64) -> bool {
         frame > 0
-            && dice
+            && random
                 .fork("drop")
                 .nth(camera as u64)
                 .nth(frame)
                 .chance(self.drop)
     }
 
-    /// How late a camera's clock is, seconds.
-    pub(crate) fn late_s(&self, dice: Dice, camera: usize) -> f64 {
+    /// The clock offset of a camera, seconds.
+    pub(crate) fn late_s(&self, random: Random, camera: usize) -> f64 {
         if camera == 0 {
             return 0.0;
         }
-        self.desync_s * dice.fork("desync").nth(camera as u64).range(-1.0, 1.0)
+        self.desync_s * random.fork("desync").nth(camera as u64).range(-1.0, 1.0)
     }
 
-    /// The rig as somebody with a bad calibration would have it.
-    pub(crate) fn written(&self, rig: &Rig, dice: Dice) -> Result<Rig, RigError> {
+    /// The rig with the calibration error.
+    pub(crate) fn written(&self, rig: &Rig, random: Random) -> Result<Rig, RigError> {
         let wrong = |(nth, camera): (usize, &Camera)| {
-            let mut dice = dice.fork("calibration").nth(nth as u64);
-            let mut any = || {
-                let way = Vector3::from_fn(|_, _| dice.normal());
-                way.try_normalize(1e-6).unwrap_or(Vector3::x())
+            let mut random = random.fork("calibration").nth(nth as u64);
+            let mut direction = || {
+                let vector = Vector3::from_fn(|_, _| random.normal());
+                vector.try_normalize(1e-6).unwrap_or(Vector3::x())
             };
-            let turn = UnitQuaternion::new(any() * self.calibration_degrees.to_radians());
-            let step = any() * (self.calibration_mm * 1e-3);
+            let turn = UnitQuaternion::new(direction() * self.calibration_degrees.to_radians());
+            let step = direction() * (self.calibration_mm * 1e-3);
             let off = Isometry3::from_parts(Translation3::from(step), turn);
             Camera {
                 camera_from_world: off * camera.camera_from_world,
@@ -142,8 +141,8 @@ impl Flaws {
         Rig::new(cameras, rig.up_in_world(), rig.source())
     }
 
-    /// Does to a picture what a bad camera does: exposure, then blur, then noise.
-    pub(crate) fn spoil(&self, dice: Dice, size: Size, rgb: &mut [u8]) {
+    /// Applies the flaws to a picture: exposure, then blur, then noise.
+    pub(crate) fn degrade(&self, random: Random, size: Size, rgb: &mut [u8]) {
         if self.exposure_stops != 0.0 {
             expose(self.exposure_stops.exp2() as f32, rgb);
         }
@@ -151,13 +150,13 @@ impl Flaws {
             blur(self.blur_px as f32, size, rgb);
         }
         if self.noise > 0.0 {
-            let mut dice = dice.fork("noise");
+            let mut random = random.fork("noise");
             for value in rgb {
-                // The sum of four bytes, of deviation 1 and mean 0.
-                let bits = dice.bits().to_le_bytes();
+                // The sum of four bytes, scaled to mean 0 and standard deviation 1.
+                let bits = random.bits().to_le_bytes();
                 let sum: i32 = bits[..4].iter().map(|it| i32::from(*it)).sum();
-                let throw = (f64::from(sum) - 510.0) / 147.8;
-                *value = (f64::from(*value) + self.noise * throw)
+                let deviate = (f64::from(sum) - 510.0) / 147.8;
+                *value = (f64::from(*value) + self.noise * deviate)
                     .round()
                     .clamp(0.0, 255.0) as u8;
             }
@@ -175,7 +174,7 @@ fn expose(gain: f32, rgb: &mut [u8]) {
     }
 }
 
-/// A Gaussian over rows, then over columns; the border goes on.
+/// A Gaussian blur over rows, then over columns; border pixels are repeated.
 fn blur(deviation: f32, size: Size, rgb: &mut [u8]) {
     let reach = (3.0 * deviation).ceil() as usize;
     let weights: Vec<f32> = (0..=2 * reach)
@@ -208,19 +207,19 @@ mod tests {
 
     const SIZE: Size = Size::new(40, 30);
 
-    fn spoiled(flaws: Flaws) -> Vec<u8> {
+    fn degraded(flaws: Flaws) -> Vec<u8> {
         let mut rgb: Vec<u8> = (0..SIZE.rgb_bytes())
             .map(|it| (it / 3 % 40 * 6) as u8)
             .collect();
-        flaws.spoil(Dice::new(1), SIZE, &mut rgb);
+        flaws.degrade(Random::new(1), SIZE, &mut rgb);
         rgb
     }
 
     #[test]
-    fn no_flaw_changes_nothing_and_every_flaw_does_what_it_says() {
-        let plain = spoiled(Flaws::default());
+    fn every_flaw_has_the_requested_size_and_none_changes_nothing() {
+        let plain = degraded(Flaws::default());
         let mean = |rgb: &[u8]| rgb.iter().map(|it| f64::from(*it)).sum::<f64>() / rgb.len() as f64;
-        let noisy = spoiled(Flaws {
+        let noisy = degraded(Flaws {
             noise: 5.0,
             ..Flaws::default()
         });
@@ -231,16 +230,16 @@ mod tests {
         let deviation = (off.sum::<f64>() / plain.len() as f64).sqrt();
         assert!((deviation - 5.0).abs() < 0.5, "{deviation}");
         assert!((mean(&noisy) - mean(&plain)).abs() < 0.7);
-        let bright = spoiled(Flaws {
+        let bright = degraded(Flaws {
             exposure_stops: 1.0,
             ..Flaws::default()
         });
-        let dark = spoiled(Flaws {
+        let dark = degraded(Flaws {
             exposure_stops: -1.0,
             ..Flaws::default()
         });
         assert!(mean(&bright) > mean(&plain) + 15.0 && mean(&dark) < mean(&plain) - 15.0);
-        let soft = spoiled(Flaws {
+        let soft = degraded(Flaws {
             blur_px: 2.0,
             ..Flaws::default()
         });
@@ -254,37 +253,37 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_calibration_is_off_by_as_much_as_asked() {
+    fn the_calibration_error_has_the_requested_size() {
         let rig = crate::rigs::humaneva().unwrap();
         let flaws = Flaws {
             calibration_degrees: 2.0,
             calibration_mm: 30.0,
             ..Flaws::default()
         };
-        let written = flaws.written(&rig, Dice::new(5)).unwrap();
+        let written = flaws.written(&rig, Random::new(5)).unwrap();
         for (a, b) in rig.cameras().iter().zip(written.cameras()) {
             let off = b.camera_from_world * a.camera_from_world.inverse();
             assert!((off.rotation.angle().to_degrees() - 2.0).abs() < 1e-9);
             assert!((off.translation.vector.norm() - 0.03).abs() < 1e-9);
         }
-        assert_eq!(Flaws::default().written(&rig, Dice::new(5)).unwrap(), rig);
+        assert_eq!(Flaws::default().written(&rig, Random::new(5)).unwrap(), rig);
     }
 
     #[test]
-    fn as_many_frames_are_dropped_as_asked_but_never_the_first() {
+    fn frames_are_dropped_with_the_requested_probability_but_never_the_first() {
         let flaws = Flaws {
             drop: 0.2,
             ..Flaws::default()
         };
         let n = (0..2000)
-            .filter(|it| flaws.drops(Dice::new(3), 1, *it))
+            .filter(|it| flaws.drops(Random::new(3), 1, *it))
             .count();
         assert!((330..470).contains(&n), "{n}");
-        assert!(!(0..50).any(|it| flaws.drops(Dice::new(it), 1, 0)));
+        assert!(!(0..50).any(|it| flaws.drops(Random::new(it), 1, 0)));
     }
 
     #[test]
-    fn what_cannot_be_is_refused_by_name() {
+    fn flaws_out_of_range_are_refused_by_name() {
         assert_eq!(Flaws::default().check(), Ok(()));
         for name in Flaws::NAMES {
             for wrong in [f64::NAN, 1e9, -9.0] {

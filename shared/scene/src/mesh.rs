@@ -1,19 +1,19 @@
-//! The surface of a body as triangles that hang on bones, and where bent bones take them.
+//! The surface of a body as a triangle mesh, and its skinning to the bones.
 
 mod nets;
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x4, Point3, Vector3};
 
 use crate::body::{Bones, N_BONES, THIGH};
-use crate::flesh::{FAR, Flesh, Grid};
+use crate::shape::{BodyShape, FAR, Grid};
 
 /// Distance of the lattice on which the surface is made, metres.
 const STEP: f32 = 0.012;
 
-/// Within this difference of distances (metres) a point follows two bones.
+/// Within about this difference of distances (metres) a point follows two bones.
 const SHARED: f32 = 0.02;
 
-/// Bones that a point may hang on.
+/// Bones that a point may follow.
 const N_WEIGHTS: usize = 4;
 
 /// The surface at rest.
@@ -36,31 +36,31 @@ pub(crate) struct Posed {
 }
 
 impl Mesh {
-    pub(crate) fn new(flesh: &Flesh) -> Self {
-        let mut grid = Grid::around(flesh.bounds(), STEP);
-        flesh.fill(&mut grid);
+    pub(crate) fn new(shape: &BodyShape) -> Self {
+        let mut grid = Grid::around(shape.bounds(), STEP);
+        shape.fill(&mut grid);
         let (mut points, triangles) = nets::surface(&grid);
         for point in &mut points {
-            // Newton's steps onto the surface, which the lattice has rounded off.
+            // Newton's steps onto the surface, which the lattice has smoothed.
             for _ in 0..2 {
-                let off = flesh.distance(point).clamp(-STEP, STEP);
-                *point -= flesh.normal(point) * off;
+                let off = shape.distance(point).clamp(-STEP, STEP);
+                *point -= shape.normal(point) * off;
             }
         }
-        let normals = points.iter().map(|it| flesh.normal(it)).collect();
-        let weights = points.iter().map(|it| weights(flesh, it)).collect();
+        let normals = points.iter().map(|it| shape.normal(it)).collect();
+        let weights = points.iter().map(|it| weights(shape, it)).collect();
         Self {
             points,
             normals,
             triangles,
             weights,
-            rest_from_body: flesh.frames,
+            rest_from_body: shape.frames,
         }
     }
 
     /// Moves every point as its bones move (linear blend skinning).
     ///
-    /// * `frames`: of the bones, in the world that the points are wanted in.
+    /// * `frames`: of the bones; the points are in the same frame of reference.
     pub(crate) fn pose(&self, frames: &[Isometry3<f64>; N_BONES], posed: &mut Posed) {
         let moves: [Matrix3x4<f32>; N_BONES] = core::array::from_fn(|bone| {
             let it = frames[bone] * self.rest_from_body[bone].inverse();
@@ -92,7 +92,7 @@ impl Mesh {
         usize::from(self.weights[point][0].0)
     }
 
-    /// How directions at rest are turned with every bone.
+    /// By bone, the rotation of directions at rest.
     pub(crate) fn turns(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Matrix3<f32>; N_BONES] {
         core::array::from_fn(|bone| {
             let turn = frames[bone].rotation * self.rest_from_body[bone].rotation.inverse();
@@ -101,10 +101,10 @@ impl Mesh {
     }
 }
 
-/// Which bones a point follows: those whose flesh it lies on, softly where two are as near.
-fn weights(flesh: &Flesh, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
-    let mut distances = flesh.by_bone(at);
-    // A leg never pulls at the skin of the other.
+/// Which bones a point follows: those whose solids it lies on, blended where two are equally near.
+fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
+    let mut distances = shape.by_bone(at);
+    // A point of one leg never follows the other leg.
     let other = if at.y > 0.0 { THIGH[1] } else { THIGH[0] };
     distances[other..other + 3].fill(FAR);
     let mut order: [usize; N_BONES] = core::array::from_fn(|it| it);
@@ -129,10 +129,10 @@ fn weights(flesh: &Flesh, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
 }
 
 /// The surface of a person at rest.
-pub(crate) fn of(subject: &crate::subject::Subject, bones: &Bones) -> (Flesh, Mesh) {
-    let flesh = Flesh::new(subject, bones);
-    let mesh = Mesh::new(&flesh);
-    (flesh, mesh)
+pub(crate) fn of(subject: &crate::subject::Subject, bones: &Bones) -> (BodyShape, Mesh) {
+    let shape = BodyShape::new(subject, bones);
+    let mesh = Mesh::new(&shape);
+    (shape, mesh)
 }
 
 #[cfg(test)]
@@ -140,19 +140,19 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::flesh::rest_pose;
+    use crate::shape::rest_pose;
     use crate::subject::Subject;
 
-    fn made(number: u64) -> (Bones, Flesh, Mesh) {
+    fn mesh_of(number: u64) -> (Bones, BodyShape, Mesh) {
         let subject = Subject::new(number);
         let bones = Bones::new(&subject.proportions);
-        let (flesh, mesh) = of(&subject, &bones);
-        (bones, flesh, mesh)
+        let (shape, mesh) = of(&subject, &bones);
+        (bones, shape, mesh)
     }
 
     #[test]
-    fn the_surface_is_closed_and_turned_outward() {
-        let (_, _, mesh) = made(3);
+    fn the_surface_is_closed_and_oriented_outward() {
+        let (_, _, mesh) = mesh_of(3);
         let mut edges: BTreeMap<(u32, u32), i32> = BTreeMap::new();
         let mut volume = 0.0;
         for [a, b, c] in &mesh.triangles {
@@ -172,23 +172,23 @@ mod tests {
 
     #[test]
     fn points_lie_on_the_surface_and_the_bones_inside() {
-        let (bones, flesh, mesh) = made(4);
+        let (bones, shape, mesh) = mesh_of(4);
         let on = mesh
             .points
             .iter()
-            .filter(|it| flesh.distance(it).abs() < 1.5e-3)
+            .filter(|it| shape.distance(it).abs() < 1.5e-3)
             .count();
         assert!(on as f64 > 0.98 * mesh.points.len() as f64);
-        let joints = bones.joints(&flesh.frames);
+        let joints = bones.joints(&shape.frames);
         for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {
-            let distance = flesh.distance(&at.cast());
+            let distance = shape.distance(&at.cast());
             assert!(distance < 0.012, "{}: {distance}", joint.name);
         }
     }
 
     #[test]
-    fn at_rest_the_pose_is_the_rest() {
-        let (bones, _, mesh) = made(5);
+    fn the_rest_pose_gives_the_mesh_at_rest() {
+        let (bones, _, mesh) = mesh_of(5);
         let mut posed = Posed::default();
         mesh.pose(&bones.frames(&rest_pose()), &mut posed);
         for (a, b) in posed.points.iter().zip(&mesh.points) {
@@ -197,8 +197,8 @@ mod tests {
     }
 
     #[test]
-    fn the_left_hand_is_the_left_one_on_the_surface_too() {
-        let (bones, _, mesh) = made(6);
+    fn bending_the_left_forearm_moves_points_on_the_left_only() {
+        let (bones, _, mesh) = mesh_of(6);
         let mut pose = rest_pose();
         pose.angles[crate::body::FOREARM[0]] = [90.0, 0.0, 0.0];
         let mut posed = Posed::default();

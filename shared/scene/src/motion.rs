@@ -1,4 +1,4 @@
-//! What a person does: from an action, a subject and a seed to a pose at any time.
+//! Generated motion: from an action, a subject and a seed to a pose at any time.
 
 mod gait;
 mod keys;
@@ -7,12 +7,12 @@ mod stance;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::body::{Bones, COLLAR, FOOT, Pose, UPPER_ARM, clamped};
-use crate::dice::Dice;
+use crate::random::Random;
 use crate::room::Block;
 use crate::subject::Subject;
 use stance::Stance;
 
-/// What a person can be seen doing.
+/// What the person does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Action {
     /// Around the middle of the room.
@@ -52,7 +52,7 @@ impl Action {
         Self::Lying,
     ];
 
-    /// What it is called on the command line and in files.
+    /// Its name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Walking => "walking",
@@ -74,7 +74,7 @@ impl Action {
     }
 }
 
-/// A person who acts.
+/// A person doing an action.
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
     pub(crate) bones: Bones,
@@ -82,25 +82,25 @@ pub(crate) struct Motion {
     action: Action,
 }
 
-/// What every action of one performance shares.
+/// Parameters that every action uses.
 #[derive(Debug, Clone)]
 struct Actor {
     subject: Subject,
-    dice: Dice,
+    random: Random,
     /// Direction that the person faces at first, radians from x to y.
     heading: f64,
-    /// Where the person stands, or the middle of the way, metres.
+    /// Where the person stands, or the centre of the path, metres.
     place: [f64; 2],
 }
 
 impl Motion {
     /// An action. The same subject, action and seed move the same way.
     pub(crate) fn new(subject: &Subject, action: Action, seed: u64) -> Self {
-        let dice = Dice::new(seed)
+        let random = Random::new(seed)
             .fork("motion")
             .nth(subject.number)
             .fork(action.name());
-        let mut stage = dice.fork("stage");
+        let mut stage = random.fork("stage");
         let bones = Bones::new(&subject.proportions);
         let place = [stage.range(-0.25, 0.25), stage.range(-0.25, 0.25)];
         let heading = stage.range(0.0, core::f64::consts::TAU);
@@ -108,7 +108,7 @@ impl Motion {
             bones,
             actor: Actor {
                 subject: subject.clone(),
-                dice,
+                random,
                 heading,
                 place,
             },
@@ -124,7 +124,7 @@ impl Motion {
             Action::Jogging => gait::jogging(&self.actor, seconds),
             _ => keys::stance(&self.actor, action, seconds),
         };
-        stance.live(&self.actor, seconds);
+        stance.sway(&self.actor, seconds);
         self.grounded(&stance)
     }
 
@@ -163,15 +163,15 @@ impl Motion {
 }
 
 impl Stance {
-    /// What nobody can hold still: slow sway of every joint, collars that rise with the arms.
-    fn live(&mut self, actor: &Actor, seconds: f64) {
+    /// Adds slow sway to every joint, and lifts the collars with the arms.
+    fn sway(&mut self, actor: &Actor, seconds: f64) {
         for (bone, angles) in self.angles.iter_mut().enumerate() {
             for (axis, angle) in angles.iter_mut().enumerate() {
-                let mut dice = actor.dice.fork("sway").nth((3 * bone + axis) as u64);
-                let size = dice.range(0.6, 2.2);
+                let mut random = actor.random.fork("sway").nth((3 * bone + axis) as u64);
+                let size = random.range(0.6, 2.2);
                 for hertz in [0.23, 0.61] {
-                    let hertz = hertz * dice.range(0.8, 1.25);
-                    let phase = dice.range(0.0, core::f64::consts::TAU);
+                    let hertz = hertz * random.range(0.8, 1.25);
+                    let phase = random.range(0.0, core::f64::consts::TAU);
                     *angle += size * (core::f64::consts::TAU * hertz * seconds + phase).sin();
                 }
             }

@@ -1,4 +1,4 @@
-//! A person put into a background: samples shaded, shadows cast, pixels written.
+//! Renders a person in front of a background: shades samples, casts shadows, writes pixels.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Vector3};
 
@@ -20,7 +20,7 @@ pub(crate) struct Figure {
     pub(crate) wear: Wear,
 }
 
-/// Buffers that are used again from picture to picture.
+/// The renderer; its buffers are reused from picture to picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Painter {
     posed: Posed,
@@ -28,12 +28,12 @@ pub(crate) struct Painter {
     pub(crate) samples: Samples,
     shadow: Shadow,
     curve: Curve,
-    /// What the bones do to directions at rest.
+    /// By bone, the rotation of directions at rest.
     turns: [Matrix3<f32>; N_BONES],
     eye: Vector3<f32>,
 }
 
-/// What is painted: all in the frame of the stage.
+/// The input of a picture, all in the frame of the stage.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Subject<'a> {
     pub(crate) figure: &'a Figure,
@@ -56,7 +56,7 @@ impl Painter {
         }
     }
 
-    /// Finds out which samples see the person.
+    /// Determines which samples see the person.
     pub(crate) fn draw(&mut self, of: &Subject<'_>) {
         let mesh = &of.figure.mesh;
         mesh.pose(of.frames, &mut self.posed);
@@ -148,7 +148,7 @@ impl Painter {
         Some((sum + behind * (all - n as f32)) / all)
     }
 
-    /// The light that a place of the body sends to the camera.
+    /// The light reflected to the camera by a place of the body.
     fn shade(&self, of: &Subject<'_>, triangle: usize, place: Point2<f32>) -> Linear {
         let Figure { mesh, wear } = of.figure;
         let corners = mesh.triangles[triangle].map(|it| it as usize);
@@ -174,7 +174,7 @@ impl Painter {
             .try_normalize(1e-6)
             .map_or(0.0, |it| it.dot(&normal).max(0.0));
         let shine = finish.gloss * mirrored.powi(24) * 4.0 * (1.0 - dark);
-        // What looks down near the floor is darker still.
+        // Places near the floor are darker.
         let low = 1.0 - 0.35 * (-(at.z.max(0.0)) / 0.25).exp();
         finish
             .colour

@@ -1,4 +1,4 @@
-//! What the person of a scene does: an action that is made up, or a recording.
+//! What the person of a scene does: a generated action, or a recording.
 
 use nalgebra::Isometry3;
 
@@ -13,7 +13,7 @@ pub(crate) struct Performance {
     pub(crate) bones: Bones,
     /// Standing height of the person, metres.
     pub(crate) height: f64,
-    /// What the truth calls it.
+    /// Its name in the ground truth.
     pub(crate) name: String,
     pub(crate) course: Course,
 }
@@ -30,11 +30,11 @@ impl Performance {
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         match &self.course {
             Course::Acted(motion) => self.bones.frames(&motion.pose(seconds)),
-            Course::Recorded(it) => it.frames(seconds),
+            Course::Recorded(recorded) => recorded.frames(seconds),
         }
     }
 
-    /// Chairs, tables and mats that it needs; nobody knows what a recording needs.
+    /// Chairs, tables and mats that the action needs; none for a recording, where they are unknown.
     pub(crate) fn furniture(&self) -> Vec<Block> {
         match &self.course {
             Course::Acted(motion) => motion.furniture(),

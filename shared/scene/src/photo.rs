@@ -1,4 +1,4 @@
-//! A photograph that stands behind the person.
+//! A photograph as the background.
 
 use footage::{FootageError, Size};
 use nalgebra::Vector2;
@@ -19,7 +19,7 @@ impl Photo {
         Ok(Self { size, rgb })
     }
 
-    /// The colour at shares of the width and the height, between the nearest pixels.
+    /// The colour at fractions of the width and the height, interpolated bilinearly.
     pub(crate) fn at(&self, share: Vector2<f32>) -> Linear {
         let Size { width, height } = self.size;
         if width == 0 || height == 0 {

@@ -1,4 +1,4 @@
-//! Triangles to samples: which triangle is nearest, four samples a pixel.
+//! The rasteriser: which triangle is nearest at every sample, four samples per pixel.
 
 #[cfg(test)]
 mod reference;
@@ -8,13 +8,13 @@ use nalgebra::{Point2, Point3, Vector3};
 /// Samples along the side of a pixel.
 pub(crate) const SUB: usize = 2;
 
-/// A corner on the picture: pixels, and 1 / depth; depth 0 is behind the camera.
+/// A projected corner: pixels, and 1 / depth; 0 if it is behind the camera.
 pub(crate) type Corner = Vector3<f32>;
 
 /// No triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
-/// Which triangle every sample sees, and how far it is.
+/// The z-buffer: the nearest triangle of every sample and its distance.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Samples {
     /// Samples a row.
@@ -28,7 +28,7 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    /// Begins a picture: nothing is nearer than what `behind` says, a value a sample.
+    /// Begins a picture. `behind` is the background: 1 / depth of every sample.
     pub(crate) fn begin(&mut self, width: usize, height: usize, behind: &[f32]) {
         (self.width, self.height) = (width, height);
         self.near.clear();
@@ -94,7 +94,7 @@ impl Samples {
     }
 }
 
-/// Samples on an edge belong to both sides, whatever rounding says, so that there are no gaps.
+/// Samples on an edge belong to both sides, so that rounding leaves no gaps.
 const EDGE: f32 = 1e-5;
 
 /// The shares of the corners at a place of the picture, corrected for depth; they sum to 1.
@@ -115,12 +115,12 @@ pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     weighted.map(|it| it / sum)
 }
 
-/// A value of the corners between them.
+/// A value interpolated between those of the corners.
 pub(crate) fn between(values: [&Vector3<f32>; 3], shares: [f32; 3]) -> Vector3<f32> {
     values[0] * shares[0] + values[1] * shares[1] + values[2] * shares[2]
 }
 
-/// The same of points.
+/// The same for points.
 pub(crate) fn point_between(values: [&Point3<f32>; 3], shares: [f32; 3]) -> Point3<f32> {
     Point3::from(between(values.map(|it| &it.coords), shares))
 }

@@ -8,10 +8,10 @@ use crate::body::{
 };
 use crate::truth::N_JOINTS;
 
-/// Where the joints of somebody were over time, as motion capture has them.
+/// Joint positions over time, from motion capture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// What it is called; stands where else the action does.
+    /// Its name, used in the place of the name of an action.
     pub name: String,
     /// Postures a second.
     pub rate_hz: f64,
@@ -19,10 +19,10 @@ pub struct Recording {
     pub postures: Vec<Posture>,
 }
 
-/// Where the joints were at one time: metres, z up.
+/// Joint positions at one time: metres, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posture {
-    /// Those of `skeleton::PARSE14`.
+    /// The joints of `skeleton::PARSE14`.
     pub joints: [[f64; 3]; N_JOINTS],
     /// The toes of the right and of the left foot, if they are known; feet follow the shins without them.
     pub toes: Option<[[f64; 3]; 2]>,
@@ -34,7 +34,7 @@ impl Recording {
         self.postures.len().saturating_sub(1) as f64 / self.rate_hz
     }
 
-    /// Between two postures; before the first and after the last nobody moves.
+    /// The posture at a time, interpolated linearly; constant before the first and after the last.
     fn at(&self, seconds: f64) -> Posture {
         let last = self.postures.len() - 1;
         let place = (seconds * self.rate_hz).clamp(0.0, last as f64);
@@ -62,13 +62,13 @@ const WRISTS: [usize; 2] = [11, 6];
 const NECK_JOINT: usize = 12;
 const HEAD_JOINT: usize = 13;
 
-/// Share of the postures whose lowest point may lie below the floor: the recording is not exact.
+/// Share of the postures whose lowest point may be below the floor, because recordings are not exact.
 const BELOW_FLOOR: f64 = 0.05;
 
-/// A recording as a subject would perform it: directions are those of the recording, lengths the subject's.
+/// A recording transferred to a subject: directions are those of the recording, lengths the subject's.
 ///
-/// The way is scaled as the legs are, moved to the middle of the room, and put on the floor. No joint is
-/// kept within limits: what was recorded is what somebody did.
+/// The path is scaled like the legs, moved to the middle of the room, and put on the floor. Joint limits are
+/// not applied.
 #[derive(Debug, Clone)]
 pub(crate) struct Recorded {
     recording: Recording,
@@ -82,7 +82,7 @@ pub(crate) struct Recorded {
 impl Recorded {
     /// * `height`: of the subject, metres.
     pub(crate) fn new(recording: &Recording, bones: &Bones, height: f64) -> Self {
-        let mut it = Self {
+        let mut recorded = Self {
             scale: leg(bones) / recorded_leg(recording),
             recording: recording.clone(),
             bones: bones.clone(),
@@ -90,20 +90,20 @@ impl Recorded {
         };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut lowest = Vec::new();
-        for posture in &it.recording.postures {
-            let frames = it.posed(posture);
+        for posture in &recorded.recording.postures {
+            let frames = recorded.posed(posture);
             let at = frames[PELVIS].translation.vector;
             for axis in 0..2 {
                 low[axis] = low[axis].min(at[axis]);
                 high[axis] = high[axis].max(at[axis]);
             }
-            lowest.push(it.bones.lowest(&frames, height));
+            lowest.push(recorded.bones.lowest(&frames, height));
         }
         lowest.sort_by(f64::total_cmp);
         let floor = lowest[(BELOW_FLOOR * lowest.len() as f64) as usize];
         let middle = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]));
-        it.shift = -Vector3::new(middle[0], middle[1], floor);
-        it
+        recorded.shift = -Vector3::new(middle[0], middle[1], floor);
+        recorded
     }
 
     /// The frames of all bones at a time, in the frame of the stage.
@@ -146,7 +146,7 @@ fn recorded_leg(recording: &Recording) -> f64 {
     all[all.len() / 2].max(1e-3)
 }
 
-/// The turns of all bones, in the frame of the recording.
+/// The rotations of all bones, in the frame of the recording.
 fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     let joint = |it: usize| Vector3::from(posture.joints[it]);
     let across = |pair: [usize; 2]| joint(pair[LEFT]) - joint(pair[RIGHT]);
@@ -185,9 +185,9 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     turns
 }
 
-/// The turns of the two bones of a limb, which hang down at rest, from where its three joints are.
+/// The rotations of the two bones of a limb, which hang down at rest, from its three joints.
 ///
-/// The axis of the hinge between them follows from the bend; of a straight limb it is that of the trunk.
+/// The axis of the hinge between them follows from the bend; for a straight limb it is that of the trunk.
 ///
 /// * `fold`: 1 if the hinge folds backward, -1 if forward.
 fn hinged(
@@ -202,7 +202,7 @@ fn hinged(
         .unwrap_or_else(UnitQuaternion::identity);
     let straight = carried * (trunk * Vector3::y());
     let bend = fold * upper.cross(&lower);
-    // From 9 to 27 degrees the bend takes over.
+    // Blended from 9 to 27 degrees of bend.
     let share = ((bend.norm() - 0.15) / 0.3).clamp(0.0, 1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let axis = straight * (1.0 - share) + unit(bend, straight) * share;
@@ -210,7 +210,7 @@ fn hinged(
     [upper, turned(down, lower, upper * Vector3::y())]
 }
 
-/// The turn that takes `from` to the direction of `along`, and the axis y as near to `left` as that allows.
+/// The rotation that takes `from` to the direction of `along`, and the axis y as near to `left` as that allows.
 fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQuaternion<f64> {
     let basis = |along: Vector3<f64>, left: Vector3<f64>| {
         let along = unit(along, Vector3::z());
@@ -227,7 +227,7 @@ fn turned(from: Vector3<f64>, along: Vector3<f64>, left: Vector3<f64>) -> UnitQu
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn))
 }
 
-/// A vector of length 1 of that direction, or `other` where it has none.
+/// The unit vector of that direction, or `other` for a zero vector.
 fn unit(it: Vector3<f64>, other: Vector3<f64>) -> Vector3<f64> {
     it.try_normalize(1e-9).unwrap_or(other)
 }

@@ -1,4 +1,4 @@
-//! A room around the stage: floor, walls with windows and pictures, furniture; seen by casting rays.
+//! A room around the stage: floor, walls with windows and pictures, furniture; rendered by ray casting.
 
 mod furnish;
 mod material;
@@ -6,11 +6,11 @@ mod material;
 use nalgebra::{Point3, Vector2, Vector3};
 
 use crate::colour::Linear;
-use crate::dice::Dice;
 use crate::light::Light;
+use crate::random::Random;
 pub(crate) use material::Material;
 
-/// A box that stands upright.
+/// An upright box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Block {
     /// Middle, metres in the frame of the stage.
@@ -19,7 +19,7 @@ pub(crate) struct Block {
     pub(crate) half: [f32; 3],
     /// Sine and cosine of the turn about the vertical.
     turn: [f32; 2],
-    /// Of the ball around it, metres.
+    /// Radius of the bounding ball, metres.
     reach: f32,
     pub(crate) material: Material,
 }
@@ -37,7 +37,7 @@ impl Block {
         }
     }
 
-    /// Larger by so much to every side.
+    /// Larger by a distance to every side.
     fn grown(&self, by: f32) -> Self {
         Self {
             half: self.half.map(|it| it + by),
@@ -79,17 +79,17 @@ pub(crate) struct Hit {
     pub(crate) colour: Linear,
     /// Shines by itself: light does not change it.
     pub(crate) shines: bool,
-    /// Share of the light from around that corners take away.
+    /// Share of the ambient light that corners take away.
     pub(crate) dim: f32,
 }
 
 impl Room {
-    /// A room by chance that holds the cameras.
+    /// A random room that contains the cameras.
     ///
-    /// * `cameras`: where they stand; nothing stands between them and the stage.
-    /// * `furniture`: what the action needs, where it stands.
-    pub(crate) fn new(dice: Dice, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Self {
-        furnish::room(dice, cameras, furniture)
+    /// * `cameras`: their places; no random furniture stands between them and the stage.
+    /// * `furniture`: that of the action, at its place.
+    pub(crate) fn new(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Self {
+        furnish::room(random, cameras, furniture)
     }
 
     /// What a ray from inside the room sees.
@@ -183,8 +183,7 @@ impl Room {
 }
 
 impl Block {
-    /// Where a ray from outside enters: metres along it, the normal there, and the place in the block's
-    /// own frame.
+    /// Where a ray from outside enters: distance along it, the normal, and the place in the block's own frame.
     fn enter(
         &self,
         from: &Point3<f32>,
@@ -194,7 +193,7 @@ impl Block {
         let off = Vector3::from(self.centre) - from.coords;
         let along = off.dot(direction);
         let length2 = direction.norm_squared();
-        // The ray passes the ball around the block, or the ball lies behind.
+        // The ray misses the bounding ball, or the ball lies behind.
         if off.norm_squared() * length2 - along * along > self.reach * self.reach * length2
             || along < -self.reach * length2.sqrt()
         {
@@ -203,10 +202,10 @@ impl Block {
         let inside =
             |v: Vector3<f32>| Vector3::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x, v.z);
         let origin = inside(-off);
-        let way = inside(*direction);
+        let heading = inside(*direction);
         let (mut first, mut last, mut face) = (f32::MIN, f32::MAX, 0);
         for axis in 0..3 {
-            let over = 1.0 / way[axis];
+            let over = 1.0 / heading[axis];
             let mid = -origin[axis] * over;
             let reach = self.half[axis] * over.abs();
             if mid - reach > first {
@@ -218,13 +217,13 @@ impl Block {
             return None;
         }
         let mut normal = Vector3::zeros();
-        normal[face] = -way[face].signum();
+        normal[face] = -heading[face].signum();
         let normal = Vector3::new(
             cos * normal.x - sin * normal.y,
             sin * normal.x + cos * normal.y,
             normal.z,
         );
-        Some((first, normal, origin + way * first))
+        Some((first, normal, origin + heading * first))
     }
 }
 

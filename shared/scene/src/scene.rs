@@ -1,4 +1,4 @@
-//! A scene put together, and what each of its cameras sees of it.
+//! A scene, and the pictures and ground truth of each of its cameras.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::backdrop::Backdrop;
 use crate::body::{Bones, CHEST, N_BONES, PELVIS};
-use crate::dice::Dice;
 use crate::light::Light;
 use crate::mesh;
 use crate::motion::Motion;
 use crate::painter::{self, Figure, Painter};
 use crate::performance::{Course, Performance};
 use crate::photo::{Photo, photos_in};
+use crate::random::Random;
 use crate::raster::{NOTHING, SUB};
 use crate::recorded::{Recorded, Recording};
 use crate::rigs::{self, RigChoiceError};
 use crate::room::Room;
 use crate::settings::Settings;
 use crate::subject::Subject;
-use crate::truth::{Header, N_JOINTS, View as SeenJoints};
+use crate::truth::{Header, N_JOINTS, View as ViewTruth};
 use crate::wear::Wear;
 
 /// Why there is no scene.
@@ -33,7 +33,7 @@ pub enum SceneError {
     /// A photograph for the background.
     #[error("a background")]
     Backdrop(#[from] FootageError),
-    /// A calibration as wrong as was asked for is none.
+    /// With the requested calibration error the cameras are no valid rig.
     #[error("the calibration error")]
     Calibration(#[from] RigError),
     /// No such camera.
@@ -55,17 +55,17 @@ pub struct Scene {
     performance: Performance,
     figure: Figure,
     room: Room,
-    dice: Dice,
+    random: Random,
 }
 
-/// How much flesh there is around a joint: what is nearer to the camera by more hides it, metres of a person
+/// Thickness of the body around a joint: a surface nearer to the camera by more occludes it. Metres for a person
 /// of 1.75 m, in the order of `skeleton::PARSE14`.
-const FLESH: [f64; N_JOINTS] = [
+const TISSUE: [f64; N_JOINTS] = [
     0.07, 0.085, 0.16, 0.16, 0.085, 0.07, 0.055, 0.07, 0.10, 0.10, 0.07, 0.055, 0.10, 0.13,
 ];
 
 impl Scene {
-    /// Puts a scene together: makes the surface of the person, furnishes the room.
+    /// Makes a scene: the surface of the person and the room.
     ///
     /// # Errors
     ///
@@ -82,8 +82,8 @@ impl Scene {
         Self::of(settings, &subject, performance)
     }
 
-    /// The same of a recording: the subject does what was recorded, in the middle of the room, as large as the
-    /// subject is. The action of the settings does not count.
+    /// Makes a scene of a recording: the subject does what was recorded, in the middle of the room, scaled to the
+    /// subject's size. The action of the settings is ignored.
     ///
     /// # Errors
     ///
@@ -113,9 +113,9 @@ impl Scene {
     ) -> Result<Self, SceneError> {
         let rig = settings.rig.rig()?;
         let world_from_stage = rigs::world_from_stage(&rig)?;
-        let (flesh, mesh) = mesh::of(subject, &performance.bones);
-        let wear = Wear::new(subject, &flesh);
-        let dice = Dice::new(settings.seed)
+        let (shape, mesh) = mesh::of(subject, &performance.bones);
+        let wear = Wear::new(subject, &shape);
+        let random = Random::new(settings.seed)
             .fork("scene")
             .nth(settings.subject)
             .fork(&performance.name);
@@ -123,9 +123,9 @@ impl Scene {
         let eyes = rig
             .cameras()
             .iter()
-            .map(|it| (stage_from_world * it.centre_in_world()).cast());
+            .map(|camera| (stage_from_world * camera.centre_in_world()).cast());
         let eyes: Vec<Point3<f32>> = eyes.collect();
-        let room = Room::new(dice, &eyes, performance.furniture());
+        let room = Room::new(random, &eyes, performance.furniture());
         Ok(Self {
             settings: settings.clone(),
             rig,
@@ -133,7 +133,7 @@ impl Scene {
             performance,
             figure: Figure { mesh, wear },
             room,
-            dice,
+            random,
         })
     }
 
@@ -152,13 +152,13 @@ impl Scene {
         &self.rig
     }
 
-    /// The cameras as a calibration with the asked error has them.
+    /// The cameras with the requested calibration error.
     ///
     /// # Errors
     ///
     /// [`RigError`] if the error is so large that no rig is left.
     pub fn written_rig(&self) -> Result<Rig, RigError> {
-        self.settings.flaws.written(&self.rig, self.dice)
+        self.settings.flaws.written(&self.rig, self.random)
     }
 
     /// The first line of the truth.
@@ -198,14 +198,14 @@ impl Scene {
         camera_of(&self.rig, name)
     }
 
-    /// When a camera took the picture of a frame, and whether it is that of an earlier one.
+    /// When a camera took the picture of a frame, and whether it repeats that of an earlier one.
     fn taken(&self, camera: usize, frame: u64) -> (f64, bool) {
         let flaws = &self.settings.flaws;
         let mut shown = frame;
-        while flaws.drops(self.dice, camera, shown) {
+        while flaws.drops(self.random, camera, shown) {
             shown -= 1;
         }
-        let late = flaws.late_s(self.dice, camera);
+        let late = flaws.late_s(self.random, camera);
         (self.seconds(shown) + late, shown != frame)
     }
 }
@@ -241,24 +241,24 @@ pub struct View {
 }
 
 impl View {
-    /// Looks at the room: takes as long as some pictures.
+    /// Renders the background, which takes as long as some pictures.
     ///
     /// # Errors
     ///
     /// [`SceneError::Backdrop`] if a photograph cannot be read, [`SceneError::NoCamera`].
     pub fn new(scene: &Arc<Scene>, camera: usize) -> Result<Self, SceneError> {
         let camera = camera_of(&scene.rig, &camera.to_string())?;
-        let it = &scene.rig.cameras()[camera];
+        let in_world = &scene.rig.cameras()[camera];
         let on_stage = Camera {
-            camera_from_world: it.camera_from_world * scene.world_from_stage,
-            ..it.clone()
+            camera_from_world: in_world.camera_from_world * scene.world_from_stage,
+            ..in_world.clone()
         };
         let photo = match &scene.settings.backdrop {
             None => None,
             Some(folder) => {
                 let all = photos_in(folder)?;
-                let mut dice = scene.dice.fork("backdrop").nth(camera as u64);
-                Some(Photo::read(dice.pick::<std::path::PathBuf>(&all))?)
+                let mut random = scene.random.fork("backdrop").nth(camera as u64);
+                Some(Photo::read(random.pick::<std::path::PathBuf>(&all))?)
             }
         };
         let backdrop = Backdrop::new(&on_stage, &scene.room, photo.as_ref());
@@ -276,14 +276,14 @@ impl View {
         self.backdrop.size
     }
 
-    /// Makes the picture of a frame, and says what is true of it.
+    /// Makes the picture of a frame, and its ground truth.
     ///
     /// * `rgb`: `width * height * 3` bytes, all of them written.
     ///
     /// # Panics
     ///
     /// If `rgb` has another length.
-    pub fn picture(&mut self, frame: u64, rgb: &mut [u8]) -> SeenJoints {
+    pub fn picture(&mut self, frame: u64, rgb: &mut [u8]) -> ViewTruth {
         assert_eq!(
             rgb.len(),
             self.size().rgb_bytes(),
@@ -301,24 +301,24 @@ impl View {
             light,
         };
         self.painter.paint(&subject, rgb);
-        let dice = self
+        let random = self
             .scene
-            .dice
+            .random
             .fork("spoil")
             .nth(self.camera as u64)
             .nth(seconds.to_bits());
         self.scene
             .settings
             .flaws
-            .spoil(dice, self.backdrop.size, rgb);
-        self.seen(&frames, seconds, repeated)
+            .degrade(random, self.backdrop.size, rgb);
+        self.ground_truth(&frames, seconds, repeated)
     }
 
-    /// What is true of the picture of a frame, without the picture.
-    pub fn truth(&mut self, frame: u64) -> SeenJoints {
+    /// The ground truth of the picture of a frame, without the picture.
+    pub fn truth(&mut self, frame: u64) -> ViewTruth {
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
         let frames = self.draw(seconds);
-        self.seen(&frames, seconds, repeated)
+        self.ground_truth(&frames, seconds, repeated)
     }
 
     /// How much of every pixel of the last picture the person covers, 0 to 255, row major.
@@ -342,47 +342,54 @@ impl View {
         frames
     }
 
-    fn seen(&self, frames: &[Isometry3<f64>; N_BONES], seconds: f64, repeated: bool) -> SeenJoints {
+    fn ground_truth(
+        &self,
+        frames: &[Isometry3<f64>; N_BONES],
+        seconds: f64,
+        repeated: bool,
+    ) -> ViewTruth {
         let camera = &self.scene.rig.cameras()[self.camera];
         let joints = self.scene.performance.bones.joints(frames);
-        let in_world = joints.map(|it| self.scene.world_from_stage * it);
-        let pixels = in_world.map(|it| camera.project(&it).map(|it| it.coords.into()));
+        let in_world = joints.map(|joint| self.scene.world_from_stage * joint);
+        let pixels = in_world.map(|joint| camera.project(&joint).map(|px| px.coords.into()));
         let eye = self.on_stage.centre_in_world();
         let facing: f64 = [CHEST, PELVIS]
             .iter()
-            .map(|it| {
-                let to_eye = eye - Point3::from(frames[*it].translation.vector);
-                (frames[*it].rotation * Vector3::x()).dot(&to_eye)
+            .map(|bone| {
+                let to_eye = eye - Point3::from(frames[*bone].translation.vector);
+                (frames[*bone].rotation * Vector3::x()).dot(&to_eye)
             })
             .sum();
-        SeenJoints {
+        ViewTruth {
             camera: camera.name.clone(),
             seconds,
             repeated,
             from_behind: facing < 0.0,
-            visible: core::array::from_fn(|it| self.is_visible(it, &joints[it], pixels[it])),
+            visible: core::array::from_fn(|joint| {
+                self.is_visible(joint, &joints[joint], pixels[joint])
+            }),
             pixels,
             outline: self.outline(),
         }
     }
 
-    /// Whether nothing stands before a joint but the flesh around it.
+    /// Whether nothing occludes a joint but the body around it.
     fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
         let Some([x, y]) = pixel else { return false };
         let samples = &self.painter.samples;
-        let index = |it: f64, n: usize| {
-            let it = ((it + 0.5) * SUB as f64).floor();
-            (it >= 0.0 && it < n as f64).then_some(it as usize)
+        let index = |pixel: f64, n: usize| {
+            let sample = ((pixel + 0.5) * SUB as f64).floor();
+            (sample >= 0.0 && sample < n as f64).then_some(sample as usize)
         };
         let (Some(column), Some(row)) = (index(x, samples.width), index(y, samples.height)) else {
             return false;
         };
         let depth = (self.on_stage.camera_from_world * at).z;
-        let before = depth - 1.0 / f64::from(samples.near[row * samples.width + column]);
-        before < FLESH[joint] * self.scene.performance.height / 1.75
+        let in_front = depth - 1.0 / f64::from(samples.near[row * samples.width + column]);
+        in_front < TISSUE[joint] * self.scene.performance.height / 1.75
     }
 
-    /// Around the samples that see the person, pixels.
+    /// The bounding box of the samples that see the person, pixels.
     fn outline(&self) -> Option<[f64; 4]> {
         let samples = &self.painter.samples;
         let [x1, y1, x2, y2] = samples.touched;
@@ -395,7 +402,7 @@ impl View {
                 }
             }
         }
-        let pixel = |it: usize| (it / SUB) as f64;
+        let pixel = |sample: usize| (sample / SUB) as f64;
         (low[0] != usize::MAX)
             .then(|| [pixel(low[0]), pixel(low[1]), pixel(high[0]), pixel(high[1])])
     }

@@ -1,4 +1,4 @@
-//! What a scene is: the settings, and the address that says all of them in one line.
+//! The settings of a scene, and the address that holds all of them in one line.
 
 use std::path::{Path, PathBuf};
 
@@ -11,22 +11,22 @@ use crate::rigs::{RigChoice, RigChoiceError};
 pub struct Settings {
     /// The cameras.
     pub rig: RigChoice,
-    /// Number of the subject: shape, clothes, manners.
+    /// Number of the subject: shape, clothes, style of movement.
     pub subject: u64,
     /// What the subject does.
     pub action: Action,
-    /// What chance begins with: the performance, the room, the lamps.
+    /// Seed of the random choices: the performance, the room, the lamps.
     pub seed: u64,
     /// Frames a second.
     pub rate_hz: f64,
-    /// Folder of photographs to stand in the place of the room, one for every camera by chance.
+    /// Folder of photographs to use instead of the room, a random one for every camera.
     pub backdrop: Option<PathBuf>,
-    /// How bad the cameras are.
+    /// The flaws of the cameras.
     pub flaws: Flaws,
 }
 
 impl Default for Settings {
-    /// Subject 1 walks before the cameras of HumanEva, 30 frames a second, no flaws.
+    /// Subject 1 walks in front of the cameras of HumanEva, 30 frames a second, no flaws.
     fn default() -> Self {
         Self {
             rig: RigChoice::HumanEva,
@@ -40,7 +40,7 @@ impl Default for Settings {
     }
 }
 
-/// Why an address is none.
+/// Why an address is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum AddressError {
     /// It does not begin with `synth://`.
@@ -49,19 +49,19 @@ pub enum AddressError {
     /// The rig.
     #[error("the rig of the address")]
     Rig(#[from] RigChoiceError),
-    /// A key that there is not.
+    /// An unknown key.
     #[error("unknown key {key:?}, expected one of {}", Address::KEYS.join(", "))]
     Key {
-        /// What was said.
+        /// The key.
         key: String,
     },
     /// A key without `=`, or twice.
     #[error("{text:?} is not one key=value, each key once")]
     Pair {
-        /// What was said.
+        /// The text.
         text: String,
     },
-    /// A value that cannot be.
+    /// An invalid value.
     #[error("{key}={value}: expected {expected}")]
     Value {
         /// The key.
@@ -71,7 +71,7 @@ pub enum AddressError {
         /// What it should be.
         expected: String,
     },
-    /// A flaw that cannot be.
+    /// An invalid flaw.
     #[error("a flaw of the address")]
     Flaw(#[from] FlawError),
     /// No camera is named.
@@ -93,14 +93,14 @@ pub struct Address {
     pub settings: Settings,
     /// Name of the camera in the rig, or its number there, from 0.
     pub camera: String,
-    /// Frames that there are.
+    /// Number of frames.
     pub n_frames: u64,
 }
 
 const SCHEME: &str = "synth://";
 
 impl Address {
-    /// Keys of an address, before those of the flaws; `camera` must be said.
+    /// Keys of an address, those of the flaws last; `camera` is required.
     pub const KEYS: [&'static str; 14] = [
         "camera",
         "action",
@@ -118,12 +118,12 @@ impl Address {
         "calibration-mm",
     ];
 
-    /// Whether a text wants to be an address.
-    pub fn is_one(text: &str) -> bool {
+    /// Whether a text begins like an address, valid or not.
+    pub fn is_address(text: &str) -> bool {
         text.starts_with(SCHEME)
     }
 
-    /// Reads an address. What is not said is as in [`Settings::default`]; 300 frames.
+    /// Reads an address. Missing keys are as in [`Settings::default`]; 300 frames.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl Address {
     pub fn parse(text: &str) -> Result<Self, AddressError> {
         let rest = text.strip_prefix(SCHEME).ok_or(AddressError::Scheme)?;
         let (rig, query) = rest.split_once('?').unwrap_or((rest, ""));
-        let mut it = Self {
+        let mut address = Self {
             settings: Settings {
                 rig: RigChoice::parse(rig)?,
                 ..Settings::default()
@@ -149,28 +149,28 @@ impl Address {
                 return Err(wrong());
             }
             seen.push(key);
-            it.set(key, value)?;
+            address.set(key, value)?;
         }
-        it.settings.flaws.check()?;
-        if it.camera.is_empty() {
+        address.settings.flaws.check()?;
+        if address.camera.is_empty() {
             return Err(AddressError::NoCamera);
         }
-        Ok(it)
+        Ok(address)
     }
 
-    /// The address with relative paths taken as relative to `base`; what is no address stays as it is.
+    /// The address with relative paths taken as relative to `base`; any other text is returned unchanged.
     #[must_use]
     pub fn relative_to(text: &str, base: &Path) -> String {
-        let Ok(mut it) = Self::parse(text) else {
+        let Ok(mut address) = Self::parse(text) else {
             return text.to_owned();
         };
-        if let RigChoice::File(path) = &mut it.settings.rig {
+        if let RigChoice::File(path) = &mut address.settings.rig {
             *path = base.join(&path);
         }
-        if let Some(folder) = &mut it.settings.backdrop {
+        if let Some(folder) = &mut address.settings.backdrop {
             *folder = base.join(&folder);
         }
-        it.to_string()
+        address.to_string()
     }
 
     fn set(&mut self, key: &str, value: &str) -> Result<(), AddressError> {
@@ -213,7 +213,7 @@ impl Address {
 }
 
 impl std::fmt::Display for Address {
-    /// The address, with all that is not as in the default.
+    /// The address; flaws that are 0 are left out.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Settings {
             rig,
@@ -249,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wrong_addresses_say_what_is_wrong() {
+    fn errors_of_invalid_addresses_name_the_cause() {
         let cases = [
             ("http://x", "begins with synth://"),
             ("synth://nowhere?camera=0", "rig of the address"),
@@ -264,28 +264,56 @@ mod tests {
             ("synth://umpm?camera=l&drop=2", "flaw"),
         ];
         for (text, expected) in cases {
-            let said = Address::parse(text).unwrap_err().to_string();
-            assert!(said.contains(expected), "{text}: {said}");
+            let error = Address::parse(text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{text}: {error}");
         }
     }
 
     #[test]
-    fn the_keys_of_all_flaws_are_told() {
+    fn every_flaw_is_a_key() {
         for name in Flaws::NAMES {
             assert!(Address::KEYS.contains(&name));
         }
     }
 
+    /// Pairs that are valid wherever they stand, but for a key that comes twice.
+    fn pair() -> impl Strategy<Value = String> {
+        prop_oneof![
+            "action=(walking|boxing|throw-catch)",
+            "(subject|seed|frames)=[0-9]{1,12}",
+            "rate=[1-9][0-9]{0,1}(\\.[0-9]{1,4})?",
+            "backdrop=[a-z/. ]{1,8}",
+            "(noise|blur|desync|calibration-degrees|calibration-mm)=[0-9](\\.[0-9]{1,6})?",
+            "exposure=-?[1-7]",
+            "drop=0(\\.[0-8])?",
+        ]
+    }
+
     proptest! {
+        /// Valid texts in any spelling, so that the assertion is reached.
         #[test]
-        fn any_text_is_an_address_or_an_error(text in "(synth://)?[a-z:/0-9.]{0,12}[?]?[a-z=&0-9.-]{0,40}") {
-            if let Ok(it) = Address::parse(&text) {
-                prop_assert_eq!(Address::parse(&it.to_string()).unwrap(), it);
+        fn a_parsed_address_is_written_and_parsed_to_the_same(
+            rig in "humaneva|umpm|ring:[1-9](:[2-9](\\.[0-9]{1,3})?)?|[a-z]{1,5}/[a-z]{1,5}\\.toml",
+            camera in "[a-zA-Z0-9_]{1,4}", pairs in prop::collection::vec(pair(), 0..4),
+        ) {
+            let mut keys: Vec<&str> = pairs.iter().filter_map(|pair| pair.split('=').next()).collect();
+            keys.sort_unstable();
+            keys.dedup();
+            let text = format!("synth://{rig}?camera={camera}&{}", pairs.join("&"));
+            let parsed = Address::parse(&text);
+            prop_assert_eq!(parsed.is_ok(), keys.len() == pairs.len(), "{}: {:?}", text, parsed);
+            if let Ok(address) = parsed {
+                prop_assert_eq!(Address::parse(&address.to_string()).unwrap(), address);
             }
         }
 
         #[test]
-        fn what_is_written_is_read(
+        fn no_text_panics(text in "(synth://)?[a-z:/0-9.]{0,12}[?]?[a-z=&0-9.-]{0,40}") {
+            drop(Address::parse(&text));
+        }
+
+        #[test]
+        fn a_written_address_is_read_back(
             subject: u64, seed: u64, action in 0..10_usize, n_frames in 1..u64::MAX,
             noise in 0.0..50.0, desync in 0.0..1.0, n in 1_usize..60, radius in 2.0..50.0,
         ) {

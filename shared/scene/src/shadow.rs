@@ -1,4 +1,4 @@
-//! The shadow of a person: how near to the lamp the body is, across its rays.
+//! The shadow of a person: a shadow map of the key lamp.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -7,7 +7,7 @@ use crate::light::Light;
 /// Width of a cell, metres.
 const CELL: f32 = 0.011;
 
-/// The body as the key lamp sees it.
+/// The shadow map of the body.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shadow {
     low: Vector2<f32>,
@@ -19,8 +19,6 @@ pub(crate) struct Shadow {
 
 impl Shadow {
     /// Draws the body.
-    ///
-    /// * `reach`: farther out than this from the middle of the stage nothing is drawn, metres.
     pub(crate) fn cast(&mut self, light: &Light, points: &[Point3<f32>], triangles: &[[u32; 3]]) {
         let beams: Vec<(Vector2<f32>, f32)> =
             points.iter().map(|it| light.beam(&it.coords)).collect();
@@ -69,12 +67,10 @@ impl Shadow {
         }
     }
 
-    /// Share of the lamp's light that the body takes away from a point, 0 to 1.
+    /// Share of the lamp's light that the body blocks at a point, 0 to 1: the mean over a square of cells.
     ///
-    /// The mean over a square of cells, more of them the larger the lamp is taken to be.
-    ///
-    /// * `reach`: cells to every side.
-    /// * `bias`: what is not nearer to the lamp than this casts no shadow, metres.
+    /// * `reach`: cells to every side; more for a larger lamp.
+    /// * `bias`: surfaces that are nearer to the lamp by less cast no shadow, metres.
     pub(crate) fn share(&self, across: Vector2<f32>, near: f32, reach: usize, bias: f32) -> f32 {
         let at = (across - self.low) / CELL;
         let border = reach as f32 + 1.0;
@@ -106,7 +102,7 @@ impl Shadow {
     }
 }
 
-/// The square slides smoothly over the cells: its first and last are covered in part.
+/// Weight of a cell along one axis of the square, whose first and last cells are covered in part.
 fn weight(nth: i64, taps: i64, part: f32) -> f32 {
     match nth {
         0 => 1.0 - part,
@@ -118,11 +114,11 @@ fn weight(nth: i64, taps: i64, part: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dice::Dice;
+    use crate::random::Random;
 
     #[test]
-    fn behind_a_plate_it_is_dark_and_beside_it_is_light() {
-        let light = Light::new(Dice::new(1));
+    fn a_plate_shades_what_is_behind_it_only() {
+        let light = Light::new(Random::new(1));
         let to = light.to_key;
         let side = to.cross(&Vector3::x()).try_normalize(1e-6).unwrap();
         let other = to.cross(&side);

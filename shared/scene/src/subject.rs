@@ -1,11 +1,11 @@
-//! Who is seen: the sizes, the skin, the hair, the clothes and the manners of a person by number.
+//! A synthetic person by number: sizes, skin, hair, clothes and style of movement.
 
 use crate::body::Proportions;
 use crate::colour::{Linear, srgb};
-use crate::dice::Dice;
 use crate::fabric::{Fabric, Pattern};
+use crate::random::Random;
 
-/// A person who does not exist. The same number is the same person, always.
+/// A synthetic person. The same number always gives the same person.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Subject {
     pub(crate) number: u64,
@@ -21,7 +21,7 @@ pub(crate) struct Subject {
     pub(crate) top: Top,
     pub(crate) bottom: Bottom,
     pub(crate) shoes: Linear,
-    pub(crate) manner: Manner,
+    pub(crate) style: Style,
 }
 
 /// Hair of the head and the face.
@@ -57,9 +57,9 @@ pub(crate) struct Bottom {
     pub(crate) is_skirt: bool,
 }
 
-/// How somebody moves: factors and angles that add to every action.
+/// Style of movement: factors and angles that are applied to every action.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Manner {
+pub(crate) struct Style {
     pub(crate) tempo: f64,
     pub(crate) energy: f64,
     pub(crate) arm_swing: f64,
@@ -99,8 +99,8 @@ const SHOES: &[[u8; 3]] = &[
 
 impl Subject {
     pub(crate) fn new(number: u64) -> Self {
-        let dice = Dice::new(number).fork("subject");
-        let mut shape = dice.fork("shape");
+        let random = Random::new(number).fork("subject");
+        let mut shape = random.fork("shape");
         let woman = shape.chance(0.45);
         let sign = if woman { 1.0 } else { 0.0 };
         let proportions = Proportions {
@@ -111,7 +111,7 @@ impl Subject {
             hips: 1.0 + 0.06 * sign + 0.03 * shape.normal(),
         };
         let girth = (1.0 - 0.06 * sign + 0.07 * shape.normal()).clamp(0.82, 1.2);
-        let mut looks = dice.fork("looks");
+        let mut looks = random.fork("looks");
         let skin = srgb(*looks.pick(SKINS)) * looks.range(0.9, 1.08) as f32;
         Self {
             number,
@@ -121,72 +121,72 @@ impl Subject {
             curves: sign as f32,
             skin,
             hair: hair(&mut looks, woman),
-            top: top(&mut dice.fork("top")),
-            bottom: bottom(&mut dice.fork("bottom"), woman),
+            top: top(&mut random.fork("top")),
+            bottom: bottom(&mut random.fork("bottom"), woman),
             shoes: srgb(*looks.pick(SHOES)),
-            manner: manner(&mut dice.fork("manner")),
+            style: style(&mut random.fork("manner")),
         }
     }
 }
 
-fn hair(dice: &mut Dice, woman: bool) -> Hair {
-    let bald = !woman && dice.chance(0.1);
-    let long = dice.chance(if woman { 0.7 } else { 0.08 });
+fn hair(random: &mut Random, woman: bool) -> Hair {
+    let bald = !woman && random.chance(0.1);
+    let long = random.chance(if woman { 0.7 } else { 0.08 });
     Hair {
-        colour: srgb(*dice.pick(HAIRS)),
+        colour: srgb(*random.pick(HAIRS)),
         thickness: if bald {
             0.0
         } else {
-            dice.range(0.006, 0.02) as f32
+            random.range(0.006, 0.02) as f32
         },
         length: if long && !bald {
-            dice.range(0.04, 0.16) as f32
+            random.range(0.04, 0.16) as f32
         } else {
             0.0
         },
-        beard: !woman && dice.chance(0.25),
+        beard: !woman && random.chance(0.25),
     }
 }
 
-fn top(dice: &mut Dice) -> Top {
-    let sleeve = match dice.unit() {
-        it if it < 0.5 => dice.range(0.22, 0.4),
+fn top(random: &mut Random) -> Top {
+    let sleeve = match random.unit() {
+        it if it < 0.5 => random.range(0.22, 0.4),
         it if it < 0.58 => 0.02,
-        _ => dice.range(0.92, 0.98),
+        _ => random.range(0.92, 0.98),
     };
     Top {
-        fabric: Fabric::any(dice, Fabric::TOPS, Pattern::ON_TOPS),
+        fabric: Fabric::any(random, Fabric::TOPS, Pattern::ON_TOPS),
         sleeve: sleeve as f32,
-        hem: dice.range(-0.06, 0.10) as f32,
-        slack: dice.range(0.008, 0.02) as f32,
+        hem: random.range(-0.06, 0.10) as f32,
+        slack: random.range(0.008, 0.02) as f32,
     }
 }
 
-fn bottom(dice: &mut Dice, woman: bool) -> Bottom {
-    let is_skirt = woman && dice.chance(0.25);
-    let is_short = dice.chance(0.3);
+fn bottom(random: &mut Random, woman: bool) -> Bottom {
+    let is_skirt = woman && random.chance(0.25);
+    let is_short = random.chance(0.3);
     let leg = match (is_skirt, is_short) {
-        (true, _) => dice.range(0.4, 0.62),
-        (_, true) => dice.range(0.32, 0.5),
-        _ => dice.range(0.93, 0.99),
+        (true, _) => random.range(0.4, 0.62),
+        (_, true) => random.range(0.32, 0.5),
+        _ => random.range(0.93, 0.99),
     };
     Bottom {
-        fabric: Fabric::any(dice, Fabric::BOTTOMS, Pattern::ON_BOTTOMS),
+        fabric: Fabric::any(random, Fabric::BOTTOMS, Pattern::ON_BOTTOMS),
         leg: leg as f32,
-        slack: dice.range(0.006, 0.02) as f32,
+        slack: random.range(0.006, 0.02) as f32,
         is_skirt,
     }
 }
 
-fn manner(dice: &mut Dice) -> Manner {
-    Manner {
-        tempo: dice.range(0.88, 1.12),
-        energy: dice.range(0.85, 1.15),
-        arm_swing: dice.range(0.6, 1.3),
-        elbows: dice.range(4.0, 22.0),
-        stoop: dice.range(-2.0, 7.0),
-        arms_out: dice.range(7.0, 14.0),
-        toes_out: dice.range(2.0, 12.0),
+fn style(random: &mut Random) -> Style {
+    Style {
+        tempo: random.range(0.88, 1.12),
+        energy: random.range(0.85, 1.15),
+        arm_swing: random.range(0.6, 1.3),
+        elbows: random.range(4.0, 22.0),
+        stoop: random.range(-2.0, 7.0),
+        arms_out: random.range(7.0, 14.0),
+        toes_out: random.range(2.0, 12.0),
     }
 }
 
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_is_one_person_and_another_is_another() {
+    fn the_same_number_gives_the_same_person_and_another_number_another() {
         assert_eq!(Subject::new(3), Subject::new(3));
         for number in 0..50 {
             assert_ne!(Subject::new(number), Subject::new(number + 1));
@@ -203,10 +203,10 @@ mod tests {
     }
 
     #[test]
-    fn people_are_of_all_sorts() {
+    fn people_vary_in_every_property() {
         let people: Vec<Subject> = (0..200).map(Subject::new).collect();
-        let has = |what: &dyn Fn(&Subject) -> bool| {
-            let n = people.iter().filter(|it| what(it)).count();
+        let has = |property: &dyn Fn(&Subject) -> bool| {
+            let n = people.iter().filter(|person| property(person)).count();
             (4..196).contains(&n)
         };
         assert!(has(&|it| it.curves > 0.5));

@@ -1,18 +1,18 @@
-//! What is true of a sequence, as lines of JSON: where the joints are, and what every camera sees of them.
+//! The ground truth of a sequence, as lines of JSON: where the joints are, and what every camera sees of them.
 //!
 //! The format is documented in `TRUTH.md` beside this crate.
 
 use serde::{Deserialize, Serialize};
 use skeleton::JointSet;
 
-/// What the first line of a file says.
+/// The format name in the first line of a file.
 const FORMAT: &str = "parallax-truth";
 const VERSION: u32 = 1;
 
 /// Number of joints, those of `skeleton::PARSE14`.
 pub const N_JOINTS: usize = 14;
 
-/// The first line: what the sequence is.
+/// The first line: the description of the sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
@@ -24,7 +24,7 @@ pub struct Header {
     pub subject: u64,
     /// Name of the action.
     pub action: String,
-    /// What chance was begun with.
+    /// Seed of the random choices.
     pub seed: u64,
     /// Frames a second.
     pub frame_rate_hz: f64,
@@ -58,7 +58,7 @@ pub struct View {
     pub camera: String,
     /// When the picture was taken.
     pub seconds: f64,
-    /// The camera dropped this frame: an earlier picture stands in its place.
+    /// The camera dropped this frame: an earlier picture is repeated.
     pub repeated: bool,
     /// The person's back is turned to the camera.
     pub from_behind: bool,
@@ -66,33 +66,33 @@ pub struct View {
     pub pixels: [Option<[f64; 2]>; N_JOINTS],
     /// Whether the joint can be seen.
     pub visible: [bool; N_JOINTS],
-    /// Around what is seen of the person, `[x1, y1, x2, y2]` pixels.
+    /// Bounding box of the visible part of the person, `[x1, y1, x2, y2]` pixels.
     #[serde(rename = "box")]
     pub outline: Option<[f64; 4]>,
 }
 
-/// Why a line is not what it should be.
+/// Why a line is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// Not JSON, or not of these keys.
+    /// Not JSON, or not with these keys.
     #[error("not a line of a truth file")]
     Syntax(#[from] serde_json::Error),
     /// Another format or version.
     #[error("{format:?} version {version}, expected {FORMAT:?} version {VERSION}")]
     Version {
-        /// What the line says.
+        /// The format in the line.
         format: String,
-        /// What the line says.
+        /// The version in the line.
         version: u32,
     },
-    /// Other joints than ours.
+    /// Other joints than those of `skeleton::PARSE14`.
     #[error("joint {nth} is {got:?}, expected {expected:?}")]
     Joint {
         /// From 1.
         nth: usize,
-        /// What the line says; nothing if there are too few.
+        /// The name in the line; empty if there are too few.
         got: String,
-        /// Its name in `skeleton::PARSE14`; nothing if there are too many.
+        /// Its name in `skeleton::PARSE14`; empty if there are too many.
         expected: String,
     },
     /// More or fewer views than cameras, or of other names.
@@ -104,7 +104,7 @@ pub enum TruthError {
 }
 
 impl Header {
-    /// A header of the joints that we write.
+    /// A header with the joints of `skeleton::PARSE14`.
     pub fn new(subject: u64, action: &str, seed: u64) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -151,7 +151,7 @@ impl Header {
     ///
     /// # Errors
     ///
-    /// None that a header of finite numbers can have.
+    /// None if all numbers are finite.
     pub fn to_line(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self)
     }
@@ -176,7 +176,7 @@ impl Frame {
     ///
     /// # Errors
     ///
-    /// None that a frame of finite numbers can have.
+    /// None if all numbers are finite.
     pub fn to_line(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self)
     }
@@ -188,7 +188,7 @@ impl Frame {
 }
 
 impl View {
-    /// The joints of another set on the picture; `None` if one that they are made of is behind the camera.
+    /// The joints of another set on the picture; `None` if any joint is behind the camera.
     pub fn in_set(&self, set: &JointSet) -> Option<Vec<[f64; 2]>> {
         let mut joints = [[0.0; 2]; N_JOINTS];
         for (joint, pixel) in joints.iter_mut().zip(self.pixels) {
@@ -202,7 +202,7 @@ fn names() -> impl Iterator<Item = &'static str> {
     skeleton::PARSE14.joints.iter().map(|it| it.name)
 }
 
-/// Every set is made of the same parts: goes over those.
+/// Converts joints to another set, by way of the parts that every set is made of.
 fn in_set<const D: usize>(joints: &[[f64; D]; N_JOINTS], set: &JointSet) -> Vec<[f64; D]> {
     let mut parts = [[0.0; D]; skeleton::N_PARTS];
     for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_and_all_else_refused() {
+    fn written_lines_are_read_back_and_invalid_ones_refused() {
         let line = header().to_line().unwrap();
         assert_eq!(Header::parse(&line).unwrap(), header());
         for (from, to) in [

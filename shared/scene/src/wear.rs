@@ -1,14 +1,14 @@
-//! What is where on a person: skin, hair, a face, cloth; asked of points of the body at rest.
+//! The appearance of a person: skin, hair, face and cloth at points of the body at rest.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
 use crate::body::{FOOT, HAND, HEAD, N_BONES, PELVIS, THIGH, UPPER_ARM};
 use crate::colour::{Linear, srgb};
-use crate::dice::noise;
-use crate::flesh::Flesh;
+use crate::random::noise;
+use crate::shape::BodyShape;
 use crate::subject::Subject;
 
-/// How a point of the surface takes light.
+/// Material of a point of the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Finish {
     pub(crate) colour: Linear,
@@ -31,8 +31,8 @@ pub(crate) struct Wear {
 }
 
 impl Wear {
-    pub(crate) fn new(subject: &Subject, flesh: &Flesh) -> Self {
-        let joint = |bone: usize| Point3::from(flesh.frames[bone].translation.vector.cast::<f32>());
+    pub(crate) fn new(subject: &Subject, shape: &BodyShape) -> Self {
+        let joint = |bone: usize| Point3::from(shape.frames[bone].translation.vector.cast::<f32>());
         let limbs = |from: [usize; 2], to: [usize; 2]| {
             [0, 1].map(|side| [joint(from[side]), joint(to[side])])
         };
@@ -40,15 +40,15 @@ impl Wear {
             subject: subject.clone(),
             arms: limbs(UPPER_ARM, HAND),
             legs: limbs(THIGH, FOOT),
-            head_from_rest: flesh.frames[HEAD].cast().inverse(),
+            head_from_rest: shape.frames[HEAD].cast().inverse(),
             hips: joint(PELVIS).z,
-            scale: flesh.height / 1.75,
+            scale: shape.height / 1.75,
         }
     }
 
-    /// How the surface is at a point of the body at rest.
+    /// The material at a point of the body at rest.
     ///
-    /// * `bone`: that the point hangs on.
+    /// * `bone`: that the point follows.
     pub(crate) fn finish(&self, at: &Point3<f32>, bone: usize) -> Finish {
         debug_assert!(bone < N_BONES, "a bone");
         let side = usize::from(at.y < 0.0);

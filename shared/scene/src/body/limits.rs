@@ -1,11 +1,11 @@
-//! How far the joints of a healthy adult turn, degrees.
+//! The joint limits of a healthy adult, degrees.
 
 use super::N_BONES;
 
 /// Smallest and largest flexion, abduction and twist of every bone.
 ///
 /// Rounded from the normal ranges of the American Academy of Orthopaedic Surgeons; the spine's are
-/// dealt out over two bones.
+/// divided between two bones.
 pub(crate) const LIMITS: [[[f64; 2]; 3]; N_BONES] = [
     [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
     [[-15.0, 50.0], [-20.0, 20.0], [-15.0, 15.0]],

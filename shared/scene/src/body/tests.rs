@@ -1,4 +1,4 @@
-//! The skeleton keeps its lengths and its sides.
+//! Bone lengths, sides and the directions of rotation.
 
 use proptest::prelude::*;
 
@@ -28,7 +28,7 @@ fn bent(bone: usize, degrees: [f64; 3]) -> [Isometry3<f64>; N_BONES] {
 }
 
 #[test]
-fn a_standing_person_is_as_tall_as_asked() {
+fn a_standing_person_has_the_requested_height() {
     let bones = bones();
     let frames = bones.frames(&standing());
     let top = (frames[HEAD] * Point3::from(bones.head_top)).z;
@@ -37,7 +37,7 @@ fn a_standing_person_is_as_tall_as_asked() {
 }
 
 #[test]
-fn left_is_left() {
+fn left_joints_are_on_the_left() {
     let joints = bones().joints(&bones().frames(&standing()));
     let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
     for (name, joint) in names.zip(joints) {
@@ -51,7 +51,7 @@ fn left_is_left() {
 }
 
 #[test]
-fn joints_turn_the_way_that_their_names_say() {
+fn positive_angles_turn_joints_in_the_documented_direction() {
     for side in [LEFT, RIGHT] {
         let out = [1.0, -1.0][side];
         let place =

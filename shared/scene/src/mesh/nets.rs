@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::flesh::Grid;
+use crate::shape::Grid;
 
-/// Surface nets (Gibson 1998): one point in every cell that the surface cuts, at the mean of where it cuts
-/// the cell's edges; two triangles for every edge of the lattice that it cuts.
+/// Surface nets (Gibson 1998): one point in every cell that the surface intersects, at the mean of the intersections
+/// with the cell's edges; two triangles for every edge of the lattice that it intersects.
 ///
 /// The border of the lattice must lie outside. Triangles are anticlockwise seen from outside.
 pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {

@@ -6,7 +6,7 @@ use super::Actor;
 use super::stance::Stance;
 use crate::body::{FOOT, FOREARM, SHIN, THIGH, UPPER_ARM};
 
-/// Sizes of one way of going.
+/// Parameters of a gait.
 struct Gait {
     /// Strides (two steps) a second, and metres a stride in heights of the person.
     hertz: f64,
@@ -22,9 +22,9 @@ struct Gait {
 }
 
 pub(super) fn walking(actor: &Actor, seconds: f64) -> Stance {
-    let energy = actor.subject.manner.energy;
+    let energy = actor.subject.style.energy;
     let gait = Gait {
-        hertz: 0.88 * actor.subject.manner.tempo,
+        hertz: 0.88 * actor.subject.style.tempo,
         stride: 0.74 * energy,
         hip: [9.0, 20.0 * energy],
         knee: [56.0, 13.0],
@@ -33,13 +33,13 @@ pub(super) fn walking(actor: &Actor, seconds: f64) -> Stance {
         lean: 2.0,
         flight: 0.0,
     };
-    going(actor, &gait, seconds)
+    gait_stance(actor, &gait, seconds)
 }
 
 pub(super) fn jogging(actor: &Actor, seconds: f64) -> Stance {
-    let energy = actor.subject.manner.energy;
+    let energy = actor.subject.style.energy;
     let gait = Gait {
-        hertz: 1.32 * actor.subject.manner.tempo,
+        hertz: 1.32 * actor.subject.style.tempo,
         stride: 0.98 * energy,
         hip: [18.0, 30.0 * energy],
         knee: [88.0 * energy, 26.0],
@@ -48,7 +48,7 @@ pub(super) fn jogging(actor: &Actor, seconds: f64) -> Stance {
         lean: 8.0,
         flight: 0.05,
     };
-    going(actor, &gait, seconds)
+    gait_stance(actor, &gait, seconds)
 }
 
 /// A bump around a phase of the stride, 1 at its top.
@@ -59,40 +59,40 @@ fn bump(phase: f64, at: f64, width: f64) -> f64 {
 
 /// Joint angles over the stride as bumps and waves after the curves of Winter, *Biomechanics and Motor
 /// Control of Human Movement*, by eye.
-fn going(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
-    let manner = actor.subject.manner;
-    let mut stage = actor.dice.fork("way");
+fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
+    let style = actor.subject.style;
+    let mut stage = actor.random.fork("way");
     let radius = stage.range(0.8, 1.05);
-    let way = if stage.chance(0.5) { 1.0 } else { -1.0 };
+    let direction = if stage.chance(0.5) { 1.0 } else { -1.0 };
     let speed = gait.hertz * gait.stride * actor.subject.proportions.height;
-    let turned = way * speed / radius * seconds;
+    let turned = direction * speed / radius * seconds;
     let stride = stage.unit() + gait.hertz * seconds;
-    let mut it = Stance::standing(&actor.subject).trunk(gait.lean, 0.0, 0.0);
+    let mut stance = Stance::standing(&actor.subject).trunk(gait.lean, 0.0, 0.0);
     for side in 0..2 {
         // The right leg is half a stride behind; an arm goes with the other leg.
         let phase = (stride + 0.5 * side as f64).rem_euclid(1.0);
         let wave = (TAU * phase + 0.25).cos();
-        it.angles[THIGH[side]][0] = gait.hip[0] + gait.hip[1] * wave;
-        it.angles[THIGH[side]][1] = 1.5;
+        stance.angles[THIGH[side]][0] = gait.hip[0] + gait.hip[1] * wave;
+        stance.angles[THIGH[side]][1] = 1.5;
         let swing = gait.knee[0] * bump(phase, 0.71, 0.09);
-        it.angles[SHIN[side]][0] = 4.0 + swing + gait.knee[1] * bump(phase, 0.14, 0.07);
-        it.angles[FOOT[side]][0] = 9.0 * bump(phase, 0.42, 0.12)
+        stance.angles[SHIN[side]][0] = 4.0 + swing + gait.knee[1] * bump(phase, 0.14, 0.07);
+        stance.angles[FOOT[side]][0] = 9.0 * bump(phase, 0.42, 0.12)
             - 19.0 * bump(phase, 0.63, 0.06)
             - 5.0 * bump(phase, 0.07, 0.04);
-        let arm = -gait.arm * manner.arm_swing * wave;
-        it.angles[UPPER_ARM[side]][0] = arm - 2.0;
-        it.angles[FOREARM[side]][0] = gait.elbow + 0.6 * manner.elbows + 0.5 * arm.max(0.0);
+        let arm = -gait.arm * style.arm_swing * wave;
+        stance.angles[UPPER_ARM[side]][0] = arm - 2.0;
+        stance.angles[FOREARM[side]][0] = gait.elbow + 0.6 * style.elbows + 0.5 * arm.max(0.0);
     }
     let wave = (TAU * stride).cos();
-    it = it.trunk(0.0, 1.5 * (TAU * stride).sin(), 5.0 * wave);
-    it.spin = -4.0 * wave;
-    // Towards the middle of the round one leans and looks.
-    it.roll = -2.0 * way;
-    it = it.look(2.0, 6.0 * way + 5.0 * (0.37 * seconds).sin());
-    it.heading = actor.heading + turned + way * TAU / 4.0;
+    stance = stance.trunk(0.0, 1.5 * (TAU * stride).sin(), 5.0 * wave);
+    stance.spin = -4.0 * wave;
+    // Lean and look towards the centre of the path.
+    stance.roll = -2.0 * direction;
+    stance = stance.look(2.0, 6.0 * direction + 5.0 * (0.37 * seconds).sin());
+    stance.heading = actor.heading + turned + direction * TAU / 4.0;
     let angle = actor.heading + turned;
-    it.place = [radius * angle.cos(), radius * angle.sin()];
-    it.planted = false;
-    it.lift = gait.flight * (2.0 * TAU * (stride + 0.13)).cos().max(0.0);
-    it
+    stance.place = [radius * angle.cos(), radius * angle.sin()];
+    stance.planted = false;
+    stance.lift = gait.flight * (2.0 * TAU * (stride + 0.13)).cos().max(0.0);
+    stance
 }

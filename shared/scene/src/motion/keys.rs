@@ -1,9 +1,9 @@
-//! Actions made of key poses: one after the other on a beat, chosen by chance where the action is free.
+//! Actions made of key poses at regular beats, chosen at random where the action allows it.
 
 use super::stance::Stance;
 use super::{Action, Actor, Motion};
 use crate::body::{HEAD, PELVIS, Pose};
-use crate::dice::Dice;
+use crate::random::Random;
 use crate::room::{Block, Material};
 
 /// Seconds from one key pose to the next.
@@ -20,9 +20,9 @@ fn beat_seconds(action: Action) -> f64 {
 
 /// The stance between the two key poses of a time.
 pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
-    let beats = seconds * actor.subject.manner.tempo / beat_seconds(action);
+    let beats = seconds * actor.subject.style.tempo / beat_seconds(action);
     let nth = beats.floor();
-    // The first three quarters of a beat go to the next pose, the last holds it.
+    // The first three quarters of a beat move to the next pose, the last quarter holds it.
     let share = ((beats - nth) / 0.75).min(1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let nth = nth as i64;
@@ -42,22 +42,22 @@ pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
 
 /// The n-th key pose.
 fn key(actor: &Actor, action: Action, nth: i64) -> Stance {
-    let mut dice = actor.dice.fork("keys").nth(nth as u64);
+    let mut random = actor.random.fork("keys").nth(nth as u64);
     let it = Stance::standing(&actor.subject);
     let mut it = match action {
-        Action::Boxing => boxing(it, nth, &mut dice),
-        Action::Gestures => gestures(it, &mut dice),
+        Action::Boxing => boxing(it, nth, &mut random),
+        Action::Gestures => gestures(it, &mut random),
         Action::ThrowCatch => throw_catch(it, nth.rem_euclid(6)),
-        Action::Chair => chair(it, nth.rem_euclid(6), &mut dice),
-        Action::Grab => grab(it, nth.rem_euclid(4), &mut dice),
+        Action::Chair => chair(it, nth.rem_euclid(6), &mut random),
+        Action::Grab => grab(it, nth.rem_euclid(4), &mut random),
         Action::Lean => lean(it, nth, actor),
-        Action::Table => table(it, &mut dice),
-        Action::Lying => lying(it, actor, &mut dice),
+        Action::Table => table(it, &mut random),
+        Action::Lying => lying(it, actor, &mut random),
         Action::Walking | Action::Jogging => it,
     };
     // No two repetitions are the same.
     for angle in it.angles.iter_mut().flatten() {
-        *angle *= 1.0 + 0.06 * dice.normal();
+        *angle *= 1.0 + 0.06 * random.normal();
     }
     if matches!(action, Action::Lying) {
         it
@@ -66,8 +66,8 @@ fn key(actor: &Actor, action: Action, nth: i64) -> Stance {
     }
 }
 
-fn boxing(it: Stance, nth: i64, dice: &mut Dice) -> Stance {
-    let knees = dice.range(18.0, 34.0);
+fn boxing(it: Stance, nth: i64, random: &mut Random) -> Stance {
+    let knees = random.range(18.0, 34.0);
     let guard = it
         .leg(0, 24.0, knees)
         .leg(1, -4.0, knees)
@@ -76,9 +76,9 @@ fn boxing(it: Stance, nth: i64, dice: &mut Dice) -> Stance {
     if nth.rem_euclid(2) == 0 {
         return guard;
     }
-    let side = usize::from(dice.chance(0.45));
+    let side = usize::from(random.chance(0.45));
     let turn = if side == 0 { -28.0 } else { 34.0 };
-    let (shoulder, elbow) = match dice.unit() {
+    let (shoulder, elbow) = match random.unit() {
         it if it < 0.6 => ([84.0, 4.0, -20.0], 10.0),
         it if it < 0.8 => ([62.0, 55.0, -30.0], 85.0),
         _ => ([72.0, 2.0, 0.0], 75.0),
@@ -86,8 +86,8 @@ fn boxing(it: Stance, nth: i64, dice: &mut Dice) -> Stance {
     guard.arm(side, shoulder, elbow).trunk(6.0, 0.0, turn)
 }
 
-/// Shoulder and elbow of an arm that says something.
-const SIGNS: [([f64; 3], f64); 11] = [
+/// Angles of the shoulder and the elbow for gestures.
+const ARM_GESTURES: [([f64; 3], f64); 11] = [
     ([4.0, 10.0, 0.0], 14.0),
     ([4.0, 10.0, 0.0], 14.0),
     ([5.0, 85.0, 78.0], 75.0),
@@ -101,23 +101,23 @@ const SIGNS: [([f64; 3], f64); 11] = [
     ([26.0, 14.0, 8.0], 78.0),
 ];
 
-fn gestures(it: Stance, dice: &mut Dice) -> Stance {
-    let left = *dice.pick(&SIGNS);
-    let right = if dice.chance(0.4) {
+fn gestures(it: Stance, random: &mut Random) -> Stance {
+    let left = *random.pick(&ARM_GESTURES);
+    let right = if random.chance(0.4) {
         left
     } else {
-        *dice.pick(&SIGNS)
+        *random.pick(&ARM_GESTURES)
     };
     it.arm(0, left.0, left.1)
         .arm(1, right.0, right.1)
         .trunk(
-            dice.range(-4.0, 10.0),
-            dice.range(-5.0, 5.0),
-            dice.range(-16.0, 16.0),
+            random.range(-4.0, 10.0),
+            random.range(-5.0, 5.0),
+            random.range(-16.0, 16.0),
         )
-        .look(dice.range(-8.0, 12.0), dice.range(-30.0, 30.0))
-        .leg(0, dice.range(-3.0, 6.0), dice.range(2.0, 12.0))
-        .leg(1, dice.range(-3.0, 6.0), dice.range(2.0, 12.0))
+        .look(random.range(-8.0, 12.0), random.range(-30.0, 30.0))
+        .leg(0, random.range(-3.0, 6.0), random.range(2.0, 12.0))
+        .leg(1, random.range(-3.0, 6.0), random.range(2.0, 12.0))
 }
 
 fn throw_catch(it: Stance, phase: i64) -> Stance {
@@ -154,8 +154,8 @@ fn sitting(it: Stance) -> Stance {
     it
 }
 
-fn chair(it: Stance, phase: i64, dice: &mut Dice) -> Stance {
-    let rest = |it: Stance, dice: &mut Dice| match dice.unit() {
+fn chair(it: Stance, phase: i64, random: &mut Random) -> Stance {
+    let rest = |it: Stance, random: &mut Random| match random.unit() {
         share if share < 0.5 => it.arms([24.0, 8.0, -8.0], 62.0),
         share if share < 0.75 => it.arms([42.0, 8.0, -42.0], 98.0),
         _ => it
@@ -170,15 +170,19 @@ fn chair(it: Stance, phase: i64, dice: &mut Dice) -> Stance {
             .trunk(22.0, 0.0, 0.0)
             .arms([34.0, 8.0, 0.0], 40.0)
             .look(-20.0, 0.0),
-        2 => rest(sitting(it), dice),
-        3 => rest(sitting(it), dice).trunk(dice.range(-8.0, 18.0), 0.0, dice.range(-20.0, 20.0)),
-        _ => rest(sitting(it), dice).look(dice.range(-5.0, 20.0), dice.range(-40.0, 40.0)),
+        2 => rest(sitting(it), random),
+        3 => rest(sitting(it), random).trunk(
+            random.range(-8.0, 18.0),
+            0.0,
+            random.range(-20.0, 20.0),
+        ),
+        _ => rest(sitting(it), random).look(random.range(-5.0, 20.0), random.range(-40.0, 40.0)),
     }
 }
 
-fn grab(it: Stance, phase: i64, dice: &mut Dice) -> Stance {
+fn grab(it: Stance, phase: i64, random: &mut Random) -> Stance {
     match phase {
-        0 if dice.chance(0.5) => it
+        0 if random.chance(0.5) => it
             .legs(112.0, 112.0)
             .pitched(30.0)
             .trunk(22.0, 0.0, 0.0)
@@ -186,31 +190,31 @@ fn grab(it: Stance, phase: i64, dice: &mut Dice) -> Stance {
         0 => it
             .legs(72.0, 34.0)
             .pitched(52.0)
-            .trunk(44.0, 0.0, dice.range(-12.0, 12.0))
+            .trunk(44.0, 0.0, random.range(-12.0, 12.0))
             .arms([74.0, 4.0, 0.0], 12.0)
             .look(-20.0, 0.0),
         1 => it.arms([24.0, 8.0, -14.0], 86.0).look(15.0, 0.0),
         2 => {
-            let turn = dice.range(-25.0, 25.0);
+            let turn = random.range(-25.0, 25.0);
             it.arms([122.0, 8.0, 0.0], 28.0)
                 .trunk(-4.0, 0.0, turn)
                 .look(-18.0, turn)
         }
         _ => {
-            let side = usize::from(dice.chance(0.5));
+            let side = usize::from(random.chance(0.5));
             it.arm(side, [92.0, 28.0, 0.0], 14.0).trunk(8.0, 6.0, 12.0)
         }
     }
 }
 
-/// Which way of leaning a performance is about, for the furniture stands still.
-fn way_of_leaning(actor: &Actor) -> u64 {
-    actor.dice.fork("lean").bits() % 3
+/// The way of leaning, one for a whole performance because the furniture does not move.
+fn leaning_variant(actor: &Actor) -> u64 {
+    actor.random.fork("lean").bits() % 3
 }
 
 fn lean(it: Stance, nth: i64, actor: &Actor) -> Stance {
     let deep = if nth.rem_euclid(2) == 0 { 1.0 } else { 0.82 };
-    match way_of_leaning(actor) {
+    match leaning_variant(actor) {
         0 => it
             .pitched(22.0 * deep)
             .legs(22.0 * deep, 4.0)
@@ -231,43 +235,43 @@ fn lean(it: Stance, nth: i64, actor: &Actor) -> Stance {
     }
 }
 
-fn table(it: Stance, dice: &mut Dice) -> Stance {
+fn table(it: Stance, random: &mut Random) -> Stance {
     let mut arm = |it: Stance, side: usize| {
         let shoulder = [
-            dice.range(18.0, 64.0),
-            dice.range(4.0, 26.0),
-            dice.range(-25.0, 5.0),
+            random.range(18.0, 64.0),
+            random.range(4.0, 26.0),
+            random.range(-25.0, 5.0),
         ];
-        let elbow = dice.range(26.0, 88.0);
+        let elbow = random.range(26.0, 88.0);
         it.arm(side, shoulder, elbow)
     };
     let it = arm(it, 0);
     let it = arm(it, 1);
-    let bend = dice.range(4.0, 30.0);
-    it.trunk(bend, dice.range(-6.0, 6.0), dice.range(-20.0, 20.0))
+    let bend = random.range(4.0, 30.0);
+    it.trunk(bend, random.range(-6.0, 6.0), random.range(-20.0, 20.0))
         .pitched(0.4 * bend)
         .legs(0.4 * bend, 4.0)
-        .look(14.0, dice.range(-20.0, 20.0))
+        .look(14.0, random.range(-20.0, 20.0))
 }
 
-fn lying(it: Stance, actor: &Actor, dice: &mut Dice) -> Stance {
+fn lying(it: Stance, actor: &Actor, random: &mut Random) -> Stance {
     let mut it = it.pitched(-90.0);
-    let on = actor.dice.fork("lying").unit();
+    let on = actor.random.fork("lying").unit();
     it.spin = match on {
         it if it < 0.55 => 0.0,
         it if it < 0.7 => 78.0,
         it if it < 0.85 => -78.0,
         _ => 180.0,
-    } + dice.range(-10.0, 10.0);
+    } + random.range(-10.0, 10.0);
     it.planted = false;
     it.lift = 0.06;
     for side in 0..2 {
-        it = match dice.unit() {
+        it = match random.unit() {
             share if share < 0.5 => it.leg(side, 3.0, 6.0),
             share if share < 0.8 && on < 0.85 => it.leg(side, 48.0, 92.0),
             _ => it.leg(side, 18.0, 34.0),
         };
-        it = match dice.unit() {
+        it = match random.unit() {
             share if share < 0.4 => it.arm(side, [4.0, 16.0, 0.0], 14.0),
             share if share < 0.6 => it.arm(side, [10.0, 70.0, 30.0], 30.0),
             share if share < 0.8 => it.arm(side, [140.0, 40.0, 40.0], 100.0),
@@ -280,7 +284,7 @@ fn lying(it: Stance, actor: &Actor, dice: &mut Dice) -> Stance {
 const WOOD: Material = Material::Wood([150, 108, 66]);
 const STEEL: Material = Material::Plain([70, 72, 78]);
 
-/// What the action needs around the person.
+/// The furniture that the action needs.
 pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
     let actor = &motion.actor;
     let placed = |stance: Stance| {
@@ -294,7 +298,7 @@ pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
     };
     let standing = || Stance::standing(&actor.subject).flat();
     let height = actor.subject.proportions.height;
-    let set = |pose: &Pose| Set {
+    let set = |pose: &Pose| Placement {
         at: pose.root.translation.vector.xy().into(),
         heading: actor.heading,
     };
@@ -305,10 +309,10 @@ pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
             set(&pose).chair(seat)
         }
         Action::Table => set(&placed(standing()).1).table(0.43, 0.43 * height),
-        Action::Lean if way_of_leaning(actor) == 0 => {
+        Action::Lean if leaning_variant(actor) == 0 => {
             set(&placed(standing()).1).table(0.62, 0.46 * height)
         }
-        Action::Lean if way_of_leaning(actor) == 2 => {
+        Action::Lean if leaning_variant(actor) == 2 => {
             vec![set(&placed(standing()).1).block(
                 [0.05, -0.72, 1.1],
                 [0.14, 0.14, 1.1],
@@ -316,10 +320,10 @@ pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
             )]
         }
         Action::Lying => {
-            let (frames, pose) = placed(lying(standing(), actor, &mut actor.dice.fork("mat")));
+            let (frames, pose) = placed(lying(standing(), actor, &mut actor.random.fork("mat")));
             let middle =
                 (frames[HEAD].translation.vector + frames[PELVIS].translation.vector) / 2.0;
-            let set = Set {
+            let set = Placement {
                 at: [
                     0.75 * pose.root.translation.x + 0.25 * middle.x,
                     0.75 * pose.root.translation.y + 0.25 * middle.y,
@@ -336,14 +340,14 @@ pub(super) fn furniture(motion: &Motion, action: Action) -> Vec<Block> {
     }
 }
 
-/// A place and a direction to put furniture in.
-struct Set {
+/// A frame of reference on the floor, to place furniture in.
+struct Placement {
     at: [f64; 2],
     heading: f64,
 }
 
-impl Set {
-    /// A block whose centre is so far forward, to the left and up.
+impl Placement {
+    /// A block with its centre at a distance forward, to the left and up.
     fn block(&self, centre: [f64; 3], half: [f64; 3], material: Material) -> Block {
         let (sin, cos) = self.heading.sin_cos();
         let [forward, left, up] = centre;

@@ -1,11 +1,11 @@
-//! A pose in the making: angles of joints, and how the body stands in the room.
+//! A pose before joint limits and the floor are applied: joint angles, and how the body stands in the room.
 
 use crate::body::{
     ABDOMEN, Angles, CHEST, FOOT, FOREARM, HAND, HEAD, N_BONES, NECK, SHIN, THIGH, UPPER_ARM,
 };
 use crate::subject::Subject;
 
-/// Angles in degrees as [`Angles`] has them, before limits and floor are thought of.
+/// Angles in degrees as in [`Angles`], before joint limits and the floor are applied.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stance {
     pub(super) angles: Angles,
@@ -24,10 +24,10 @@ pub(super) struct Stance {
 }
 
 impl Stance {
-    /// Standing, in the manner of the subject.
+    /// Standing, in the style of the subject.
     pub(super) fn standing(subject: &Subject) -> Self {
-        let manner = subject.manner;
-        let mut it = Self {
+        let style = subject.style;
+        let mut stance = Self {
             angles: [[0.0; 3]; N_BONES],
             heading: 0.0,
             pitch: 0.0,
@@ -37,17 +37,17 @@ impl Stance {
             planted: true,
             lift: 0.0,
         };
-        it.angles[CHEST][0] = manner.stoop;
-        it.angles[NECK][0] = 4.0 + manner.stoop;
-        it.angles[HEAD][0] = -3.0 - manner.stoop;
+        stance.angles[CHEST][0] = style.stoop;
+        stance.angles[NECK][0] = 4.0 + style.stoop;
+        stance.angles[HEAD][0] = -3.0 - style.stoop;
         for side in 0..2 {
-            it.angles[UPPER_ARM[side]] = [3.0, manner.arms_out, -6.0];
-            it.angles[FOREARM[side]] = [manner.elbows, 0.0, -10.0];
-            it.angles[HAND[side]] = [8.0, 0.0, 0.0];
-            it.angles[THIGH[side]] = [1.0, 3.5, manner.toes_out];
-            it.angles[SHIN[side]] = [3.0, 0.0, 0.0];
+            stance.angles[UPPER_ARM[side]] = [3.0, style.arms_out, -6.0];
+            stance.angles[FOREARM[side]] = [style.elbows, 0.0, -10.0];
+            stance.angles[HAND[side]] = [8.0, 0.0, 0.0];
+            stance.angles[THIGH[side]] = [1.0, 3.5, style.toes_out];
+            stance.angles[SHIN[side]] = [3.0, 0.0, 0.0];
         }
-        it
+        stance
     }
 
     pub(super) fn arm(mut self, side: usize, shoulder: [f64; 3], elbow: f64) -> Self {

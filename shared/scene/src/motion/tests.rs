@@ -1,4 +1,4 @@
-//! People keep their limits, their lengths and the floor, and their sides.
+//! Joint limits, bone lengths, the floor and the sides are kept.
 
 use proptest::prelude::*;
 
@@ -64,7 +64,7 @@ proptest! {
     }
 
     #[test]
-    fn people_stand_on_the_floor_in_the_middle_of_the_room(
+    fn people_are_on_the_floor_in_the_middle_of_the_room(
         number in 0_u64..200, action in action(), seed in 0_u64..1000, seconds in 0.0..60.0,
     ) {
         let motion = acting(number, action, seed);
@@ -88,7 +88,7 @@ proptest! {
     }
 
     #[test]
-    fn the_left_of_the_trunk_is_on_the_left(
+    fn left_joints_are_on_the_left_of_the_trunk(
         number in 0_u64..200, action in action(), seed in 0_u64..1000, seconds in 0.0..60.0,
     ) {
         let motion = acting(number, action, seed);
@@ -114,7 +114,7 @@ impl OrZero for Vector3<f64> {
 }
 
 #[test]
-fn seeds_and_subjects_move_in_their_own_way() {
+fn motion_depends_on_the_seed_and_the_subject() {
     let at = |number, seed| acting(number, Action::Gestures, seed).pose(3.7);
     assert_eq!(at(1, 1), at(1, 1));
     assert_ne!(at(1, 1), at(1, 2));

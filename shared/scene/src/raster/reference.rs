@@ -1,12 +1,12 @@
-//! The readable reference: rays through the samples, against every triangle.
+//! The readable reference: rays through the samples, intersected with every triangle.
 
 use geometry::Camera;
 use nalgebra::{Point2, Point3, Vector3};
 
 use super::{Corner, NOTHING, Samples};
 
-/// The nearest triangle that a ray meets from its front, and the depth of the place along the axis.
-pub(super) fn seen(
+/// The nearest triangle that a ray meets from its front, and the depth of the intersection.
+pub(super) fn nearest_triangle(
     camera: &Camera,
     points: &[Point3<f64>],
     triangles: &[[u32; 3]],
@@ -41,18 +41,18 @@ mod tests {
     use crate::rigs;
     use crate::subject::Subject;
 
-    /// A whole person through a lens that distorts: rays and the z-buffer see the same.
+    /// A whole person through a lens with distortion.
     #[test]
-    fn the_z_buffer_sees_what_rays_see() {
+    fn the_z_buffer_agrees_with_ray_casting() {
         let rig = rigs::humaneva().unwrap();
         let mut camera = rig.cameras()[0].clone();
-        // Far smaller, so that every sample can be asked: 64 x 48.
-        let inside = &mut camera.intrinsics;
+        // Much smaller, so that every sample can be checked: 64 x 48.
+        let intrinsics = &mut camera.intrinsics;
         for value in [
-            &mut inside.fx,
-            &mut inside.fy,
-            &mut inside.cx,
-            &mut inside.cy,
+            &mut intrinsics.fx,
+            &mut intrinsics.fy,
+            &mut intrinsics.cx,
+            &mut intrinsics.cy,
         ] {
             *value /= 10.0;
         }
@@ -75,14 +75,14 @@ mod tests {
         for row in (0..96).step_by(2) {
             for column in (0..128).step_by(2) {
                 let place = Samples::place(column, row).cast::<f64>();
-                let ray = seen(&camera, &points, &mesh.triangles, place);
+                let ray = nearest_triangle(&camera, &points, &mesh.triangles, place);
                 let index = row * 128 + column;
                 let found = (samples.triangle[index] != NOTHING)
                     .then(|| 1.0 / f64::from(samples.near[index]));
                 match (ray, found) {
                     (Some((_, ray)), Some(found)) => {
                         n_seen += 1;
-                        // A sample on a silhouette may fall to another triangle.
+                        // A sample on a silhouette may get another triangle.
                         n_edge += usize::from((ray - found).abs() > 2e-3);
                     }
                     (None, None) => {}

@@ -1,4 +1,4 @@
-//! Who is recorded is seen again.
+//! A recording of a generated action is reproduced.
 
 use proptest::prelude::*;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::motion::{Action, Motion};
 use crate::subject::Subject;
 
-/// What a motion capture system of no error would have recorded of an action.
+/// An error-free recording of a generated action.
 fn recorded(number: u64, action: Action, rate_hz: f64, n: usize) -> (Recording, Motion) {
     let motion = Motion::new(&Subject::new(number), action, 7);
     let posture = |nth: usize| {
@@ -33,7 +33,7 @@ fn performed(recording: &Recording, number: u64) -> (Recorded, Bones, f64) {
 }
 
 #[test]
-fn who_performs_his_own_recording_moves_as_he_did() {
+fn a_subject_reproduces_the_subjects_own_recording() {
     for action in Action::ALL {
         let (recording, motion) = recorded(3, action, 25.0, 100);
         let (it, bones, _) = performed(&recording, 3);
@@ -44,12 +44,13 @@ fn who_performs_his_own_recording_moves_as_he_did() {
                 .bones
                 .joints(&motion.bones.frames(&motion.pose(seconds)));
             for joint in 0..N_JOINTS {
-                // Where the trunk bends, joints alone do not say; the way may be moved as a whole.
-                let off = (got[joint] - got[NECK_JOINT]) - (expected[joint] - expected[NECK_JOINT]);
+                // Joints alone do not determine where the trunk bends; the path may be moved as a whole.
+                let error =
+                    (got[joint] - got[NECK_JOINT]) - (expected[joint] - expected[NECK_JOINT]);
                 assert!(
-                    off.norm() < 0.08,
+                    error.norm() < 0.08,
                     "{action:?}, joint {joint}: {}",
-                    off.norm()
+                    error.norm()
                 );
             }
         }
@@ -97,7 +98,7 @@ proptest! {
 }
 
 #[test]
-fn nobody_moves_before_the_beginning_and_after_the_end() {
+fn the_pose_is_constant_before_the_beginning_and_after_the_end() {
     let (recording, _) = recorded(1, Action::Walking, 10.0, 11);
     assert!((recording.seconds() - 1.0).abs() < 1e-12);
     let (it, ..) = performed(&recording, 2);
@@ -107,7 +108,7 @@ fn nobody_moves_before_the_beginning_and_after_the_end() {
 }
 
 #[test]
-fn a_recording_of_a_giant_far_away_is_the_same_person_in_the_middle_of_the_room() {
+fn a_scaled_and_shifted_recording_gives_the_same_motion() {
     let (recording, _) = recorded(4, Action::Gestures, 20.0, 60);
     let mut far = recording.clone();
     for posture in &mut far.postures {
@@ -120,14 +121,14 @@ fn a_recording_of_a_giant_far_away_is_the_same_person_in_the_middle_of_the_room(
     let lowest = bones.lowest(&near.frames(1.0), height);
     assert!(lowest.abs() < 0.05, "{lowest}");
     for (a, b) in near.frames(1.0).iter().zip(far.frames(1.0)) {
-        let off = a.translation.vector - b.translation.vector;
-        assert!(off.norm() < 1e-9, "{off}");
+        let error = a.translation.vector - b.translation.vector;
+        assert!(error.norm() < 1e-9, "{error}");
         assert!(a.translation.vector.xy().norm() < 1.6);
     }
 }
 
 #[test]
-fn joints_that_coincide_make_no_nonsense() {
+fn coinciding_joints_give_finite_frames() {
     let nowhere = Recording {
         name: String::new(),
         rate_hz: 1.0,

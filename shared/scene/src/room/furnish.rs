@@ -1,10 +1,10 @@
-//! Rooms by chance.
+//! Random rooms.
 
 use nalgebra::{Point3, Vector3};
 
 use super::{Block, Material, Panel, Room};
-use crate::dice::Dice;
 use crate::light::Light;
+use crate::random::Random;
 
 const FLOORS: [Material; 8] = [
     Material::Wood([168, 124, 80]),
@@ -36,11 +36,11 @@ const BODIES: [Material; 7] = [
     Material::Plain([64, 100, 66]),
 ];
 
-/// Nothing but the action's own furniture stands nearer to the middle, metres.
-const CLEAR: f32 = 1.75;
+/// Only the action's own furniture stands nearer to the middle, metres.
+const CLEAR_RADIUS: f32 = 1.75;
 
-pub(super) fn room(dice: Dice, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Room {
-    let mut any = dice.fork("room");
+pub(super) fn room(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Room {
+    let mut any = random.fork("room");
     let mut margin = || any.range(0.5, 1.3) as f32;
     let (mut low, mut high) = (Vector3::new(-2.6, -2.6, 0.0), Vector3::new(2.6, 2.6, 2.7));
     for camera in cameras {
@@ -48,45 +48,48 @@ pub(super) fn room(dice: Dice, cameras: &[Point3<f32>], furniture: Vec<Block>) -
         high = high.sup(&camera.coords.add_scalar(margin()));
     }
     low.z = 0.0;
-    let mut any = dice.fork("finish");
+    let mut any = random.fork("finish");
     let mut room = Room {
         low,
         high,
         floor: *any.pick(&FLOORS),
         wall: *any.pick(&WALLS),
         panels: core::array::from_fn(|wall| {
-            panels(dice.fork("wall").nth(wall as u64), wall, low, high)
+            panels(random.fork("wall").nth(wall as u64), wall, low, high)
         }),
         blocks: furniture,
-        light: Light::new(dice.fork("light")),
+        light: Light::new(random.fork("light")),
     };
     for nth in 0..22 {
-        let things = thing(dice.fork("thing").nth(nth), low, high);
+        let pieces = wall_furniture(random.fork("thing").nth(nth), low, high);
         let free =
             |it: &Block| is_free(it, cameras) && !room.blocks.iter().any(|other| touch(it, other));
-        if things.iter().all(free) {
-            room.blocks.extend(things);
+        if pieces.iter().all(free) {
+            room.blocks.extend(pieces);
         }
     }
     room
 }
 
-fn panels(mut dice: Dice, wall: usize, low: Vector3<f32>, high: Vector3<f32>) -> Vec<Panel> {
+fn panels(mut random: Random, wall: usize, low: Vector3<f32>, high: Vector3<f32>) -> Vec<Panel> {
     let (from, to) = if wall < 2 {
         (low.y, high.y)
     } else {
         (low.x, high.x)
     };
     let mut panels = Vec::new();
-    let mut at = from + dice.range(0.3, 1.4) as f32;
+    let mut at = from + random.range(0.3, 1.4) as f32;
     while at < to - 0.8 {
-        let seed = dice.bits() as u32;
-        let (half, up, material) = match dice.unit() {
+        let seed = random.bits() as u32;
+        let (half, up, material) = match random.unit() {
             it if it < 0.3 => ([0.6, 0.65], 1.5, Material::Window(seed)),
             it if it < 0.45 => ([0.45, 1.02], 1.02, Material::Wood([150, 116, 82])),
             _ => {
-                let half = [dice.range(0.2, 0.45) as f32, dice.range(0.25, 0.4) as f32];
-                (half, dice.range(1.4, 1.8) as f32, Material::Poster(seed))
+                let half = [
+                    random.range(0.2, 0.45) as f32,
+                    random.range(0.25, 0.4) as f32,
+                ];
+                (half, random.range(1.4, 1.8) as f32, Material::Poster(seed))
             }
         };
         panels.push(Panel {
@@ -94,16 +97,16 @@ fn panels(mut dice: Dice, wall: usize, low: Vector3<f32>, high: Vector3<f32>) ->
             half,
             material,
         });
-        at += 2.0 * half[0] + dice.range(0.3, 1.6) as f32;
+        at += 2.0 * half[0] + random.range(0.3, 1.6) as f32;
     }
     panels
 }
 
-/// Something to stand at a wall: a cupboard, a shelf, cartons, a plant, a chair.
-fn thing(mut dice: Dice, low: Vector3<f32>, high: Vector3<f32>) -> Vec<Block> {
-    let wall = dice.bits() % 4;
-    let off = dice.range(0.02, 0.5) as f32;
-    let along = dice.range(0.05, 0.95) as f32;
+/// Random furniture at a wall: a cupboard, a shelf, cartons, a plant, a chair.
+fn wall_furniture(mut random: Random, low: Vector3<f32>, high: Vector3<f32>) -> Vec<Block> {
+    let wall = random.bits() % 4;
+    let off = random.range(0.02, 0.5) as f32;
+    let along = random.range(0.05, 0.95) as f32;
     let x = low.x + (high.x - low.x) * along;
     let y = low.y + (high.y - low.y) * along;
     let place = |depth: f32| match wall {
@@ -117,9 +120,9 @@ fn thing(mut dice: Dice, low: Vector3<f32>, high: Vector3<f32>) -> Vec<Block> {
     } else {
         0.0
     };
-    let seed = dice.bits() as u32;
-    let material = *dice.pick(&BODIES);
-    let mut size = |low: f64, high: f64| dice.range(low, high) as f32;
+    let seed = random.bits() as u32;
+    let material = *random.pick(&BODIES);
+    let mut size = |low: f64, high: f64| random.range(low, high) as f32;
     match seed % 5 {
         0 | 1 => {
             let half = [size(0.3, 0.7), size(0.18, 0.3), size(0.35, 1.0)];
@@ -187,11 +190,11 @@ fn chair([x, y]: [f32; 2], yaw: f32, material: Material) -> Vec<Block> {
     ]
 }
 
-/// Off the stage, and neither at nor before a camera.
+/// Whether a block is off the stage, and neither at nor in front of a camera.
 fn is_free(block: &Block, cameras: &[Point3<f32>]) -> bool {
     let [x, y, _] = block.centre;
     let reach = block.half[0].hypot(block.half[1]);
-    if x.hypot(y) - reach < CLEAR {
+    if x.hypot(y) - reach < CLEAR_RADIUS {
         return false;
     }
     let grown = block.grown(0.15);

@@ -1,23 +1,23 @@
-//! What rooms are made of.
+//! The materials of rooms.
 
 use nalgebra::Vector3;
 
 use crate::colour::{Linear, srgb};
-use crate::dice::{Dice, noise};
+use crate::random::{Random, noise};
 
-/// A surface and how it is coloured; colours as written, 0 to 255.
+/// A material and its colour, sRGB of 0 to 255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Material {
     Plain([u8; 3]),
     /// Boards along x.
     Wood([u8; 3]),
-    /// Squares of two shades, so many metres wide.
+    /// Squares of two shades; their width in metres.
     Tiles([u8; 3], f32),
     Carpet([u8; 3]),
     Bricks([u8; 3]),
     /// Vertical stripes.
     Paper([u8; 3]),
-    /// Rows of coloured backs.
+    /// Rows of coloured book spines.
     Books(u32),
     /// A picture of coloured shapes.
     Poster(u32),
@@ -31,7 +31,7 @@ fn chequered(u: f32, v: f32) -> f32 {
 }
 
 impl Material {
-    /// The colour at a place: metres in a frame of the thing's own, or shares from -1 to 1 of a panel.
+    /// The colour at a place: metres in the object's own frame, or -1 to 1 across a panel.
     pub(crate) fn colour(self, at: &Vector3<f32>) -> Linear {
         let grain = |scale: f32, size: f32| 1.0 + size * noise(&(at * scale), 21);
         match self {
@@ -94,7 +94,7 @@ impl Material {
         }
     }
 
-    /// The frame around a panel of this.
+    /// The colour of the frame around a panel of this material.
     pub(super) fn frame(self) -> Linear {
         match self {
             Self::Window(_) => srgb([225, 224, 220]),
@@ -115,11 +115,11 @@ fn books(at: &Vector3<f32>, seed: u32) -> Linear {
         return srgb([120, 90, 60]);
     }
     let across = (at.x + at.y) / 0.045;
-    let mut dice = Dice::new(u64::from(seed))
+    let mut random = Random::new(u64::from(seed))
         .nth(shelf as i64 as u64)
         .nth(across.floor() as i64 as u64);
-    let top = 0.6 + 0.35 * dice.unit() as f32;
-    let colour = [0, 0, 0].map(|_: u8| 40 + (170.0 * dice.unit()) as u8);
+    let top = 0.6 + 0.35 * random.unit() as f32;
+    let colour = [0, 0, 0].map(|_: u8| 40 + (170.0 * random.unit()) as u8);
     if up > top {
         srgb([26, 22, 20])
     } else {
@@ -128,12 +128,12 @@ fn books(at: &Vector3<f32>, seed: u32) -> Linear {
 }
 
 fn poster(at: &Vector3<f32>, seed: u32) -> Linear {
-    let mut dice = Dice::new(u64::from(seed)).fork("poster");
-    let mut any = || [0, 0, 0].map(|_: u8| 30 + (215.0 * dice.unit()) as u8);
+    let mut random = Random::new(u64::from(seed)).fork("poster");
+    let mut any = || [0, 0, 0].map(|_: u8| 30 + (215.0 * random.unit()) as u8);
     let mut colour = any();
     let shades = [any(), any(), any(), any()];
     for (nth, shade) in shades.into_iter().enumerate() {
-        let mut place = Dice::new(u64::from(seed)).fork("shape").nth(nth as u64);
+        let mut place = Random::new(u64::from(seed)).fork("shape").nth(nth as u64);
         let [x, y] = [0, 1].map(|_| place.range(-0.9, 0.9) as f32);
         let [wide, high] = [0, 1].map(|_| place.range(0.15, 0.6) as f32);
         let [u, v] = [(at.x - x) / wide, (at.y - y) / high];

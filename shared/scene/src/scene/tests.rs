@@ -1,4 +1,4 @@
-//! Pictures and what is said to be true of them agree.
+//! Pictures agree with their ground truth.
 
 use std::collections::BTreeSet;
 
@@ -18,15 +18,14 @@ fn scene(rig: &str, action: Action, subject: u64) -> Arc<Scene> {
     )
 }
 
-fn picture(view: &mut View, frame: u64) -> (Vec<u8>, SeenJoints) {
+fn picture(view: &mut View, frame: u64) -> (Vec<u8>, ViewTruth) {
     let mut rgb = vec![7; view.size().rgb_bytes()];
     let seen = view.picture(frame, &mut rgb);
     (rgb, seen)
 }
 
-/// Exactness: what is written of the picture is the projection of what is written of the world.
 #[test]
-fn joints_on_pictures_are_projections_of_joints_in_the_world() {
+fn pixels_of_the_truth_are_projections_of_its_joints() {
     for rig in ["humaneva", "umpm"] {
         let scene = scene(rig, Action::Walking, 2);
         for (nth, camera) in scene.rig().cameras().iter().enumerate() {
@@ -43,7 +42,7 @@ fn joints_on_pictures_are_projections_of_joints_in_the_world() {
 }
 
 #[test]
-fn visible_joints_lie_on_the_mask_and_the_mask_in_its_box() {
+fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
     for (nth, action) in Action::ALL.into_iter().enumerate() {
         let scene = scene("ring:3:4.4:1.6", action, nth as u64);
         let mut view = View::new(&scene, nth % 3).unwrap();
@@ -70,7 +69,7 @@ fn visible_joints_lie_on_the_mask_and_the_mask_in_its_box() {
                 (x1 - 3.0..=x2 + 3.0).contains(&x) && (y1 - 3.0..=y2 + 3.0).contains(&y),
                 "{action:?}"
             );
-            // Within 3 pixels of what is the person.
+            // Within 3 pixels of the person.
             let near =
                 (-3..=3).flat_map(|dy| (-3..=3).map(move |dx| (x as i64 + dx, y as i64 + dy)));
             let on = near.filter(|(x, y)| {
@@ -89,8 +88,8 @@ fn visible_joints_lie_on_the_mask_and_the_mask_in_its_box() {
 }
 
 #[test]
-fn what_lies_behind_the_body_is_not_visible() {
-    // Round the ring, every joint of the limbs is hidden from some side and seen from another.
+fn joints_behind_the_body_are_not_visible() {
+    // Around the ring, every joint of the limbs is occluded in some view and visible in another.
     let scene = scene("ring:8", Action::Walking, 1);
     let views = (0..8).map(|it| View::new(&scene, it).unwrap().truth(3).visible);
     let views: Vec<_> = views.collect();
@@ -101,7 +100,7 @@ fn what_lies_behind_the_body_is_not_visible() {
 }
 
 #[test]
-fn from_the_front_the_left_is_on_the_right_of_the_picture() {
+fn left_joints_are_on_the_right_of_the_picture_if_seen_from_the_front() {
     let scene = scene("ring:8", Action::Walking, 1);
     let (mut n_front, mut n_behind) = (0, 0);
     for camera in 0..8 {
@@ -120,9 +119,9 @@ fn from_the_front_the_left_is_on_the_right_of_the_picture() {
 #[test]
 fn the_same_settings_give_the_same_bits_in_any_order() {
     let first = scene("ring:2", Action::Boxing, 4);
-    let again = scene("ring:2", Action::Boxing, 4);
+    let second = scene("ring:2", Action::Boxing, 4);
     let mut a = View::new(&first, 1).unwrap();
-    let mut b = View::new(&again, 1).unwrap();
+    let mut b = View::new(&second, 1).unwrap();
     let forward: Vec<_> = (0..3).map(|it| picture(&mut a, it)).collect();
     let mut copy = b.clone();
     drop(picture(&mut copy, 9));
@@ -135,7 +134,7 @@ fn the_same_settings_give_the_same_bits_in_any_order() {
 }
 
 #[test]
-fn a_person_stands_out_and_throws_a_shadow() {
+fn a_person_covers_pixels_and_casts_a_shadow() {
     let scene = scene("ring:2", Action::Gestures, 3);
     let mut view = View::new(&scene, 0).unwrap();
     let (rgb, _) = picture(&mut view, 5);
@@ -163,7 +162,7 @@ fn a_person_stands_out_and_throws_a_shadow() {
 }
 
 #[test]
-fn late_clocks_and_lost_frames_are_told() {
+fn clock_offsets_and_dropped_frames_are_in_the_truth() {
     let mut settings = Settings {
         rig: RigChoice::parse("ring:2").unwrap(),
         ..Settings::default()
@@ -187,7 +186,7 @@ fn late_clocks_and_lost_frames_are_told() {
             assert_eq!(
                 before.as_ref(),
                 Some(&(rgb.clone(), seen.seconds)),
-                "the picture before, again"
+                "the previous picture is repeated"
             );
         } else {
             assert_eq!(seen.seconds, scene.seconds(frame));
@@ -198,10 +197,10 @@ fn late_clocks_and_lost_frames_are_told() {
 }
 
 #[test]
-fn a_camera_is_known_by_name_and_by_number() {
+fn a_camera_is_found_by_name_and_by_number() {
     let scene = scene("humaneva", Action::Walking, 1);
     assert_eq!(scene.camera("C2").unwrap(), 1);
     assert_eq!(scene.camera("2").unwrap(), 2);
-    let said = scene.camera("3").unwrap_err().to_string();
-    assert!(said.contains("C1, C2, C3"), "{said}");
+    let error = scene.camera("3").unwrap_err().to_string();
+    assert!(error.contains("C1, C2, C3"), "{error}");
 }

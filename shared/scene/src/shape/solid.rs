@@ -5,13 +5,13 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// A solid.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Solid {
-    /// Two balls and what a thread around both encloses.
+    /// The convex hull of two balls.
     Cone {
         ends: [Point3<f32>; 2],
         radii: [f32; 2],
     },
     /// An ellipsoid along the axes of its frame.
-    Egg {
+    Ellipsoid {
         frame: Isometry3<f32>,
         radii: Vector3<f32>,
     },
@@ -25,21 +25,21 @@ impl Solid {
         }
     }
 
-    pub(super) fn egg(centre: [f32; 3], radii: [f32; 3]) -> Self {
-        Self::Egg {
+    pub(super) fn ellipsoid(centre: [f32; 3], radii: [f32; 3]) -> Self {
+        Self::Ellipsoid {
             frame: Isometry3::translation(centre[0], centre[1], centre[2]),
             radii: radii.into(),
         }
     }
 
-    /// Larger by so much all around.
+    /// Larger by a distance in all directions.
     pub(super) fn thicker(self, by: f32) -> Self {
         match self {
             Self::Cone { ends, radii } => Self::Cone {
                 ends,
                 radii: radii.map(|it| it + by),
             },
-            Self::Egg { frame, radii } => Self::Egg {
+            Self::Ellipsoid { frame, radii } => Self::Ellipsoid {
                 frame,
                 radii: radii.add_scalar(by),
             },
@@ -52,7 +52,7 @@ impl Solid {
                 ends: ends.map(|it| by * it),
                 radii,
             },
-            Self::Egg { frame, radii } => Self::Egg {
+            Self::Ellipsoid { frame, radii } => Self::Ellipsoid {
                 frame: by * frame,
                 radii,
             },
@@ -73,7 +73,7 @@ impl Solid {
                     .add_scalar(radii[0])
                     .sup(&b.coords.add_scalar(radii[1])),
             ],
-            Self::Egg { frame, radii } => {
+            Self::Ellipsoid { frame, radii } => {
                 let turn = frame.rotation.to_rotation_matrix();
                 let reach = Vector3::from_fn(|row, _| {
                     turn.matrix()
@@ -88,7 +88,7 @@ impl Solid {
         }
     }
 
-    /// Whether a point is farther than `limit`, by a ball around the solid.
+    /// Whether a point is certainly farther than `limit`, by a bounding ball.
     pub(super) fn is_far(&self, at: &Point3<f32>, limit: f32) -> bool {
         let (centre, radius) = match self {
             Self::Cone {
@@ -98,19 +98,19 @@ impl Solid {
                 let half = 0.5 * (b - a).norm();
                 (nalgebra::center(a, b), half + radii[0].max(radii[1]))
             }
-            Self::Egg { frame, radii } => (frame.translation.vector.into(), radii.max()),
+            Self::Ellipsoid { frame, radii } => (frame.translation.vector.into(), radii.max()),
         };
         (at - centre).norm_squared() > (radius + limit).powi(2)
     }
 
-    /// Signed distance, exact for cones (Quilez, "round cone"), of first order for eggs.
+    /// Signed distance, exact for cones (Quilez, "round cone"), of first order for ellipsoids.
     pub(super) fn distance(&self, at: &Point3<f32>) -> f32 {
         match self {
             Self::Cone {
                 ends: [a, b],
                 radii,
             } => cone(&(at - a), &(b - a), *radii),
-            Self::Egg { frame, radii } => {
+            Self::Ellipsoid { frame, radii } => {
                 let p = frame.inverse_transform_point(at).coords;
                 let near = p.component_div(radii);
                 let steep = near.component_div(radii).norm();
@@ -130,7 +130,7 @@ fn cone(p: &Vector3<f32>, axis: &Vector3<f32>, [first, second]: [f32; 2]) -> f32
     let taper = first - second;
     let flat2 = length2 - taper * taper;
     if flat2 <= 0.0 {
-        // One ball holds the other.
+        // One ball contains the other.
         return (p.norm() - first).min((p - axis).norm() - second);
     }
     let y = p.dot(axis);
@@ -171,14 +171,14 @@ mod tests {
         }
 
         #[test]
-        fn a_solid_lies_in_its_bounds_and_is_near_itself(
+        fn points_inside_a_solid_are_in_its_bounds_and_in_a_thicker_solid(
             x in -1.0_f32..1.0, y in -1.0_f32..1.0, z in -1.0_f32..1.0,
             turn in prop::array::uniform3(-3.0_f32..3.0),
         ) {
             let at = Point3::new(x, y, z);
             let placed = Isometry3::new(Vector3::new(0.1, 0.2, -0.1), turn.into());
             for solid in [
-                Solid::egg([0.1, 0.0, 0.2], [0.3, 0.15, 0.4]).moved(&placed),
+                Solid::ellipsoid([0.1, 0.0, 0.2], [0.3, 0.15, 0.4]).moved(&placed),
                 Solid::cone([0.0; 3], [0.2, 0.3, -0.3], [0.2, 0.05]).moved(&placed),
             ] {
                 let [low, high] = solid.bounds();

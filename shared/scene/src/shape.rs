@@ -1,4 +1,4 @@
-//! The shape of a body at rest as a union of smooth solids, each of which hangs on a bone.
+//! The shape of a body at rest as a union of smooth solids, each attached to a bone.
 
 mod person;
 mod solid;
@@ -16,12 +16,12 @@ pub(crate) struct Piece {
     solid: Solid,
 }
 
-/// How softly solids join, metres.
+/// Radius over which solids are blended, metres.
 const BLEND: f32 = 0.028;
 
 /// A body in the pose in which its surface is made.
 #[derive(Debug, Clone)]
-pub(crate) struct Flesh {
+pub(crate) struct BodyShape {
     pieces: Vec<Piece>,
     /// Frames of the bones in that pose.
     pub(crate) frames: [Isometry3<f64>; N_BONES],
@@ -41,7 +41,7 @@ pub(crate) fn rest_pose() -> Pose {
     }
 }
 
-impl Flesh {
+impl BodyShape {
     pub(crate) fn new(subject: &Subject, bones: &Bones) -> Self {
         let frames = bones.frames(&rest_pose());
         let placed = person::pieces(subject, bones).into_iter();
@@ -65,7 +65,7 @@ impl Flesh {
         )
     }
 
-    /// Signed distance to the surface, metres, negative inside; true near the surface only.
+    /// Signed distance to the surface, metres, negative inside; accurate near the surface only.
     pub(crate) fn distance(&self, at: &Point3<f32>) -> f32 {
         let near = self.pieces.iter();
         near.fold(FAR, |sum, it| {
@@ -112,7 +112,7 @@ impl Flesh {
     }
 }
 
-/// Distances beyond this are all the same.
+/// Larger distances are clipped to this.
 pub(crate) const FAR: f32 = 0.08;
 
 /// The smaller of two, rounded where they are nearly equal (Quilez, polynomial smooth minimum).

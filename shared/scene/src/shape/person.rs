@@ -1,6 +1,6 @@
-//! The solids of a person: flesh, hair and the slack of the clothes.
+//! The solids of a person: body, hair and the slack of the clothes.
 //!
-//! Sizes in metres are those of a man of 1.75 m, by eye; all of them grow with the height, thicknesses
+//! Sizes in metres are those of a man of 1.75 m, by eye; all are scaled with the height, thicknesses
 //! with the girth.
 
 use super::solid::Solid;
@@ -9,7 +9,7 @@ use crate::body::{
 };
 use crate::subject::Subject;
 
-struct Sculptor<'a> {
+struct SolidBuilder<'a> {
     subject: &'a Subject,
     /// Of the height.
     scale: f32,
@@ -18,28 +18,28 @@ struct Sculptor<'a> {
 
 /// All solids, in the frames of their bones.
 pub(super) fn pieces(subject: &Subject, bones: &Bones) -> Vec<(usize, Solid)> {
-    let mut it = Sculptor {
+    let mut builder = SolidBuilder {
         subject,
         scale: subject.proportions.height as f32 / 1.75,
         pieces: Vec::new(),
     };
-    it.trunk();
-    it.head();
+    builder.trunk();
+    builder.head();
     for (side, out) in [(0, 1.0), (1, -1.0)] {
-        it.arm(side, out, bones);
-        it.leg(side, bones);
+        builder.arm(side, out, bones);
+        builder.leg(side, bones);
     }
     if subject.bottom.is_skirt {
-        it.skirt(bones);
+        builder.skirt(bones);
     }
-    it.pieces
+    builder.pieces
 }
 
-impl Sculptor<'_> {
-    /// An egg; `girth` thickens it across.
-    fn egg(&mut self, bone: usize, centre: [f32; 3], radii: [f32; 3], slack: f32) {
+impl SolidBuilder<'_> {
+    /// An ellipsoid; centre and radii in metres of the mean person.
+    fn ellipsoid(&mut self, bone: usize, centre: [f32; 3], radii: [f32; 3], slack: f32) {
         let s = self.scale;
-        let solid = Solid::egg(centre.map(|it| s * it), radii.map(|it| s * it));
+        let solid = Solid::ellipsoid(centre.map(|it| s * it), radii.map(|it| s * it));
         self.pieces.push((bone, solid.thicker(slack)));
     }
 
@@ -63,17 +63,17 @@ impl Sculptor<'_> {
         let slack = top.slack;
         let hips = bottom.slack.max(if top.hem > 0.0 { slack } else { 0.0 });
         let width = wide(0.155, 0.015) * self.subject.proportions.hips as f32;
-        self.egg(PELVIS, [-0.004, 0.0, 0.04], [g * 0.108, width, 0.105], hips);
+        self.ellipsoid(PELVIS, [-0.004, 0.0, 0.04], [g * 0.108, width, 0.105], hips);
         for out in [1.0, -1.0] {
             let r = wide(0.078, 0.008);
-            self.egg(PELVIS, [-0.052, out * 0.07, -0.012], [r, r, 0.085], hips);
+            self.ellipsoid(PELVIS, [-0.052, out * 0.07, -0.012], [r, r, 0.085], hips);
         }
         let waist = [belly * 0.106, wide(0.137, -0.014), 0.135];
-        self.egg(ABDOMEN, [0.01, 0.0, 0.05], waist, slack);
+        self.ellipsoid(ABDOMEN, [0.01, 0.0, 0.05], waist, slack);
         let shoulders = self.subject.proportions.shoulders as f32;
         let chest = [g * 0.112, wide(0.152, 0.0) * shoulders, 0.175];
-        self.egg(CHEST, [0.0, 0.0, 0.075], chest, slack);
-        self.egg(
+        self.ellipsoid(CHEST, [0.0, 0.0, 0.075], chest, slack);
+        self.ellipsoid(
             CHEST,
             [-0.016, 0.0, 0.15],
             [0.085, 0.155 * shoulders, 0.075],
@@ -82,7 +82,7 @@ impl Sculptor<'_> {
         let bust = 0.052 + 0.018 * curves;
         for out in [1.0, -1.0] {
             let r = [bust, 0.07, 0.062 + 0.006 * curves];
-            self.egg(
+            self.ellipsoid(
                 CHEST,
                 [0.058 + 0.018 * curves, out * 0.072, 0.085],
                 r,
@@ -101,16 +101,16 @@ impl Sculptor<'_> {
 
     fn head(&mut self) {
         let hair = self.subject.hair;
-        self.egg(HEAD, [0.008, 0.0, 0.078], [0.095, 0.074, 0.09], 0.0);
-        self.egg(HEAD, [0.040, 0.0, 0.008], [0.062, 0.058, 0.078], 0.0);
-        self.egg(HEAD, [0.074, 0.0, -0.042], [0.026, 0.03, 0.024], 0.0);
-        self.egg(HEAD, [0.106, 0.0, 0.018], [0.018, 0.014, 0.026], 0.0);
+        self.ellipsoid(HEAD, [0.008, 0.0, 0.078], [0.095, 0.074, 0.09], 0.0);
+        self.ellipsoid(HEAD, [0.040, 0.0, 0.008], [0.062, 0.058, 0.078], 0.0);
+        self.ellipsoid(HEAD, [0.074, 0.0, -0.042], [0.026, 0.03, 0.024], 0.0);
+        self.ellipsoid(HEAD, [0.106, 0.0, 0.018], [0.018, 0.014, 0.026], 0.0);
         for out in [1.0, -1.0] {
-            self.egg(HEAD, [0.0, out * 0.075, 0.03], [0.024, 0.012, 0.032], 0.0);
+            self.ellipsoid(HEAD, [0.0, out * 0.075, 0.03], [0.024, 0.012, 0.032], 0.0);
         }
         if hair.thickness > 0.0 {
             let r = [0.092, 0.075, 0.086];
-            self.egg(HEAD, [-0.008, 0.0, 0.086], r, hair.thickness);
+            self.ellipsoid(HEAD, [-0.008, 0.0, 0.086], r, hair.thickness);
         }
         if hair.length > 0.0 {
             let s = self.scale;
@@ -156,7 +156,7 @@ impl Sculptor<'_> {
             [0.046, 0.039].map(|it| it * strong),
             slack(0.4),
         );
-        self.egg(
+        self.ellipsoid(
             bone,
             [0.01, 0.0, -0.15],
             [0.046 * strong, 0.042 * strong, 0.085],
@@ -181,8 +181,8 @@ impl Sculptor<'_> {
 
     fn hand(&mut self, side: usize, out: f32) {
         let bone = HAND[side];
-        self.egg(bone, [0.0, 0.0, -0.05], [0.04, 0.019, 0.056], 0.0);
-        self.egg(
+        self.ellipsoid(bone, [0.0, 0.0, -0.05], [0.04, 0.019, 0.056], 0.0);
+        self.ellipsoid(
             bone,
             [0.002, -out * 0.004, -0.125],
             [0.034, 0.015, 0.056],
@@ -230,7 +230,7 @@ impl Sculptor<'_> {
             thick([0.053, 0.05]),
             slack(0.6, 1.0),
         );
-        self.egg(
+        self.ellipsoid(
             bone,
             [-0.024, 0.0, -0.14],
             [0.04 * g, 0.048 * g, 0.1],
@@ -246,7 +246,7 @@ impl Sculptor<'_> {
         let s = self.scale;
         let ends = [[-0.03 * s, 0.0, -0.034 * s], [0.11 * s, 0.0, -0.04 * s]];
         self.cone(bone, ends, [0.034, 0.028], 0.004);
-        self.egg(bone, [0.125, 0.0, -0.045], [0.062, 0.044, 0.023], 0.004);
+        self.ellipsoid(bone, [0.125, 0.0, -0.045], [0.062, 0.044, 0.023], 0.004);
     }
 
     fn skirt(&mut self, bones: &Bones) {

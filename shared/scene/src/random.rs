@@ -1,10 +1,10 @@
-//! Chance that is the same every time: hashes of a seed, and smooth noise in space.
+//! Reproducible random numbers: hashes of a seed, and smooth noise in space.
 
 use nalgebra::Vector3;
 
 /// A generator of numbers that depend on the seed alone (splitmix64, Steele et al. 2014).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Dice(u64);
+pub(crate) struct Random(u64);
 
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -14,7 +14,7 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-impl Dice {
+impl Random {
     pub(crate) fn new(seed: u64) -> Self {
         Self(mix(seed.wrapping_add(GOLDEN)))
     }
@@ -28,7 +28,7 @@ impl Dice {
         Self(mix(self.0 ^ hash))
     }
 
-    /// Another generator for the n-th of many.
+    /// Another generator, for the n-th of many.
     pub(crate) fn nth(self, n: u64) -> Self {
         Self(mix(self.0 ^ mix(n.wrapping_add(GOLDEN))))
     }
@@ -59,7 +59,7 @@ impl Dice {
         self.unit() < probability
     }
 
-    /// One of several; the first if there is none to choose from is never asked for.
+    /// One of several. `from` must not be empty.
     pub(crate) fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
         &from[(self.bits() % from.len() as u64) as usize]
     }
@@ -106,12 +106,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn purposes_and_numbers_have_chances_of_their_own() {
-        let dice = Dice::new(1);
+    fn forks_for_purposes_and_numbers_differ() {
+        let random = Random::new(1);
         let mut all: Vec<u64> = ["a", "b"]
-            .map(|it| dice.fork(it).bits())
+            .map(|it| random.fork(it).bits())
             .into_iter()
-            .chain((0..100).map(|it| dice.nth(it).bits()))
+            .chain((0..100).map(|it| random.nth(it).bits()))
             .collect();
         all.sort_unstable();
         all.dedup();
@@ -119,11 +119,11 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_and_the_spread_are_those_that_are_said() {
-        let mut dice = Dice::new(7);
-        let throws: Vec<f64> = (0..4000).map(|_| dice.normal()).collect();
-        let mean = throws.iter().sum::<f64>() / 4000.0;
-        let variance = throws.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / 4000.0;
+    fn normal_numbers_have_mean_0_and_variance_1() {
+        let mut random = Random::new(7);
+        let numbers: Vec<f64> = (0..4000).map(|_| random.normal()).collect();
+        let mean = numbers.iter().sum::<f64>() / 4000.0;
+        let variance = numbers.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / 4000.0;
         assert!(mean.abs() < 0.06 && (variance - 1.0).abs() < 0.08);
     }
 
@@ -141,7 +141,7 @@ mod tests {
 
         #[test]
         fn a_range_is_kept(seed: u64, low in -5.0..0.0, high in 0.1..5.0) {
-            let at = Dice::new(seed).range(low, high);
+            let at = Random::new(seed).range(low, high);
             prop_assert!((low..high).contains(&at));
         }
     }
