@@ -1,4 +1,4 @@
-//! What can be wrong with footage.
+//! Errors of footage.
 
 use std::path::{Path, PathBuf};
 
@@ -21,19 +21,19 @@ pub enum FootageError {
         path: String,
         /// What it is.
         what: &'static str,
-        /// What to do in place of it.
+        /// What to do instead.
         instead: String,
     },
-    /// Nothing was named.
+    /// The name is empty.
     #[error("the footage has no name: it is \"\"")]
     NoName,
-    /// A name whose bytes are no UTF-8, which was changed on the way.
+    /// A name that is not UTF-8, so that it was changed by conversion.
     #[error(
         "no such footage: {path}; its name, or that of a folder above it, is not UTF-8 (the odd bytes are shown as \
          \u{fffd}): rename it"
     )]
     NotUtf8 {
-        /// With the odd bytes replaced.
+        /// With the invalid bytes replaced.
         path: String,
     },
     /// A glob that cannot be parsed.
@@ -50,7 +50,7 @@ pub enum FootageError {
         /// As the user wrote it.
         path: String,
     },
-    /// The operating system refuses.
+    /// The operating system reports an error.
     #[error("cannot read {}", path.display())]
     Io {
         /// What could not be read.
@@ -84,14 +84,14 @@ pub enum FootageError {
         /// The size of the first image.
         expected: Size,
     },
-    /// Too small to find anybody in it.
+    /// Too small to detect a person.
     #[error("{} is {size}: width and height must be at least {min_side} pixels", path.display())]
     TooSmall {
         /// Which.
         path: PathBuf,
         /// Its size.
         size: Size,
-        /// The least that was asked for.
+        /// The smallest side accepted.
         min_side: usize,
     },
     /// `step` is 0.
@@ -106,14 +106,14 @@ pub enum FootageError {
         /// As given.
         rate_hz: f64,
     },
-    /// `start` lies behind the last frame.
+    /// `start` lies beyond the last frame.
     #[error("first frame {start} lies beyond the {n_frames} frames (counted from 0) of {path}")]
     StartBeyondEnd {
         /// As the user wrote it.
         path: String,
         /// First frame asked for, from 0.
         start: u64,
-        /// Frames that there are.
+        /// Number of frames.
         n_frames: u64,
     },
     /// The executable that decodes videos is absent.
@@ -135,7 +135,7 @@ pub enum FootageError {
     Video {
         /// Which.
         path: PathBuf,
-        /// What the decoder says.
+        /// Message of the decoder.
         message: String,
     },
     /// The video ends before its last frame.
@@ -145,18 +145,18 @@ pub enum FootageError {
         path: PathBuf,
         /// Frames that could be read.
         n_read: u64,
-        /// Frames that its header or index promises.
+        /// Number of frames according to its header or index.
         n_expected: u64,
-        /// What the decoder says.
+        /// Message of the decoder.
         message: String,
     },
 }
 
-/// Words for the folder that is missing, where it is one and not the file alone; for the number of a webcam, too.
+/// A hint for the message: the folder that is missing, or that a number of a webcam is not supported.
 fn what_is_missing(path: &str) -> String {
     let path = Path::new(path);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if !name.is_empty() && name.bytes().all(|it| it.is_ascii_digit()) {
+    if !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit()) {
         return "; if that is the number of a webcam: live sources are not supported by this version, record it to a \
                 file first (`ffmpeg -f v4l2 -i /dev/video0 -t 60 left.mp4`)"
             .to_owned();
@@ -164,8 +164,8 @@ fn what_is_missing(path: &str) -> String {
     let absent = path
         .ancestors()
         .skip(1)
-        .take_while(|it| !it.as_os_str().is_empty() && !it.exists());
-    absent.last().map_or_else(String::new, |it| {
-        format!("; there is no folder {}", it.display())
+        .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    absent.last().map_or_else(String::new, |folder| {
+        format!("; there is no folder {}", folder.display())
     })
 }

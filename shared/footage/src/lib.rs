@@ -1,8 +1,8 @@
-//! Pictures in and pictures out: image sequences and videos, warps into a given buffer, overlays, pacing.
+//! Reads image sequences and videos, warps images into a given buffer, draws overlays, paces frames.
 //!
 //! Every image is 8-bit RGB, row major, `width * height * 3` bytes. A point is `[x, y]` in pixels with
-//! the centre of the top-left pixel at `(0, 0)`. This crate knows no camera and no body: whoever does
-//! gives it affine maps and plain points.
+//! the centre of the top-left pixel at `(0, 0)`. This crate does not depend on cameras or skeletons: its
+//! input is affine maps and points.
 #![forbid(unsafe_code)]
 
 mod error;

@@ -1,4 +1,4 @@
-//! Drawing on pictures for people to look at.
+//! Drawing on pictures.
 
 mod canvas;
 mod compose;
@@ -20,9 +20,9 @@ pub const LEFT: Colour = [86, 180, 233];
 pub const RIGHT: Colour = [230, 159, 0];
 /// Limbs in the middle: white.
 pub const CENTRE: Colour = [245, 245, 245];
-/// What is neither: epipolar lines, boxes. Reddish purple.
+/// Other marks: epipolar lines, boxes. Reddish purple.
 pub const ACCENT: Colour = [204, 121, 167];
-/// What was before: a pose to compare with. Grey.
+/// A pose to compare with. Grey.
 pub const FAINT: Colour = [150, 150, 150];
 
 /// Drawn under lines and text, so that they show on any background.
@@ -70,28 +70,28 @@ pub fn line_width(size: Size) -> f64 {
 
 /// Draws a skeleton: limbs with a dark edge, and a dot on every end of one.
 ///
-/// Lines are as wide as [`line_width`] says.
+/// Lines have the width of [`line_width`].
 ///
-/// * `points`: pixels; limbs with an end that is not finite or not there are left out.
+/// * `points`: pixels; limbs with an end that is missing or not finite are left out.
 pub fn draw_limbs(canvas: &mut Canvas, points: &[[f64; 2]], limbs: &[Limb]) {
     let width = line_width(canvas.size());
     let point = |index: usize| {
         let point = points.get(index).copied();
-        point.filter(|it| it.iter().all(|it| it.is_finite()))
+        point.filter(|point| point.iter().all(|value| value.is_finite()))
     };
-    let seen = || {
+    let visible = || {
         limbs.iter().filter_map(|limb| {
             let (from, to) = (point(limb.from)?, point(limb.to)?);
             Some((from, to, limb.side.colour()))
         })
     };
-    for (from, to, _) in seen() {
+    for (from, to, _) in visible() {
         canvas.line(from, to, width + 2.0, SHADOW);
     }
-    for (from, to, colour) in seen() {
+    for (from, to, colour) in visible() {
         canvas.line(from, to, width, colour);
     }
-    for (from, to, colour) in seen() {
+    for (from, to, colour) in visible() {
         for end in [from, to] {
             canvas.disc(end, 0.8 * width + 1.0, SHADOW);
             canvas.disc(end, 0.8 * width, colour);

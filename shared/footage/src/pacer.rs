@@ -1,4 +1,4 @@
-//! When a frame is due.
+//! The times at which frames are due.
 
 /// When frame `k` is due on a clock that the caller reads: `start + k / rate`.
 ///
@@ -50,7 +50,7 @@ impl Pacer {
         self.due_nanos(k).saturating_sub(now_nanos)
     }
 
-    /// The latest frame that is due, for a reader who drops what it missed.
+    /// The latest frame that is due, for a reader that drops frames it missed.
     ///
     /// `None` before the start, and always without a rate, where there is nothing to miss.
     /// Satisfies `due_nanos(k) <= now_nanos < due_nanos(k + 1)`.
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_fast_as_possible_never_waits_and_misses_nothing() {
+    fn without_a_rate_every_frame_is_due_and_none_is_missed() {
         let pacer = Pacer::as_fast_as_possible();
         assert_eq!(pacer.due_nanos(1_000_000), 0);
         assert_eq!(pacer.wait_nanos(1_000_000, 5), 0);
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_day_of_a_broken_rate_does_not_drift() {
+    fn a_fractional_rate_does_not_drift_within_a_day() {
         let pacer = Pacer::realtime(0, 60_000.0 / 1001.0);
         // 60 000 frames take 1001 seconds.
         assert_eq!(pacer.due_nanos(60_000 * 86), 1001 * 86 * 1_000_000_000);
@@ -107,7 +107,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_frame_is_due_from_its_very_nanosecond(
+        fn a_frame_is_the_latest_due_from_its_due_time_on(
             start in 0_u64..1 << 60, rate_hz in 0.1..2000.0, k in 0_u64..10_000_000,
         ) {
             let pacer = Pacer::realtime(start, rate_hz);

@@ -19,7 +19,7 @@ use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};
 
-/// What footage is made of.
+/// Kind of footage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SourceKind {
     /// One image, repeated.
@@ -35,21 +35,20 @@ pub enum SourceKind {
 pub struct SourceInfo {
     /// Size of every frame.
     pub size: Size,
-    /// Frames that will be handed out. A damaged video may have fewer, and then says so.
+    /// Number of frames to be read. A damaged video may have fewer; that is an error while reading.
     pub n_frames: u64,
-    /// Frames handed out per second of the scene (the footage's rate over `step`), where it is known.
+    /// Frames read per second of the scene (the footage's rate over `step`), where it is known.
     pub frame_rate_hz: Option<f64>,
-    /// What it is made of.
+    /// Kind of footage.
     pub kind: SourceKind,
-    /// What the orientation tag of the first image asks for, which is not done here; see [`Source`]. Of a
-    /// video nothing is known.
+    /// The orientation tag of the first image, which is not applied; see [`Source`]. Unknown for a video.
     pub turn: Turn,
 }
 
 /// One frame of footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameView<'a> {
-    /// Index in the footage, from 0: `start + k * step`; some `k` may be left out.
+    /// Index in the footage, from 0: `start + k * step`; some `k` may be missing.
     pub index: u64,
     /// Presentation time, seconds after frame 0 of the footage; `None` where no rate is known.
     pub time_s: Option<f64>,
@@ -57,15 +56,15 @@ pub struct FrameView<'a> {
     pub rgb: &'a [u8],
 }
 
-/// Open footage, which hands out its frames in order.
+/// Open footage, read frame by frame in order.
 ///
-/// A frame of a video that cannot be decoded is left out: the index of the next one says so, where
+/// A frame of a video that cannot be decoded is left out; the index of the next one shows the gap, where
 /// frames are equally spaced.
 ///
 /// All frames have one size, and are 8-bit RGB whatever the file holds: grey is replicated, an alpha
 /// channel dropped, 16 bits are rounded to 8. Orientation tags (EXIF, or the display matrix of a
-/// phone's video) are ignored, because a calibration speaks of pixels as they are stored; [`read_upright`]
-/// obeys them.
+/// phone's video) are ignored, because a calibration refers to pixels as they are stored; [`read_upright`]
+/// applies them.
 ///
 /// ```no_run
 /// use footage::{Source, SourceSpec};
@@ -95,12 +94,12 @@ enum Reader {
 }
 
 impl Source {
-    /// Opens footage; of a video this starts the decoder.
+    /// Opens footage; for a video this starts the decoder.
     ///
     /// # Errors
     ///
     /// Every [`FootageError`] except [`SizeDiffers`](FootageError::SizeDiffers) and
-    /// [`VideoTruncated`](FootageError::VideoTruncated), which only show while reading.
+    /// [`VideoTruncated`](FootageError::VideoTruncated), which can only occur while reading.
     pub fn open(spec: &SourceSpec) -> Result<Self, FootageError> {
         spec.check()?;
         let (path, reader) = match listing::list(&spec.path)? {
@@ -118,7 +117,7 @@ impl Source {
             }
         };
         let clock = Clock::of(&reader, spec);
-        let info = reader.info(clock.rate_hz.map(|it| it / spec.step as f64));
+        let info = reader.info(clock.rate_hz.map(|rate_hz| rate_hz / spec.step as f64));
         check_min_side(&path, info.size, spec.min_side)?;
         Ok(Self {
             info,
@@ -129,16 +128,16 @@ impl Source {
         })
     }
 
-    /// What is known of it.
+    /// What is known before the first frame is read.
     pub fn info(&self) -> &SourceInfo {
         &self.info
     }
 
-    /// The next frame, in a buffer of the source's own; `None` at the end, and ever after.
+    /// The next frame, in a buffer of the source; `None` at the end and after it.
     ///
     /// # Errors
     ///
-    /// [`FootageError`]: what cannot be read, in which file. After an error there are no more frames.
+    /// [`FootageError`], which names the file. After an error there are no more frames.
     pub fn next_frame(&mut self) -> Result<Option<FrameView<'_>>, FootageError> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.resize(self.info.size.rgb_bytes(), 0);
@@ -151,16 +150,15 @@ impl Source {
         }))
     }
 
-    /// The pixels of the frame that [`next_frame`](Self::next_frame) gave last; before the first, and
-    /// after frames of a video were passed over, they mean nothing.
+    /// The pixels of the last frame of [`next_frame`](Self::next_frame); undefined before the first one, and
+    /// after frames of a video were skipped.
     pub fn pixels(&self) -> &[u8] {
         &self.buffer
     }
 
-    /// The next frame, decoded into `rgb`; `None` at the end, and ever after.
+    /// The next frame, decoded into `rgb`; `None` at the end and after it.
     ///
-    /// * `rgb`: `width * height * 3` bytes, all of them written; what they are after `None` or an error
-    ///   is not said.
+    /// * `rgb`: `width * height * 3` bytes, all of them written; undefined after `None` or an error.
     ///
     /// # Errors
     ///
@@ -179,9 +177,9 @@ impl Source {
         Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
-    /// Passes over the next `n` frames, and returns how many there were.
+    /// Skips the next `n` frames, and returns how many there were.
     ///
-    /// Images are not even opened; the frames of a video have to be decoded.
+    /// Images are not opened; the frames of a video have to be decoded.
     ///
     /// # Errors
     ///
@@ -206,7 +204,7 @@ impl Source {
         if self.is_over {
             return Ok(None);
         }
-        // A failure must end the footage too.
+        // Also after an error there are no more frames.
         self.is_over = true;
         let is_there = match &mut self.reader {
             Reader::Images(images) => images.read_into(rgb)?,
@@ -249,7 +247,7 @@ impl Reader {
 struct Clock {
     index: u64,
     step: u64,
-    /// Rate of the footage itself.
+    /// Rate of the footage, before `step`.
     rate_hz: Option<f64>,
     /// Times of its frames, if they are not equally spaced.
     times_s: Option<Vec<f64>>,
@@ -270,15 +268,15 @@ impl Clock {
     }
 
     fn stamp(&self) -> (u64, Option<f64>) {
-        let by_rate = || self.rate_hz.map(|it| self.index as f64 / it);
+        let by_rate = || self.rate_hz.map(|rate_hz| self.index as f64 / rate_hz);
         let listed = self
             .times_s
             .as_ref()
-            .and_then(|it| it.get(self.index as usize));
+            .and_then(|times_s| times_s.get(self.index as usize));
         (self.index, listed.copied().or_else(by_rate))
     }
 
-    /// Moves on if there was a frame, and hands the answer back.
+    /// Advances by one frame if there was one, and returns `was_there`.
     fn tick(&mut self, was_there: bool) -> bool {
         if was_there {
             self.index = self.index.saturating_add(self.step);

@@ -1,12 +1,12 @@
-//! What to open, and which of its frames.
+//! The footage to open, and the choice of its frames.
 
 use std::path::PathBuf;
 
 use crate::FootageError;
 
-/// Footage as a user names it, and which of its frames to hand out.
+/// Footage as named by the user, and which of its frames to read.
 ///
-/// Frames are counted from 0 in the order of the footage; those handed out are `start`,
+/// Frames are counted from 0 in the order of the footage; those read are `start`,
 /// `start + step`, `start + 2 step`, ..., `count` of them at most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceSpec {
@@ -17,10 +17,9 @@ pub struct SourceSpec {
     pub start: u64,
     /// Distance between frames, at least 1.
     pub step: u64,
-    /// Most frames to hand out, at least 1; all without it. A still image is handed out this often (once without
-    /// it), and has no other end.
+    /// Most frames to read, at least 1; all if not set. A still image is repeated this often (once if not set).
     pub count: Option<u64>,
-    /// Frames per second where the footage does not say: images never do, videos do.
+    /// Frames per second of footage without a rate of its own: of images, not of videos.
     pub frame_rate_hz: Option<f64>,
     /// Smallest width and height accepted, pixels.
     pub min_side: usize,
@@ -45,7 +44,7 @@ impl SourceSpec {
         }
     }
 
-    /// Refuses numbers that no footage can satisfy.
+    /// Refuses values that are invalid for any footage.
     pub(crate) fn check(&self) -> Result<(), FootageError> {
         if self.step == 0 {
             return Err(FootageError::ZeroStep);
@@ -61,11 +60,11 @@ impl SourceSpec {
         }
     }
 
-    /// How many of `n_frames` are handed out.
+    /// How many of `n_frames` are read.
     ///
     /// # Errors
     ///
-    /// [`FootageError`] of numbers that no footage can satisfy, or this one cannot.
+    /// [`FootageError`] of invalid values, or of a start beyond the end.
     pub fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
         self.check()?;
         if self.start >= n_frames {
@@ -95,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_the_frames_that_start_step_and_count_leave() {
+    fn start_step_and_count_determine_the_number_of_frames() {
         assert_eq!(delivered(0, 1, None), Some(10));
         assert_eq!(delivered(9, 1, None), Some(1));
         assert_eq!(delivered(10, 1, None), None);
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_no_frames_at_all() {
+    fn refuses_a_count_of_zero() {
         let none = SourceSpec {
             count: Some(0),
             ..SourceSpec::new("x")

@@ -12,13 +12,13 @@ use crate::Size;
 /// An affine map, `[u, v] = m[..][..2] * [x, y] + m[..][2]`, of pixels whose top-left centre is `(0, 0)`.
 pub type Affine = [[f64; 3]; 2];
 
-/// The most that an image is shrunk: beyond it a pixel is the mean of a whole face.
+/// The largest factor by which an image is shrunk.
 const MAX_SCALE: f64 = 64.0;
 
-/// Largest translation, pixels: far beyond any image, and exact in fixed point.
+/// Largest translation, pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
-/// What lies outside of the source.
+/// The value of pixels outside of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fill {
     /// Black.
@@ -39,7 +39,7 @@ pub enum WarpError {
         /// Size of the output.
         output_size: Size,
     },
-    /// The map is singular, not a number, or moves the image out of sight.
+    /// The map is singular, not finite, or its translation is too large.
     #[error("the map from output to source is singular or without bounds: {map:?}")]
     BadMap {
         /// The map.
@@ -50,14 +50,14 @@ pub enum WarpError {
     ShrinksTooMuch {
         /// Source pixels per output pixel.
         scale: f64,
-        /// The most that is done.
+        /// The largest factor accepted.
         limit: f64,
     },
 }
 
-/// A warp between two sizes, with everything computed that does not depend on the pixels.
+/// A warp between two sizes, with everything precomputed that does not depend on the pixels.
 ///
-/// What an output pixel is, from the exact to the approximate:
+/// The value of an output pixel depends on the map:
 /// * the identity copies;
 /// * a map that keeps rows and columns and does not enlarge (resize, crop, mirror): the area mean of
 ///   the rectangle that the output pixel covers, exact up to rounding to a grey level (half up);
@@ -87,7 +87,7 @@ impl Warp {
     ///
     /// * `source_from_output`: pixels of the output to pixels of the source, both with the centre of the
     ///   top-left pixel at `(0, 0)`.
-    /// * `fill`: what lies outside of the source. Pixels of its border mix with it.
+    /// * `fill`: the value outside of the source. It is interpolated with the pixels of the border.
     ///
     /// # Errors
     ///
@@ -113,7 +113,7 @@ impl Warp {
         } else if keeps_rows && a.abs() >= 1.0 && d.abs() >= 1.0 {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
-            let n_samples = scales.map(|it| (it - 1e-9).ceil().max(1.0) as usize);
+            let n_samples = scales.map(|scale| (scale - 1e-9).ceil().max(1.0) as usize);
             Plan::Sampled(Sampled::new(
                 [source, output],
                 source_from_output,
@@ -159,7 +159,7 @@ impl Warp {
         self.apply_with(Level::new(), source, out);
     }
 
-    /// The loops are plain Rust; what differs is the instruction set that they are compiled for.
+    /// The same loops, compiled for every instruction set.
     fn apply_with(&mut self, level: Level, source: &[u8], out: &mut [u8]) {
         let plan = &mut self.plan;
         dispatch!(level, _ => {
@@ -174,7 +174,7 @@ impl Warp {
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-/// The map that stretches a source over an output, so that their outer borders fall together.
+/// The map that scales a source to an output, so that their outer borders coincide.
 pub fn resize_map(source: Size, output: Size) -> Affine {
     let sx = source.width as f64 / output.width as f64;
     let sy = source.height as f64 / output.height as f64;

@@ -1,4 +1,4 @@
-//! What is wrong with footage is said with the name of the file, and nothing panics.
+//! Errors of invalid footage name the file, and nothing panics.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -32,7 +32,7 @@ fn read_all(spec: &SourceSpec) -> Result<u64, FootageError> {
     };
     assert!(
         matches!(source.next_frame(), Ok(None)),
-        "after the end there is nothing"
+        "no frame after the end"
     );
     outcome
 }
@@ -49,7 +49,7 @@ fn images(n: usize) -> TempDir {
 }
 
 #[test]
-fn what_is_not_there() {
+fn missing_files_and_empty_patterns_are_refused() {
     let folder = images(0);
     let error = refusal(&folder.path().join("absent.mp4"));
     assert!(matches!(error, FootageError::NotFound { .. }), "{error}");
@@ -64,7 +64,7 @@ fn what_is_not_there() {
 }
 
 #[test]
-fn a_file_of_no_bytes() {
+fn empty_files_are_refused() {
     let folder = images(2);
     for name in ["zero.png", "zero.mp4", "zero"] {
         let path = folder.path().join(name);
@@ -79,7 +79,7 @@ fn a_file_of_no_bytes() {
 }
 
 #[test]
-fn an_image_that_is_cut_off() {
+fn truncated_images_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for format in ["png", "jpg", "bmp"] {
         let path = folder.path().join(format!("cut.{format}"));
@@ -99,7 +99,7 @@ fn an_image_that_is_cut_off() {
 }
 
 #[test]
-fn an_image_that_is_none() {
+fn a_text_file_named_as_an_image_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("text.png");
     fs::write(&path, "this is a text, whatever its name says").unwrap();
@@ -109,7 +109,7 @@ fn an_image_that_is_none() {
 }
 
 #[test]
-fn an_image_of_another_size_in_a_sequence() {
+fn an_image_of_another_size_in_a_sequence_is_refused() {
     let folder = images(4);
     let odd = image::RgbImage::new(50, 45);
     odd.save(folder.path().join("im3.png")).unwrap();
@@ -127,7 +127,7 @@ fn an_image_of_another_size_in_a_sequence() {
 }
 
 #[test]
-fn an_image_that_is_too_small() {
+fn images_smaller_than_the_minimum_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dot.png");
     image::RgbImage::new(1, 1).save(&path).unwrap();
@@ -144,7 +144,7 @@ fn an_image_that_is_too_small() {
 }
 
 #[test]
-fn a_header_that_promises_more_than_there_is_memory() {
+fn a_header_with_a_huge_size_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bomb.bmp");
     clip::frame(0).save(&path).unwrap();
@@ -157,7 +157,7 @@ fn a_header_that_promises_more_than_there_is_memory() {
 }
 
 #[test]
-fn a_start_behind_the_end() {
+fn a_start_beyond_the_end_is_refused() {
     let folder = images(3);
     let late = SourceSpec {
         start: 3,
@@ -178,7 +178,7 @@ fn a_start_behind_the_end() {
 }
 
 #[test]
-fn no_ffmpeg() {
+fn a_missing_ffprobe_is_an_error_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video.mp4");
     fs::write(&path, "could be a video").unwrap();
@@ -202,7 +202,7 @@ fn no_ffmpeg() {
 }
 
 #[test]
-fn ffprobe_without_ffmpeg() {
+fn a_missing_ffmpeg_is_an_error() {
     if !clip::has_ffmpeg() {
         return;
     }
@@ -221,7 +221,7 @@ fn ffprobe_without_ffmpeg() {
 }
 
 #[test]
-fn a_video_that_is_none() {
+fn files_that_are_not_videos_are_refused() {
     if !clip::has_ffmpeg() {
         return;
     }
@@ -251,7 +251,7 @@ fn a_video_that_is_none() {
 }
 
 #[test]
-fn a_video_without_pictures() {
+fn a_video_without_a_video_stream_is_refused() {
     if !clip::has_ffmpeg() {
         return;
     }
@@ -264,7 +264,7 @@ fn a_video_without_pictures() {
 }
 
 #[test]
-fn a_video_that_is_cut_off() {
+fn truncated_videos_are_an_error() {
     if !clip::has_ffmpeg() {
         return;
     }
@@ -292,8 +292,8 @@ fn a_video_that_is_cut_off() {
     }
 }
 
-/// The frames that come of a video of 60 with damage in the middle, by index, each with what it shows.
-fn of_damaged(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
+/// The frames read from a video of 60 with damage in the middle: index and last pixel.
+fn frames_of_damaged_video(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
     let folder = images(60);
     let options = [
         "-c:v", "libx264", "-qp", "0", "-pix_fmt", "yuv444p", "-g", "10", "-bf", "2",
@@ -324,11 +324,11 @@ fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
     if !clip::has_ffmpeg() {
         return;
     }
-    let whole = of_damaged(0, 1);
+    let whole = frames_of_damaged_video(0, 1);
     assert!((30..60).contains(&whole.len()), "{} frames", whole.len());
     assert_eq!(whole.last().map(|it| it.0), Some(59));
     assert!(whole.is_sorted_by(|a, b| a.0 < b.0));
-    // The last group of pictures is sound, and every frame shows its own number.
+    // The last group of pictures is not damaged, and every frame shows its own number.
     for (index, corner) in whole.iter().filter(|it| it.0 >= 50) {
         let picture = clip::frame(*index as usize).into_raw();
         let expected = &picture[picture.len() - 3..];
@@ -338,7 +338,7 @@ fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
             "frame {index}: {corner:?}, expected {expected:?}"
         );
     }
-    let third = of_damaged(1, 3);
+    let third = frames_of_damaged_video(1, 3);
     let expected = whole.iter().filter(|it| it.0 % 3 == 1);
     assert_eq!(third, expected.copied().collect::<Vec<_>>());
 }
@@ -362,7 +362,7 @@ proptest! {
             bytes.truncate(1 + cut.index(bytes.len()));
         }
         fs::write(&path, if is_noise { &noise } else { &bytes }).unwrap();
-        // The law: an answer, and no panic.
+        // Either result is right, but it must not panic.
         if let Err(error) = read_all(&spec(&path)) {
             named(&error, "x.");
         }

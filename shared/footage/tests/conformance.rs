@@ -1,4 +1,4 @@
-//! One clip, stored in every way that footage can come, must give the same frames.
+//! One clip, stored as every kind of footage, must give the same frames.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,9 +12,9 @@ fn clip_frames(n: usize) -> Vec<Vec<u8>> {
     (0..n).map(|it| clip::frame(it).into_raw()).collect()
 }
 
-/// What every source owes: `expected` are all frames of the footage.
-fn conforms(spec: &SourceSpec, expected: &[Vec<u8>]) {
-    hands_out_all_frames(spec, expected);
+/// Checks everything that every source must do; `expected` are all frames of the footage.
+fn check_conformance(spec: &SourceSpec, expected: &[Vec<u8>]) {
+    check_all_frames(spec, expected);
     for (start, step, count) in [
         (0, 1, Some(5)),
         (3, 1, None),
@@ -24,12 +24,12 @@ fn conforms(spec: &SourceSpec, expected: &[Vec<u8>]) {
         (1, 100, Some(7)),
         (0, 1, Some(1000)),
     ] {
-        hands_out_a_choice(spec, expected, (start, step, count));
+        check_chosen_frames(spec, expected, (start, step, count));
     }
-    passes_over(spec, expected);
+    check_skipping(spec, expected);
 }
 
-fn hands_out_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
+fn check_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
     let mut source = Source::open(spec).unwrap();
     assert_eq!(source.info().size, clip::SIZE);
     assert_eq!(source.info().n_frames, expected.len() as u64);
@@ -37,9 +37,9 @@ fn hands_out_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
     for (index, rgb) in expected.iter().enumerate() {
         // Both ways to read, in turn.
         if index % 2 == 0 {
-            is_frame(source.next_frame().unwrap(), index, rgb);
+            assert_frame(source.next_frame().unwrap(), index, rgb);
         } else {
-            is_frame(source.next_into(&mut buffer).unwrap(), index, rgb);
+            assert_frame(source.next_into(&mut buffer).unwrap(), index, rgb);
         }
     }
     for _ in 0..3 {
@@ -49,7 +49,7 @@ fn hands_out_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
     }
 }
 
-fn is_frame(found: Option<FrameView<'_>>, index: usize, rgb: &[u8]) {
+fn assert_frame(found: Option<FrameView<'_>>, index: usize, rgb: &[u8]) {
     let found = found.unwrap();
     assert_eq!(found.index, index as u64);
     let time_s = found.time_s.unwrap();
@@ -57,7 +57,7 @@ fn is_frame(found: Option<FrameView<'_>>, index: usize, rgb: &[u8]) {
     assert!(found.rgb == rgb, "pixels of frame {index}");
 }
 
-fn hands_out_a_choice(
+fn check_chosen_frames(
     spec: &SourceSpec,
     expected: &[Vec<u8>],
     (start, step, count): (usize, usize, Option<usize>),
@@ -75,18 +75,18 @@ fn hands_out_a_choice(
     let rate_hz = source.info().frame_rate_hz.unwrap();
     assert!((rate_hz * step as f64 - 25.0).abs() < 1e-9, "{rate_hz}");
     for index in indices {
-        is_frame(source.next_frame().unwrap(), index, &expected[index]);
+        assert_frame(source.next_frame().unwrap(), index, &expected[index]);
     }
     assert_eq!(source.next_frame().unwrap(), None, "{spec:?}");
 }
 
-fn passes_over(spec: &SourceSpec, expected: &[Vec<u8>]) {
+fn check_skipping(spec: &SourceSpec, expected: &[Vec<u8>]) {
     let mut source = Source::open(spec).unwrap();
     assert_eq!(source.skip(0).unwrap(), 0);
     assert_eq!(source.skip(2).unwrap(), 2);
-    is_frame(source.next_frame().unwrap(), 2, &expected[2]);
+    assert_frame(source.next_frame().unwrap(), 2, &expected[2]);
     assert_eq!(source.skip(5).unwrap(), 5);
-    is_frame(source.next_frame().unwrap(), 8, &expected[8]);
+    assert_frame(source.next_frame().unwrap(), 8, &expected[8]);
     assert_eq!(source.skip(100).unwrap(), 3);
     assert_eq!(source.next_frame().unwrap(), None);
 }
@@ -103,37 +103,37 @@ fn kind(spec: &SourceSpec) -> SourceKind {
 }
 
 #[test]
-fn images_by_folder_glob_and_number() {
+fn images_of_a_folder_a_glob_and_a_numbered_pattern_conform() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), N_FRAMES);
-    // What a folder must pass over; a glob and a pattern do not match it.
+    // Files that a folder must ignore; a glob and a pattern do not match them.
     std::fs::write(folder.path().join("notes.txt"), "not an image").unwrap();
     std::fs::write(folder.path().join(".im0.png"), "hidden").unwrap();
     for name in ["", "im*.png", "im%d.png", "im%04d.png", "im[0-9]*.png"] {
         let spec = spec(&folder.path().join(name));
         assert_eq!(kind(&spec), SourceKind::Images, "{name}");
-        conforms(&spec, &clip_frames(N_FRAMES));
+        check_conformance(&spec, &clip_frames(N_FRAMES));
     }
 }
 
 #[test]
-fn a_still_image_again_and_again() {
+fn a_still_image_is_repeated() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), 1);
     let once = spec(&folder.path().join("im1.png"));
     assert_eq!(kind(&once), SourceKind::Still);
-    hands_out_all_frames(&once, &clip_frames(1));
+    check_all_frames(&once, &clip_frames(1));
     let often = SourceSpec {
         count: Some(12),
         ..once
     };
     let expected = vec![clip::frame(0).into_raw(); 12];
-    hands_out_all_frames(&often, &expected);
-    passes_over(&often, &expected);
+    check_all_frames(&often, &expected);
+    check_skipping(&often, &expected);
 }
 
 #[test]
-fn videos_of_several_codecs_and_containers() {
+fn videos_of_several_codecs_and_containers_conform() {
     if !clip::has_ffmpeg() {
         return;
     }
@@ -146,25 +146,25 @@ fn videos_of_several_codecs_and_containers() {
     ] {
         let spec = spec(&clip::encode(folder.path(), name, options));
         assert_eq!(kind(&spec), SourceKind::Video, "{name}");
-        conforms(&spec, &clip_frames(N_FRAMES));
+        check_conformance(&spec, &clip_frames(N_FRAMES));
     }
 }
 
 #[test]
-fn a_video_says_its_rate_and_images_are_told() {
+fn a_video_has_its_own_rate_and_images_take_that_of_the_spec() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), 2);
     let path = folder.path().to_str().unwrap();
-    let mut untold = Source::open(&SourceSpec::new(path)).unwrap();
-    assert_eq!(untold.info().frame_rate_hz, None);
-    assert_eq!(untold.next_frame().unwrap().unwrap().time_s, None);
+    let mut without_rate = Source::open(&SourceSpec::new(path)).unwrap();
+    assert_eq!(without_rate.info().frame_rate_hz, None);
+    assert_eq!(without_rate.next_frame().unwrap().unwrap().time_s, None);
     if clip::has_ffmpeg() {
         let video = clip::encode(folder.path(), "a.mkv", clip::FFV1);
-        let told_wrong = SourceSpec {
+        let wrong_rate = SourceSpec {
             frame_rate_hz: Some(99.0),
             ..spec(&video)
         };
-        let source = Source::open(&told_wrong).unwrap();
+        let source = Source::open(&wrong_rate).unwrap();
         assert_eq!(source.info().frame_rate_hz, Some(25.0));
     }
 }

@@ -1,4 +1,4 @@
-//! What drawing must do to pixels.
+//! The effect of drawing on pixels.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -27,7 +27,7 @@ fn amount(canvas: &Canvas) -> f64 {
 }
 
 #[test]
-fn a_line_is_as_wide_as_asked_and_ends_where_it_ends() {
+fn a_line_has_the_requested_width_and_ends() {
     const GROUND: [u8; 3] = [90, 120, 150];
     let mut canvas = Canvas::new(SIZE, GROUND);
     canvas.line([5.0, 10.0], [30.0, 10.0], 3.0, INK);
@@ -73,7 +73,7 @@ fn a_disc_has_its_area_and_a_ring_has_a_hole() {
 }
 
 #[test]
-fn a_box_covers_its_area_in_its_opacity() {
+fn a_box_covers_its_area_with_its_opacity() {
     let mut canvas = black();
     // From the middle of one pixel to the middle of another.
     canvas.filled_box([10.0, 10.0, 20.0, 14.0], 0.5, INK);
@@ -84,7 +84,7 @@ fn a_box_covers_its_area_in_its_opacity() {
 }
 
 #[test]
-fn the_outline_of_a_box_leaves_its_inside() {
+fn the_outline_of_a_box_does_not_fill_it() {
     let mut canvas = black();
     canvas.frame([5.0, 5.0, 20.0, 15.0], 1.0, INK);
     for (x, y) in [(5, 5), (20, 5), (20, 15), (5, 15), (12, 5), (5, 10)] {
@@ -94,7 +94,7 @@ fn the_outline_of_a_box_leaves_its_inside() {
 }
 
 #[test]
-fn text_is_as_wide_as_it_says_and_differs() {
+fn text_has_its_computed_width_and_shows_its_characters() {
     let drawn = |text: &str| {
         let mut canvas = Canvas::new(Size::new(100, 20), [90; 3]);
         canvas.text([2.0, 2.0], text, [255; 3]);
@@ -108,7 +108,7 @@ fn text_is_as_wide_as_it_says_and_differs() {
 }
 
 #[test]
-fn limbs_take_the_colour_of_their_side_and_lost_points_are_left_out() {
+fn limbs_have_the_colour_of_their_side_and_missing_points_are_left_out() {
     let points = [
         [5.0, 5.0],
         [5.0, 25.0],
@@ -142,7 +142,7 @@ fn limbs_take_the_colour_of_their_side_and_lost_points_are_left_out() {
 }
 
 #[test]
-fn a_sheet_shows_every_picture_whole() {
+fn a_composed_sheet_contains_every_picture() {
     let colours = [[10, 0, 0], [0, 20, 0], [0, 0, 30]];
     let pictures = colours.map(|it| Canvas::new(SIZE, it));
     let small = Canvas::new(Size::new(7, 9), INK);
@@ -180,7 +180,7 @@ fn a_sheet_shows_every_picture_whole() {
 }
 
 #[test]
-fn a_saved_picture_comes_back_and_nothing_else_is_left() {
+fn a_saved_picture_is_read_back_and_no_other_file_remains() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("view.png");
     std::fs::write(&path, "an older file").unwrap();
@@ -196,7 +196,7 @@ fn a_saved_picture_comes_back_and_nothing_else_is_left() {
 }
 
 #[test]
-fn a_picture_that_cannot_be_saved_says_where() {
+fn errors_of_saving_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let error = black()
         .save_png(&folder.path().join("absent/view.png"))
@@ -232,7 +232,7 @@ fn outside() -> impl Strategy<Value = f64> {
 
 proptest! {
     #[test]
-    fn a_colour_on_itself_changes_nothing_wherever_it_is_drawn(
+    fn drawing_in_the_colour_of_the_background_changes_nothing(
         a in [coordinate(), coordinate()], b in [coordinate(), coordinate()],
         width in prop_oneof![0.0..20.0, Just(f64::NAN), Just(1e300)],
     ) {
@@ -244,12 +244,12 @@ proptest! {
         canvas.frame([a[0], a[1], b[0], b[1]], width, INK);
         canvas.filled_box([a[0], a[1], b[0], b[1]], 0.5, INK);
         prop_assert!(canvas == ground);
-        // Text has an edge of its own; that it is drawn is enough.
+        // Text has a dark edge; it must only not panic.
         canvas.text(a, "text", INK);
     }
 
     #[test]
-    fn what_lies_far_outside_leaves_no_trace(
+    fn shapes_outside_of_the_picture_change_nothing(
         a in (outside(), coordinate()), b in (outside(), coordinate()), width in 0.0..20.0,
     ) {
         let (a, b) = (<[f64; 2]>::from(a), <[f64; 2]>::from(b));
@@ -262,9 +262,8 @@ proptest! {
         prop_assert!(canvas == black());
     }
 
-    /// Where a shape lies by whole pixels does not change what it looks like.
     #[test]
-    fn a_moved_line_is_the_line_moved(
+    fn a_line_moved_by_whole_pixels_looks_the_same(
         x1 in 2.0..20.0, y1 in 2.0..20.0, x2 in 2.0..20.0, y2 in 2.0..20.0, width in 0.5..4.0,
     ) {
         let (mut here, mut there) = (black(), black());

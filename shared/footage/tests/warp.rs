@@ -1,4 +1,4 @@
-//! What a warp must do to images whose result is known.
+//! Warps of images whose result is known.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -81,7 +81,7 @@ fn a_shift_by_whole_pixels_moves_and_fills() {
 }
 
 #[test]
-fn half_the_size_is_the_mean_of_four_rounded_half_up() {
+fn halving_takes_the_mean_of_four_pixels_rounded_half_up() {
     let (source, output) = (Size::new(20, 12), Size::new(10, 6));
     let rgb = noise(source);
     let out = warp(
@@ -111,7 +111,7 @@ fn a_quarter_turn_permutes_pixels() {
 }
 
 #[test]
-fn a_mirror_mirrors() {
+fn a_negative_factor_mirrors() {
     let size = Size::new(9, 5);
     let rgb = noise(size);
     let map = [[-1.0, 0.0, 8.0], [0.0, 1.0, 0.0]];
@@ -132,7 +132,7 @@ fn pixels_outside_are_black_or_the_nearest() {
 }
 
 #[test]
-fn refuses_what_it_cannot_map() {
+fn refuses_empty_images_and_invalid_maps() {
     let size = Size::new(8, 8);
     let refusal =
         |source, output, map: Affine| Warp::new(source, output, &map, Fill::Black).unwrap_err();
@@ -174,7 +174,7 @@ proptest! {
         let map = turn(source, output, degrees, scale);
         let rgb = vec![value; source.rgb_bytes()];
         let out = warp(source, &rgb, output, &map, Fill::Replicate);
-        // The area mean divides by an area that is rounded to f32, which no grey level notices.
+        // The area is rounded to f32, which does not change the grey level.
         prop_assert!(out.iter().all(|&it| it == value));
     }
 
@@ -215,8 +215,8 @@ proptest! {
     }
 }
 
-/// The mean of `n * n` bilinear samples by hand, in f64, with positions rounded to 1/32 pixel.
-struct ByHand<'a> {
+/// Reference: the mean of `n * n` bilinear samples in f64, with positions rounded to 1/32 pixel.
+struct Reference<'a> {
     source: Size,
     rgb: &'a [u8],
     map: Affine,
@@ -224,7 +224,7 @@ struct ByHand<'a> {
     fill: Fill,
 }
 
-impl ByHand<'_> {
+impl Reference<'_> {
     fn value(&self, x: f64, y: f64, channel: usize) -> f64 {
         let last = [
             self.source.width as f64 - 1.0,
@@ -247,7 +247,7 @@ impl ByHand<'_> {
         weighted.iter().sum()
     }
 
-    /// `None` where the centre falls so near between two positions that either may be taken.
+    /// `None` where rounding the position of the centre is ambiguous.
     fn pixel(&self, x: usize, y: usize) -> Option<[f64; 3]> {
         let centre = self
             .map
@@ -285,9 +285,9 @@ proptest! {
         map[1][2] += dy;
         let fill = if is_black { Fill::Black } else { Fill::Replicate };
         let out = warp(source, &rgb, output, &map, fill);
-        let by_hand = ByHand { source, rgb: &rgb, map, n: scale.ceil() as usize, fill };
+        let reference = Reference { source, rgb: &rgb, map, n: scale.ceil() as usize, fill };
         for (x, y) in (0..output.width).flat_map(|x| (0..output.height).map(move |y| (x, y))) {
-            let Some(expect) = by_hand.pixel(x, y) else { continue };
+            let Some(expect) = reference.pixel(x, y) else { continue };
             for (found, expect) in at(&out, output, x, y).into_iter().zip(expect) {
                 let error = (f64::from(found) - expect).abs();
                 prop_assert!(error < 0.6, "{found} for {expect} at {x}, {y}");

@@ -33,8 +33,8 @@ pub enum OverlayError {
 
 /// A picture to draw on. Points are `[x, y]` pixels, the centre of the top-left pixel at `(0, 0)`.
 ///
-/// Edges are smoothed: a pixel takes as much of a colour as the shape covers of it. What lies outside
-/// of the picture is cut off, and a shape with a coordinate that is not finite is left out.
+/// Edges are anti-aliased: a pixel is blended by its share that the shape covers. Shapes are clipped to the
+/// picture; a shape with a coordinate that is not finite is left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Canvas {
     size: Size,
@@ -122,7 +122,7 @@ impl Canvas {
 
     /// A filled box `[x1, y1, x2, y2]` from corner to corner.
     ///
-    /// * `opacity`: from 0, nothing is seen, to 1, nothing is seen through.
+    /// * `opacity`: from 0, invisible, to 1, opaque.
     pub fn filled_box(&mut self, corners: [f64; 4], opacity: f64, colour: Colour) {
         let [x1, y1, x2, y2] = corners;
         let cover = |at: f64, low: f64, high: f64| {
@@ -133,7 +133,7 @@ impl Canvas {
         });
     }
 
-    /// Puts a picture down with its top-left pixel at column `x`, row `y`, which must leave room for it.
+    /// Copies a picture, with its top-left pixel at column `x`, row `y`; it must fit.
     pub(super) fn put(&mut self, picture: &Self, [x, y]: [usize; 2]) {
         let rows = picture.rgb.chunks_exact(picture.size.width * 3);
         for (row, from) in rows.enumerate() {
@@ -142,14 +142,14 @@ impl Canvas {
         }
     }
 
-    /// Mixes a colour into the pixels of a box `[x1, y1, x2, y2]`, as much as `cover` says of each.
+    /// Blends a colour into the pixels of a box `[x1, y1, x2, y2]`; `cover` is the share of each.
     pub(super) fn paint(
         &mut self,
         corners: [f64; 4],
         colour: Colour,
         cover: impl Fn(f64, f64) -> f64,
     ) {
-        if !corners.iter().all(|it| it.is_finite()) {
+        if !corners.iter().all(|corner| corner.is_finite()) {
             return;
         }
         let [x1, y1, x2, y2] = corners;
@@ -159,7 +159,7 @@ impl Canvas {
         for y in range(y1, y2, self.size.height) {
             for x in range(x1, x2, self.size.width) {
                 let cover = cover(x as f64, y as f64);
-                // Not a number, where distances overflow, covers nothing.
+                // False for NaN, where distances overflow.
                 if cover > 0.0 {
                     let at = (y * self.size.width + x) * 3;
                     blend(&mut self.rgb[at..at + 3], colour, cover.min(1.0));
@@ -172,7 +172,7 @@ impl Canvas {
     ///
     /// # Errors
     ///
-    /// The size is none that a PNG can have.
+    /// A PNG cannot have this size.
     pub fn png(&self) -> Result<Vec<u8>, ImageError> {
         let mut png = Vec::new();
         PngEncoder::new(&mut png).write_image(
@@ -184,12 +184,12 @@ impl Canvas {
         Ok(png)
     }
 
-    /// Writes a PNG. Who reads `path` sees the old file or the new one, never a part: it is written
+    /// Writes a PNG. A reader of `path` sees the old file or the new one, never a part: it is written
     /// beside it (`.part`) and renamed.
     ///
     /// # Errors
     ///
-    /// [`OverlayError`], with nothing left behind.
+    /// [`OverlayError`]; no partial file remains.
     pub fn save_png(&self, path: &Path) -> Result<(), OverlayError> {
         let png = self.png().map_err(|source| OverlayError::Encode {
             path: path.to_path_buf(),

@@ -4,7 +4,7 @@ use super::text::{TEXT_HEIGHT, text_width};
 use super::{CENTRE, Canvas, Colour};
 use crate::Size;
 
-const GROUND: Colour = [24, 24, 24];
+const BACKGROUND: Colour = [24, 24, 24];
 const GAP: usize = 8;
 const CAPTION: usize = TEXT_HEIGHT + 6;
 
@@ -13,7 +13,7 @@ const CAPTION: usize = TEXT_HEIGHT + 6;
 pub struct Tile<'a> {
     /// The picture.
     pub picture: &'a Canvas,
-    /// One line of text, cut off where the picture is narrower.
+    /// One line of text, truncated to the width of the cell.
     pub caption: &'a str,
 }
 
@@ -37,7 +37,7 @@ pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
         n_columns * (cell.width + GAP) + GAP,
         n_rows * (cell.height + GAP) + GAP,
     );
-    let mut sheet = Canvas::new(size, GROUND);
+    let mut sheet = Canvas::new(size, BACKGROUND);
     for (index, tile) in tiles.iter().enumerate() {
         let left = GAP + index % n_columns * (cell.width + GAP);
         let top = GAP + index / n_columns * (cell.height + GAP);
@@ -52,7 +52,7 @@ pub fn compose(tiles: &[Tile<'_>], n_columns: usize) -> Canvas {
     sheet
 }
 
-/// As much of a line as there is room for.
+/// A line, truncated to a width.
 fn fitting(line: &str, width: usize) -> &str {
     let n_fitting = width / text_width("m");
     line.char_indices()

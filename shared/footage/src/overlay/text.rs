@@ -1,4 +1,4 @@
-//! Text of one size, smoothed.
+//! Anti-aliased text.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
@@ -16,13 +16,13 @@ pub fn text_width(text: &str) -> usize {
 }
 
 impl Canvas {
-    /// One line of text with a dark edge, its top-left corner at `at`; what is not ASCII becomes a
-    /// question mark.
+    /// One line of text with a dark edge, its top-left corner at `at`; characters that are not ASCII become
+    /// question marks.
     pub fn text(&mut self, at: [f64; 2], text: &str, colour: Colour) {
         self.enlarged(at, text, colour, 1.0);
     }
 
-    /// The same, as large as suits the picture: once for every 480 rows, rounded, and at least once.
+    /// The same, scaled with the picture: by its rows / 480, rounded, and at least 1.
     pub fn label(&mut self, at: [f64; 2], text: &str, colour: Colour) {
         let times = (self.size().height as f64 / 480.0).round().max(1.0);
         self.enlarged(at, text, colour, times);

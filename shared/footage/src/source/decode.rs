@@ -12,7 +12,7 @@ use image::{
 
 use crate::{FootageError, Size};
 
-/// How a picture is turned between its stored pixels and what people see: its orientation tag (EXIF).
+/// The orientation tag (EXIF) of a picture: how its stored pixels must be turned to show it upright.
 ///
 /// ```
 /// use footage::{Size, Turn};
@@ -31,12 +31,12 @@ impl Default for Turn {
 }
 
 impl Turn {
-    /// Whether the pixels are stored as they are seen.
+    /// Whether the pixels are stored upright.
     pub fn is_none(self) -> bool {
         self.0 == Orientation::NoTransforms
     }
 
-    /// The picture as it is seen, from its stored pixels; of pixels of another size, these themselves.
+    /// The upright picture of stored pixels; unchanged if the number of bytes does not fit the size.
     pub fn apply(self, size: Size, rgb: Vec<u8>) -> (Size, Vec<u8>) {
         if self.is_none() || rgb.len() != size.rgb_bytes() {
             return (size, rgb);
@@ -64,10 +64,10 @@ impl fmt::Display for Turn {
     }
 }
 
-/// The largest image decoded, bytes: a header of 30 bytes may promise any size.
+/// The largest image decoded, bytes: a header of 30 bytes may claim any size.
 const MAX_BYTES: u64 = 1 << 29;
 
-/// An image file in memory. What it holds is told by its content, never by its name.
+/// An image file in memory. Its format is detected from its content, never from its name.
 pub(super) struct Encoded<'a> {
     path: &'a Path,
     bytes: Vec<u8>,
@@ -93,11 +93,13 @@ impl<'a> Encoded<'a> {
         Ok(size_of(&decoder))
     }
 
-    /// How the picture is to be turned before people look at it, by its orientation tag (EXIF); a tag
-    /// that cannot be read counts as none.
+    /// The orientation tag (EXIF); a tag that cannot be read counts as none.
     pub(super) fn turn(&self) -> Turn {
         let decoder = self.decoder();
-        let tag = decoder.and_then(|mut it| it.orientation().map_err(|source| self.wrong(source)));
+        let tag = decoder.and_then(|mut decoder| {
+            let tag = decoder.orientation();
+            tag.map_err(|source| self.error(source))
+        });
         Turn(tag.unwrap_or(Orientation::NoTransforms))
     }
 
@@ -107,7 +109,7 @@ impl<'a> Encoded<'a> {
     /// `rgb` must have the size of the image.
     pub(super) fn decode_into(&self, rgb: &mut [u8]) -> Result<(), FootageError> {
         let decoder = self.decoder()?;
-        let wrong = |it| self.wrong(it);
+        let wrong = |source| self.error(source);
         if self.is_jpeg() && jpeg_into(&self.bytes, rgb) {
             return Ok(());
         }
@@ -120,19 +122,19 @@ impl<'a> Encoded<'a> {
     }
 
     fn decoder(&self) -> Result<impl ImageDecoder + '_, FootageError> {
-        let wrong = |it| self.wrong(it);
+        let wrong = |source| self.error(source);
         let reader = ImageReader::new(Cursor::new(&self.bytes[..]))
             .with_guessed_format()
-            .map_err(|it| self.wrong(ImageError::IoError(it)))?;
+            .map_err(|source| self.error(ImageError::IoError(source)))?;
         if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_whole(&self.bytes) {
             let hint = ImageFormatHint::Exact(ImageFormat::Jpeg);
             let cut = "the file is cut off: it has no end-of-image marker";
-            return Err(self.wrong(ImageError::Decoding(DecodingError::new(hint, cut))));
+            return Err(self.error(ImageError::Decoding(DecodingError::new(hint, cut))));
         }
         let decoder = reader.into_decoder().map_err(wrong)?;
         if decoder.total_bytes() > MAX_BYTES || size_of(&decoder).rgb_bytes() as u64 > MAX_BYTES {
             let limit = LimitError::from_kind(LimitErrorKind::InsufficientMemory);
-            return Err(self.wrong(ImageError::Limits(limit)));
+            return Err(self.error(ImageError::Limits(limit)));
         }
         Ok(decoder)
     }
@@ -141,7 +143,7 @@ impl<'a> Encoded<'a> {
         image::guess_format(&self.bytes).is_ok_and(|it| it == ImageFormat::Jpeg)
     }
 
-    fn wrong(&self, source: ImageError) -> FootageError {
+    fn error(&self, source: ImageError) -> FootageError {
         FootageError::Image {
             path: self.path.to_path_buf(),
             source,
@@ -149,11 +151,11 @@ impl<'a> Encoded<'a> {
     }
 }
 
-/// Decodes a JPEG file with libjpeg, whose rounding the reference programs saw; `false` if it cannot.
+/// Decodes a JPEG file with libjpeg, whose rounding the reference programs used; `false` if it cannot.
 ///
-/// Other decoders differ by a few grey levels in every seventh sample, which is enough to turn ties of
-/// gradient orientations: of 100 PARSE images only 22 then keep their detection to the cell.
-/// The library reports errors by unwinding, which ends here; the caller tries another decoder.
+/// Other decoders differ by a few grey levels in every seventh sample, which is enough to break ties of
+/// gradient orientations differently: only 22 of 100 PARSE images then keep their detection to the cell.
+/// The library reports errors by unwinding, which is caught here; the caller tries another decoder.
 fn jpeg_into(bytes: &[u8], rgb: &mut [u8]) -> bool {
     let decode = || -> std::io::Result<Vec<u8>> {
         let mut lines = mozjpeg::Decompress::new_mem(bytes)?.rgb()?;
@@ -177,8 +179,8 @@ fn size_of(decoder: &impl ImageDecoder) -> Size {
 
 /// Whether the data of a JPEG file reaches its end-of-image marker (ITU-T T.81, B.1.1).
 ///
-/// Decoders fill what is missing with grey and say nothing. The segments in front of the data are
-/// stepped over, as a thumbnail in them has an end marker of its own.
+/// Decoders fill missing data with grey without an error. The segments in front of the data are
+/// skipped, because a thumbnail in them has an end marker of its own.
 fn jpeg_is_whole(bytes: &[u8]) -> bool {
     const START_OF_SCAN: u8 = 0xda;
     let mut at = 2;

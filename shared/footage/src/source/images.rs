@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use super::decode::{Encoded, Turn};
 use crate::{FootageError, Size, SourceSpec};
 
-/// The images that are handed out, in order.
+/// The images to be read, in order.
 #[derive(Debug)]
 pub(super) struct Images {
     paths: std::vec::IntoIter<PathBuf>,
     first: PathBuf,
     pub(super) size: Size,
-    /// Of the first.
+    /// Orientation tag of the first image.
     pub(super) turn: Turn,
     pub(super) n_frames: u64,
 }
@@ -60,13 +60,13 @@ impl Images {
         Ok(true)
     }
 
-    /// Passes over the next image without opening it.
+    /// Skips the next image without opening it.
     pub(super) fn skip_one(&mut self) -> bool {
         self.paths.next().is_some()
     }
 }
 
-/// One image, decoded once and handed out again and again.
+/// One image, decoded once and repeated.
 #[derive(Debug)]
 pub(super) struct Still {
     rgb: Vec<u8>,
@@ -106,19 +106,19 @@ impl Still {
 
 /// Decodes one image file: its size and its pixels, `width * height * 3` bytes of RGB, row major.
 ///
-/// The same pixels that [`Source`](crate::Source) hands out for the file; `path` is a file, never a pattern.
+/// The same pixels as those of [`Source`](crate::Source); `path` is a file, never a pattern.
 ///
 /// # Errors
 ///
 /// [`FootageError`]: absent, empty, damaged or too large; each names the file.
 pub fn read_image(path: &Path) -> Result<(Size, Vec<u8>), FootageError> {
-    Still::open(path, 1).map(|it| (it.size, it.rgb))
+    Still::open(path, 1).map(|still| (still.size, still.rgb))
 }
 
-/// Decodes one image file as people see it: [`read_image`], turned as its orientation tag (EXIF) says, and how.
+/// Decodes one image file upright: [`read_image`] with its orientation tag (EXIF) applied. Returns the tag too.
 ///
-/// For pictures by themselves. A calibration speaks of pixels as they are stored: whoever has one takes
-/// [`read_image`] or [`Source`](crate::Source).
+/// For pictures without a calibration. A calibration refers to pixels as they are stored: use
+/// [`read_image`] or [`Source`](crate::Source) with it.
 ///
 /// # Errors
 ///
@@ -140,7 +140,7 @@ pub fn is_image(path: &Path) -> Result<bool, FootageError> {
     use std::io::Read as _;
     let mut head = Vec::with_capacity(32);
     std::fs::File::open(path)
-        .and_then(|it| it.take(32).read_to_end(&mut head))
+        .and_then(|file| file.take(32).read_to_end(&mut head))
         .map_err(|source| FootageError::Io {
             path: path.to_path_buf(),
             source,
@@ -150,7 +150,7 @@ pub fn is_image(path: &Path) -> Result<bool, FootageError> {
             path: path.to_path_buf(),
         });
     }
-    let by_content = image::guess_format(&head).is_ok_and(|it| it.reading_enabled());
-    let by_name = image::ImageFormat::from_path(path).is_ok_and(|it| it.reading_enabled());
+    let by_content = image::guess_format(&head).is_ok_and(|format| format.reading_enabled());
+    let by_name = image::ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled());
     Ok(by_content || by_name)
 }

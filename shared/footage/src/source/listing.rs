@@ -1,4 +1,4 @@
-//! Which files a path stands for, and in which order.
+//! The files that a path stands for, and their order.
 
 use std::cmp::Ordering;
 use std::ffi::OsStr;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::live;
 use crate::FootageError;
 
-/// What a path turns out to be.
+/// What a path stands for.
 #[derive(Debug, PartialEq)]
 pub(super) enum Listing {
     /// One file, which may be an image or a video.
@@ -24,14 +24,14 @@ pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
         return Err(FootageError::NoName);
     }
     let as_is = Path::new(path);
-    let found = look(as_is)?;
-    if found.as_ref().is_some_and(Metadata::is_file) {
+    let metadata = metadata_of(as_is)?;
+    if metadata.as_ref().is_some_and(Metadata::is_file) {
         return Ok(Listing::File(as_is.to_path_buf()));
     }
-    let images = if found.as_ref().is_some_and(Metadata::is_dir) {
+    let images = if metadata.as_ref().is_some_and(Metadata::is_dir) {
         files_of(as_is, is_image_name)?
-    } else if let Some(what) = found
-        .map(|it| live::kind(it.file_type()))
+    } else if let Some(what) = metadata
+        .map(|metadata| live::kind(metadata.file_type()))
         .or_else(|| live::what(path))
     {
         return Err(FootageError::Live {
@@ -54,10 +54,10 @@ pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
     Ok(Listing::Images(images))
 }
 
-/// What lies there; none if nothing does.
-fn look(path: &Path) -> Result<Option<Metadata>, FootageError> {
+/// The metadata of a path; `None` if it does not exist.
+fn metadata_of(path: &Path) -> Result<Option<Metadata>, FootageError> {
     match std::fs::metadata(path) {
-        Ok(it) => Ok(Some(it)),
+        Ok(metadata) => Ok(Some(metadata)),
         Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(FootageError::Io {
             path: path.to_path_buf(),
             source: error,
@@ -108,7 +108,7 @@ fn is_image_name(name: &OsStr) -> bool {
         && path.extension().is_some_and(|extension| {
             ["png", "jpg", "jpeg", "bmp"]
                 .iter()
-                .any(|it| extension.eq_ignore_ascii_case(it))
+                .any(|known| extension.eq_ignore_ascii_case(known))
         })
 }
 
@@ -123,9 +123,9 @@ fn matches_of(pattern: &str) -> Result<Vec<PathBuf>, FootageError> {
     })?;
     let mut files = Vec::new();
     for path in paths {
-        let path = path.map_err(|it| FootageError::Io {
-            path: it.path().to_path_buf(),
-            source: it.into(),
+        let path = path.map_err(|error| FootageError::Io {
+            path: error.path().to_path_buf(),
+            source: error.into(),
         })?;
         if path.is_file() {
             files.push(path);
@@ -150,7 +150,8 @@ impl<'a> Numbered<'a> {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
-        width.bytes().all(|it| it.is_ascii_digit()).then_some(Self {
+        let is_width = width.bytes().all(|byte| byte.is_ascii_digit());
+        is_width.then_some(Self {
             folder,
             prefix,
             suffix,
@@ -161,8 +162,10 @@ impl<'a> Numbered<'a> {
     fn files(&self) -> Result<Vec<PathBuf>, FootageError> {
         files_of(self.folder, |name| {
             name.to_str()
-                .and_then(|it| it.strip_prefix(self.prefix)?.strip_suffix(self.suffix))
-                .is_some_and(|it| !it.is_empty() && it.bytes().all(|it| it.is_ascii_digit()))
+                .and_then(|name| name.strip_prefix(self.prefix)?.strip_suffix(self.suffix))
+                .is_some_and(|number| {
+                    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+                })
         })
     }
 }
@@ -173,7 +176,7 @@ fn sort_naturally(paths: &mut [PathBuf]) {
     });
 }
 
-/// Compares as people count: runs of digits by their value, everything else by character.
+/// Natural order: runs of digits by their value, everything else by character.
 fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut a, mut b) = (a, b);
     loop {
@@ -201,7 +204,7 @@ fn split_run(text: &str) -> (&str, &str) {
     text.split_at(end)
 }
 
-/// Digits without leading zeros, which compare by length and then by character; any length of them.
+/// The digits without leading zeros, of any length; they compare by length and then by character.
 fn value_of(run: &str) -> Option<&str> {
     run.starts_with(|it: char| it.is_ascii_digit())
         .then(|| run.trim_start_matches('0'))
@@ -219,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_as_people_do() {
+    fn numbers_in_names_compare_by_value() {
         assert_eq!(
             sorted(&["im10.png", "im2.png", "im1.png"]),
             ["im1.png", "im2.png", "im10.png"]

@@ -1,14 +1,14 @@
-//! Sources that are no files: cameras, streams, devices.
+//! Sources that are not files: cameras, streams, devices.
 
 use std::fs::FileType;
 use std::os::unix::fs::FileTypeExt as _;
 
-/// Whether a text names a camera or a stream and not a file: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`.
+/// Whether a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`.
 pub fn is_live(text: &str) -> bool {
     what(text).is_some()
 }
 
-/// What a text names that cannot be read, if it says so itself.
+/// The kind of source that the scheme of an address stands for; `None` for a file.
 pub(super) fn what(text: &str) -> Option<&'static str> {
     let (scheme, _) = text.split_once(':')?;
     match scheme.to_ascii_lowercase().as_str() {
@@ -22,18 +22,18 @@ pub(super) fn what(text: &str) -> Option<&'static str> {
     }
 }
 
-/// What lies at a place that is neither a file nor a folder.
-pub(super) fn kind(it: FileType) -> &'static str {
-    if it.is_char_device() || it.is_block_device() {
+/// The name of a file type that is neither a file nor a folder.
+pub(super) fn kind(file_type: FileType) -> &'static str {
+    if file_type.is_char_device() || file_type.is_block_device() {
         "a device"
-    } else if it.is_fifo() {
+    } else if file_type.is_fifo() {
         "a pipe"
     } else {
         "no file"
     }
 }
 
-/// What to do in place of it.
+/// What to do instead, for the message.
 pub(super) fn instead(path: &str) -> String {
     if let Some(file) = path.strip_prefix("file://") {
         return format!("name the file without file://: {file}");
@@ -51,16 +51,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn streams_and_devices_are_told_from_files() {
-        for it in [
+    fn streams_and_devices_are_distinguished_from_files() {
+        for text in [
             "rtsp://10.0.0.5/a",
             "UDP://@:5000",
             "http://a/b.mp4",
             "v4l2:/dev/video0",
         ] {
-            assert!(is_live(it), "{it}");
+            assert!(is_live(text), "{text}");
         }
-        for it in [
+        for text in [
             "a.mp4",
             "C:a.mp4",
             "frames/%05d.png",
@@ -68,12 +68,12 @@ mod tests {
             "12:30.mp4",
             "",
         ] {
-            assert!(!is_live(it), "{it}");
+            assert!(!is_live(text), "{text}");
         }
     }
 
     #[test]
-    fn what_to_do_instead_names_what_was_named() {
+    fn the_advice_names_the_source() {
         for (path, words) in [
             ("rtsp://c/1", "ffmpeg -i rtsp://c/1 "),
             ("v4l2:/dev/video2", "ffmpeg -f v4l2 -i /dev/video2 "),

@@ -1,4 +1,4 @@
-//! What a decoder says on its standard error: complaints, and the time of every frame.
+//! The standard error of a decoder: error messages, and the time of every frame.
 
 use std::io::Read;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -7,12 +7,12 @@ use std::time::Duration;
 
 /// Bytes kept of a log; a damaged video can fill a disk with it.
 const MAX_BYTES: usize = 16 << 10;
-/// Times that may wait; a decoder is a few frames ahead at most.
+/// Capacity of the queue of times; a decoder is a few frames ahead at most.
 const MAX_TIMES: usize = 1024;
-/// How long the time of a frame that is there may take.
+/// How long to wait for the time of a frame that has been read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Reads a log to its end in a thread of its own, so that a decoder with much to say does not block.
+/// Reads a log to its end in a thread of its own, so that a decoder with much output does not block.
 #[derive(Debug)]
 pub(super) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
@@ -31,26 +31,26 @@ impl Log {
         })
     }
 
-    /// The time of the next frame that was told, seconds; waits for it a little.
+    /// The time of the next frame, seconds; waits for it for a short time.
     pub(super) fn next_time_s(&self) -> Option<f64> {
         self.times_s.recv_timeout(PATIENCE).ok()
     }
 
-    /// Waits for the end of the log, and gives the last of it; empty if nothing was said.
+    /// Waits for the end of the log, and returns its last messages; empty if there were none.
     pub(super) fn finish(&mut self) -> String {
-        let bytes = self.reader.take().and_then(|it| it.join().ok());
+        let bytes = self.reader.take().and_then(|thread| thread.join().ok());
         summary(&bytes.unwrap_or_default())
     }
 }
 
-/// Tells the lines of ffmpeg's `framecrc` output from everything else.
+/// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
     times_s: SyncSender<f64>,
-    /// Seconds of one unit of time, as its head says.
+    /// The unit of time from its header, seconds.
     unit_s: f64,
-    /// What is no line of that output.
+    /// The error messages.
     kept: Vec<u8>,
-    /// A line whose end has not come.
+    /// The beginning of an incomplete line.
     partial: Vec<u8>,
 }
 
@@ -67,7 +67,7 @@ impl Lines {
     fn read(mut self, mut stream: impl Read) -> Vec<u8> {
         let mut chunk = [0; 1024];
         while let Ok(n @ 1..) = stream.read(&mut chunk) {
-            for piece in chunk[..n].split_inclusive(|it| *it == b'\n') {
+            for piece in chunk[..n].split_inclusive(|byte| *byte == b'\n') {
                 self.partial.extend_from_slice(piece);
                 if piece.ends_with(b"\n") || self.partial.len() > MAX_BYTES / 2 {
                     self.line();
@@ -84,7 +84,7 @@ impl Lines {
         if let Some(unit_s) = text.strip_prefix("#tb 0: ") {
             self.unit_s = fraction(unit_s).unwrap_or(f64::NAN);
         } else if let Some(units) = frame_units(&text) {
-            // Who does not listen to times, or only late, misses some.
+            // Times are dropped if the receiver is gone or too slow.
             self.times_s.try_send(units * self.unit_s).ok();
         } else if !text.starts_with('#') {
             self.kept.extend_from_slice(&line);
@@ -96,26 +96,26 @@ impl Lines {
 }
 
 /// The time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
-/// presentation time, duration, bytes, checksum. It is written at once, but maybe in the middle of a complaint, which is written in
-/// pieces: what stands before it does not matter.
+/// presentation time, duration, bytes, checksum. It is written at once, but possibly in the middle of an error
+/// message, which is written in pieces: any text before it is ignored.
 fn frame_units(line: &str) -> Option<f64> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let [.., stream, _, presented, _, bytes, checksum] = fields[..] else {
         return None;
     };
-    let is_ours =
+    let is_frame =
         stream.ends_with('0') && checksum.starts_with("0x") && bytes.parse::<u64>().is_ok();
     presented
         .parse::<i64>()
         .ok()
-        .filter(|_| is_ours)
-        .map(|it| it as f64)
+        .filter(|_| is_frame)
+        .map(|units| units as f64)
 }
 
 /// `1/25`.
 fn fraction(text: &str) -> Option<f64> {
     let (above, below) = text.trim().split_once('/')?;
-    let [above, below] = [above, below].map(|it| it.parse::<f64>().ok());
+    let [above, below] = [above, below].map(|number| number.parse::<f64>().ok());
     Some(above? / below?)
 }
 
@@ -124,26 +124,26 @@ pub(super) fn summary(log: &[u8]) -> String {
     let text = String::from_utf8_lossy(log);
     let lines: Vec<&str> = text
         .lines()
-        .map(|it| without_address(it.trim()))
-        .filter(|it| !it.is_empty())
+        .map(|line| without_address(line.trim()))
+        .filter(|line| !line.is_empty())
         .collect();
     lines[lines.len().saturating_sub(3)..].join("; ")
 }
 
-/// A line without `[mov,mp4 @ 0x55d1]`: who speaks in ffmpeg, and where in its memory that is.
+/// A line without the component of ffmpeg and its memory address, `[mov,mp4 @ 0x55d1]`.
 fn without_address(line: &str) -> &str {
     let Some((head, rest)) = line.split_once("] ") else {
         return line;
     };
-    let is_speaker = head.starts_with('[') && head.contains(" @ 0x");
-    if is_speaker { rest } else { line }
+    let is_component = head.starts_with('[') && head.contains(" @ 0x");
+    if is_component { rest } else { line }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What is kept of a text, and the times that it told.
+    /// The messages and the times in a text.
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
         let (sender, times_s) = sync_channel(MAX_TIMES);
         let kept = Lines::new(sender).read(text.as_bytes());
@@ -163,15 +163,15 @@ mod tests {
     }
 
     #[test]
-    fn times_of_frames_are_told_from_complaints() {
+    fn times_of_frames_are_separated_from_messages() {
         let text = "#software: Lavf59\n#tb 0: 1/50\n#dimensions 0: 2x2\n0,   0,   0,   1,  12, 0x14a00440\n\
                     [h264 @ 0x5] error while decoding MB 3 14, bytestream -16\n\
                     [h264 @ 0x5] 0,   7,   7,   1,  12, 0x14a00440\ncabac error\n1, 2, 3, 4, 5, 6\n0, 9, x, 1, 12, 0x0";
         let (kept, times_s) = read(text);
         assert_eq!(times_s, [0.0, 0.14]);
-        let said = "[h264 @ 0x5] error while decoding MB 3 14, bytestream -16\n\
+        let expected = "[h264 @ 0x5] error while decoding MB 3 14, bytestream -16\n\
                     cabac error\n1, 2, 3, 4, 5, 6\n0, 9, x, 1, 12, 0x0";
-        assert_eq!(String::from_utf8_lossy(&kept), said);
+        assert_eq!(String::from_utf8_lossy(&kept), expected);
     }
 
     #[test]
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn addresses_in_memory_tell_nobody_anything() {
+    fn memory_addresses_are_removed() {
         let log = b"[mov,mp4,m4a @ 0x56362d165d40] moov atom not found\n[a] b\n";
         assert_eq!(summary(log), "moov atom not found; [a] b");
     }

@@ -1,4 +1,4 @@
-//! Asks `ffprobe` what a video is.
+//! The properties of a video, from `ffprobe`.
 
 use std::io;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(super) struct Probe {
     pub(super) rate_hz: Option<f64>,
     /// Frames in the stream, from the container or by counting packets.
     pub(super) n_frames: u64,
-    /// Frames that there would be if the file went on to the duration in its header.
+    /// Frames according to the duration in the header.
     pub(super) n_promised: u64,
     /// Presentation times, seconds after the first frame, where frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
@@ -27,15 +27,15 @@ pub(super) struct Probe {
 const ENTRIES: &str = "program_version=version:\
     stream=width,height,nb_frames,avg_frame_rate,r_frame_rate:format=duration";
 
-/// Asks for the first video stream of `path`; reads the whole file (without decoding) only if the
-/// container does not tell the number of frames, or that they are equally spaced.
+/// Probes the first video stream of `path`. Reads the whole file (without decoding) only if the
+/// container does not have the number of frames, or may not have equally spaced ones.
 pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageError> {
-    let answer = ask(
+    let output = run_ffprobe(
         path,
         spec,
         &["-show_program_version", "-show_entries", ENTRIES],
     )?;
-    let stream = &answer["streams"][0];
+    let stream = &output["streams"][0];
     let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
     let size = Size::new(side("width"), side("height"));
     if size.rgb_bytes() == 0 {
@@ -51,26 +51,30 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         n_frames: number(&stream["nb_frames"]).map_or(0, |it| it as u64),
         n_promised: 0,
         times_s: None,
-        has_fps_mode: has_fps_mode(answer["program_version"]["version"].as_str().unwrap_or("")),
+        has_fps_mode: has_fps_mode(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     if probe.n_frames == 0 || rate_hz != fraction(&stream["r_frame_rate"]) {
-        let packets = ask(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
+        let packets = run_ffprobe(path, spec, &["-show_entries", "packet=pts_time,flags"])?;
         let packets = packets["packets"].as_array().map_or(&[][..], Vec::as_slice);
-        probe.count(packets, number(&answer["format"]["duration"]));
+        probe.count(packets, number(&output["format"]["duration"]));
     }
     probe.n_promised = probe.n_promised.max(probe.n_frames);
     Ok(probe)
 }
 
 impl Probe {
-    /// Takes numbers and times of the frames from the packets of the stream.
+    /// Determines the number and the times of the frames from the packets of the stream.
     fn count(&mut self, packets: &[Value], duration_s: Option<f64>) {
         // Packets in front of the first frame that is shown are marked `D`, to be discarded.
-        let is_discarded = |it: &Value| it["flags"].as_str().is_some_and(|it| it.contains('D'));
+        let is_discarded = |packet: &Value| {
+            packet["flags"]
+                .as_str()
+                .is_some_and(|flags| flags.contains('D'))
+        };
         let shown: Vec<&Value> = packets.iter().filter(|it| !is_discarded(it)).collect();
         let mut times_s: Vec<f64> = shown
             .iter()
-            .filter_map(|it| number(&it["pts_time"]))
+            .filter_map(|packet| number(&packet["pts_time"]))
             .collect();
         times_s.sort_by(f64::total_cmp);
         let first_s = times_s.first().copied().unwrap_or(0.0);
@@ -99,8 +103,8 @@ impl Probe {
         self.rate_hz.filter(|_| self.times_s.is_none())
     }
 
-    /// Whether every frame comes where the rate says: to a quarter of a frame, as some containers round
-    /// times to milliseconds.
+    /// Whether all frames are equally spaced, to a quarter of a frame, because some containers round times to
+    /// milliseconds.
     fn is_regular(&self, times_s: &[f64]) -> bool {
         self.rate_hz.is_some_and(|rate_hz| {
             let late = |(k, time_s): (usize, &f64)| (time_s * rate_hz - k as f64).abs();
@@ -109,7 +113,7 @@ impl Probe {
     }
 }
 
-fn ask(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, FootageError> {
+fn run_ffprobe(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, FootageError> {
     let Output {
         status,
         stdout,
@@ -129,10 +133,10 @@ fn ask(path: &Path, spec: &SourceSpec, wanted: &[&str]) -> Result<Value, Footage
         return Err(unreadable(super::log::summary(&stderr)));
     }
     serde_json::from_slice(&stdout)
-        .map_err(|it| unreadable(format!("ffprobe answered what is not JSON: {it}")))
+        .map_err(|error| unreadable(format!("the output of ffprobe is not JSON: {error}")))
 }
 
-/// The name of a file for ffmpeg, which would take `concat:x` or `-x` for something else.
+/// The name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
 pub(super) fn input_name(path: &Path) -> std::ffi::OsString {
     let mut name = std::ffi::OsString::from("file:");
     name.push(path);
@@ -151,14 +155,14 @@ fn number(value: &Value) -> Option<f64> {
     value.as_str()?.parse().ok()
 }
 
-/// `"60000/1001"`; `"0/0"` stands for unknown.
+/// `"60000/1001"`; `"0/0"` means unknown.
 fn fraction(value: &Value) -> Option<f64> {
     let (numerator, denominator) = value.as_str()?.split_once('/')?;
     let rate = numerator.parse::<f64>().ok()? / denominator.parse::<f64>().ok()?;
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
-/// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are taken for new ones.
+/// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
 fn has_fps_mode(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')
@@ -175,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn old_versions_are_asked_in_their_own_words() {
+    fn the_option_depends_on_the_version_of_ffmpeg() {
         for (version, expect) in [
             ("5.1.9-0+deb12u1", true),
             ("n7.0", true),

@@ -1,4 +1,4 @@
-//! A video, decoded by the `ffmpeg` executable at the other end of a pipe.
+//! A video, decoded by an `ffmpeg` process and read from a pipe.
 
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
@@ -8,20 +8,20 @@ use super::log::Log;
 use super::probe::{Probe, input_name, missing, probe};
 use crate::{FootageError, SourceSpec};
 
-/// A running decoder. It is killed when this is dropped; should this process die without dropping
-/// anything, the decoder ends at its next write, as nobody holds the other end of the pipe.
+/// A running decoder. It is killed when this is dropped. If this process dies without dropping it,
+/// the decoder ends at its next write to the closed pipe.
 #[derive(Debug)]
 pub(super) struct Video {
     path: PathBuf,
     pub(super) probe: Probe,
-    /// Frames that should come, from the index of the container.
+    /// Expected frames, from the index of the container.
     pub(super) n_frames: u64,
-    /// Frames that should come, from the duration in the header.
+    /// Expected frames, from the duration in the header.
     n_promised: u64,
     n_read: u64,
     /// Index in the footage of the frame that was read last.
     last_index: u64,
-    /// Distance between the frames that are handed out, and the first of them.
+    /// Distance between the frames that are read, and the first of them.
     step: u64,
     start: u64,
     child: Child,
@@ -62,17 +62,16 @@ impl Video {
         })
     }
 
-    /// Reads the next frame, and gives its index in the footage; `None` at the end of a video that came
-    /// whole.
+    /// Reads the next frame, and returns its index in the footage; `None` at the end of a complete video.
     ///
-    /// An index that was expected is left out where the decoder could make nothing of a frame.
+    /// The index of a frame that could not be decoded is left out.
     pub(super) fn read_into(&mut self, rgb: &mut [u8]) -> Result<Option<u64>, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
             match self.stdout.read(&mut rgb[filled..]) {
                 Ok(0) => break,
                 Ok(n) => filled += n,
-                Err(it) if it.kind() == ErrorKind::Interrupted => {}
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(source) => {
                     return Err(FootageError::Io {
                         path: self.path.clone(),
@@ -100,16 +99,19 @@ impl Video {
         let Some(rate_hz) = self.probe.regular_hz() else {
             return counted;
         };
-        let told = self.log.next_time_s().map(|it| (it * rate_hz).round());
-        told.map_or(counted, |it| counted.max(it as u64))
+        let by_time = self
+            .log
+            .next_time_s()
+            .map(|time_s| (time_s * rate_hz).round());
+        by_time.map_or(counted, |index| counted.max(index as u64))
     }
 
-    /// Tells a video that is over from one that is cut off.
+    /// Distinguishes the end of a complete video from one that is cut off.
     ///
-    /// Damage is what the decoder complains about *and* what costs frames: many a good video makes it
-    /// complain, and some containers count a frame or two that are never shown. Without a complaint, a
-    /// tenth of the frames may be missing: it takes the header's duration for that of the pictures
-    /// only in a complaint, because sound may be longer.
+    /// A video counts as damaged if the decoder reports errors *and* frames are missing: many valid videos cause
+    /// messages, and some containers count a frame or two that are never shown. Without a message, a tenth of
+    /// the frames may be missing. The duration in the header is used only if there is a message, because the
+    /// sound may be longer than the pictures.
     fn check_end(&mut self, is_partial: bool) -> Result<(), FootageError> {
         let message = self.log.finish();
         let status = self.child.wait().map_err(|source| FootageError::Io {
@@ -128,11 +130,11 @@ impl Video {
             });
         }
         let n_expected = self.n_promised;
-        // Frames that were left out on the way are no reason to doubt the end.
+        // Frames that could not be decoded do not mean that the end is missing.
         let n_reached = (self.last_index - self.start) / self.step + 1;
-        let complains = !message.is_empty() && n_reached < n_expected;
+        let has_errors = !message.is_empty() && n_reached < n_expected;
         let is_short = n_reached < self.n_frames - self.n_frames / 10;
-        if complains || is_partial || is_short || !status.success() {
+        if has_errors || is_partial || is_short || !status.success() {
             return Err(FootageError::VideoTruncated {
                 path: self.path.clone(),
                 n_read: self.n_read,
@@ -156,9 +158,8 @@ impl Drop for Video {
     }
 }
 
-/// What the decoder is to write: the pixels of the frames that are wanted and, where frames are equally
-/// spaced, beside its complaints the time of each; a frame that it could make nothing of is missing in
-/// both.
+/// The outputs of the decoder: the pixels of the chosen frames and, where frames are equally spaced, the time of
+/// each on standard error. A frame that cannot be decoded is missing in both.
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
     let mut arguments = output(probe, spec, None, &pixels);
@@ -189,9 +190,9 @@ fn output(probe: &Probe, spec: &SourceSpec, more: Option<&str>, format: &[&str])
     arguments
 }
 
-/// Lets the decoder drop the frames that are not wanted, so that they never cross the pipe.
+/// The filter that drops the frames that are not wanted before they are written to the pipe.
 ///
-/// Every frame before them is decoded all the same: a seek lands on the wrong frame in many files. Where
+/// Every earlier frame is decoded nevertheless: a seek finds the wrong frame in many files. Where
 /// frames are equally spaced they are chosen by their time, so that one which cannot be decoded does not
 /// shift the others.
 fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn the_decoder_drops_what_is_not_wanted() {
+    fn the_decoder_drops_frames_that_are_not_wanted() {
         let spec = SourceSpec {
             start: 5,
             step: 10,
@@ -249,8 +250,9 @@ mod tests {
         assert!(!counted.contains(&"framecrc".to_owned()), "{counted:?}");
     }
 
-    /// A second of video, too large for the pipe; `None` without ffmpeg.
+    /// A second of video, too large for the pipe; `None`, with a message, without ffmpeg.
     #[cfg(target_os = "linux")]
+    #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     fn long_video(folder: &Path) -> Option<PathBuf> {
         let path = folder.join("long.nut");
         let made = Command::new("ffmpeg")
@@ -258,6 +260,9 @@ mod tests {
             .args(["testsrc=size=640x480:duration=1", "-c:v", "rawvideo"])
             .arg(&path)
             .status();
+        if made.is_err() {
+            eprintln!("skipped: there is no ffmpeg on the PATH");
+        }
         made.is_ok().then_some(path)
     }
 
@@ -279,17 +284,17 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_decoder_that_nobody_listens_to_ends() {
+    fn a_decoder_ends_when_its_pipe_is_closed() {
         let folder = tempfile::tempdir().unwrap();
         let Some(path) = long_video(folder.path()) else {
             return;
         };
         let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
-        // What the death of this process would do: the only reader of the pipe goes away.
-        let silent = Command::new("true").stdout(Stdio::piped()).spawn();
-        let (mut silent, unheard) = (silent.unwrap(), &mut video.stdout);
-        drop(std::mem::replace(unheard, silent.stdout.take().unwrap()));
+        // As after the death of this process: the only reader of the pipe is closed.
+        let other = Command::new("true").stdout(Stdio::piped()).spawn();
+        let (mut other, pipe) = (other.unwrap(), &mut video.stdout);
+        drop(std::mem::replace(pipe, other.stdout.take().unwrap()));
         assert!(!video.child.wait().unwrap().success());
-        silent.wait().unwrap();
+        other.wait().unwrap();
     }
 }

@@ -1,7 +1,7 @@
 //! The exact area mean, for maps that keep rows and columns.
 #![expect(
     clippy::inline_always,
-    reason = "only what is inlined is compiled for the instruction set at hand"
+    reason = "only inlined functions are compiled for the chosen instruction set"
 )]
 
 use super::Fill;
@@ -79,7 +79,7 @@ impl Cover {
             .map(|pixel| {
                 let mut sides = [pixel as f64, pixel as f64 + 1.0];
                 if fill == Fill::Replicate {
-                    // The pixels of the border reach out for ever.
+                    // The pixels of the border extend without limit.
                     sides[0] = if pixel == 0 {
                         f64::NEG_INFINITY
                     } else {
@@ -108,6 +108,6 @@ impl Cover {
         }
         // A sum of integers is exact below 2^24, and its quotient correctly rounded: integer factors
         // give the true mean.
-        total.map(|it| (it / area + 0.5) as u8)
+        total.map(|sum| (sum / area + 0.5) as u8)
     }
 }

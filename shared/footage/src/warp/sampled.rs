@@ -5,7 +5,7 @@
 //! *phase*, and a pixel costs one short integer correlation, whatever the number of samples.
 #![expect(
     clippy::inline_always,
-    reason = "only what is inlined is compiled for the instruction set at hand"
+    reason = "only inlined functions are compiled for the chosen instruction set"
 )]
 
 use super::{Affine, Fill};
@@ -18,7 +18,7 @@ const BLOCK: usize = 3 * BLOCK_PIXELS;
 /// Fractional bits of source positions.
 const POSITION_BITS: u32 = 32;
 
-/// Weights of a kernel add up to `1 << WEIGHT_BITS`, exactly: a constant image stays as it is.
+/// Weights of a kernel add up to `1 << WEIGHT_BITS`, exactly, so that a constant image is unchanged.
 const WEIGHT_BITS: u32 = 14;
 
 /// Weights per byte of a stretch of a source row: every pixel's weight three times.
@@ -153,7 +153,7 @@ impl Sampled {
         *sums = added;
     }
 
-    /// The same sums, already per channel, where some pixels are not there.
+    /// The same sums, already per channel, where some pixels are outside of the source.
     #[cold]
     fn add_across(&self, source: &[u8], kernel: &[Block], [left, top]: [i64; 2]) -> Sums {
         let footprint = self.footprint;
@@ -290,7 +290,7 @@ impl Footprint {
     }
 }
 
-/// Rounds weights so that their sum stays `1 << WEIGHT_BITS`: what rounding loses, the largest gets.
+/// Rounds weights so that their sum stays `1 << WEIGHT_BITS`: the largest one takes the rounding error.
 fn integers(weights: &[f64]) -> Vec<i16> {
     let mut rounded: Vec<i16> = weights.iter().map(|it| it.round() as i16).collect();
     let sum: i32 = rounded.iter().copied().map(i32::from).sum();

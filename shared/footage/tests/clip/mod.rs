@@ -1,4 +1,4 @@
-//! A small synthetic clip, and the ways to put it on a disk.
+//! A small synthetic clip, and functions that write it to files.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,10 +6,10 @@ use std::process::Command;
 use footage::Size;
 use image::RgbImage;
 
-/// Odd on purpose: rows have no round number of bytes.
+/// Odd on purpose, so that rows are not aligned.
 pub(crate) const SIZE: Size = Size::new(67, 45);
 
-/// A slope with a square that moves, and something of every frame in every channel.
+/// A ramp with a moving square; every frame differs in every channel.
 pub(crate) fn frame(index: usize) -> RgbImage {
     RgbImage::from_fn(SIZE.width as u32, SIZE.height as u32, |x, y| {
         let (left, n) = (4 * index as u32, index as u8);
@@ -29,7 +29,7 @@ pub(crate) fn write_images(folder: &Path, n: usize) {
     }
 }
 
-/// Whether there is an ffmpeg; says so if not.
+/// Whether there is an ffmpeg; prints that the test is skipped if not.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 pub(crate) fn has_ffmpeg() -> bool {
     let is_there = Command::new("ffmpeg").arg("-version").output().is_ok();
