@@ -1,4 +1,4 @@
-//! Judges every annotation, one fault at most each.
+//! Validates every annotation; reports at most one fault each.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::{Fault, People, Person, Problem, ReadOptions};
 
-/// A person of a data set as it was read, before anything is known to hold.
+/// A person of a data set as it was read, not validated yet.
 #[derive(Debug)]
 pub(crate) struct Row {
     /// Row of the data set, from 1.
@@ -18,17 +18,17 @@ pub(crate) struct Row {
     pub(crate) place: String,
     /// The name, where there is one.
     pub(crate) name: Option<String>,
-    /// The person, or why the row is none.
+    /// The person, or the fault of the row.
     pub(crate) person: Result<Person, Fault>,
 }
 
-/// People smaller than this, pixels, are of no size.
+/// Smaller people are a fault, pixels.
 const MIN_EXTENT_PX: f64 = 1.0;
 
-/// Sorts people who can be used from those who cannot.
-pub(crate) fn judge(file: &Path, rows: Vec<Row>, options: &ReadOptions) -> People {
+/// Separates the valid people from those with a fault.
+pub(crate) fn validate(file: &Path, rows: Vec<Row>, options: &ReadOptions) -> People {
     let mut sizes = image_sizes(&rows);
-    let mut judge = Judge {
+    let mut validator = Validator {
         options,
         n_joints: options.n_joints,
         names: BTreeMap::new(),
@@ -37,7 +37,7 @@ pub(crate) fn judge(file: &Path, rows: Vec<Row>, options: &ReadOptions) -> Peopl
     let mut people = People::default();
     for entry in rows {
         let row = entry.place.clone();
-        match judge.person(entry, &mut sizes) {
+        match validator.person(entry, &mut sizes) {
             Ok(person) => people.people.push(person),
             Err(fault) => people.problems.push(Problem {
                 file: file.to_owned(),
@@ -51,12 +51,12 @@ pub(crate) fn judge(file: &Path, rows: Vec<Row>, options: &ReadOptions) -> Peopl
 
 type Sizes = BTreeMap<PathBuf, Result<Size, FootageError>>;
 
-/// Decodes every image once, to know that it can be.
+/// Decodes every image once, to check it.
 fn image_sizes(rows: &[Row]) -> Sizes {
     let mut images: Vec<&Path> = rows
         .iter()
-        .filter_map(|it| it.person.as_ref().ok())
-        .map(|it| it.image.as_path())
+        .filter_map(|row| row.person.as_ref().ok())
+        .map(|person| person.image.as_path())
         .collect();
     images.sort_unstable();
     images.dedup();
@@ -69,15 +69,15 @@ fn image_sizes(rows: &[Row]) -> Sizes {
         .collect()
 }
 
-/// What has been seen so far.
-struct Judge<'a> {
+/// The state of the validation.
+struct Validator<'a> {
     options: &'a ReadOptions,
     n_joints: Option<usize>,
     names: BTreeMap<String, String>,
     seen: BTreeMap<(PathBuf, Vec<[u64; 2]>), String>,
 }
 
-impl Judge<'_> {
+impl Validator<'_> {
     fn person(&mut self, entry: Row, sizes: &mut Sizes) -> Result<Person, Fault> {
         let Row {
             place,
@@ -91,14 +91,14 @@ impl Judge<'_> {
         self.numbers(&person)?;
         let size = match sizes.get(&person.image) {
             Some(Ok(size)) => *size,
-            // Errors cannot be copied: for the other people of a bad image it is decoded again.
+            // Errors cannot be copied: for other people on an invalid image it is decoded again.
             _ => match sizes.remove(&person.image) {
                 Some(size) => size?,
                 None => footage::read_image(&person.image)?.0,
             },
         };
         self.inside(&person, size)?;
-        self.only_once(&person, name)?;
+        self.unique(&person, name)?;
         Ok(person)
     }
 
@@ -119,18 +119,18 @@ impl Judge<'_> {
 
     fn numbers(&self, person: &Person) -> Result<(), Fault> {
         for (joint, &at) in (1..).zip(&person.joints) {
-            if at.iter().all(|it| it.is_nan()) {
+            if at.iter().all(|value| value.is_nan()) {
                 if !self.options.unknown_joints {
                     return Err(Fault::Unknown { joint });
                 }
-            } else if !at.iter().all(|it| it.is_finite()) {
+            } else if !at.iter().all(|value| value.is_finite()) {
                 return Err(Fault::NotFinite { joint, at });
             }
         }
         let ends = [0, 1].map(|axis| {
-            let values = person.joints.iter().map(|it| it[axis]);
-            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
-                [low.min(it), high.max(it)]
+            let values = person.joints.iter().map(|joint| joint[axis]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                [low.min(value), high.max(value)]
             })
         });
         let extent_px = ends.map(|[low, high]| high - low);
@@ -168,11 +168,11 @@ impl Judge<'_> {
         }
     }
 
-    fn only_once(&mut self, person: &Person, name: Option<String>) -> Result<(), Fault> {
+    fn unique(&mut self, person: &Person, name: Option<String>) -> Result<(), Fault> {
         let bits = person
             .joints
             .iter()
-            .map(|it| it.map(f64::to_bits))
+            .map(|joint| joint.map(f64::to_bits))
             .collect();
         match self.seen.entry((person.image.clone(), bits)) {
             Entry::Occupied(before) => {

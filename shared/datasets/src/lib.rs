@@ -1,25 +1,25 @@
-//! Annotated people: read, judged, turned and mirrored, and their joints as the parts of a model.
+//! Annotated people: reading, validation, rotation and mirroring, and the parts of a model from their joints.
 //!
-//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines and gives
-//! [`People`]: those who can be used, and a [`Problem`] for everybody else, with file and row. A
-//! [`Sample`] is one of them with the pixels; a [`SkeletonTable`] turns joints into parts.
+//! [`read`] takes the folder of a data set (PARSE, LSP, LSP-extended) or a file of JSON lines and returns
+//! [`People`]: the valid ones, and a [`Problem`] for each of the others, with file and row. A
+//! [`Sample`] is a person with the pixels; a [`SkeletonTable`] converts joints to parts.
 //!
 //! Pixels: the centre of the top-left pixel is `(0, 0)`; the MATLAB files count from 1, which is undone
 //! when they are read.
 //!
-//! # Our own annotation file
+//! # The annotation file of Parallax
 //!
-//! One JSON object a line, one person each; empty lines are passed over:
+//! One JSON object per line, one person each; empty lines are ignored:
 //!
 //! ```json
 //! {"image": "photos/7.jpg", "joints": [[31.5, 80.0], null, [40.0, 61.25]], "visible": [true, false, true], "name": "ann"}
 //! ```
 //!
-//! | key | what |
+//! | key | meaning |
 //! |---|---|
 //! | `image` | path of the image, relative to the annotation file |
 //! | `joints` | `[x, y]` in pixels, or `null` where the joint is not known; the order is that of the skeleton table |
-//! | `visible` | optional, one `true` or `false` a joint; without it, all known joints are visible |
+//! | `visible` | optional, one `true` or `false` per joint; without it, all known joints are visible |
 //! | `name` | optional, no two people of a file may have the same |
 //!
 //! Other keys are refused.

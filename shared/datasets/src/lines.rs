@@ -1,4 +1,4 @@
-//! Our own annotation file: one JSON object a line, one person each.
+//! The annotation file of Parallax: one JSON object per line, one person each.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Fault, Person};
 
-/// A line as it is written.
+/// The content of a line.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Line {
@@ -18,9 +18,9 @@ struct Line {
     name: Option<String>,
 }
 
-/// Reads one line: the person, with `image` as it is written and an empty `row`, and the name.
+/// Parses one line: the person, with `image` as written and an empty `row`, and the name.
 ///
-/// Joints that are not known become NaN and are not visible.
+/// Unknown joints become NaN and are not visible.
 ///
 /// # Errors
 ///
@@ -49,22 +49,24 @@ pub fn parse_line(line: &str) -> Result<(Person, Option<String>), Fault> {
         joints: line
             .joints
             .into_iter()
-            .map(|it| it.unwrap_or([f64::NAN; 2]))
+            .map(|joint| joint.unwrap_or([f64::NAN; 2]))
             .collect(),
     };
     Ok((person, line.name))
 }
 
-/// Writes a person as a line, without its end.
+/// Writes a person as a line, without the end of the line.
 ///
-/// Joints that are not numbers are written as not known. What [`parse_line`] makes of it is the same
-/// person, with an empty `row`.
+/// Joints that are not finite are written as unknown. [`parse_line`] returns the same person, with an empty `row`.
 ///
 /// # Errors
 ///
 /// Only for an image whose path is not Unicode.
 pub fn to_line(person: &Person, name: Option<&str>) -> Result<String, serde_json::Error> {
-    let known = |it: &[f64; 2]| it.iter().all(|it| it.is_finite()).then_some(*it);
+    let known = |joint: &[f64; 2]| {
+        let is_finite = joint.iter().all(|value| value.is_finite());
+        is_finite.then_some(*joint)
+    };
     serde_json::to_string(&Line {
         image: person.image.clone(),
         joints: person.joints.iter().map(known).collect(),
@@ -80,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_known_is_neither_a_number_nor_visible() {
+    fn an_unknown_joint_is_nan_and_not_visible() {
         let (person, name) = parse_line(r#"{"image":"a/b.png","joints":[[1,2.5],null]}"#).unwrap();
         assert_eq!(person.joints[0], [1.0, 2.5]);
         assert!(person.joints[1][0].is_nan());
@@ -89,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_person_says_why() {
+    fn errors_of_invalid_lines_name_the_cause() {
         let cases = [
             ("[]", "not a person: invalid length 0"),
             (
@@ -111,19 +113,19 @@ mod tests {
             ),
         ];
         for (line, expected) in cases {
-            let said = parse_line(line).unwrap_err().to_string();
-            assert!(said.starts_with(expected), "{line}: {said}");
+            let error = parse_line(line).unwrap_err().to_string();
+            assert!(error.starts_with(expected), "{line}: {error}");
         }
     }
 
     proptest! {
         #[test]
-        fn never_panics(line: String) {
+        fn no_text_panics(line: String) {
             drop(parse_line(&line));
         }
 
         #[test]
-        fn reads_what_was_written(
+        fn a_written_line_is_read_back(
             image in "[a-z/\"\\\\ é]{1,12}",
             joints in prop::collection::vec((-1e6..1e6, -1e6..1e6, any::<bool>()), 0..20),
             name in prop::option::of("\\PC{0,8}"),

@@ -1,4 +1,4 @@
-//! The MATLAB files that PARSE and LSP come with.
+//! The MATLAB files of PARSE and LSP.
 
 use mat5::{ContainerError, Numbers, Value};
 
@@ -8,10 +8,10 @@ pub type Annotation = (Vec<[f64; 2]>, Vec<bool>);
 /// Why a MATLAB file is not an annotation.
 #[derive(Debug, thiserror::Error)]
 pub enum MatLayoutError {
-    /// Not a MATLAB file that can be read.
+    /// The MATLAB file cannot be read.
     #[error("not a readable MATLAB level 5 file")]
     Container(#[from] ContainerError),
-    /// The variable is not there, or is not an array of numbers.
+    /// The variable is missing, or not an array of real numbers.
     #[error("it holds no array of real numbers called `{variable}`")]
     Missing {
         /// Its name.
@@ -24,18 +24,18 @@ pub enum MatLayoutError {
         variable: &'static str,
         /// Its sizes.
         got: Vec<usize>,
-        /// Sizes that would do.
+        /// Sizes that are accepted.
         expected: &'static str,
     },
 }
 
 /// Reads PARSE's `labels.mat`: `ptsAll`, joints x 2 x people, pixels from 1.
 ///
-/// * Returns one annotation a person, from 0, all joints visible.
+/// * Returns one annotation per person, from 0, all joints visible.
 ///
 /// # Errors
 ///
-/// [`MatLayoutError`]. The numbers themselves may be anything.
+/// [`MatLayoutError`]. The values are not validated.
 pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     const NAME: &str = "ptsAll";
     with_numbers(file, NAME, |numbers| match three_sizes(numbers) {
@@ -60,11 +60,11 @@ pub fn parse_labels(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
 /// set joints x 3 x people with a flag that is 1 where it is visible (Johnson & Everingham 2010, 2011).
 /// 3 x 3 x people is taken for the original layout.
 ///
-/// * Returns one annotation a person, from 0.
+/// * Returns one annotation per person, from 0.
 ///
 /// # Errors
 ///
-/// [`MatLayoutError`]. The numbers themselves may be anything.
+/// [`MatLayoutError`]. The values are not validated.
 pub fn parse_joints(file: &[u8]) -> Result<Vec<Annotation>, MatLayoutError> {
     const NAME: &str = "joints";
     with_numbers(file, NAME, |numbers| {
@@ -109,7 +109,7 @@ fn with_numbers(
     Err(MatLayoutError::Missing { variable })
 }
 
-/// The sizes; MATLAB leaves out a last size of 1. Zeros if there are more than three.
+/// The three sizes; MATLAB leaves out a last size of 1. Zeros if there are more than three.
 fn three_sizes(numbers: &Numbers<'_>) -> [usize; 3] {
     match *numbers.sizes() {
         [rows, columns] => [rows, columns, 1],
@@ -127,7 +127,7 @@ fn annotations(
             (0..n_joints)
                 .map(|joint| {
                     let (point, is_visible) = read(joint, person);
-                    (point.map(|it| it - 1.0), is_visible)
+                    (point.map(|value| value - 1.0), is_visible)
                 })
                 .unzip()
         })

@@ -1,4 +1,4 @@
-//! People as they are annotated, and what can be wrong with an annotation.
+//! Annotated people, and the faults of annotations.
 
 use std::path::PathBuf;
 
@@ -7,34 +7,33 @@ use footage::{FootageError, Size};
 /// One annotated person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// The image that the person is on.
+    /// The image.
     pub image: PathBuf,
-    /// Where in the data set the person was found, for messages.
+    /// The place in the data set, for messages.
     pub row: String,
-    /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Joints that are
-    /// not known are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::ReadOptions)
-    /// lets them pass.
+    /// The joints, `[x, y]` in pixels, the centre of the top-left pixel at `(0, 0)`. Unknown joints
+    /// are NaN; there are none unless [`ReadOptions::unknown_joints`](crate::ReadOptions) is set.
     pub joints: Vec<[f64; 2]>,
-    /// Whether the joint can be seen, as the annotation says.
+    /// Whether the joint is visible according to the annotation.
     pub visible: Vec<bool>,
 }
 
-/// The people of a data set who can be used, and what is wrong with the others.
+/// The valid people of a data set, and the problems of the others.
 #[derive(Debug, Default)]
 pub struct People {
     /// In the order of the data set.
     pub people: Vec<Person>,
-    /// One for everybody who was left out because of a fault, in the order of the data set.
+    /// One for each person that was left out because of a fault, in the order of the data set.
     pub problems: Vec<Problem>,
 }
 
 impl People {
-    /// How many problems there are of every kind that occurs.
+    /// The number of problems of every kind that occurs.
     pub fn counts(&self) -> Vec<(FaultKind, usize)> {
         FaultKind::ALL
             .into_iter()
             .map(|kind| {
-                let of_kind = |it: &&Problem| it.fault.kind() == kind;
+                let of_kind = |problem: &&Problem| problem.fault.kind() == kind;
                 (kind, self.problems.iter().filter(of_kind).count())
             })
             .filter(|(_, count)| *count > 0)
@@ -48,45 +47,45 @@ impl People {
     }
 }
 
-/// A person who cannot be used.
+/// A person with a fault.
 #[derive(Debug, thiserror::Error)]
 #[error("{}, {row}", file.display())]
 pub struct Problem {
     /// The annotation file.
     pub file: PathBuf,
-    /// Which person of it.
+    /// The place of the person in the file.
     pub row: String,
-    /// What is wrong.
+    /// The fault.
     #[source]
     pub fault: Fault,
 }
 
-/// What is wrong with a person. Joints count from 1.
+/// The fault of a person. Joints count from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// The line is not what a person looks like.
+    /// The line does not describe a person.
     #[error("not a person: {message}")]
     Syntax {
-        /// What the reader of JSON says.
+        /// Message of the JSON parser.
         message: String,
     },
     /// More or fewer joints than the skeleton has.
     #[error("{got} {what}, expected {expected}")]
     Count {
-        /// Of what: joints, or marks of visibility.
+        /// What is counted: joints, or marks of visibility.
         what: &'static str,
-        /// How many there are.
+        /// The number found.
         got: usize,
-        /// How many there should be.
+        /// The number expected.
         expected: usize,
     },
-    /// A joint is not known: `null` in our own file, NaN twice in others.
+    /// A joint is unknown: `null` in JSON lines, both coordinates NaN in other files.
     #[error("joint {joint} is not known")]
     Unknown {
         /// Which, from 1.
         joint: usize,
     },
-    /// A coordinate is infinite, or the only one that is not a number.
+    /// A coordinate is infinite, or one of the two is NaN.
     #[error("joint {joint} lies at ({}, {})", at[0], at[1])]
     NotFinite {
         /// Which, from 1.
@@ -125,21 +124,21 @@ pub enum Fault {
     /// The same joints on the same image.
     #[error("the same image and joints as {before}")]
     Twice {
-        /// Where they were first.
+        /// Place of the first occurrence.
         before: String,
     },
-    /// Somebody else has the name.
+    /// Another person has the same name.
     #[error("the name {name:?} is that of {before}")]
     SameName {
         /// The name.
         name: String,
-        /// Who had it first.
+        /// Place of the first person with that name.
         before: String,
     },
 }
 
 impl Fault {
-    /// Of which kind it is.
+    /// Its kind.
     pub fn kind(&self) -> FaultKind {
         match self {
             Self::Syntax { .. } => FaultKind::Syntax,
@@ -155,7 +154,7 @@ impl Fault {
     }
 }
 
-/// Kinds of [`Fault`], to count them and to say which are fatal.
+/// Kinds of [`Fault`], to count them and to choose the fatal ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
     /// [`Fault::Syntax`]
@@ -192,7 +191,7 @@ impl FaultKind {
         Self::SameName,
     ];
 
-    /// What it is called on the command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Syntax => "syntax",

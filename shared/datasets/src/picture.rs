@@ -1,4 +1,4 @@
-//! An image that we own.
+//! An owned image.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ impl Picture {
         }
     }
 
-    /// Takes pixels over.
+    /// An image of given pixels.
     ///
     /// * `rgb`: `width * height * 3` bytes.
     ///
@@ -58,7 +58,7 @@ impl Picture {
         &mut self.rgb
     }
 
-    /// The same pixels, as detection takes them.
+    /// A view of the pixels, as detection takes it.
     ///
     /// # Panics
     ///
@@ -72,8 +72,7 @@ impl Picture {
         view.expect("the number of bytes is checked when a picture is made")
     }
 
-    /// What of the image lies within a rectangle `[x1, y1, x2, y2]` (pixels), and where its top-left pixel
-    /// was.
+    /// The part of the image within a rectangle `[x1, y1, x2, y2]` (pixels), and the position of its top-left pixel.
     pub fn crop(&self, within: [f64; 4]) -> (Self, [f64; 2]) {
         let range = |low: f64, high: f64, n: usize| {
             let start = low.floor().clamp(0.0, n as f64) as usize;
@@ -96,7 +95,7 @@ impl Picture {
 }
 
 impl std::fmt::Debug for Picture {
-    /// The size: nobody reads a million bytes.
+    /// The size only: the pixels are too many to print.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(out, "Picture({})", self.size)
     }

@@ -1,31 +1,31 @@
-//! Reads a data set of any of the layouts.
+//! Reads data sets of all supported layouts.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::check::{Row, judge};
+use crate::check::{Row, validate};
 use crate::mat_files::Annotation;
 use crate::{
     FaultKind, MatLayoutError, People, Person, Problem, SelectError, Selection, parse_joints,
     parse_labels, parse_line,
 };
 
-/// What of a data set is read, and what is let pass.
+/// Which people of a data set are read, and which faults are accepted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// Who is read; everybody if not given.
+    /// The people to read; all if not set.
     pub only: Option<Selection>,
-    /// Who is left out: a test set.
+    /// The people to leave out, such as a test set.
     pub without: Option<Selection>,
-    /// How many joints a person has; that of the first person if not given.
+    /// Number of joints of a person; that of the first person if not set.
     pub n_joints: Option<usize>,
     /// How far outside the image a joint may lie, pixels. Clicked joints lie up to 2 px outside.
     pub outside_px: f64,
-    /// Whether people with joints that are not known are read.
+    /// Whether people with unknown joints are read.
     pub unknown_joints: bool,
-    /// Kinds of fault for which nobody is read; people with others are left out.
+    /// Kinds of fault that make the whole data set an error; people with other faults are left out.
     pub fatal: Vec<FaultKind>,
 }
 
@@ -45,7 +45,7 @@ impl Default for ReadOptions {
 /// Why a data set cannot be read at all.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// Neither of the layouts.
+    /// The layout is not known.
     #[error(
         "{} is no data set: expected a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a \
          file of JSON lines",
@@ -55,21 +55,21 @@ pub enum DatasetError {
         /// The folder or file.
         path: PathBuf,
     },
-    /// Two layouts.
+    /// The folder has two layouts.
     #[error("{} holds both labels.mat and joints.mat: name one of the two", path.display())]
     Ambiguous {
         /// The folder.
         path: PathBuf,
     },
-    /// The operating system refused.
+    /// The file cannot be read.
     #[error("cannot read {}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// A MATLAB file that is not an annotation.
+    /// The MATLAB file is not an annotation.
     #[error("{} cannot be read", path.display())]
     Mat {
         /// The file.
@@ -82,15 +82,15 @@ pub enum DatasetError {
     ImageList {
         /// The list.
         path: PathBuf,
-        /// Images that it names.
+        /// Number of images that it names.
         got: usize,
-        /// People that there are.
+        /// Number of people.
         expected: usize,
     },
-    /// The selection means nobody.
+    /// The selection is invalid.
     #[error(transparent)]
     Select(#[from] SelectError),
-    /// Somebody has a fault that was called fatal.
+    /// People have a fault of a fatal kind.
     #[error("{n_fatal} of {n_people} people have a fault that was called fatal")]
     Fatal {
         /// How many.
@@ -103,23 +103,23 @@ pub enum DatasetError {
     },
 }
 
-/// Reads a data set, and judges everybody in it.
+/// Reads and validates a data set.
 ///
-/// The layout is told by what is there:
+/// The layout is detected from the files:
 /// * PARSE: `labels.mat`, images `im0001.jpg`... beside it (Ramanan 2006);
 /// * LSP: `joints.mat`, images in `images/`, `im0001.jpg`... or `im00001.jpg`..., or those that
-///   `images.txt` beside it names, one a person (Johnson & Everingham 2010, 2011);
-/// * our own: a file of JSON lines.
+///   `images.txt` beside it names, one per person (Johnson & Everingham 2010, 2011);
+/// * that of Parallax: a file of JSON lines.
 ///
-/// All images of the people who are selected are decoded once, to know that they can be. The result
+/// All images of the selected people are decoded once, to check them. The result
 /// does not depend on the number of threads.
 ///
 /// * `path`: the folder, or the annotation file in it.
 ///
 /// # Errors
 ///
-/// [`DatasetError`]. People who cannot be used are no error, but [`People::problems`], unless
-/// [`ReadOptions::fatal`] says so.
+/// [`DatasetError`]. A person with a fault is listed in [`People::problems`], and is an error only if its kind is
+/// in [`ReadOptions::fatal`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> {
     let file = annotation_file(path)?;
     let bytes = fs::read(&file).map_err(|source| DatasetError::Io {
@@ -144,8 +144,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> 
     };
     select(&file, &mut rows, options)?;
     let n_people = rows.len();
-    let mut people = judge(&file, rows, options);
-    let is_fatal = |it: &Problem| options.fatal.contains(&it.fault.kind());
+    let mut people = validate(&file, rows, options);
+    let is_fatal = |problem: &Problem| options.fatal.contains(&problem.fault.kind());
     let n_fatal = people.problems.iter().filter(|it| is_fatal(it)).count();
     match people.problems.iter().position(is_fatal) {
         None => Ok(people),
@@ -160,14 +160,14 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<People, DatasetError> 
 const LABELS: &str = "labels.mat";
 const JOINTS: &str = "joints.mat";
 
-/// Where the image of a person is, counted from 0.
+/// The path of the image of a person, counted from 0.
 type ImageOf = Box<dyn Fn(usize) -> PathBuf>;
 
 fn is_called(file: &Path, name: &str) -> bool {
     file.file_name().is_some_and(|it| it == name)
 }
 
-/// The file with the annotations; of a folder the one that is known by its name.
+/// The file with the annotations; in a folder the one with a known name.
 fn annotation_file(path: &Path) -> Result<PathBuf, DatasetError> {
     let unrecognised = || DatasetError::Unrecognised {
         path: path.to_owned(),
@@ -212,20 +212,21 @@ fn with_images(
     Ok(people.into_iter().enumerate().map(row).collect())
 }
 
-/// Images whose names have a number from 1, of the first number of digits that a file has.
+/// Images with a number from 1 in their names, with the first of the numbers of digits that any file has.
 fn numbered_images(folder: &Path, digits: &[usize]) -> ImageOf {
     let names: Vec<String> = fs::read_dir(folder)
         .into_iter()
         .flatten()
-        .filter_map(|it| it.ok()?.file_name().into_string().ok())
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .collect();
     let is_used = |n_digits: usize, ending: &str| {
         names.iter().any(|name| {
             let number = name
                 .strip_prefix("im")
-                .and_then(|it| it.strip_suffix(ending));
-            number
-                .is_some_and(|it| it.len() == n_digits && it.bytes().all(|it| it.is_ascii_digit()))
+                .and_then(|rest| rest.strip_suffix(ending));
+            number.is_some_and(|digits| {
+                digits.len() == n_digits && digits.bytes().all(|byte| byte.is_ascii_digit())
+            })
         })
     };
     let shapes = [".jpg", ".png"]
@@ -240,19 +241,19 @@ fn numbered_images(folder: &Path, digits: &[usize]) -> ImageOf {
 
 fn lsp_images(folder: &Path, n_people: usize) -> Result<ImageOf, DatasetError> {
     let path = folder.join("images.txt");
-    let inside = folder.join("images");
+    let images = folder.join("images");
     let list = match fs::read_to_string(&path) {
         Ok(list) => list,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Ok(numbered_images(&inside, &[5, 4]));
+            return Ok(numbered_images(&images, &[5, 4]));
         }
         Err(source) => return Err(DatasetError::Io { path, source }),
     };
     let names: Vec<PathBuf> = list
         .lines()
         .map(str::trim)
-        .filter(|it| !it.is_empty())
-        .map(|it| inside.join(it))
+        .filter(|name| !name.is_empty())
+        .map(|name| images.join(name))
         .collect();
     if names.len() != n_people {
         return Err(DatasetError::ImageList {
@@ -287,7 +288,7 @@ fn rows_of_lines(bytes: &[u8], folder: &Path) -> Vec<Row> {
         .collect()
 }
 
-/// Keeps who is meant.
+/// Keeps the selected rows.
 fn select(file: &Path, rows: &mut Vec<Row>, options: &ReadOptions) -> Result<(), SelectError> {
     let image = |row: &Row| match &row.person {
         Ok(person) => person.image.clone(),

@@ -1,4 +1,4 @@
-//! One person with the pixels, and what is made of it to have more of them: turned and mirrored.
+//! One person with the pixels, and its augmentation by rotation and mirroring.
 
 use footage::{Affine, Fill, FootageError, Size, Warp, WarpError};
 
@@ -33,7 +33,7 @@ impl Sample {
     ///
     /// # Panics
     ///
-    /// If `joint_mirror` has not one entry a joint, or names one that is not there.
+    /// If `joint_mirror` does not have one entry per joint, or has an index out of range.
     #[must_use]
     pub fn mirrored(&self, joint_mirror: &[usize]) -> Self {
         assert_eq!(
@@ -54,11 +54,11 @@ impl Sample {
         Self { image, joints }
     }
 
-    /// Turned about the centre of the image, anticlockwise as one sees it (as MATLAB's `imrotate`).
+    /// Rotated about the centre of the image, anticlockwise as seen (as MATLAB's `imrotate`).
     ///
     /// The canvas grows so that no pixel is lost: `width |cos| + height |sin|`, rounded up. Pixels are
-    /// bilinear samples of the source, which lies in the middle of the canvas; the joints are turned by
-    /// the same map. `Fill::Black` is what `imrotate` puts into the corners; `Fill::Replicate` makes no
+    /// bilinear samples of the source, which lies in the middle of the canvas; the joints are rotated by
+    /// the same map. `Fill::Black` fills the corners as `imrotate` does; `Fill::Replicate` makes no
     /// edges there that a detector could learn.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl Sample {
     pub fn rotated(&self, degrees: f64, fill: Fill) -> Result<Self, WarpError> {
         let source = self.image.size();
         let (sin, cos) = degrees.to_radians().sin_cos();
-        // Quarter turns are exact: what is left of 0 there is rounding.
+        // Quarter turns are exact: remove the rounding error of a sine or cosine of 0.
         let [sin, cos] = [sin, cos].map(|it| if it.abs() < 1e-12 { 0.0 } else { it });
         let [width, height] = [source.width, source.height].map(|it| it as f64);
         let grown = |it: f64| (it - 1e-6).ceil().max(1.0) as usize;
@@ -78,7 +78,7 @@ impl Sample {
         let centre = |it: usize| (it as f64 - 1.0) / 2.0;
         let from = [centre(source.width), centre(source.height)];
         let to = [centre(output.width), centre(output.height)];
-        // Rows point down, so that (cos, -sin; sin, cos) turns a point of the output clockwise: back.
+        // Rows point down, so (cos, -sin; sin, cos) rotates a point of the output clockwise, which is the inverse.
         let source_from_output: Affine = [
             [cos, -sin, from[0] - cos * to[0] + sin * to[1]],
             [sin, cos, from[1] - sin * to[0] - cos * to[1]],
@@ -106,8 +106,8 @@ mod tests {
 
     const MIRROR: [usize; 3] = [1, 0, 2];
 
-    /// A grey image with a round dot, smooth so that sampling does not move it, at the last joint.
-    fn planted(size: Size, joint: [usize; 2]) -> Sample {
+    /// A grey image with a round dot at the last joint, smooth so that sampling does not move it.
+    fn sample_with_dot(size: Size, joint: [usize; 2]) -> Sample {
         let mut image = Picture::filled(size, [64; 3]);
         for (at, pixel) in image
             .rgb_mut()
@@ -126,8 +126,8 @@ mod tests {
         }
     }
 
-    /// Centre of what is brighter than the grey.
-    fn bright(sample: &Sample) -> [f64; 2] {
+    /// Centre of the dot.
+    fn dot(sample: &Sample) -> [f64; 2] {
         let width = sample.image.size().width;
         let (mut sum, mut weights) = ([0.0; 2], 0.0);
         for (at, pixel) in sample.image.rgb().as_chunks::<3>().0.iter().enumerate() {
@@ -139,14 +139,15 @@ mod tests {
         sum.map(|it| it / weights)
     }
 
-    fn off(sample: &Sample) -> f64 {
-        let ([x, y], [u, v]) = (bright(sample), sample.joints[2]);
+    /// Distance of the dot from the last joint.
+    fn error(sample: &Sample) -> f64 {
+        let ([x, y], [u, v]) = (dot(sample), sample.joints[2]);
         (x - u).hypot(y - v)
     }
 
     #[test]
     fn the_mirror_exchanges_sides() {
-        let sample = planted(Size::new(30, 20), [8, 10]);
+        let sample = sample_with_dot(Size::new(30, 20), [8, 10]);
         let mirrored = sample.mirrored(&MIRROR);
         assert_eq!(
             mirrored.joints,
@@ -157,25 +158,25 @@ mod tests {
 
     #[test]
     fn a_quarter_turn_is_anticlockwise_and_exact() {
-        let sample = planted(Size::new(30, 20), [8, 10]);
+        let sample = sample_with_dot(Size::new(30, 20), [8, 10]);
         let turned = sample.rotated(90.0, Fill::Black).unwrap();
         assert_eq!(turned.image.size(), Size::new(20, 30));
         assert_eq!(turned.joints[2], [10.0, 21.0]);
-        assert_eq!(off(&turned), 0.0);
+        assert_eq!(error(&turned), 0.0);
         let back = turned.rotated(-90.0, Fill::Black).unwrap();
         assert_eq!(back, sample);
     }
 
     #[test]
-    fn no_turn_changes_nothing() {
-        let sample = planted(Size::new(31, 20), [8, 10]);
+    fn a_rotation_by_0_or_360_degrees_changes_nothing() {
+        let sample = sample_with_dot(Size::new(31, 20), [8, 10]);
         assert_eq!(sample.rotated(0.0, Fill::Replicate).unwrap(), sample);
         assert_eq!(sample.rotated(360.0, Fill::Replicate).unwrap(), sample);
     }
 
     #[test]
-    fn an_angle_that_is_no_number_is_refused() {
-        let sample = planted(Size::new(31, 20), [8, 10]);
+    fn an_angle_of_nan_is_refused() {
+        let sample = sample_with_dot(Size::new(31, 20), [8, 10]);
         assert!(matches!(
             sample.rotated(f64::NAN, Fill::Black).unwrap_err(),
             WarpError::BadMap { .. }
@@ -184,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_replicated_border_has_no_black_corners() {
-        let sample = planted(Size::new(40, 30), [20, 15]);
+        let sample = sample_with_dot(Size::new(40, 30), [20, 15]);
         let turned = sample.rotated(30.0, Fill::Replicate).unwrap();
         assert!(turned.image.rgb().iter().all(|&it| it >= 63));
         let turned = sample.rotated(30.0, Fill::Black).unwrap();
@@ -193,7 +194,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_dot_at_a_joint_is_found_at_the_joint_after(
+        fn joints_move_with_the_pixels(
             width in 30_usize..60, height in 30_usize..60,
             x in 0.0..1.0, y in 0.0..1.0, degrees in -180.0..180.0,
         ) {
@@ -201,16 +202,16 @@ mod tests {
                 7 + (x * (width - 15) as f64) as usize,
                 7 + (y * (height - 15) as f64) as usize,
             ];
-            let sample = planted(Size::new(width, height), joint);
-            prop_assert!(off(&sample.mirrored(&MIRROR)) < 1e-9);
+            let sample = sample_with_dot(Size::new(width, height), joint);
+            prop_assert!(error(&sample.mirrored(&MIRROR)) < 1e-9);
             let turned = sample.rotated(degrees, Fill::Replicate).unwrap();
-            prop_assert!(off(&turned) < 0.05, "off by {}", off(&turned));
+            prop_assert!(error(&turned) < 0.05, "{} px", error(&turned));
             let both = turned.mirrored(&MIRROR);
-            prop_assert!(off(&both) < 0.05);
+            prop_assert!(error(&both) < 0.05);
         }
 
         #[test]
-        fn twice_mirrored_is_the_same(width in 1_usize..9, height in 1_usize..9, seed: u64) {
+        fn mirroring_twice_is_the_identity(width in 1_usize..9, height in 1_usize..9, seed: u64) {
             let size = Size::new(width, height);
             let bytes = (0..size.rgb_bytes() as u64).map(|it| (it.wrapping_mul(seed) >> 7) as u8);
             let sample = Sample {
@@ -221,8 +222,8 @@ mod tests {
         }
 
         #[test]
-        fn distances_are_kept_and_nothing_is_lost(degrees in -400.0..400.0) {
-            let sample = planted(Size::new(33, 21), [8, 10]);
+        fn rotation_keeps_distances_and_all_corners(degrees in -400.0..400.0) {
+            let sample = sample_with_dot(Size::new(33, 21), [8, 10]);
             let turned = sample.rotated(degrees, Fill::Black).unwrap();
             let distance = |it: &Sample| {
                 let [a, b] = [it.joints[0], it.joints[2]];

@@ -1,4 +1,4 @@
-//! Which people of a data set are meant: ranges of rows, or names of images.
+//! A selection of people of a data set: ranges of rows, or names of images.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 /// Some of the people of a data set.
 ///
 /// Written as ranges of rows from 1 (`1-100,150`), or as the path of a list file with a range, a row or
-/// the file name of an image a line. Whatever is named must be there: a slip of the pen in the list of a
-/// test set would otherwise train on it.
+/// the file name of an image per line. Every entry must match: because of a typing error in the list of a
+/// test set, its people would otherwise be used for training.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Selection {
     rows: Vec<RangeInclusive<usize>>,
     images: BTreeSet<String>,
 }
 
-/// Why a selection means nothing.
+/// Why a selection is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {
     /// Neither ranges nor a list file.
@@ -25,7 +25,7 @@ pub enum SelectError {
     NotASelection {
         /// As the user wrote it.
         text: String,
-        /// What the operating system says of a file of that name.
+        /// Error of the operating system on reading a file of that name.
         source: io::Error,
     },
     /// A range that ends before it begins, or begins at 0.
@@ -37,7 +37,7 @@ pub enum SelectError {
         last: usize,
     },
     /// The list file is empty.
-    #[error("the list {} names nobody", path.display())]
+    #[error("the list {} is empty: it names no rows or images", path.display())]
     EmptyList {
         /// The file.
         path: PathBuf,
@@ -63,7 +63,7 @@ pub enum SelectError {
 }
 
 impl Selection {
-    /// Reads a selection as it stands on a command line: ranges of rows, else the path of a list file.
+    /// Reads an argument of the command line: ranges of rows, else the path of a list file.
     ///
     /// # Errors
     ///
@@ -110,7 +110,7 @@ impl Selection {
         Ok(selection)
     }
 
-    /// Whether a person is meant.
+    /// Whether a person is selected.
     ///
     /// * `row`: from 1.
     pub fn contains(&self, row: usize, image: &Path) -> bool {
@@ -118,13 +118,13 @@ impl Selection {
             let name = image.file_name().unwrap_or_default().to_string_lossy();
             self.images.contains(name.as_ref())
         };
-        self.rows.iter().any(|it| it.contains(&row)) || by_name()
+        self.rows.iter().any(|rows| rows.contains(&row)) || by_name()
     }
 
-    /// Checks that every range and every name means somebody.
+    /// Checks that every range and every name matches a person.
     ///
     /// * `data`: the data set, for messages.
-    /// * `people`: row and image of everybody.
+    /// * `people`: row and image of every person.
     pub(crate) fn check(
         &self,
         data: &Path,
@@ -141,7 +141,7 @@ impl Selection {
         }
         let names: BTreeSet<_> = people
             .values()
-            .map(|it| it.file_name().unwrap_or_default().to_string_lossy())
+            .map(|image| image.file_name().unwrap_or_default().to_string_lossy())
             .collect();
         for name in &self.images {
             if !names.contains(name.as_str()) {
@@ -160,9 +160,9 @@ fn ranges(text: &str) -> Option<Result<Vec<RangeInclusive<usize>>, SelectError>>
     let number = |it: &str| it.trim().parse::<usize>().ok();
     let ranges: Option<Vec<_>> = text
         .split(',')
-        .map(|it| match it.split_once('-') {
+        .map(|range| match range.split_once('-') {
             Some((first, last)) => Some((number(first)?, number(last)?)),
-            None => number(it).map(|row| (row, row)),
+            None => number(range).map(|row| (row, row)),
         })
         .collect();
     let checked = ranges?.into_iter().map(|(first, last)| {
@@ -192,13 +192,13 @@ mod tests {
     }
 
     #[test]
-    fn ranges_hold_both_of_their_ends() {
+    fn ranges_include_both_ends() {
         let selection = Selection::from_argument("3-5, 9").unwrap();
         assert_eq!(rows_of(&selection), [3, 4, 5, 9]);
     }
 
     #[test]
-    fn a_list_names_images_wherever_they_lie_and_rows() {
+    fn a_list_has_rows_and_file_names_of_images() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("list.txt");
         fs::write(&path, " im7.jpg\n\n2-3\n").unwrap();
@@ -209,17 +209,20 @@ mod tests {
     }
 
     #[test]
-    fn what_means_nothing_is_refused() {
-        let said = |text| Selection::from_argument(text).unwrap_err().to_string();
-        assert!(said("5-4").starts_with("the rows 5-4 are none"));
-        assert!(said("0-4").starts_with("the rows 0-4 are none"));
-        assert!(said("no/such/list").starts_with("\"no/such/list\" is neither rows"));
+    fn invalid_selections_are_refused() {
+        let error = |text| Selection::from_argument(text).unwrap_err().to_string();
+        assert!(error("5-4").starts_with("the rows 5-4 are none"));
+        assert!(error("0-4").starts_with("the rows 0-4 are none"));
+        assert!(error("no/such/list").starts_with("\"no/such/list\" is neither rows"));
         let empty = Selection::from_list(Path::new("l"), "\n \n").unwrap_err();
-        assert_eq!(empty.to_string(), "the list l names nobody");
+        assert_eq!(
+            empty.to_string(),
+            "the list l is empty: it names no rows or images"
+        );
     }
 
     #[test]
-    fn what_is_named_must_be_there() {
+    fn every_entry_must_match_a_person() {
         let check = |text: &str| {
             let selection = Selection::from_list(Path::new("l"), text).unwrap();
             selection.check(Path::new("set"), &people())
@@ -233,7 +236,7 @@ mod tests {
                 ..
             }
         ));
-        let said = check("c.jpg").unwrap_err().to_string();
-        assert_eq!(said, "c.jpg of the selection is no image of set");
+        let error = check("c.jpg").unwrap_err().to_string();
+        assert_eq!(error, "c.jpg of the selection is no image of set");
     }
 }

@@ -1,24 +1,24 @@
-//! Left and right: as people call their own sides, or as they are seen.
+//! Left and right: anatomical, or as seen in the picture.
 
 use core::str::FromStr;
 
 use crate::Person;
 
-/// Whose left and right the joints of a data set are called by.
+/// The convention of left and right for the joints of a data set.
 ///
-/// A model of parts knows an arm by the side of the picture that it is on, since that is all one view
-/// shows for certain; LSP and LSP-extended name the arms as their owner would. The two differ for
-/// people who are seen from behind.
+/// A model of parts distinguishes the arms by the side of the picture, because that is all a single view
+/// shows for certain; LSP and LSP-extended use the anatomical sides. The two differ for
+/// people seen from behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sides {
-    /// As they were marked.
+    /// As annotated.
     #[default]
     Marked,
-    /// As if everybody faced the camera: who is seen from behind has left and right exchanged.
+    /// As if all people faced the camera: left and right are exchanged for people seen from behind.
     Seen,
 }
 
-/// A name that is not one of sides.
+/// An unknown name of a convention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("expected marked or seen")]
 pub struct UnknownSides;
@@ -36,14 +36,14 @@ impl FromStr for Sides {
 }
 
 impl Sides {
-    /// Calls the joints of a person by these sides.
+    /// Applies the convention to the joints of a person.
     ///
     /// * `joint_mirror`: the joint on the other side for every joint, see
     ///   [`SkeletonTable::joint_mirror`](crate::SkeletonTable::joint_mirror).
     ///
     /// # Panics
     ///
-    /// If `joint_mirror` has not one entry a joint, or names one that is not there.
+    /// If `joint_mirror` does not have one entry per joint, or has an index out of range.
     #[must_use]
     pub fn of(self, person: Person, joint_mirror: &[usize]) -> Person {
         assert_eq!(
@@ -65,19 +65,19 @@ impl Sides {
 }
 
 /// Whether the right joints lie further right in the picture than the left ones: by the median over all
-/// pairs that are known, so that crossed hands or feet decide nothing.
+/// known pairs, so that crossed hands or feet have no influence.
 ///
 /// Of two joints that mirror each other the first one is the right one, as in PARSE and LSP.
 fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
     let pairs = joint_mirror.iter().enumerate();
-    let mut ahead: Vec<f64> = pairs
+    let mut differences: Vec<f64> = pairs
         .filter(|(right, left)| right < *left)
         .map(|(right, &left)| joints[right][0] - joints[left][0])
         .filter(|it| it.is_finite())
         .collect();
-    ahead.sort_unstable_by(f64::total_cmp);
-    let n = ahead.len();
-    n > 0 && ahead[n / 2] + ahead[(n - 1) / 2] > 0.0
+    differences.sort_unstable_by(f64::total_cmp);
+    let n = differences.len();
+    n > 0 && differences[n / 2] + differences[(n - 1) / 2] > 0.0
 }
 
 #[cfg(test)]
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::SkeletonTable;
 
-    /// Somebody who faces the camera, arms and legs apart: right is on the left of the picture.
+    /// A person that faces the camera, arms and legs apart: the right side is on the left of the picture.
     fn facing() -> Person {
         let right = [[40, 90], [41, 70], [42, 50], [58, 50], [59, 70], [60, 90]];
         let arms = [[30, 50], [33, 40], [40, 30], [60, 30], [67, 40], [70, 50]];
@@ -107,7 +107,7 @@ mod tests {
         SkeletonTable::published().joint_mirror().to_vec()
     }
 
-    /// As the same picture would be marked if it showed the person's back.
+    /// The annotation of the same picture if it showed the person's back.
     fn from_behind(person: &Person) -> Person {
         let mirror = mirror();
         Person {
@@ -118,19 +118,19 @@ mod tests {
     }
 
     #[test]
-    fn who_faces_the_camera_stays_as_marked() {
+    fn a_person_facing_the_camera_stays_as_annotated() {
         assert_eq!(Sides::Seen.of(facing(), &mirror()), facing());
     }
 
     #[test]
-    fn who_is_seen_from_behind_gets_the_sides_of_the_picture() {
+    fn a_person_seen_from_behind_gets_the_sides_of_the_picture() {
         let behind = from_behind(&facing());
         assert_eq!(Sides::Seen.of(behind.clone(), &mirror()), facing());
         assert_eq!(Sides::Marked.of(behind.clone(), &mirror()), behind);
     }
 
     #[test]
-    fn crossed_hands_and_unknown_joints_decide_nothing() {
+    fn crossed_hands_and_unknown_joints_have_no_influence() {
         let mut crossed = facing();
         crossed.joints.swap(6, 11);
         crossed.joints[0] = [f64::NAN; 2];
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn without_pairs_there_are_no_sides() {
+    fn without_mirrored_joints_nothing_is_exchanged() {
         let own: Vec<usize> = (0..14).collect();
         assert_eq!(
             Sides::Seen.of(from_behind(&facing()), &own),
@@ -151,7 +151,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn twice_is_as_once(xs in prop::collection::vec(-100.0..100.0_f64, 14)) {
+        fn applying_a_convention_twice_is_the_same_as_once(xs in prop::collection::vec(-100.0..100.0_f64, 14)) {
             let mut person = facing();
             for (joint, x) in person.joints.iter_mut().zip(xs) {
                 joint[0] = x;

@@ -1,11 +1,11 @@
-//! Which parts a model has, and where they lie between the joints that are annotated.
+//! The parts of a model, and their positions between the annotated joints.
 
 mod file;
 mod published;
 
 pub use file::SkeletonFileError;
 
-/// A skeleton as it is written: nothing is known to hold yet.
+/// The definition of a skeleton, not validated yet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSpec {
     /// Names of the parts.
@@ -22,10 +22,10 @@ pub struct SkeletonSpec {
     pub joint_mirror: Vec<usize>,
 }
 
-/// A skeleton that has been checked: what a model is trained for.
+/// A validated skeleton, for which a model is trained.
 ///
 /// * The parts are a tree: part 0 and only part 0 is the root, every other part comes after its parent.
-/// * Either mirror is its own inverse; that of the parts keeps the tree, and the part on the other side
+/// * Both mirrors are their own inverses; that of the parts keeps the tree, and the part on the other side
 ///   lies between the joints on the other side. So the parts of a mirrored person are the mirrored
 ///   parts.
 /// * The weights of every part add up to 1.
@@ -45,7 +45,7 @@ pub enum TableError {
         /// Most that are accepted.
         max: usize,
     },
-    /// A list has not one entry a part or a joint.
+    /// A list does not have one entry per part or joint.
     #[error("there are {got} {what}, expected {expected}")]
     Length {
         /// Of what.
@@ -55,7 +55,7 @@ pub enum TableError {
         /// Entries expected.
         expected: usize,
     },
-    /// Two have one name.
+    /// Two have the same name.
     #[error("{what} {first} and {second} are both called {name:?}")]
     SameName {
         /// `parts` or `joints`.
@@ -88,7 +88,7 @@ pub enum TableError {
         /// From 1.
         parent: usize,
     },
-    /// A mirror that is no exchange.
+    /// A mirror that is not its own inverse.
     #[error(
         "the mirror of {what} {index} ({name}) is {other}, but not the other way round or not there"
     )]
@@ -124,7 +124,7 @@ pub enum TableError {
         /// Name of its mirror image.
         other: String,
     },
-    /// A part names a joint that is not there.
+    /// A part refers to a joint that does not exist.
     #[error("part {part} ({name}) names joint {joint} of {n_joints}")]
     Joint {
         /// From 1.
@@ -148,8 +148,8 @@ pub enum TableError {
     },
 }
 
-/// How far the sum of weights may be from 1, and weights of the two sides from each other: thirds are
-/// written with a few digits.
+/// Tolerance of the sum of weights, and of the differences of the two sides: thirds are written with a few
+/// digits.
 const TOLERANCE: f64 = 1e-3;
 
 impl SkeletonTable {
@@ -173,7 +173,7 @@ impl SkeletonTable {
         Ok(Self(spec))
     }
 
-    /// What it is made of.
+    /// Its definition.
     pub fn spec(&self) -> &SkeletonSpec {
         &self.0
     }
@@ -215,8 +215,8 @@ impl SkeletonTable {
 
     /// The parts of a person.
     ///
-    /// * `joints`: one a joint of the skeleton, any unit; NaN makes the parts that need it NaN.
-    /// * Returns one point a part, in the unit of the joints.
+    /// * `joints`: one per joint of the skeleton, any unit; the parts that depend on a NaN are NaN.
+    /// * Returns one point per part, in the unit of the joints.
     ///
     /// # Panics
     ///

@@ -1,4 +1,4 @@
-//! Planted data sets of every layout, good and bad.
+//! Small data sets of every layout, valid and invalid.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -69,7 +69,7 @@ fn images(people: &People) -> Vec<String> {
     people.people.iter().map(name).collect()
 }
 
-fn said(problems: &People) -> Vec<String> {
+fn messages(problems: &People) -> Vec<String> {
     let full = |it: &datasets::Problem| {
         let file = it.file.file_name().unwrap().to_string_lossy();
         format!("{file}, {}: {}", it.row, it.source().unwrap())
@@ -78,7 +78,7 @@ fn said(problems: &People) -> Vec<String> {
 }
 
 #[test]
-fn the_layout_of_parse_is_read_and_counts_from_0() {
+fn the_layout_of_parse_is_read_with_pixels_from_0() {
     let dir = parse_set();
     let people = read(dir.path(), &ReadOptions::default()).unwrap();
     assert!(people.problems.is_empty(), "{:?}", people.problems);
@@ -96,7 +96,7 @@ fn the_layout_of_parse_is_read_and_counts_from_0() {
 }
 
 #[test]
-fn one_person_is_an_array_of_two_sizes() {
+fn an_array_of_two_sizes_is_one_person() {
     let Mat::Numbers(_, values) = labels(1) else {
         unreachable!("numbers")
     };
@@ -106,7 +106,7 @@ fn one_person_is_an_array_of_two_sizes() {
 }
 
 #[test]
-fn the_third_number_of_lsp_means_hidden_and_that_of_the_extended_set_visible() {
+fn the_third_number_is_hidden_in_lsp_and_visible_in_lsp_extended() {
     const N: usize = 4;
     let flag = |it: usize| f64::from(u8::from(it == 1));
     let value = |it: usize, axis: usize, person: usize| match axis {
@@ -189,7 +189,7 @@ fn ranges_and_lists_select_and_leave_out() {
     ));
 }
 
-/// A file of JSON lines with one of everything that can be wrong.
+/// A file of JSON lines with one of every fault.
 fn faulty() -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     write_image(&dir.path().join("photos/a.png"));
@@ -215,7 +215,7 @@ fn faulty() -> TempDir {
 }
 
 #[test]
-fn every_fault_is_told_with_file_and_row_and_counted() {
+fn every_fault_is_reported_with_file_and_row_and_counted() {
     let dir = faulty();
     let path = dir.path().join("people.jsonl");
     let people = read(&path, &ReadOptions::default()).unwrap();
@@ -223,7 +223,7 @@ fn every_fault_is_told_with_file_and_row_and_counted() {
     assert_eq!(
         rows,
         ["line 1", "line 13"],
-        "1.5 px outside is let pass by default"
+        "1.5 px outside is accepted by default"
     );
     let expected = [
         "people.jsonl, line 3: the name \"ann\" is that of line 1",
@@ -237,7 +237,7 @@ fn every_fault_is_told_with_file_and_row_and_counted() {
         "people.jsonl, line 11: the image cannot be used",
         "people.jsonl, line 12: not a person: EOF while parsing an object at line 1 column 1",
     ];
-    assert_eq!(said(&people), expected);
+    assert_eq!(messages(&people), expected);
     let cause = people.problems[6].source().unwrap().source().unwrap();
     assert!(cause.to_string().ends_with("empty.png is empty (0 bytes)"));
     let counts = people.counts();
@@ -246,7 +246,7 @@ fn every_fault_is_told_with_file_and_row_and_counted() {
 }
 
 #[test]
-fn the_caller_chooses_what_is_fatal_and_what_passes() {
+fn the_caller_chooses_fatal_faults_and_the_margin() {
     let dir = faulty();
     let path = dir.path().join("people.jsonl");
     let fatal = |kinds: &[FaultKind]| {
@@ -272,7 +272,7 @@ fn the_caller_chooses_what_is_fatal_and_what_passes() {
 }
 
 #[test]
-fn unknown_joints_pass_where_the_caller_can_do_without() {
+fn unknown_joints_are_accepted_if_requested() {
     let dir = faulty();
     let path = dir.path().join("some.jsonl");
     let line = r#"{"image":"photos/a.png","joints":[[1,2],null,[3,4]]}"#;
@@ -304,12 +304,12 @@ fn numbers_that_are_not_finite_are_faults() {
         "labels.mat, person 3: joint 3 lies at (14, inf)",
         "labels.mat, person 4: joint 1 is not known",
     ];
-    assert_eq!(said(&people), expected);
+    assert_eq!(messages(&people), expected);
     assert_eq!(people.people.len(), 1);
 }
 
 #[test]
-fn the_number_of_joints_can_be_asked_for() {
+fn the_number_of_joints_can_be_required() {
     let dir = parse_set();
     let options = ReadOptions {
         n_joints: Some(14),
@@ -320,7 +320,7 @@ fn the_number_of_joints_can_be_asked_for() {
 }
 
 #[test]
-fn what_is_no_data_set_is_refused() {
+fn other_files_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let read = |name: &str| read(&dir.path().join(name), &ReadOptions::default()).unwrap_err();
     assert!(matches!(read(""), DatasetError::Unrecognised { .. }));
@@ -344,7 +344,7 @@ fn what_is_no_data_set_is_refused() {
 
 proptest! {
     #[test]
-    fn a_data_set_survives_as_lines(unknown in 0..12_usize) {
+    fn a_data_set_is_the_same_when_written_as_lines(unknown in 0..12_usize) {
         let dir = parse_set();
         let mut people = read(dir.path(), &ReadOptions::default()).unwrap().people;
         people[unknown / 3].joints[unknown % 3] = [f64::NAN; 2];
@@ -359,17 +359,17 @@ proptest! {
         let path = dir.path().join("people.jsonl");
         fs::write(&path, lines.join("\n")).unwrap();
         let options = ReadOptions { unknown_joints: true, ..ReadOptions::default() };
-        let again = read(&path, &options).unwrap();
-        prop_assert_eq!(again.people.len(), 4);
-        for (ours, theirs) in again.people.iter().zip(&people) {
-            prop_assert_eq!(&ours.image, &theirs.image);
-            prop_assert_eq!(&ours.visible, &theirs.visible);
-            prop_assert_eq!(format!("{:?}", ours.joints), format!("{:?}", theirs.joints));
+        let read_back = read(&path, &options).unwrap();
+        prop_assert_eq!(read_back.people.len(), 4);
+        for (read, written) in read_back.people.iter().zip(&people) {
+            prop_assert_eq!(&read.image, &written.image);
+            prop_assert_eq!(&read.visible, &written.visible);
+            prop_assert_eq!(format!("{:?}", read.joints), format!("{:?}", written.joints));
         }
     }
 
     #[test]
-    fn damaged_files_do_not_make_it_panic(at in 0..400_usize, to: u8, end in 0..600_usize) {
+    fn damaged_files_do_not_panic(at in 0..400_usize, to: u8, end in 0..600_usize) {
         for (name, parse) in [
             ("ptsAll", parse_labels as fn(&[u8]) -> _),
             ("joints", parse_joints as fn(&[u8]) -> _),

@@ -9,24 +9,24 @@ use serde::Deserialize;
 
 use super::{SkeletonSpec, SkeletonTable, TableError};
 
-/// Why no skeleton came out of a file.
+/// Why a skeleton file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SkeletonFileError {
-    /// The operating system refused.
+    /// The file cannot be read.
     #[error("cannot read the skeleton {}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// Not TOML, or with other keys.
     #[error("not a skeleton")]
     Syntax(#[from] toml::de::Error),
-    /// A name that is not that of a part or a joint.
+    /// An unknown name of a part or a joint.
     #[error("{whose} names the {what} {name:?}, which is not there")]
     NoSuch {
-        /// Who names it.
+        /// Where it is used.
         whose: String,
         /// `part`, or `joint`.
         what: &'static str,
@@ -39,7 +39,7 @@ pub enum SkeletonFileError {
         /// Its name.
         name: String,
     },
-    /// The file can be read, but its skeleton makes no sense.
+    /// The skeleton in the file is invalid.
     #[error("the skeleton was refused")]
     Table(#[from] TableError),
 }

@@ -1,4 +1,4 @@
-//! Laws of skeletons, and everything that is refused.
+//! Properties of skeletons, and the errors of invalid ones.
 
 use std::error::Error as _;
 use std::path::Path;
@@ -15,15 +15,15 @@ fn upper_body() -> SkeletonTable {
 
 type Change = fn(&mut SkeletonSpec);
 
-/// What is said after one change to the published skeleton.
-fn said_after(change: impl FnOnce(&mut SkeletonSpec)) -> String {
+/// The error after one change to the published skeleton.
+fn error_after(change: impl FnOnce(&mut SkeletonSpec)) -> String {
     let mut spec = SkeletonTable::published().0;
     change(&mut spec);
     SkeletonTable::new(spec).unwrap_err().to_string()
 }
 
 #[test]
-fn the_published_skeleton_holds() {
+fn the_published_skeleton_is_valid() {
     let published = SkeletonTable::published();
     assert_eq!(
         SkeletonTable::new(published.spec().clone()).as_ref(),
@@ -33,7 +33,7 @@ fn the_published_skeleton_holds() {
 }
 
 #[test]
-fn the_upper_body_is_the_upper_body_of_the_published_skeleton() {
+fn the_upper_body_file_agrees_with_the_published_skeleton() {
     let (upper, published) = (upper_body(), SkeletonTable::published());
     assert_eq!(upper.n_parts(), 18);
     let place = |table: &SkeletonTable, part: usize| {
@@ -61,7 +61,7 @@ fn the_upper_body_is_the_upper_body_of_the_published_skeleton() {
 }
 
 #[test]
-fn what_does_not_hold_is_refused_by_name_and_number() {
+fn errors_of_invalid_skeletons_have_name_and_number() {
     let cases: [(&str, Change); 12] = [
         ("the skeleton has 0 parts, expected 1 to 64", |it| {
             it.names.clear();
@@ -115,13 +115,13 @@ fn what_does_not_hold_is_refused_by_name_and_number() {
         ),
     ];
     for (expected, change) in cases {
-        assert_eq!(said_after(change), expected);
+        assert_eq!(error_after(change), expected);
     }
-    assert!(said_after(|it| it.weights[1] = vec![(12, f64::NAN)]).contains("add up to NaN"));
+    assert!(error_after(|it| it.weights[1] = vec![(12, f64::NAN)]).contains("add up to NaN"));
 }
 
 #[test]
-fn a_file_that_names_what_is_not_there_is_refused() {
+fn invalid_skeleton_files_are_refused() {
     const FILE: &str = "joints = [\"a\", \"b\"]\njoint_mirror = [[\"a\", \"b\"]]\n\
                         [[part]]\nname = \"r\"\njoints = { a = 0.5, b = 0.5 }\n";
     SkeletonTable::parse(FILE).unwrap();
@@ -159,7 +159,7 @@ fn a_file_that_names_what_is_not_there_is_refused() {
 
 proptest! {
     #[test]
-    fn parts_come_back_as_the_joints_they_are(
+    fn joints_are_recovered_from_the_parts(
         joints in prop::collection::vec((-500.0..500.0, -500.0..500.0), 14),
     ) {
         let joints: Vec<_> = joints.into_iter().map(|(x, y)| [x, y]).collect();
@@ -184,7 +184,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_it_panic(text: String) {
+    fn no_text_panics(text: String) {
         drop(SkeletonTable::parse(&text));
     }
 }
