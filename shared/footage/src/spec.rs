@@ -11,7 +11,7 @@ use crate::FootageError;
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceSpec {
     /// One of: a folder of images; a glob (`frames/*.png`); a numbered pattern (`frames/%05d.png`);
-    /// an image; a video. A path that exists is taken as it is, whatever characters it contains.
+    /// an image; a video. A path that exists is never taken as a pattern, whatever it contains.
     pub path: String,
     /// First frame, from 0. For a numbered pattern this counts files, not the numbers in their names.
     pub start: u64,
