@@ -1,4 +1,4 @@
-//! Any other sequence, described by a file: cameras, footage, and a TRC file with the joints.
+//! Sequences described by a file: cameras, footage, and a TRC file with the joints.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use geometry::files::ReadOptions;
 use serde::Deserialize;
 use skeleton::JointSet;
 
-use crate::error::{text, wrong};
+use crate::error::{invalid, text};
 use crate::{Frame, Options, Sequence, SequenceError, View};
 
-/// The file. Paths are relative to it.
+/// The description. Paths are relative to its file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -20,10 +20,10 @@ struct Description {
     /// Name of the data set.
     #[serde(default)]
     dataset: Option<String>,
-    /// Who.
+    /// Name of the subject.
     #[serde(default)]
     subject: String,
-    /// What; the name, if not given.
+    /// Name of the action; that of the sequence, if not given.
     #[serde(default)]
     action: Option<String>,
     /// The calibration.
@@ -50,7 +50,7 @@ struct CameraEntry {
 struct Truth {
     /// A TRC file.
     trc: PathBuf,
-    /// Frame of the sequence that goes with its first row.
+    /// Frame of the sequence that corresponds to its first row.
     #[serde(default)]
     first_frame: u64,
     /// Which of the file's axes are the world's x, y and z; `["z", "x", "y"]` where y is up.
@@ -69,10 +69,10 @@ enum Axis {
     Z,
 }
 
-/// Reads a description and what it names.
+/// Reads a description and the files that it refers to.
 pub(crate) fn read(file: &Path, options: &Options) -> Result<Sequence, SequenceError> {
     let description: Description =
-        toml::from_str(&text(file)?).map_err(|error| wrong(file, 0, error.to_string()))?;
+        toml::from_str(&text(file)?).map_err(|error| invalid(file, 0, error.to_string()))?;
     let folder = file.parent().unwrap_or_else(|| Path::new("."));
     let rig_file = folder.join(&description.rig);
     let all = geometry::files::read(&rig_file, &ReadOptions::default())?;
@@ -122,11 +122,11 @@ fn truth(
     options: &Options,
 ) -> Result<(&'static JointSet, Vec<Frame>), SequenceError> {
     let set = JointSet::by_name(&truth.joints)
-        .ok_or_else(|| wrong(file, 0, format!("no joint set {:?}", truth.joints)))?;
+        .ok_or_else(|| invalid(file, 0, format!("no joint set {:?}", truth.joints)))?;
     if truth.markers.len() != set.joints.len() {
         let (got, expected) = (truth.markers.len(), set.joints.len());
         let what = format!("{got} markers, {} has {expected} joints", set.name);
-        return Err(wrong(file, 0, what));
+        return Err(invalid(file, 0, what));
     }
     let path = folder.join(&truth.trc);
     let trc = Trc::parse(&text(&path)?).map_err(|source| {
@@ -149,10 +149,16 @@ fn truth(
     };
     let columns = truth.markers.iter().map(column);
     let columns: Vec<usize> = columns.collect::<Result<_, _>>()?;
-    let place = |it: Point| truth.world_from_file.map(|axis| metres * it[axis as usize]);
+    let place = |point: Point| {
+        truth
+            .world_from_file
+            .map(|axis| metres * point[axis as usize])
+    };
     let frame = |row: usize| {
         let index = truth.first_frame + row as u64;
-        let joints = columns.iter().map(|&it| trc.frames[row][it].map(place));
+        let joints = columns
+            .iter()
+            .map(|&column| trc.frames[row][column].map(place));
         Frame {
             number: index,
             index,

@@ -10,13 +10,13 @@ use geometry::files::RigFileError;
 /// Why a sequence could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
-    /// Neither a data set that is known, nor a description.
+    /// Neither a known data set, nor a description.
     #[error(
         "{}: neither a folder of HumanEva-I, UMPM or `parallax synth`, nor a description (.toml)",
         .path.display()
     )]
     Unknown {
-        /// What was given.
+        /// The path.
         path: PathBuf,
     },
     /// A file cannot be read.
@@ -27,7 +27,7 @@ pub enum SequenceError {
         /// Why.
         source: std::io::Error,
     },
-    /// The footage of a camera is not there.
+    /// The footage of a camera is missing.
     #[error("{}: {hint}", .path.display())]
     NoFootage {
         /// Where it should be.
@@ -38,7 +38,7 @@ pub enum SequenceError {
     /// The calibration cannot be read.
     #[error("the calibration")]
     Rig(#[from] RigFileError),
-    /// The cameras make no rig.
+    /// The cameras are not a valid rig.
     #[error("{}: the cameras", .path.display())]
     Cameras {
         /// The calibration.
@@ -49,7 +49,7 @@ pub enum SequenceError {
     /// The rig lacks a camera.
     #[error("{}: no camera {name:?}", .path.display())]
     NoCamera {
-        /// The calibration, or what names the camera.
+        /// The calibration, or the file that refers to the camera.
         path: PathBuf,
         /// The camera.
         name: String,
@@ -70,12 +70,12 @@ pub enum SequenceError {
         /// The point.
         name: String,
     },
-    /// A length of motion capture is not known.
+    /// The unit of motion capture is not known.
     #[error("{}: unit {units:?} is not known", .path.display())]
     Units {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// The unit in the file.
         units: String,
     },
     /// The reference cannot be read.
@@ -86,17 +86,17 @@ pub enum SequenceError {
         /// Why.
         source: TrcError,
     },
-    /// A text is not what it should be.
+    /// A text is invalid.
     #[error("{}, line {line}: {what}", .path.display())]
     Text {
         /// The file.
         path: PathBuf,
-        /// Line, from 1; 0 for the whole.
+        /// Line, from 1; 0 for the whole file.
         line: usize,
         /// What is wrong.
         what: String,
     },
-    /// The streams of a trial cannot be put together.
+    /// The streams of a trial cannot be synchronised.
     #[error("{}", .path.display())]
     Sync {
         /// The folder.
@@ -106,7 +106,7 @@ pub enum SequenceError {
     },
 }
 
-/// Why the streams of a trial cannot be put together.
+/// Why the streams of a trial cannot be synchronised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SyncError {
     /// No camera has an offset.
@@ -126,7 +126,7 @@ pub enum SyncError {
     },
 }
 
-/// Reads a text file, and names it if that fails.
+/// Reads a text file; the error names it.
 pub(crate) fn text(path: &Path) -> Result<String, SequenceError> {
     std::fs::read_to_string(path).map_err(|source| io(path, source))
 }
@@ -136,7 +136,7 @@ pub(crate) fn io(path: &Path, source: std::io::Error) -> SequenceError {
     SequenceError::Io { path, source }
 }
 
-pub(crate) fn wrong(path: &Path, line: usize, what: impl Into<String>) -> SequenceError {
+pub(crate) fn invalid(path: &Path, line: usize, what: impl Into<String>) -> SequenceError {
     SequenceError::Text {
         path: path.to_owned(),
         line,

@@ -2,7 +2,7 @@
 //!
 //! `Image_Data/Walking_1_(C1).avi` (or a folder of its pictures, without the extension),
 //! `Calibration_Data/C1.cal`, `Sync_Data/Walking_1_(C1).ofs`, `Mocap_Data/Walking_1.c3d`, `Static.c3d` and
-//! `S1.mp`. The first five frames of every film are one frame repeated, so trials begin at frame 6.
+//! `S1.mp`. The first five frames of every video are one frame repeated, so trials begin at frame 6.
 
 mod body;
 mod sync;
@@ -14,7 +14,7 @@ use geometry::files::ReadOptions;
 use nalgebra::Vector3;
 use skeleton::HUMANEVA20;
 
-use crate::error::{motion, text, wrong};
+use crate::error::{invalid, motion, text};
 use crate::{Frame, Options, Sequence, SequenceError, SyncError, View};
 use body::{Body, Measures};
 use sync::Offset;
@@ -22,10 +22,10 @@ pub use sync::Sync;
 
 /// The colour cameras, which the paper uses.
 const CAMERAS: [&str; 3] = ["C1", "C2", "C3"];
-/// All cameras, in the order in which the toolbox looks at their offsets.
+/// All cameras, in the order in which the toolbox uses their offsets.
 const ALL_CAMERAS: [&str; 7] = ["C1", "C2", "C3", "BW1", "BW2", "BW3", "BW4"];
 
-/// The trial whose first half is the paper's test set: the part that the data set's makers meant for validation.
+/// The trial whose first half is the paper's test set: the part that the data set's authors intended for validation.
 pub const TRIAL: u32 = 1;
 
 /// The frames that the paper tests on, of one subject and action.
@@ -39,7 +39,7 @@ pub struct PaperTest {
     pub first: u64,
     /// The last frame.
     pub last: u64,
-    /// How many there are in each camera: those at which motion capture is whole.
+    /// Number of frames of each camera: those with complete motion capture.
     pub n_frames: usize,
 }
 
@@ -58,7 +58,7 @@ const fn test(
     }
 }
 
-/// The 4493 test frames of each camera, as the released predictions of expected errors have them.
+/// The 4493 test frames of each camera, as in the released predictions of expected errors.
 pub const PAPER_TEST: [PaperTest; 12] = [
     test("S1", "Box", [6, 358], 249),
     test("S1", "Gestures", [6, 395], 390),
@@ -74,16 +74,16 @@ pub const PAPER_TEST: [PaperTest; 12] = [
     test("S3", "Walking", [6, 448], 412),
 ];
 
-/// Reads what the paper tests on of one subject, as far as it is there.
+/// Reads the paper's test sequences of one subject, those that exist.
 pub(crate) fn read_subject(
     folder: &Path,
     options: &Options,
 ) -> Result<Vec<Sequence>, SequenceError> {
     let subject = folder.file_name().unwrap_or_default().to_string_lossy();
     let mut sequences = Vec::new();
-    for it in PAPER_TEST.iter().filter(|it| it.subject == subject) {
-        if trial(folder, it.action).is_file() {
-            sequences.push(read(folder, it, options)?);
+    for test in PAPER_TEST.iter().filter(|test| test.subject == subject) {
+        if trial(folder, test.action).is_file() {
+            sequences.push(read(folder, test, options)?);
         }
     }
     if sequences.is_empty() {
@@ -112,7 +112,9 @@ fn read(folder: &Path, test: &PaperTest, options: &Options) -> Result<Sequence, 
     })?;
     let frame = |number: u64| {
         let joints = body.joints(sync.motion_at(number))?;
-        let joints = joints.iter().map(|it| Some(it.map(|it| it * metres)));
+        let joints = joints
+            .iter()
+            .map(|joint| Some(joint.map(|value| value * metres)));
         Some(Frame {
             number,
             index: number - 1,
@@ -143,16 +145,16 @@ fn sync(folder: &Path, action: &str) -> Result<Sync, SequenceError> {
         }
         match Offset::parse(&text(&path)?) {
             Some(offset) => Ok(Some(offset)),
-            None => Err(wrong(&path, 0, "expected three numbers")),
+            None => Err(invalid(&path, 0, "expected three numbers")),
         }
     };
     let offsets = ALL_CAMERAS.iter().map(offset);
     let offsets: Vec<Option<Offset>> = offsets.collect::<Result<_, _>>()?;
-    let wrong = |source: SyncError| SequenceError::Sync {
+    let failed = |source: SyncError| SequenceError::Sync {
         path: folder.clone(),
         source,
     };
-    Sync::new(&offsets).map_err(wrong)
+    Sync::new(&offsets).map_err(failed)
 }
 
 fn cameras(folder: &Path, action: &str, sync: &Sync) -> Result<(Rig, Vec<View>), SequenceError> {
@@ -193,7 +195,7 @@ fn measures(folder: &Path, subject: &str) -> Result<Measures, SequenceError> {
     let file = folder.join(format!("{subject}.mp"));
     let parameters = text(&file)?;
     let what = "no LShoulderOffset and RShoulderOffset, or no shoulders in Static.c3d";
-    Measures::new(&still, &parameters).ok_or_else(|| wrong(&file, 0, what))
+    Measures::new(&still, &parameters).ok_or_else(|| invalid(&file, 0, what))
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
-//! Films of one person by several calibrated cameras, with the joints in space where they are known.
+//! Recordings of one person by several calibrated cameras, with the true joints in space where they are known.
 //!
-//! [`read`] takes what a user has: the folder of a data set in its own layout (`HumanEva-I`, UMPM, our
-//! synthetic scenes), or a file that describes any other sequence; and gives [`Sequence`]s. No pixel
-//! is read here: a [`View`] says which footage to open, and where the sequence begins in it.
+//! [`read`] takes the folder of a data set in its own layout (`HumanEva-I`, UMPM, synthetic scenes of
+//! Parallax), or a file that describes any other sequence, and returns [`Sequence`]s. No pixels
+//! are read here: a [`View`] has the footage to open and the frame at which the sequence begins.
 //!
-//! [`read_motion`] takes a C3D or TRC file alone: what one person did, without cameras.
+//! [`read_motion`] takes a C3D or TRC file alone: the motion of one person, without cameras.
 //!
 //! Metres; the world is that of the calibration.
 #![forbid(unsafe_code)]

@@ -1,8 +1,8 @@
 //! The motion of one person from a C3D or TRC file: joints over time, in metres and z up.
 //!
-//! Markers become joints by a [`MarkerTable`]. What is read is checked: gaps are bridged up to a limit, legs must be
-//! as long as legs are, heads above feet, and knees must fold backward, which they do not where axes are mirrored or
-//! sides exchanged.
+//! A [`MarkerTable`] converts markers to joints. Gaps are interpolated up to a limit. The motion is checked for
+//! plausibility: the length of the legs, the head above the feet, and knees that bend backward, which they do not
+//! if axes are mirrored or sides exchanged.
 
 mod check;
 mod error;
@@ -17,12 +17,12 @@ pub use table::{MarkerTable, PRESETS};
 use skeleton::PARSE14;
 use trial::Trial;
 
-/// Which part of a file to take, and how.
+/// Options for reading a motion file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionOptions {
-    /// First and last frame, as the file counts; all without it.
+    /// First and last frame, numbered as in the file; all if not set.
     pub frames: Option<[u32; 2]>,
-    /// The longest gap of a marker that is bridged by a straight line, seconds.
+    /// The longest gap of a marker that is interpolated linearly, seconds.
     pub max_gap_s: f64,
 }
 
@@ -36,20 +36,20 @@ impl Default for MotionOptions {
     }
 }
 
-/// Where the joints of a person were over time: metres, z up.
+/// The joints of a person over time: metres, z up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// Postures a second.
     pub rate_hz: f64,
     /// `[frame]`: the joints of `skeleton::PARSE14`.
     pub joints: Vec<[[f64; 3]; 14]>,
-    /// `[frame]`: the toes of the right and of the left foot; `None` where the table does not name them.
+    /// `[frame]`: the toes of the right and of the left foot; `None` if the table does not have them.
     pub toes: Option<Vec<[[f64; 3]; 2]>>,
 }
 
 /// Reads a file.
 ///
-/// * `table`: how markers become joints; without it that of [`PRESETS`] whose markers are all there.
+/// * `table`: converts markers to joints; if not given, the first of [`PRESETS`] whose markers all exist.
 ///
 /// # Errors
 ///
@@ -71,10 +71,10 @@ pub fn read_motion(
     let columns = Columns::new(file, &trial, &table, options)?;
     let names = PARSE14.joints.iter().map(|it| it.name);
     let joints: Vec<Vec<[f64; 3]>> = names
-        .map(|it| columns.joint(&table, it))
+        .map(|joint| columns.joint(&table, joint))
         .collect::<Result<_, _>>()?;
     let toes = if table.has_toes() {
-        let [right, left] = ["right toes", "left toes"].map(|it| columns.joint(&table, it));
+        let [right, left] = ["right toes", "left toes"].map(|joint| columns.joint(&table, joint));
         Some((right?, left?))
     } else {
         None
@@ -85,17 +85,16 @@ pub fn read_motion(
         joints: (0..n)
             .map(|frame| core::array::from_fn(|joint| joints[joint][frame]))
             .collect(),
-        toes: toes.map(|(right, left)| (0..n).map(|it| [right[it], left[it]]).collect()),
+        toes: toes.map(|(right, left)| right.into_iter().zip(left).map(<[_; 2]>::from).collect()),
     };
     check::check(file, &motion)?;
     Ok(motion)
 }
 
-/// The preset whose markers a trial has.
+/// The first preset whose markers a trial has.
 fn preset_for(trial: &Trial) -> Option<MarkerTable> {
-    let tables = PRESETS.iter().filter_map(|it| MarkerTable::preset(it));
-    let mut fitting = tables.filter(|it| it.markers().all(|name| trial.marker(name).is_some()));
-    fitting.next()
+    let mut tables = PRESETS.iter().filter_map(|name| MarkerTable::preset(name));
+    tables.find(|table| table.markers().all(|name| trial.marker(name).is_some()))
 }
 
 /// The markers that a table needs, without gaps: metres, z up.
@@ -125,25 +124,28 @@ impl<'a> Columns<'a> {
                 name: name.to_owned(),
                 markers: trial.names.clone(),
             })?;
-            let seen: Vec<Option<[f64; 3]>> = trial.frames.iter().map(|it| it[index]).collect();
+            let seen: Vec<Option<[f64; 3]>> =
+                trial.frames.iter().map(|frame| frame[index]).collect();
             let points =
-                bridged(&seen, options.max_gap_s * trial.rate_hz).map_err(|[from, to]| {
+                interpolated(&seen, options.max_gap_s * trial.rate_hz).map_err(|[from, to]| {
                     MotionError::Gap {
                         path: path.to_owned(),
                         marker: name.to_owned(),
-                        frames: [from, to].map(|it| trial.first + it as u32),
+                        frames: [from, to].map(|frame| trial.first + frame as u32),
                         seconds: (to - from + 1) as f64 / trial.rate_hz,
                         max_gap_s: options.max_gap_s,
                     }
                 })?;
-            let upright = points.into_iter().map(|it| table.upright(it));
-            let points = upright.map(|it| it.map(|it| it * metres)).collect();
+            let upright = points.into_iter().map(|point| table.upright(point));
+            let points = upright
+                .map(|point| point.map(|value| value * metres))
+                .collect();
             of_marker.push((name.to_owned(), points));
         }
         Ok(Self { path, of_marker })
     }
 
-    /// A joint in every frame: the sum of its markers.
+    /// A joint in every frame: the weighted sum of its markers.
     fn joint(&self, table: &MarkerTable, joint: &str) -> Result<Vec<[f64; 3]>, MotionError> {
         let no_joint = || MotionError::NoJoint {
             path: self.path.to_owned(),
@@ -165,12 +167,12 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// A marker without gaps: straight lines between what was seen, at the ends what was seen next.
+/// A marker without gaps: interpolated linearly between visible frames, constant at the ends.
 ///
 /// # Errors
 ///
-/// The first and last frame of the first gap that is longer than `longest` frames; of all, if nothing was seen.
-fn bridged(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [usize; 2]> {
+/// The first and last frame of the first gap that is longer than `longest` frames; of all, if it was never visible.
+fn interpolated(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [usize; 2]> {
     let mut points: Vec<[f64; 3]> = Vec::with_capacity(seen.len());
     while points.len() < seen.len() {
         let begin = points.len();
@@ -179,7 +181,7 @@ fn bridged(seen: &[Option<[f64; 3]>], longest: f64) -> Result<Vec<[f64; 3]>, [us
             continue;
         }
         let end = seen[begin..].iter().position(Option::is_some);
-        let end = end.map_or(seen.len(), |it| begin + it);
+        let end = end.map_or(seen.len(), |length| begin + length);
         let (before, after) = (points.last().copied(), seen.get(end).copied().flatten());
         let too_long = (end - begin) as f64 > longest + 1e-9;
         let (Some(from), false) = (before.or(after), too_long) else {

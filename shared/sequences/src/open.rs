@@ -1,4 +1,4 @@
-//! From what a user names to sequences.
+//! Finds the sequences that a path stands for.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::{Options, Sequence, SequenceError, described, humaneva, synthetic, um
 
 /// Reads all sequences that a path stands for.
 ///
-/// | path | what |
+/// | path | sequences |
 /// |---|---|
 /// | a `.toml` file | a description: rig, cameras, a TRC file (`configs/sequences/`) |
 /// | a folder with `truth.jsonl` | a sequence of `parallax synth` |
@@ -25,13 +25,13 @@ pub fn read(path: &Path, options: &Options) -> Result<Vec<Sequence>, SequenceErr
     if let Some(sequences) = folder(path, options) {
         return sequences;
     }
-    let mut inside: Vec<PathBuf> = Vec::new();
+    let mut entries: Vec<PathBuf> = Vec::new();
     for entry in std::fs::read_dir(path).map_err(|error| io(path, error))? {
-        inside.push(entry.map_err(|error| io(path, error))?.path());
+        entries.push(entry.map_err(|error| io(path, error))?.path());
     }
-    inside.sort();
+    entries.sort();
     let mut sequences = Vec::new();
-    for path in inside {
+    for path in entries {
         if let Some(more) = folder(&path, options) {
             sequences.extend(more?);
         }
@@ -44,13 +44,13 @@ pub fn read(path: &Path, options: &Options) -> Result<Vec<Sequence>, SequenceErr
     Ok(sequences)
 }
 
-/// The sequences of a folder; `None` if it is none of a known layout.
+/// The sequences of a folder; `None` if its layout is not known.
 fn folder(path: &Path, options: &Options) -> Option<Result<Vec<Sequence>, SequenceError>> {
     if path.join(synthetic::TRUTH).is_file() {
-        return Some(synthetic::read(path, options).map(|it| vec![it]));
+        return Some(synthetic::read(path, options).map(|sequence| vec![sequence]));
     }
     if path.join("Image_Data").is_dir() && path.join("Mocap_Data").is_dir() {
         return Some(humaneva::read_subject(path, options));
     }
-    umpm::description(path).map(|_| umpm::read(path, options).map(|it| vec![it]))
+    umpm::description(path).map(|_| umpm::read(path, options).map(|sequence| vec![sequence]))
 }

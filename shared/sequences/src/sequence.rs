@@ -1,25 +1,25 @@
-//! What every data set is turned into.
+//! The common form of all data sets.
 
 use evaluation::Point;
 use geometry::Rig;
 use skeleton::JointSet;
 
-/// One person doing one thing before one rig.
+/// One person doing one action in front of one rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     /// Name, different for all sequences of a data set: `S1 Walking`.
     pub name: String,
-    /// Name of the data set: `HumanEva`, `UMPM`, `synthetic`, or what a description says.
+    /// Name of the data set: `HumanEva`, `UMPM`, `synthetic`, or that of a description.
     pub dataset: String,
-    /// Who: `S1`; may be empty.
+    /// Name of the subject: `S1`; may be empty.
     pub subject: String,
-    /// What: `Walking`; the paper's tables have a row for each.
+    /// Name of the action: `Walking`; the paper's tables have a row for each.
     pub action: String,
-    /// The calibrated cameras, those of the views in their order.
+    /// The calibrated cameras, in the order of the views.
     pub rig: Rig,
     /// The footage, one for each camera.
     pub views: Vec<View>,
-    /// What the true joints are.
+    /// The set of the true joints.
     pub joints: &'static JointSet,
     /// The frames that are evaluated, ascending.
     pub frames: Vec<Frame>,
@@ -30,7 +30,7 @@ pub struct Sequence {
 pub struct View {
     /// Name of the camera in the rig.
     pub camera: String,
-    /// What to open: a video, a folder of images, a pattern.
+    /// The footage to open: a video, a folder of images, a pattern.
     pub source: String,
     /// Frame of the footage (from 0) that is frame 0 of the sequence.
     pub first: u64,
@@ -41,36 +41,36 @@ pub struct View {
 /// One instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Number, as the data set counts.
+    /// Number in the data set.
     pub number: u64,
     /// Frame of the sequence, from 0: [`View::first`] plus this is the frame of the footage.
     pub index: u64,
-    /// The joints of the sequence's joint set, metres; `None` where one is not known.
+    /// The joints of the sequence's joint set, metres; `None` where one is unknown.
     pub joints: Vec<Option<Point>>,
 }
 
-/// How the frames of UMPM go with its motion capture, which is twice as fast.
+/// How the frames of UMPM correspond to its motion capture, which is twice as fast.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Alignment {
-    /// The first frame goes with the first pose, as the data set says.
+    /// The first frame corresponds to the first pose, as documented by the data set.
     #[default]
     Direct,
-    /// Every frame goes with the pose of the frame before it: what the tool that was released with
-    /// the paper computes, by mistake as it seems.
+    /// Every frame corresponds to the pose of the frame before it: as computed by the tool that was
+    /// released with the paper, apparently by mistake.
     OneLate,
 }
 
-/// What a user may choose about reading.
+/// Options for reading sequences.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
-    /// For UMPM.
+    /// The alignment of UMPM.
     pub alignment: Alignment,
-    /// Which share of the frames to take, from and to, 0..1; all without it.
+    /// Which share of the frames to read, from and to, 0..1; all if not set.
     pub share: Option<[f64; 2]>,
 }
 
 impl Options {
-    /// Of `n` frames those that are to be taken.
+    /// The chosen range of `n` frames.
     pub(crate) fn range(&self, n: usize) -> std::ops::Range<usize> {
         let [from, to] = self.share.unwrap_or([0.0, 1.0]);
         let at = |share: f64| ((share.clamp(0.0, 1.0) * n as f64).round() as usize).min(n);
@@ -81,8 +81,8 @@ impl Options {
 impl Sequence {
     /// Keeps some of the frames.
     ///
-    /// * `every`: the first and every so many-th after it.
-    /// * `most`: how many at most.
+    /// * `every`: the distance between frames, from the first.
+    /// * `most`: the largest number of frames.
     pub fn thin_out(&mut self, every: usize, most: Option<usize>) {
         let kept = std::mem::take(&mut self.frames).into_iter();
         let kept = kept.step_by(every.max(1));

@@ -1,4 +1,4 @@
-//! Sequences that `parallax synth` left behind: `truth.jsonl`, `rig.toml`, and a folder for each camera.
+//! Sequences written by `parallax synth`: `truth.jsonl`, `rig.toml`, and a folder for each camera.
 
 use std::path::Path;
 
@@ -6,13 +6,13 @@ use geometry::files::ReadOptions;
 use serde::Deserialize;
 use skeleton::PARSE14;
 
-use crate::error::{text, wrong};
+use crate::error::{invalid, text};
 use crate::{Frame, Options, Sequence, SequenceError, View};
 
-/// What a folder must hold to be one.
+/// The file that identifies such a folder.
 pub(crate) const TRUTH: &str = "truth.jsonl";
 
-/// The part of the first line that is needed here; the format is documented where it is written.
+/// The part of the first line that is needed here; the format is documented in the crate `scene`.
 #[derive(Debug, Deserialize)]
 struct Header {
     format: String,
@@ -35,24 +35,24 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     let path = folder.join(TRUTH);
     let text = text(&path)?;
     let mut lines = text.lines().enumerate();
-    let (_, first) = lines.next().ok_or_else(|| wrong(&path, 1, "no header"))?;
+    let (_, first) = lines.next().ok_or_else(|| invalid(&path, 1, "no header"))?;
     let header: Header =
-        serde_json::from_str(first).map_err(|error| wrong(&path, 1, error.to_string()))?;
+        serde_json::from_str(first).map_err(|error| invalid(&path, 1, error.to_string()))?;
     if (header.format.as_str(), header.version) != ("parallax-truth", 1) {
         let (format, version) = (header.format, header.version);
         let what = format!("{format:?} {version}, expected \"parallax-truth\" 1");
-        return Err(wrong(&path, 1, what));
+        return Err(invalid(&path, 1, what));
     }
     if !header
         .joints
         .iter()
         .eq(PARSE14.joints.iter().map(|it| it.name))
     {
-        return Err(wrong(&path, 1, "joints other than the 14 of PARSE"));
+        return Err(invalid(&path, 1, "joints other than the 14 of PARSE"));
     }
     let mut frames = Vec::new();
     for (index, line) in lines {
-        let at = |what: String| wrong(&path, index + 1, what);
+        let at = |what: String| invalid(&path, index + 1, what);
         let line: Line = serde_json::from_str(line).map_err(|error| at(error.to_string()))?;
         if line.joints.len() != PARSE14.joints.len() {
             return Err(at(format!("{} joints, expected 14", line.joints.len())));
@@ -68,7 +68,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     let rig = geometry::files::read(&folder.join("rig.toml"), &ReadOptions::default())?;
     let known = rig.cameras().iter().map(|it| it.name.as_str());
     if !header.cameras.iter().map(String::as_str).eq(known) {
-        return Err(wrong(&path, 1, "other cameras than `rig.toml`"));
+        return Err(invalid(&path, 1, "other cameras than `rig.toml`"));
     }
     let view = |camera: &String| View {
         camera: camera.clone(),

@@ -1,4 +1,4 @@
-//! Every layout, written to disk and read again.
+//! Every layout, written to disk and read back.
 
 use std::path::Path;
 
@@ -66,7 +66,7 @@ fn umpm(root: &Path) {
 }
 
 #[test]
-fn every_second_pose_of_umpm_goes_with_a_frame() {
+fn every_second_pose_of_umpm_belongs_to_a_frame() {
     let dir = tempfile::tempdir().unwrap();
     umpm(dir.path());
     let poses = |alignment| {
@@ -92,7 +92,7 @@ fn every_second_pose_of_umpm_goes_with_a_frame() {
 }
 
 #[test]
-fn a_packed_video_of_umpm_is_to_be_unpacked() {
+fn a_packed_video_of_umpm_is_an_error_with_advice() {
     let dir = tempfile::tempdir().unwrap();
     umpm(dir.path());
     let video = dir.path().join("p2_chair_2/Video/p2_chair_2_r.avi");
@@ -102,7 +102,7 @@ fn a_packed_video_of_umpm_is_to_be_unpacked() {
 }
 
 #[test]
-fn the_last_fifth_can_be_taken() {
+fn the_last_fifth_can_be_chosen() {
     let dir = tempfile::tempdir().unwrap();
     umpm(dir.path());
     let options = Options {
@@ -153,7 +153,7 @@ fn synthetic_scenes_are_read() {
 }
 
 #[test]
-fn a_line_of_a_synthetic_scene_that_is_wrong_is_named() {
+fn an_invalid_line_of_a_synthetic_scene_is_named() {
     let dir = tempfile::tempdir().unwrap();
     for (line, replaced, by, expected) in [
         (0, "parallax-truth", "other", "line 1"),
@@ -206,7 +206,7 @@ fn any_other_sequence_can_be_described() {
         matches!(wrong, Err(SequenceError::NoCamera { .. })),
         "{wrong:?}"
     );
-    std::fs::write(&file, description.replace("\"M3\"", "\"nobody\"")).unwrap();
+    std::fs::write(&file, description.replace("\"M3\"", "\"none\"")).unwrap();
     let wrong = read(&file, &Options::default());
     assert!(
         matches!(wrong, Err(SequenceError::NoPoint { .. })),
@@ -215,7 +215,7 @@ fn any_other_sequence_can_be_described() {
 }
 
 #[test]
-fn a_folder_of_nothing_is_said_to_be_unknown() {
+fn an_empty_folder_is_unknown() {
     let dir = tempfile::tempdir().unwrap();
     let got = read(dir.path(), &Options::default());
     assert!(matches!(got, Err(SequenceError::Unknown { .. })), "{got:?}");

@@ -1,8 +1,8 @@
 //! UMPM in its own layout: a folder for each sequence, calibrations beside them.
 //!
 //! `SEQ/SEQ.json` names the calibration, `SEQ/Video/SEQ_{f,l,r,s}.avi` are 50 frames a second of 644x486,
-//! and `SEQ/Groundtruth/SEQ_vm.c3d` has the 15 joints of the person (of each of several: the first is
-//! taken) at 100 Hz, so that every second pose goes with a frame. The videos are distributed packed
+//! and `SEQ/Groundtruth/SEQ_vm.c3d` has the 15 joints of the person (of several people, the first is
+//! used) at 100 Hz, so that every second pose corresponds to a frame. The videos are distributed packed
 //! (`.avi.xz`).
 
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use geometry::files::ReadOptions;
 use nalgebra::Vector3;
 use skeleton::UMPM15;
 
-use crate::error::{motion, text, wrong};
+use crate::error::{invalid, motion, text};
 use crate::{Alignment, Frame, Options, Sequence, SequenceError, View};
 
 const CAMERAS: [&str; 4] = ["f", "l", "r", "s"];
 
 /// Poses for each frame of a camera.
-const POSES_A_FRAME: usize = 2;
+const POSES_PER_FRAME: usize = 2;
 
 /// The description of the sequence in a folder, if it is one of UMPM.
 pub(crate) fn description(folder: &Path) -> Option<PathBuf> {
@@ -33,8 +33,8 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         path: folder.to_owned(),
     })?;
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    let calibration =
-        value(&text(&description)?, "calib").ok_or_else(|| wrong(&description, 0, "no `calib`"))?;
+    let calibration = value(&text(&description)?, "calib")
+        .ok_or_else(|| invalid(&description, 0, "no `calib`"))?;
     let (rig, views) = cameras(folder, &name, &calibration)?;
     let file = folder.join("Groundtruth").join(format!("{name}_vm.c3d"));
     let (trial, metres) = motion(&file)?;
@@ -44,25 +44,25 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
             "{} points, expected {n_joints} for a person",
             trial.n_points()
         );
-        return Err(wrong(&file, 0, what));
+        return Err(invalid(&file, 0, what));
     }
-    let n = trial.n_frames().div_ceil(POSES_A_FRAME);
+    let n = trial.n_frames().div_ceil(POSES_PER_FRAME);
     let frame = |index: usize| {
         let nth = match options.alignment {
             Alignment::Direct => index,
             Alignment::OneLate => index.checked_sub(1)?,
         };
-        let points = &trial.frame(nth * POSES_A_FRAME)[..n_joints];
+        let points = &trial.frame(nth * POSES_PER_FRAME)[..n_joints];
         let joints = points
             .iter()
-            .map(|it| it.map(|it| it.map(|it| it * metres)));
+            .map(|joint| joint.map(|point| point.map(|value| value * metres)));
         Some(Frame {
             number: index as u64 + 1,
             index: index as u64,
             joints: joints.collect(),
         })
     };
-    // `p1_chair_2`: people, what they do, which time.
+    // `p1_chair_2`: people, action, trial.
     let mut words = name.split('_');
     let subject = words.next().unwrap_or_default().to_owned();
     let action = words.next().map_or_else(|| name.to_string(), capital);
@@ -106,7 +106,7 @@ fn cameras(
             let hint = "unpack it first (`xz -dk`)";
             return Err(SequenceError::NoFootage { path: packed, hint });
         }
-        // A folder of pictures will do.
+        // A folder of pictures is accepted too.
         let source = if stem.is_dir() { stem } else { video };
         if !source.exists() {
             let hint = "the video, or a folder of its pictures without the extension, is not there";
@@ -124,7 +124,7 @@ fn cameras(
     Ok((rig, views))
 }
 
-/// A text in an object of JSON. Some files of the set have a comma too many, so they are not parsed.
+/// A string in a JSON object. Some files of the set have a trailing comma, so they are not parsed.
 fn value(text: &str, key: &str) -> Option<String> {
     let (_, rest) = text.split_once(&format!("\"{key}\""))?;
     let rest = rest.trim_start().strip_prefix(':')?.trim_start();
@@ -132,7 +132,7 @@ fn value(text: &str, key: &str) -> Option<String> {
     Some(value.to_owned())
 }
 
-/// `chair` as the paper's tables have it: `Chair`.
+/// `chair` as in the paper's tables: `Chair`.
 fn capital(word: &str) -> String {
     let mut letters = word.chars();
     let first = letters.next().map(|it| it.to_ascii_uppercase());
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_comma_too_many_does_no_harm() {
+    fn a_trailing_comma_is_accepted() {
         let text = "{ \"id\": 7, \"calib\" : \"calib_l06\", }";
         assert_eq!(value(text, "calib").as_deref(), Some("calib_l06"));
         assert_eq!(value(text, "video"), None);

@@ -2,9 +2,9 @@
 //!
 //! The files hold four points for each segment of Vicon's Plug-in-Gait model: its origin (`PELO`) and its
 //! axes: anterior (`PELA`, x), lateral (`PELL`, y) and proximal (`PELP`, z). The data set's toolbox
-//! (version 1.1) makes joints of them, with corrections: the pelvis lies 50 mm further back and the trunk
+//! (version 1.1) computes joints from them, with corrections: the pelvis lies 50 mm further back and the trunk
 //! leans back by half the width of the shoulders; the upper arms turn by half the offset of the shoulder; the head is
-//! 316.103 mm long. What is here follows what it computes, not how it is written.
+//! 316.103 mm long. This module computes the same, but is not a translation of that code.
 
 use c3d::C3d;
 use evaluation::Point;
@@ -18,7 +18,7 @@ const PELVIS_MM: f64 = -50.0;
 /// Half the size of a marker, mm.
 const HALF_MARKER_MM: f64 = 7.0;
 
-/// The markers that must all be seen, or the pose is not trusted; some have a second name.
+/// The markers that must all be visible for a pose to be used; some have a second name.
 const MARKERS: [&[&str]; 39] = [
     &["RASI"],
     &["LASI"],
@@ -61,7 +61,7 @@ const MARKERS: [&[&str]; 39] = [
     &["RTOE"],
 ];
 
-/// What of a subject's measures enters the joints, mm.
+/// The measures of a subject that the joints depend on, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measures {
     /// Half the distance of the shoulder markers, less half a marker.
@@ -71,7 +71,7 @@ pub(crate) struct Measures {
 }
 
 impl Measures {
-    /// From the static trial and the text of the `.mp` file; `None` if one lacks what is needed.
+    /// From the static trial and the text of the `.mp` file; `None` if either is incomplete.
     pub(crate) fn new(still: &C3d, parameters: &str) -> Option<Self> {
         let [left, right] = ["LSHO", "RSHO"].map(|it| still.point(it));
         let (left, right) = (left?, right?);
@@ -103,7 +103,7 @@ fn parameter(text: &str, name: &str) -> Option<f64> {
     text.lines().find_map(value)
 }
 
-/// The points of a trial that the joints are made of.
+/// The points of a trial from which the joints are computed.
 #[derive(Debug)]
 pub(crate) struct Body<'a> {
     trial: &'a C3d,
@@ -124,9 +124,9 @@ impl<'a> Body<'a> {
         };
         let markers = MARKERS.iter().map(marker).collect::<Result<_, _>>()?;
         let axes = ["O", "A", "L", "P"];
-        let of_segment = |it: &str| axes.map(|axis| format!("{it}{axis}"));
+        let of_segment = |segment: &str| axes.map(|axis| format!("{segment}{axis}"));
         let points = SEGMENTS.into_iter().flat_map(of_segment);
-        let missing = |it: &String| trial.point(it).is_none();
+        let missing = |name: &String| trial.point(name).is_none();
         let mut points = points.chain(ORIGINS.map(str::to_owned));
         if let Some(name) = points.find(missing) {
             return Err(name);
@@ -140,9 +140,9 @@ impl<'a> Body<'a> {
 
     /// The 20 joint ends of `skeleton::HUMANEVA20`, in the file's unit (mm), at a frame (from 1, fractional).
     ///
-    /// * Returns `None` outside of the trial, and where a marker was lost in either frame around.
+    /// * Returns `None` outside of the trial, and where a marker was lost in either neighbouring frame.
     pub(crate) fn joints(&self, at: f64) -> Option<[Point; 20]> {
-        // NaN is outside too.
+        // False for NaN.
         if !(at >= 1.0 && at.ceil() <= self.trial.n_frames() as f64) {
             return None;
         }
@@ -190,7 +190,7 @@ const SEGMENTS: [&str; 10] = [
 /// Other points that are needed.
 const ORIGINS: [&str; 3] = ["TRXO", "LCLO", "RCLO"];
 
-/// A turn about the lateral axis that moves the proximal end backwards.
+/// A rotation about the lateral axis that moves the proximal end backwards.
 fn backwards(angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -angle)
 }
@@ -261,7 +261,7 @@ impl Pose<'_> {
         ))
     }
 
-    /// The axes of a segment at another point: in between linearly, and by the shortest turn.
+    /// The axes of a segment at another origin, interpolated: the origin linearly, the rotation spherically.
     fn segment(&self, axes: &str, origin: &str) -> Option<Isometry3<f64>> {
         let [o, x, y, z] = ["O", "A", "L", "P"].map(|it| self.points(&format!("{axes}{it}")));
         let (o, x, y, z) = (o?, x?, y?, z?);
@@ -280,10 +280,10 @@ impl Pose<'_> {
     }
 }
 
-/// A point of a frame; lost ones are marked, or lie exactly in the origin.
+/// A point of a frame; `None` for a lost one, which is marked or lies exactly at the origin.
 fn seen(trial: &C3d, frame: usize, point: usize) -> Option<Vector3<f64>> {
-    let it = trial.frame(frame)[point]?;
-    (it != [0.0; 3]).then(|| it.into())
+    let position = trial.frame(frame)[point]?;
+    (position != [0.0; 3]).then(|| position.into())
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! When the streams of a trial began.
+//! Synchronisation of the streams of a trial.
 
 use crate::SyncError;
 
-/// What an `.ofs` file says: a frame of the camera, the frame of motion capture at the same time, and how many
-/// of the latter there are for each of the former. Frames count from 1.
+/// The content of an `.ofs` file: a frame of the camera, the frame of motion capture at the same time, and the
+/// number of frames of motion capture per frame of the camera. Frames count from 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Offset {
     pub(crate) image: f64,
@@ -30,10 +30,10 @@ impl Offset {
     }
 }
 
-/// How the streams of a trial go together.
+/// The temporal alignment of the streams of a trial.
 ///
-/// Follows the toolbox of the data set (version 1.1): the first camera with an offset gives the time, the
-/// rates of all are averaged, and all begin as early as the earliest can.
+/// Follows the toolbox of the data set (version 1.1): the first camera with an offset defines the time, the
+/// rates of all are averaged, and frame 1 is the first frame of the earliest camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sync {
     /// Frame of motion capture (from 1, fractional) at frame 1 of the trial.
@@ -50,12 +50,12 @@ impl Sync {
     pub(crate) fn new(offsets: &[Option<Offset>]) -> Result<Self, SyncError> {
         let known: Vec<&Offset> = offsets.iter().flatten().collect();
         let first = *known.first().ok_or(SyncError::Nothing)?;
-        if let Some(it) = known.iter().find(|it| it.rate <= 0.0) {
-            return Err(SyncError::Rate { rate: it.rate });
+        if let Some(offset) = known.iter().find(|offset| offset.rate <= 0.0) {
+            return Err(SyncError::Rate { rate: offset.rate });
         }
-        let begin = |it: &Offset| it.image + (first.motion - it.motion) / it.rate;
-        let rate = known.iter().map(|it| it.rate).sum::<f64>() / known.len() as f64;
-        let earliest = known.iter().map(|it| begin(it));
+        let begin = |offset: &Offset| offset.image + (first.motion - offset.motion) / offset.rate;
+        let rate = known.iter().map(|offset| offset.rate).sum::<f64>() / known.len() as f64;
+        let earliest = known.iter().map(|offset| begin(offset));
         let earliest = earliest.fold(f64::INFINITY, f64::min);
         let mut motion = first.motion - rate * (earliest - 1.0);
         let mut shift = 1.0 - earliest;
@@ -63,9 +63,11 @@ impl Sync {
             shift -= (motion - 1.0) / rate;
             motion = 1.0;
         }
-        let frame = |it: &Option<Offset>| {
-            let Some(it) = it else { return Ok(None) };
-            let offset = (begin(it) + shift).round();
+        let frame = |offset: &Option<Offset>| {
+            let Some(offset) = offset else {
+                return Ok(None);
+            };
+            let offset = (begin(offset) + shift).round();
             if offset < 1.0 {
                 return Err(SyncError::Before { offset });
             }
@@ -99,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_that_began_later_skip_frames_less() {
+    fn cameras_that_began_later_skip_fewer_frames() {
         // At motion 101 the first camera is at frame 11, the second at 31: it began 20 frames earlier.
         let got = Sync::new(&[11.0, 31.0].map(|it| Some(offset(it, 101.0, 2.0)))).unwrap();
         assert_eq!(got.image_first, [Some(1), Some(21)]);
@@ -118,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_rates_of_nothing_are_refused() {
+    fn missing_offsets_and_rates_of_0_are_refused() {
         assert_eq!(Sync::new(&[None, None]), Err(SyncError::Nothing));
         let got = Sync::new(&[Some(offset(1.0, 1.0, 0.0))]);
         assert_eq!(got, Err(SyncError::Rate { rate: 0.0 }));
@@ -136,15 +138,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_an_offset_says_stays_true(
+        fn the_correspondence_of_every_offset_is_kept(
             image in 1.0..500.0_f64,
             motion in 1.0..1000.0_f64,
             other in 1.0..500.0_f64,
         ) {
             let got = Sync::new(&[image, other].map(|it| Some(offset(it, motion, 2.0)))).unwrap();
-            for (first, said) in got.image_first.iter().zip([image, other]) {
-                // The frame of the trial at which this camera shows frame `said`.
-                let frame = said - first.unwrap() as f64 + 1.0;
+            for (first, image_frame) in got.image_first.iter().zip([image, other]) {
+                // The frame of the trial at which this camera shows frame `image_frame`.
+                let frame = image_frame - first.unwrap() as f64 + 1.0;
                 let at = got.motion_first + (frame - 1.0) * 2.0;
                 prop_assert!((at - motion).abs() <= 1.0 + 1e-9, "rounded to whole frames");
             }

@@ -1,4 +1,4 @@
-//! A subject's folder, written as the data set has it.
+//! A subject's folder in the layout of the data set.
 
 use geometry::files::Format;
 use nalgebra::Isometry3;
@@ -51,10 +51,10 @@ fn subject(folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_subject_is_read_with_its_streams_in_step() {
+fn a_subject_is_read_with_synchronised_streams() {
     let dir = tempfile::tempdir().unwrap();
     subject(dir.path());
-    // The folder above is that of the data set.
+    // The parent folder is that of the data set.
     let got = crate::read(dir.path(), &Options::default()).unwrap();
     let [walking] = &got[..] else {
         panic!("{} sequences", got.len())
@@ -80,7 +80,7 @@ fn a_subject_is_read_with_its_streams_in_step() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_files_are_named() {
     let dir = tempfile::tempdir().unwrap();
     let folder = subject(dir.path());
     std::fs::remove_file(folder.join("Image_Data/Walking_1_(C2).avi")).unwrap();

@@ -1,4 +1,4 @@
-//! Whether a motion can be that of a person.
+//! Plausibility checks of a motion.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use super::{Motion, MotionError};
 const LEGS: [[usize; 3]; 2] = [[3, 4, 5], [2, 1, 0]];
 const HEAD: usize = 13;
 
-/// How long a leg can be, metres: that of a small child, and of the tallest man with markers that lie badly.
+/// Plausible lengths of a leg, metres: from that of a small child to that of the tallest man with badly placed markers.
 const LEG_METRES: [f64; 2] = [0.3, 1.5];
 
-/// Refuses what no person does.
+/// Refuses a motion that is impossible for a person.
 pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let refuse = |what: String| {
         let path = path.to_owned();
@@ -31,9 +31,9 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
             "a leg would be {leg:.3} m long: another unit? (unit = \"mm\" in a marker table)"
         ));
     }
-    let above = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
-    let head = median(all().map(above));
-    // Who lies down is as high as low; who stands on the head all the time is read with a wrong axis.
+    let head_above_foot = |frame: &[[f64; 3]; 14]| frame[HEAD][2] - frame[LEGS[0][2]][2];
+    let head = median(all().map(head_above_foot));
+    // Tolerates lying; a head that is below the feet most of the time means a wrong axis.
     if head < -0.3 * leg {
         return refuse(format!(
             "the head would be {:.2} m below the feet: another axis points up? (up = \"y\" in a marker table)",
@@ -50,7 +50,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     Ok(())
 }
 
-/// How much the knees fold backward; negative if forward, 0 if they are straight.
+/// How much the knees bend backward; negative if forward, 0 if they are straight.
 fn fold(frame: &[[f64; 3]; 14]) -> f64 {
     let joint = |it: usize| Vector3::from(frame[it]);
     let left = joint(LEGS[0][0]) - joint(LEGS[1][0]);
@@ -58,8 +58,8 @@ fn fold(frame: &[[f64; 3]; 14]) -> f64 {
         let thigh = (joint(knee) - joint(hip)).try_normalize(1e-9);
         let shin = (joint(ankle) - joint(knee)).try_normalize(1e-9);
         let axis = thigh.zip(shin).map(|(a, b)| a.cross(&b));
-        let axis = axis.filter(|it| it.norm() > 0.2);
-        axis.map_or(0.0, |it| it.dot(&left))
+        let axis = axis.filter(|axis| axis.norm() > 0.2);
+        axis.map_or(0.0, |axis| axis.dot(&left))
     };
     LEGS.into_iter().map(of_leg).sum()
 }

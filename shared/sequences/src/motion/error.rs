@@ -16,7 +16,7 @@ pub enum MotionError {
         /// Why.
         source: std::io::Error,
     },
-    /// Neither C3D nor TRC by its name.
+    /// The file name ends in neither `.c3d` nor `.trc`.
     #[error("{}: expected a file whose name ends in .c3d or .trc", .path.display())]
     Kind {
         /// The file.
@@ -38,33 +38,33 @@ pub enum MotionError {
         /// Why.
         source: TrcError,
     },
-    /// A rate that is none.
+    /// A rate out of range.
     #[error("{}: {rate_hz} frames a second", .path.display())]
     Rate {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// The rate in the file.
         rate_hz: f64,
     },
     /// A unit that is not known.
-    #[error("{}: unit {unit:?} is not known; say it in the marker table: unit = \"mm\"", .path.display())]
+    #[error("{}: unit {unit:?} is not known; set it in the marker table: unit = \"mm\"", .path.display())]
     Unit {
         /// The file.
         path: PathBuf,
-        /// What it says.
+        /// The unit in the file.
         unit: String,
     },
-    /// Frames that are not there.
+    /// Frames that the file does not have.
     #[error("{}: frames {}-{} are not among its frames {}-{}", .path.display(), .asked[0], .asked[1], .has[0], .has[1])]
     Frames {
         /// The file.
         path: PathBuf,
-        /// First and last that were asked for.
+        /// First and last that were requested.
         asked: [u32; 2],
         /// First and last of the file.
         has: [u32; 2],
     },
-    /// A table that is none.
+    /// An invalid marker table.
     #[error("{}: {what}", .path.display())]
     Table {
         /// The file.
@@ -83,25 +83,25 @@ pub enum MotionError {
         /// Its markers.
         markers: Vec<String>,
     },
-    /// A marker that the table names is not there.
+    /// A marker of the table is missing.
     #[error("{}: no marker {name:?}; it has {}", .path.display(), .markers.join(", "))]
     NoMarker {
         /// The file.
         path: PathBuf,
         /// The marker.
         name: String,
-        /// Those that there are.
+        /// The existing ones.
         markers: Vec<String>,
     },
-    /// A joint that the table does not make.
-    #[error("{}: the marker table says nothing of {joint:?}", .path.display())]
+    /// A joint that the table does not define.
+    #[error("{}: the marker table does not define {joint:?}", .path.display())]
     NoJoint {
         /// The motion.
         path: PathBuf,
         /// The joint.
         joint: String,
     },
-    /// A marker was not seen for too long.
+    /// A marker is missing for too long.
     #[error(
         "{}: marker {marker:?} is missing in frames {}-{} ({seconds:.2} s); gaps are bridged up to {max_gap_s} s",
         .path.display(), .frames[0], .frames[1]
@@ -111,19 +111,19 @@ pub enum MotionError {
         path: PathBuf,
         /// The marker.
         marker: String,
-        /// First and last frame without it, as the file counts.
+        /// First and last frame without it, numbered as in the file.
         frames: [u32; 2],
-        /// How long that is.
+        /// Duration of the gap.
         seconds: f64,
-        /// What would do.
+        /// The longest gap accepted.
         max_gap_s: f64,
     },
-    /// No person moves like that.
+    /// The motion is impossible for a person.
     #[error("{}: {what}", .path.display())]
     Implausible {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and what it may come from.
+        /// What is wrong, and a likely cause.
         what: String,
     },
 }

@@ -1,4 +1,4 @@
-//! How the markers of a file become joints.
+//! Marker tables: the conversion of the markers of a file to joints.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,7 +8,7 @@ use skeleton::PARSE14;
 
 use super::MotionError;
 
-/// Names of the tables that Parallax knows; they stand in `configs/markers`.
+/// Names of the built-in tables, from `configs/markers`.
 pub const PRESETS: [&str; 4] = ["cmu", "pose2sim", "parallax", "optitrack36"];
 
 const TEXTS: [&str; 4] = [
@@ -20,7 +20,7 @@ const TEXTS: [&str; 4] = [
 
 const TOES: [&str; 2] = ["right toes", "left toes"];
 
-/// How the markers of a file become joints: sums of markers with weights that add up to 1.
+/// Converts the markers of a file to joints: sums of markers with weights that add up to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarkerTable {
     up: Axis,
@@ -28,13 +28,13 @@ pub struct MarkerTable {
     joints: BTreeMap<String, Vec<(String, f64)>>,
 }
 
-/// The file.
+/// The content of a file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     /// The axis of the motion file that points up.
     up: Axis,
-    /// What the motion file counts in, if it does not say so, or is wrong.
+    /// The unit of the motion file, if that in the file is missing or wrong.
     #[serde(default)]
     unit: Option<String>,
     joints: BTreeMap<String, Markers>,
@@ -78,7 +78,7 @@ impl MarkerTable {
         })
     }
 
-    /// Reads the text of a table; the error says what is wrong with it.
+    /// Parses the text of a table; the error describes what is wrong.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|it| it.to_string())?;
         let unit_metres = match &file.unit {
@@ -95,7 +95,7 @@ impl MarkerTable {
             if !known.clone().chain(TOES).any(|it| it == joint) {
                 return Err(format!("{joint:?} is no joint"));
             }
-            let weights = weights(markers).map_err(|it| format!("{joint:?}: {it}"))?;
+            let weights = weights(markers).map_err(|error| format!("{joint:?}: {error}"))?;
             joints.insert(joint, weights);
         }
         if joints.contains_key(TOES[0]) != joints.contains_key(TOES[1]) {
@@ -113,7 +113,7 @@ impl MarkerTable {
         self.joints.get(name).map(Vec::as_slice)
     }
 
-    /// The markers that it needs, some several times.
+    /// The markers of all joints; one may occur several times.
     pub(super) fn markers(&self) -> impl Iterator<Item = &str> {
         self.joints.values().flatten().map(|it| it.0.as_str())
     }
@@ -126,7 +126,7 @@ impl MarkerTable {
         self.unit_metres
     }
 
-    /// A point of the file with z up: axes change places in a circle, so that left stays left.
+    /// A point of the file with z up: axes are permuted cyclically, which does not mirror.
     pub(super) fn upright(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self.up {
             Axis::X => [y, z, x],
@@ -140,7 +140,7 @@ fn weights(markers: Markers) -> Result<Vec<(String, f64)>, String> {
     let weights: Vec<(String, f64)> = match markers {
         Markers::Mean(names) => {
             let share = 1.0 / names.len() as f64;
-            names.into_iter().map(|it| (it, share)).collect()
+            names.into_iter().map(|name| (name, share)).collect()
         }
         Markers::Sum(weights) => weights.into_iter().collect(),
     };

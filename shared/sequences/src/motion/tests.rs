@@ -1,4 +1,4 @@
-//! Motion that is read is the motion that was written, or is refused with what is wrong.
+//! Motion files are read back as written, or refused with the cause.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -9,7 +9,7 @@ use testkit::c3d::{Processor, Trial as Written};
 
 use super::*;
 
-/// A man who bobs up and down, knees bent: joints of PARSE14 in metres, z up, and toes.
+/// A person that moves up and down with bent knees: joints of PARSE14 in metres, z up, and toes.
 fn posture(frame: usize) -> [[f64; 3]; 16] {
     let down = 0.05 * (frame as f64 * 0.3).sin();
     let z = |it: f64| it - down;
@@ -62,7 +62,7 @@ fn names(with_toes: bool) -> Vec<String> {
     names.into_iter().map(|it| it.replace(' ', "_")).collect()
 }
 
-/// A TRC file, y up; `missing` says of which frame and marker nothing is written.
+/// A TRC file, y up, without the frames and markers for which `missing` is true.
 fn trc(n: usize, with_toes: bool, missing: impl Fn(usize, usize) -> bool) -> String {
     let names = names(with_toes);
     let mut text = format!(
@@ -122,7 +122,7 @@ fn assert_near(got: &[f64; 3], expected: &[f64; 3], tolerance: f64) {
 }
 
 #[test]
-fn the_presets_are_tables() {
+fn every_preset_is_a_valid_table() {
     for name in PRESETS {
         assert!(MarkerTable::preset(name).is_some(), "{name}");
     }
@@ -130,7 +130,7 @@ fn the_presets_are_tables() {
 }
 
 #[test]
-fn a_trc_file_gives_its_joints_upright() {
+fn joints_of_a_trc_file_are_read_with_z_up() {
     let got = read(
         "a.trc",
         trc(30, false, |_, _| false),
@@ -170,7 +170,7 @@ fn c3d(unit: &str, per_metre: f64) -> Vec<u8> {
     testkit::c3d::write(&trial, Processor::Intel, None)
 }
 
-/// `up = "z"`, and what else is said before the joints.
+/// A table with `up = "z"`, and more lines before the joints.
 fn own_table(more: &str) -> String {
     let joints = PARSE14.joints.iter().map(|it| it.name);
     let lines = joints.map(|it| format!("\"{it}\" = [\"{}\"]\n", it.replace(' ', "_")));
@@ -181,7 +181,7 @@ fn own_table(more: &str) -> String {
 }
 
 #[test]
-fn a_c3d_file_gives_its_joints_whatever_it_counts_in() {
+fn joints_of_a_c3d_file_are_read_in_every_unit() {
     for (unit, per_metre, more) in [
         ("mm", 1000.0, ""),
         ("m", 1.0, ""),
@@ -201,7 +201,7 @@ fn a_c3d_file_gives_its_joints_whatever_it_counts_in() {
 }
 
 #[test]
-fn short_gaps_are_straight_lines_and_long_ones_are_refused_by_their_frames() {
+fn short_gaps_are_interpolated_and_long_ones_are_refused_with_their_frames() {
     // A quarter of a second of 50 frames is 12 frames.
     let gap =
         |from: usize, to: usize| move |frame, marker| marker == 1 && (from..=to).contains(&frame);
@@ -222,7 +222,7 @@ fn short_gaps_are_straight_lines_and_long_ones_are_refused_by_their_frames() {
         trc(60, false, gap(10, 22)),
         &MotionOptions::default(),
     );
-    let expected = "trc: marker \"right_knee\" is missing in frames 11-23 (0.26 s); gaps are bridged up to 0.25 s";
+    let expected = "trc: marker \"right_knee\" is missing in frames 11-23 (0.26 s); gaps are interpolated up to 0.25 s";
     assert_eq!(refused(got), expected);
     let got = read(
         "a.trc",
@@ -236,7 +236,7 @@ fn short_gaps_are_straight_lines_and_long_ones_are_refused_by_their_frames() {
 }
 
 #[test]
-fn what_no_person_does_is_refused_with_what_it_may_come_from() {
+fn impossible_motion_is_refused_with_a_likely_cause() {
     let options = MotionOptions::default();
     let by = |table: &str| refused(read_by("a.c3d", c3d("mm", 1000.0), Some(table), &options));
     let got = by(&own_table("unit = \"m\""));
@@ -299,7 +299,7 @@ fn files_that_cannot_be_used_are_refused() {
 }
 
 #[test]
-fn tables_that_are_none_are_refused() {
+fn invalid_tables_are_refused() {
     let refused =
         |from: &str, to: &str| MarkerTable::parse(&own_table("").replace(from, to)).unwrap_err();
     assert_eq!(
@@ -318,14 +318,14 @@ fn tables_that_are_none_are_refused() {
 
 proptest! {
     #[test]
-    fn what_was_seen_stays_and_what_was_not_lies_between(
+    fn visible_frames_are_kept_and_gaps_are_interpolated(
         seen in prop::collection::vec(prop::option::weighted(0.6, -5.0..5.0_f64), 1..60),
         longest in 0_usize..8,
     ) {
-        let points: Vec<Option<[f64; 3]>> = seen.iter().map(|it| it.map(|it| [it, 2.0 * it, 1.0])).collect();
+        let points: Vec<Option<[f64; 3]>> = seen.iter().map(|it| it.map(|x| [x, 2.0 * x, 1.0])).collect();
         let gaps: Vec<usize> = points.split(Option::is_some).map(<[_]>::len).collect();
         let is_fine = seen.iter().any(Option::is_some) && gaps.iter().all(|it| *it <= longest);
-        match bridged(&points, longest as f64) {
+        match interpolated(&points, longest as f64) {
             Err([from, to]) => {
                 prop_assert!(!is_fine);
                 prop_assert!(points[from..=to].iter().all(Option::is_none));
@@ -333,7 +333,7 @@ proptest! {
             Ok(got) => {
                 prop_assert!(is_fine);
                 prop_assert_eq!(got.len(), points.len());
-                let (low, high) = seen.iter().flatten().fold((f64::MAX, f64::MIN), |it, x| (it.0.min(*x), it.1.max(*x)));
+                let (low, high) = seen.iter().flatten().fold((f64::MAX, f64::MIN), |ends, x| (ends.0.min(*x), ends.1.max(*x)));
                 for (got, expected) in got.iter().zip(&points) {
                     if let Some(expected) = expected {
                         prop_assert_eq!(got, expected);

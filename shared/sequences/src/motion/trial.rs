@@ -1,4 +1,4 @@
-//! The markers of a C3D or TRC file, as they stand there.
+//! The markers of a C3D or TRC file, as stored.
 
 use std::path::Path;
 
@@ -12,16 +12,16 @@ use super::{MotionError, MotionOptions};
 pub(super) struct Trial {
     pub(super) rate_hz: f64,
     unit: String,
-    /// Number of the first frame, as the file counts.
+    /// Number of the first frame in the file.
     pub(super) first: u32,
-    /// Names of the markers; those of nameless ones are empty.
+    /// Names of the markers; empty for unnamed ones.
     pub(super) names: Vec<String>,
     /// `[frame][marker]`; `None` where it was not seen.
     pub(super) frames: Vec<Vec<Option<[f64; 3]>>>,
 }
 
 impl Trial {
-    /// Reads a file, by the end of its name.
+    /// Reads a file; its format follows from the extension.
     pub(super) fn read(path: &Path) -> Result<Self, MotionError> {
         let bytes = std::fs::read(path).map_err(|source| MotionError::Io {
             path: path.to_owned(),
@@ -49,19 +49,22 @@ impl Trial {
             path: path.to_owned(),
             source,
         })?;
-        // A marker at the very origin was not seen: so do many programs write it.
-        let seen = |it: &Option<[f64; 3]>| it.filter(|it| *it != [0.0; 3]);
+        // Many programs write a marker that was not visible at exactly the origin.
+        let seen = |marker: &Option<[f64; 3]>| marker.filter(|point| *point != [0.0; 3]);
         let names = trial.labels().iter();
-        let own = |it: &String| it.rsplit_once(':').map_or(it.clone(), |it| it.1.to_owned());
+        let without_subject = |label: &String| match label.rsplit_once(':') {
+            Some((_, name)) => name.to_owned(),
+            None => label.clone(),
+        };
         Ok(Self {
             rate_hz: trial.rate_hz(),
             unit: match trial.units().trim() {
-                // What the format's examples count in.
+                // The unit of the format's examples.
                 "" => "mm".to_owned(),
                 unit => unit.to_owned(),
             },
             first: trial.first_frame(),
-            names: names.map(own).collect(),
+            names: names.map(without_subject).collect(),
             frames: (0..trial.n_frames())
                 .map(|frame| trial.frame(frame).iter().map(seen).collect())
                 .collect(),
@@ -83,14 +86,14 @@ impl Trial {
         })
     }
 
-    /// Place of a marker among those of a frame.
+    /// Index of a marker in a frame.
     pub(super) fn marker(&self, name: &str) -> Option<usize> {
         let n_points = self.frames.first().map_or(0, Vec::len);
         let place = self.names.iter().position(|it| it == name);
         place.filter(|it| *it < n_points)
     }
 
-    /// The frames that are asked for.
+    /// The requested frames.
     pub(super) fn part(
         mut self,
         path: &Path,

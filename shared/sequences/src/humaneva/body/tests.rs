@@ -1,4 +1,4 @@
-//! Laws of the joints, on a person made of segments.
+//! Properties of the joints, on a person made of segments.
 
 use proptest::prelude::*;
 use testkit::c3d::{Processor, Trial, write};
@@ -22,7 +22,7 @@ const STANDING: [(&str, [f64; 3]); 13] = [
     ("RTI", [0.0, -100.0, 90.0]),
 ];
 
-/// All points that the reader looks for, each frame at its own place.
+/// A trial with all points that are needed; the person stands at another place in every frame.
 pub(crate) fn person(places: &[Isometry3<f64>]) -> Trial {
     let mut labels = Vec::new();
     let mut points = Vec::new();
@@ -108,12 +108,12 @@ fn the_trunk_leans_back_and_the_elbows_come_forwards() {
     let turn = (25.0_f64 / 300.0).atan();
     let elbow = [-300.0 * turn.sin(), 180.0, 1430.0 - 300.0 * turn.cos()];
     assert_near(got[3], elbow, "left elbow");
-    assert_near(got[4], got[3], "the forearm hangs on it");
+    assert_near(got[4], got[3], "the forearm begins at the elbow");
     assert_near(got[7], [0.0, -180.0, 1130.0], "right elbow");
 }
 
 #[test]
-fn a_lost_marker_makes_the_frames_around_it_untrusted() {
+fn a_lost_marker_invalidates_the_frames_around_it() {
     let here = Isometry3::identity();
     let mut trial = person(&[here; 4]);
     let lost = trial.labels.iter().position(|it| it == "T10").unwrap();
@@ -125,7 +125,7 @@ fn a_lost_marker_makes_the_frames_around_it_untrusted() {
 }
 
 #[test]
-fn outside_of_the_trial_nothing_is_known() {
+fn there_are_no_joints_outside_of_the_trial() {
     let here = Isometry3::identity();
     let trial = read(&person(&[here; 2]));
     let body = Body::new(&trial, Measures::default()).unwrap();
@@ -135,7 +135,7 @@ fn outside_of_the_trial_nothing_is_known() {
 }
 
 #[test]
-fn a_point_that_is_missing_is_named() {
+fn a_missing_point_is_named() {
     let mut trial = person(&[Isometry3::identity()]);
     let at = trial.labels.iter().position(|it| it == "S1:LTIO").unwrap();
     trial.labels[at] = "other".to_owned();
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn between_two_frames_the_person_is_between_them(share in 0.0..1.0_f64, far in -500.0..500.0_f64) {
+    fn joints_are_interpolated_between_frames(share in 0.0..1.0_f64, far in -500.0..500.0_f64) {
         let places = [0.0, far].map(|x| Isometry3::translation(x, 0.0, 0.0));
         let got = joints(&places, Measures::default(), 1.0 + share).unwrap();
         let expected = joints(&[places[0]; 2], Measures::default(), 1.0).unwrap();
