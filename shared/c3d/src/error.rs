@@ -1,9 +1,9 @@
-//! What can be wrong with a C3D file.
+//! Errors of C3D files.
 
 /// Why a C3D file was refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum C3dError {
-    /// The file ends before something that it must have, or announces.
+    /// The file ends before required or declared data.
     #[error("the file has {got} bytes, {what} would end at byte {needed}")]
     Short {
         /// What is cut off.
@@ -19,7 +19,7 @@ pub enum C3dError {
         /// The byte.
         got: u8,
     },
-    /// The kind of processor is none of the three.
+    /// The processor type is none of the three.
     #[error("processor {code} is none of 84 (Intel), 85 (DEC) and 86 (MIPS)")]
     Processor {
         /// The code in the file.
@@ -39,7 +39,7 @@ pub enum C3dError {
         /// The scale.
         value: f64,
     },
-    /// The last frame comes before the first.
+    /// The last frame is before the first.
     #[error("frames {first} to {last} are none")]
     Frames {
         /// Number of the first frame.

@@ -1,10 +1,10 @@
-//! The header, and the points that it leads to.
+//! The header, and the points that it locates.
 
 use crate::C3dError;
 use crate::numbers::{BLOCK, Bytes};
 use crate::parameters::Parameters;
 
-/// What of the header is needed.
+/// The fields of the header that are needed.
 #[derive(Debug)]
 pub(crate) struct Header {
     pub(crate) n_points: usize,
@@ -22,7 +22,7 @@ pub(crate) struct Header {
 impl Header {
     /// Reads the first block.
     ///
-    /// Frames are numbered with 16 bits; where those are all set, `POINT:FRAMES` may say more.
+    /// Frames are numbered with 16 bits; at the largest number, `POINT:FRAMES` may have more.
     pub(crate) fn read(bytes: Bytes<'_>, parameters: &Parameters<'_>) -> Result<Self, C3dError> {
         const WHAT: &str = "the header";
         let word = |nth: usize| bytes.u16(2 * (nth - 1), WHAT);
@@ -76,7 +76,7 @@ impl Header {
         Ok(points)
     }
 
-    /// A point; `None` if its fourth value is negative, or its place no number.
+    /// A point; `None` if its fourth value is negative, or its position not finite.
     fn point(&self, bytes: Bytes<'_>, point: &[u8]) -> Option<[f64; 3]> {
         let (place, residual) = if self.scale < 0.0 {
             let [x, y, z, w] = *point.as_chunks().0.first_chunk()?;
@@ -84,8 +84,8 @@ impl Header {
             (place, bytes.f32_of(w))
         } else {
             let [x, y, z, w] = *point.as_chunks().0.first_chunk()?;
-            let whole = |it: [u8; 2]| bytes.u16_of(it) as i16;
-            let place = [x, y, z].map(|it| f64::from(whole(it)) * f64::from(self.scale));
+            let whole = |bytes_of_word: [u8; 2]| bytes.u16_of(bytes_of_word) as i16;
+            let place = [x, y, z].map(|word| f64::from(whole(word)) * f64::from(self.scale));
             (place, f32::from(whole(w)))
         };
         let is_seen = residual >= 0.0 && place.iter().all(|it| it.is_finite());

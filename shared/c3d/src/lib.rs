@@ -1,9 +1,9 @@
 //! Points over time from C3D files, in all six encodings: Intel, DEC and MIPS numbers, as integers or reals.
 //!
-//! Written here because the readers on offer refuse many files of old laboratories (a missing
-//! `POINT:UNITS` or `ANALOG:RATE`, an offset written as a real) that hold all that is needed. Analog
-//! samples are passed over. Nothing is allocated on a count's word: what a file announces must be
-//! there. The format is described in *The C3D File Format* (c3d.org).
+//! A reader of its own because published ones refuse many files of old laboratories (a missing
+//! `POINT:UNITS` or `ANALOG:RATE`, an offset written as a real) that have all the data needed. Analog
+//! samples are skipped. Memory is allocated only for data that is in the file, never for a declared
+//! count. The format is described in *The C3D File Format* (c3d.org).
 //!
 //! ```no_run
 //! let trial = c3d::C3d::parse(&std::fs::read("Walking_1.c3d")?)?;
@@ -48,7 +48,7 @@ impl C3d {
     ///
     /// # Errors
     ///
-    /// [`C3dError`]; the memory used is at most some tens of bytes for each byte of the file.
+    /// [`C3dError`]. The memory used is at most some tens of bytes per byte of the file.
     pub fn parse(file: &[u8]) -> Result<Self, C3dError> {
         let (bytes, section) = Bytes::of_file(file)?;
         let parameters = Parameters::read(bytes, section)?;
@@ -66,18 +66,17 @@ impl C3d {
         })
     }
 
-    /// Frames per second of the points; 0 where the file does not say.
+    /// Frames per second of the points; 0 if the file does not have it.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Unit of the positions as the file names it: `mm`, `m`; empty where it does not say.
+    /// Unit of the positions as in the file: `mm`, `m`; empty if the file does not have it.
     pub fn units(&self) -> &str {
         &self.units
     }
 
-    /// Metres per unit of the positions; millimetres where the file does not say, `None` where it
-    /// names a unit that is not known.
+    /// Metres per unit of the positions; millimetres if the file has no unit, `None` for an unknown unit.
     pub fn metres_per_unit(&self) -> Option<f64> {
         match self.units.to_ascii_lowercase().as_str() {
             "" | "mm" => Some(0.001),
@@ -89,7 +88,7 @@ impl C3d {
         }
     }
 
-    /// Number of the first frame, as the file counts (from 1).
+    /// Number of the first frame in the file (from 1).
     pub fn first_frame(&self) -> u32 {
         self.first_frame
     }
@@ -109,7 +108,7 @@ impl C3d {
         &self.labels
     }
 
-    /// Index of the point of that name: whole, or after the subject's name and a colon (`S1:LFWT`).
+    /// Index of a point by its full name, or by its name without the subject (`LFWT` of `S1:LFWT`).
     pub fn point(&self, name: &str) -> Option<usize> {
         let is_named = |label: &String| {
             let own = label.rsplit_once(':').map_or(label.as_str(), |it| it.1);
@@ -119,7 +118,7 @@ impl C3d {
     }
 
     /// The points of a frame (from 0) in the file's own unit and frame of reference; `None` where a
-    /// point was not seen.
+    /// point was not visible.
     ///
     /// # Panics
     ///

@@ -1,11 +1,11 @@
-//! The bytes of a file, and the numbers in them as its processor wrote them.
+//! The bytes of a file, and its numbers in the format of its processor.
 
 use crate::C3dError;
 
-/// Bytes of a block; places in the file are given in blocks, from 1.
+/// Bytes of a block; positions in the file are given in blocks, from 1.
 pub(crate) const BLOCK: usize = 512;
 
-/// How a processor lays out its numbers.
+/// The number format of a processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Processor {
     Intel,
@@ -13,7 +13,7 @@ enum Processor {
     Mips,
 }
 
-/// The bytes of a file that are read with bounds.
+/// The bytes of a file, read with bounds checks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bytes<'a> {
     bytes: &'a [u8],
@@ -21,26 +21,26 @@ pub(crate) struct Bytes<'a> {
 }
 
 impl<'a> Bytes<'a> {
-    /// Looks at the marks of a file; also returns where its parameters begin.
+    /// Reads the format mark and the processor; also returns where the parameters begin.
     pub(crate) fn of_file(bytes: &'a [u8]) -> Result<(Self, usize), C3dError> {
-        let mut it = Self {
+        let mut file = Self {
             bytes,
             processor: Processor::Intel,
         };
-        let [block, mark] = it.array(0, "the mark")?;
+        let [block, mark] = file.array(0, "the mark")?;
         if mark != 0x50 {
             return Err(C3dError::NotC3d { got: mark });
         }
-        it.slice(0, BLOCK, "the header")?;
+        file.slice(0, BLOCK, "the header")?;
         let section = usize::from(block.max(1) - 1) * BLOCK;
-        let [_, _, _, code] = it.array(section, "the head of the parameters")?;
-        it.processor = match code {
+        let [_, _, _, code] = file.array(section, "the head of the parameters")?;
+        file.processor = match code {
             84 => Processor::Intel,
             85 => Processor::Dec,
             86 => Processor::Mips,
             _ => return Err(C3dError::Processor { code }),
         };
-        Ok((it, section))
+        Ok((file, section))
     }
 
     pub(crate) fn slice(
@@ -65,7 +65,7 @@ impl<'a> Bytes<'a> {
     }
 
     pub(crate) fn u8(&self, at: usize, what: &'static str) -> Result<u8, C3dError> {
-        self.array(at, what).map(|[it]| it)
+        self.array(at, what).map(|[byte]| byte)
     }
 
     pub(crate) fn u16(&self, at: usize, what: &'static str) -> Result<u16, C3dError> {

@@ -25,17 +25,17 @@ pub(crate) struct Parameters<'a> {
     entries: Vec<Parameter<'a>>,
 }
 
-/// Bytes of the head of the section.
+/// Bytes of the header of the section.
 const HEAD: usize = 4;
 
 impl<'a> Parameters<'a> {
     /// Reads the section that begins at byte `section`.
     ///
-    /// A link that leads out of the section is passed over, as every entry also tells its own
-    /// length: samples of c3d.org have a link whose bytes are exchanged.
+    /// A link that points out of the section is ignored, because the length of an entry also follows from its
+    /// content: samples of c3d.org have a link with exchanged bytes.
     pub(crate) fn read(bytes: Bytes<'a>, section: usize) -> Result<Self, C3dError> {
         const WHAT: &str = "a parameter";
-        let mut it = Self {
+        let mut parameters = Self {
             bytes,
             groups: Vec::new(),
             entries: Vec::new(),
@@ -54,10 +54,10 @@ impl<'a> Parameters<'a> {
             let link = at + 2 + n;
             let offset = usize::from(bytes.u16(link, WHAT)?);
             let own_end = if id < 0 {
-                it.groups.push((id.unsigned_abs(), name));
+                parameters.groups.push((id.unsigned_abs(), name));
                 link + 2
             } else {
-                it.parameter(at, link + 2, id.unsigned_abs(), name)?
+                parameters.parameter(at, link + 2, id.unsigned_abs(), name)?
             };
             if offset == 0 {
                 break;
@@ -68,11 +68,11 @@ impl<'a> Parameters<'a> {
             }
             at = link + offset;
             if n_blocks > 0 && at >= end {
-                // Behind the value stands a description, and its length before it.
+                // After the value: the length of a description, and the description.
                 at = own_end + 1 + usize::from(bytes.u8(own_end, WHAT)?);
             }
         }
-        Ok(it)
+        Ok(parameters)
     }
 
     /// Reads the value of a parameter; returns where it ends.
@@ -115,20 +115,20 @@ impl<'a> Parameters<'a> {
         all.find(|it| it.id == id && it.name == name)
     }
 
-    /// A text, without the blanks around it.
+    /// A text, without surrounding blanks.
     pub(crate) fn text(&self, group: &str, name: &str) -> Option<String> {
-        let it = self.get(group, name)?;
-        (it.kind == -1).then(|| text(it.data))
+        let parameter = self.get(group, name)?;
+        (parameter.kind == -1).then(|| text(parameter.data))
     }
 
     /// A list of texts, the first `most` of them; empty if there is no such parameter.
     pub(crate) fn texts(&self, group: &str, name: &str, most: usize) -> Vec<String> {
-        let Some(it) = self.get(group, name).filter(|it| it.kind == -1) else {
+        let Some(parameter) = self.get(group, name).filter(|it| it.kind == -1) else {
             return Vec::new();
         };
-        match it.sizes {
+        match parameter.sizes {
             &[width, ..] if width > 0 => {
-                let each = it.data.chunks(usize::from(width));
+                let each = parameter.data.chunks(usize::from(width));
                 each.take(most).map(text).collect()
             }
             _ => Vec::new(),
@@ -137,8 +137,8 @@ impl<'a> Parameters<'a> {
 
     /// The first number of a parameter, whatever its kind; whole numbers are unsigned.
     pub(crate) fn number(&self, group: &str, name: &str) -> Option<f64> {
-        let it = self.get(group, name)?;
-        match (it.kind, it.data) {
+        let parameter = self.get(group, name)?;
+        match (parameter.kind, parameter.data) {
             (1, &[a, ..]) => Some(f64::from(a)),
             (2, &[a, b, ..]) => Some(f64::from(self.bytes.u16_of([a, b]))),
             (4, &[a, b, c, d, ..]) => Some(f64::from(self.bytes.f32_of([a, b, c, d]))),
@@ -147,7 +147,7 @@ impl<'a> Parameters<'a> {
     }
 }
 
-/// Characters as Latin-1 has them, without the blanks around them.
+/// Latin-1 text, without surrounding blanks.
 fn text(bytes: &[u8]) -> String {
     let all: String = bytes.iter().map(|&it| char::from(it)).collect();
     all.trim_matches(|it: char| it == '\0' || it.is_whitespace())

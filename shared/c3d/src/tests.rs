@@ -1,4 +1,4 @@
-//! Laws of the reader, on files that hold what is known.
+//! Tests of the reader on files with known content.
 
 use proptest::prelude::*;
 use testkit::c3d::{PROCESSORS, Processor, Trial, write};
@@ -49,11 +49,11 @@ fn a_point_is_found_with_and_without_the_name_of_its_subject() {
     assert_eq!(got.point("HEDO"), Some(0));
     assert_eq!(got.point("S1:HEDO"), Some(0));
     assert_eq!(got.point("RFWT"), Some(2));
-    assert_eq!(got.point("nobody"), None);
+    assert_eq!(got.point("none"), None);
 }
 
 #[test]
-fn more_than_255_names_go_over_several_parameters() {
+fn more_than_255_names_are_read_from_several_parameters() {
     let n = 600;
     let trial = Trial {
         labels: (0..n).map(|it| format!("P{it}")).collect(),
@@ -65,7 +65,7 @@ fn more_than_255_names_go_over_several_parameters() {
 }
 
 #[test]
-fn units_that_nobody_knows_have_no_length() {
+fn unknown_units_have_no_length() {
     for (units, metres) in [
         ("mm", Some(0.001)),
         ("M", Some(1.0)),
@@ -94,7 +94,7 @@ fn another_format_is_named() {
     assert_eq!(got, Err(C3dError::NotC3d { got: b'I' }));
 }
 
-/// A good file with some bytes replaced.
+/// A valid file with some bytes replaced.
 fn with(at: usize, bytes: &[u8]) -> Result<C3d, C3dError> {
     let mut file = write(&trial(), Processor::Intel, None);
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -118,7 +118,7 @@ fn frames_in_the_wrong_order_are_refused() {
 }
 
 #[test]
-fn frames_that_are_announced_but_not_there_are_missed() {
+fn missing_frames_are_an_error() {
     let got = with(8, &[3]);
     let what = "the last frame";
     assert!(
@@ -128,22 +128,22 @@ fn frames_that_are_announced_but_not_there_are_missed() {
 }
 
 #[test]
-fn a_parameter_of_no_kind_is_refused() {
-    // Behind the head and the group (2 + 5 + 2 + 1 bytes), the name and link of USED.
+fn a_parameter_of_an_unknown_kind_is_refused() {
+    // After the header and the group (2 + 5 + 2 + 1 bytes): the name and the link of USED.
     let got = with(512 + 4 + 10 + 8, &[3]);
     assert!(matches!(got, Err(C3dError::Parameter { .. })), "{got:?}");
 }
 
 #[test]
-fn a_link_out_of_the_section_is_passed_over() {
-    // The link of USED, behind the head, the group and its own name.
+fn a_link_out_of_the_section_is_ignored() {
+    // The link of USED, after the header, the group and its own name.
     let got = with(512 + 4 + 10 + 6, &[0xff, 0x7f]).unwrap();
     assert_eq!(got.labels(), trial().labels);
 }
 
 proptest! {
     #[test]
-    fn what_is_written_is_read(
+    fn a_written_trial_is_read_back(
         points in prop::collection::vec(prop::option::of(prop::array::uniform3(-3000..3000_i32)), 12),
         n_analog in 0..5_u16,
     ) {
@@ -161,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn no_change_of_bytes_makes_it_panic_or_invent_points(
+    fn changed_bytes_neither_panic_nor_add_points(
         which in 0..6_usize,
         changes in prop::collection::vec((0..1200_usize, any::<u8>()), 1..6),
     ) {
@@ -177,14 +177,14 @@ proptest! {
     }
 
     #[test]
-    fn a_cut_file_is_refused(which in 0..6_usize, share in 0.0..1.0_f64) {
+    fn a_truncated_file_is_refused(which in 0..6_usize, share in 0.0..1.0_f64) {
         let file = encodings(&trial()).swap_remove(which);
         let n = (share * file.len() as f64) as usize;
         prop_assert!(C3d::parse(&file[..n]).is_err());
     }
 
     #[test]
-    fn no_bytes_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+    fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         drop(C3d::parse(&bytes));
         let mut marked = bytes;
         if marked.len() > 515 {

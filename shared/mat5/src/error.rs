@@ -1,4 +1,4 @@
-//! What can be wrong with a container.
+//! Errors of MATLAB files.
 
 use std::io;
 
@@ -24,14 +24,14 @@ pub enum ContainerError {
         /// Bytes needed.
         expected: usize,
     },
-    /// A tag names another type than belongs there.
+    /// A tag has an unexpected type.
     #[error("{what} has type {got}, expected {expected}")]
     Type {
         /// What was being read.
         what: &'static str,
         /// The type's number.
         got: u32,
-        /// Which would do.
+        /// The types accepted.
         expected: &'static str,
     },
     /// An array's sizes and its values disagree.
@@ -42,12 +42,12 @@ pub enum ContainerError {
         /// Values found.
         got: usize,
     },
-    /// The file asks for more than models and annotations need.
+    /// The file exceeds a limit that models and annotations do not reach.
     #[error("the file holds more than {limit} {what}")]
     TooMuch {
-        /// Of what.
+        /// What is counted.
         what: &'static str,
-        /// How many are accepted.
+        /// The number accepted.
         limit: usize,
     },
     /// A compressed variable is damaged.

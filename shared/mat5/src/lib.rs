@@ -1,7 +1,7 @@
-//! MATLAB's level 5 container, as far as models and annotations need it: numbers, structs and cells, compressed or not.
+//! Reader of MATLAB level 5 files: numbers, structs and cells, compressed or not, as models and annotations need them.
 //!
-//! Written here because the readers on offer panic on damaged files. Nothing is allocated on a
-//! count's word: every array is a view of bytes that are there.
+//! A reader of its own because published ones panic on damaged files. Memory is never allocated for a
+//! declared count: every array is a view of bytes of the file.
 //!
 //! ```no_run
 //! let file = std::fs::read("labels.mat")?;
@@ -23,7 +23,7 @@ use flate2::read::ZlibDecoder;
 
 pub use error::ContainerError;
 
-/// A value in a file, its arrays still as bytes.
+/// A value in a file; arrays are views of its bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value<'a> {
     /// Real numbers, column-major.
@@ -65,7 +65,7 @@ impl Structs<'_> {
 }
 
 impl<'a> Structs<'a> {
-    /// A field of an element (from 0); `None` if one of the two is not there.
+    /// A field of an element (from 0); `None` if the element or the field does not exist.
     pub fn get(&self, element: usize, field: &str) -> Option<&Value<'a>> {
         let field = self.fields.iter().position(|it| it == field)?;
         self.elements.get(element)?.get(field)
@@ -109,7 +109,7 @@ impl Numbers<'_> {
     }
 }
 
-/// The variables' bytes, inflated where they are compressed.
+/// The bytes of all variables, decompressed.
 ///
 /// # Errors
 ///
@@ -163,7 +163,7 @@ pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
 }
 
 const HEADER_BYTES: usize = 128;
-/// More than the largest model that is accepted at 4 bytes a weight.
+/// More than the largest model that is accepted, at 4 bytes per weight.
 const MAX_BYTES: usize = 64 << 20;
 const MAX_VALUES: usize = 1 << 20;
 const MAX_DEPTH: usize = 8;
@@ -369,7 +369,7 @@ fn expect_type(
     }
 }
 
-/// What is left to read.
+/// The bytes that are left to read.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -391,7 +391,7 @@ impl<'a> Bytes<'a> {
         Ok(bytes.first_chunk().map_or(0, |&it| u32::from_le_bytes(it)))
     }
 
-    /// The next element: its type and its bytes; steps over the padding.
+    /// The next element: its type and its bytes; skips the padding.
     fn element(&mut self, what: &'static str) -> Result<(u32, &'a [u8]), ContainerError> {
         let tag = self.word(what)?;
         let small = (tag >> 16) as usize;

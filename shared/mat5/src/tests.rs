@@ -1,4 +1,4 @@
-//! What is read is what was written.
+//! Written values are read back.
 
 use super::*;
 

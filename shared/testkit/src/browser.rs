@@ -1,4 +1,4 @@
-//! Pages as a browser lays them out, where there is one.
+//! Layout checks of pages in a browser, if one is installed.
 
 use std::fs;
 use std::io;
@@ -8,28 +8,28 @@ use std::process::{Command, Stdio};
 /// Names under which a browser may be installed.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
-/// The elements of a page that reach beyond its width, each as `tag.class: right edge`; those that can be scrolled
-/// to inside an element of the class `scroll` do not count. None where there is no browser.
+/// The elements of a page that reach beyond its width, each as `tag.class: right edge`; those inside an element of
+/// the class `scroll` do not count. `None` if there is no browser.
 ///
-/// * `folder`: where files may be made.
+/// * `folder`: for temporary files.
 /// * `width`: of the page, pixels.
 ///
 /// # Errors
 ///
-/// The files cannot be written, or the browser does not answer.
+/// The files cannot be written, or the browser does not report a result.
 pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<String>>> {
     let installed = |name: &&&str| {
-        let asked = Command::new(name)
+        let status = Command::new(name)
             .arg("--version")
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .status();
-        asked.is_ok_and(|it| it.success())
+        status.is_ok_and(|status| status.success())
     };
     let Some(browser) = BROWSERS.iter().find(installed) else {
         return Ok(None);
     };
-    // A frame has the width that it is given; windows have a least one.
+    // An iframe has exactly the given width; windows have a minimum.
     let inside = html.replace('&', "&amp;").replace('"', "&quot;");
     let page = format!(
         "<!doctype html><meta charset=\"utf-8\"><title>not measured</title>\n\
@@ -54,14 +54,15 @@ pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<
         .stderr(Stdio::null())
         .output()?;
     let dom = String::from_utf8_lossy(&output.stdout);
-    let said = dom
+    let measured = dom
         .split("<title>measured:")
         .nth(1)
-        .and_then(|it| it.split("</title>").next());
-    let said =
-        said.ok_or_else(|| io::Error::other(format!("the page was not measured: {dom:.300}")))?;
+        .and_then(|rest| rest.split("</title>").next());
+    let measured = measured
+        .ok_or_else(|| io::Error::other(format!("the page was not measured: {dom:.300}")))?;
     Ok(Some(
-        said.split(';')
+        measured
+            .split(';')
             .filter(|it| !it.is_empty())
             .map(str::to_owned)
             .collect(),

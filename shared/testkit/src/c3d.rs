@@ -1,4 +1,4 @@
-//! Writer of C3D files in all six encodings, so that readers can be tried on files that hold what is known.
+//! Writer of C3D files in all six encodings, to test readers on known content.
 
 /// How numbers are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,11 +19,11 @@ pub const PROCESSORS: [Processor; 3] = [Processor::Intel, Processor::Dec, Proces
 pub struct Trial {
     /// Frames per second.
     pub rate_hz: f32,
-    /// `mm`, or what else the positions are in.
+    /// Unit of the positions, such as `mm`.
     pub units: String,
-    /// Names of the points; in files of more than 255 they go into several parameters.
+    /// Names of the points; more than 255 are written to several parameters.
     pub labels: Vec<String>,
-    /// `[frame][point]`, in the unit; `None` where it was not seen.
+    /// `[frame][point]`, in the unit; `None` where it was not visible.
     pub frames: Vec<Vec<Option<[f64; 3]>>>,
     /// Analog values in every frame (written as zeros).
     pub n_analog: u16,
@@ -35,14 +35,14 @@ pub struct Trial {
 ///
 /// # Panics
 ///
-/// If there are more points or frames than 16 bits count.
+/// If the number of points or frames does not fit into 16 bits.
 pub fn write(trial: &Trial, processor: Processor, integer_scale: Option<f32>) -> Vec<u8> {
     let out = Out { processor };
     let parameters = parameters(&out, trial, integer_scale.unwrap_or(-1.0));
     let n_blocks = parameters.len().div_ceil(512);
     let first_data = 2 + n_blocks;
     let n = |it: usize| {
-        assert!(u16::try_from(it).is_ok(), "{it} is more than 16 bits count");
+        assert!(u16::try_from(it).is_ok(), "{it} does not fit into 16 bits");
         it as u16
     };
     let mut file = vec![2, 0x50];

@@ -1,4 +1,4 @@
-//! What only tests need.
+//! Helpers for tests only.
 #![forbid(unsafe_code)]
 
 pub mod browser;

@@ -26,7 +26,7 @@ pub fn file(name: &str, value: &Mat, compressed: bool) -> Vec<u8> {
     }
 }
 
-/// The bytes of a file whose one variable inflates to `variable`.
+/// The bytes of a file with one compressed variable, which decompresses to `variable`.
 ///
 /// # Panics
 ///
