@@ -36,9 +36,10 @@ impl std::fmt::Display for LensModel {
                 .iter()
                 .enumerate()
                 .filter(|(_, value)| **value != 0.0);
-            nonzero
+            let parts: Vec<String> = nonzero
                 .map(|(index, value)| format!(", {name}{} {value}", index + 1))
-                .collect::<String>()
+                .collect();
+            parts.concat()
         };
         match self {
             Self::Pinhole => write!(out, "pinhole, no distortion"),
