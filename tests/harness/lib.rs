@@ -1,1 +1,1 @@
-//! Starts services as real processes and stops them again.
+//! Empty: a package needs a library or a program, and this one has tests only.

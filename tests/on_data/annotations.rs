@@ -1,11 +1,11 @@
-//! The annotated people of PARSE and LSP-extended: all of them are read, and can be.
+//! The annotated people of PARSE and LSP-extended are all read without faults.
 
 use datasets::{ReadOptions, Sample, Selection, SkeletonTable, read};
 
 use crate::shared_dir;
 
 #[test]
-fn everybody_in_parse_and_lspet_can_be_used() {
+fn all_people_of_parse_and_lspet_are_valid() {
     let Some(shared) = shared_dir() else { return };
     for (name, n_people) in [("parse", 200), ("lspet", 861)] {
         let people = read(&shared.join("data").join(name), &ReadOptions::default()).unwrap();
@@ -23,14 +23,18 @@ fn a_few_joints_lie_outside_by_no_more_than_two_pixels() {
     };
     let rows = |name: &str| -> Vec<String> {
         let people = read(&shared.join("data").join(name), &strict).unwrap();
-        people.problems.into_iter().map(|it| it.row).collect()
+        people
+            .problems
+            .into_iter()
+            .map(|problem| problem.row)
+            .collect()
     };
     assert_eq!(rows("parse"), ["person 15", "person 135"]);
     assert_eq!(rows("lspet"), ["person 3", "person 835"]);
 }
 
 #[test]
-fn the_training_half_of_parse_turns_and_mirrors_with_its_parts() {
+fn parts_of_a_parse_sample_move_with_rotation_and_mirroring() {
     let Some(shared) = shared_dir() else { return };
     let options = ReadOptions {
         without: Some(Selection::from_argument("101-305").unwrap()),

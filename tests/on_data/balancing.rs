@@ -1,6 +1,6 @@
-//! Four real cameras around a person who balances: what uprighting, facing and candidates are worth.
+//! Four real cameras around a balancing person: the effect of uprighting, facing and candidates.
 //!
-//! Prints the table of errors against the markerless reference, and holds the figures reached so far.
+//! Prints the table of errors against the markerless reference, and asserts the figures reached so far.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ pub(crate) const SIZE: [u32; 2] = [272, 480];
 /// Trunk upright, and mostly bent over.
 const UPRIGHT: [usize; 5] = [0, 5, 10, 15, 20];
 const BENT: [usize; 7] = [5, 15, 25, 35, 45, 55, 65];
-/// A view is on a wrong object if its torso is further than this from the reference's, pixels.
+/// The pose of a view is on a wrong object if its torso is further than this from the reference's, pixels.
 const WRONG_PX: f64 = 40.0;
 
-/// What is switched on.
+/// The options of one row of the table.
 #[derive(Clone, Copy)]
 struct Switches {
     upright: bool,
@@ -52,7 +52,7 @@ impl Errors {
     }
 }
 
-/// Nothing, each of the three switches alone, and all of them.
+/// No option, each of the three alone, and all of them.
 fn rows() -> [(&'static str, Switches); 6] {
     let row = |upright, facing, candidates| Switches {
         upright,
@@ -76,12 +76,12 @@ fn rows() -> [(&'static str, Switches); 6] {
 
 pub(crate) struct Clip {
     pub(crate) cameras: Vec<Camera>,
-    /// `[view][frame]`, all frames up to the last one asked for.
+    /// `[view][frame]`, all frames up to the last one needed.
     pub(crate) frames: Vec<Vec<Vec<u8>>>,
 }
 
 #[test]
-fn uprighting_facing_and_candidates_make_the_difference() {
+fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached() {
     let Some(dir) = shared_dir() else { return };
     let rig = rig();
     let data = dir.join("data/pose2sim_balancing");
@@ -103,13 +103,13 @@ fn uprighting_facing_and_candidates_make_the_difference() {
         panic!("two rows with everything switched on")
     };
     // Reached: 7.2 / 23.3 cm upright and 19.5 / 74.0 bent by the mean, 7.5 / 23.3 and 15.1 / 74.1 by
-    // consensus. The goals are 7 / 15 and 17 / 50: crossed legs and raised wrists carry the upright
-    // tail, facing and poses that the model does not know the bent one.
+    // consensus. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised
+    // wrists in the upright frames, and to facing and poses unlike the training data in the bent ones.
     for ([upright, bent], [upright_cm, bent_cm]) in [(mean, [7.5, 21.0]), (consensus, [8.0, 17.0])]
     {
         assert_eq!(
             upright.wrong_fused, 0,
-            "nobody else while the trunk is upright"
+            "no view on a wrong object while the trunk is upright"
         );
         assert!(bent.wrong_fused <= 2, "{} views", bent.wrong_fused);
         assert!(
@@ -127,7 +127,7 @@ pub(crate) fn rig() -> Rig {
     geometry::files::read(&file, &geometry::files::ReadOptions::default()).unwrap()
 }
 
-/// Errors over [`UPRIGHT`] and [`BENT`], every frame on its own.
+/// Errors over [`UPRIGHT`] and [`BENT`], every frame estimated independently.
 fn errors(
     model: &Arc<fmp::Model>,
     rig: &Rig,
@@ -159,7 +159,7 @@ fn errors(
             .build()
             .unwrap()
             .install(|| estimator.estimate(&images, &vec![None; images.len()]));
-        let of_frame = judge(&got, &estimator, &clip.cameras, &truth[frame]);
+        let of_frame = compare(&got, &estimator, &clip.cameras, &truth[frame]);
         for (set, errors) in [&UPRIGHT[..], &BENT[..]].iter().zip(&mut all) {
             if set.contains(&frame) {
                 errors.joints_cm.extend(&of_frame.joints_cm);
@@ -172,7 +172,7 @@ fn errors(
     all
 }
 
-pub(crate) fn judge(
+pub(crate) fn compare(
     got: &pipeline::Estimate,
     estimator: &Estimator,
     cameras: &[Camera],
@@ -183,7 +183,7 @@ pub(crate) fn judge(
         .joints
         .iter()
         .zip(truth)
-        // A joint that could not be triangulated is a metre off.
+        // A joint that could not be triangulated counts as an error of one metre.
         .map(|(joint, truth)| {
             joint
                 .as_ref()

@@ -1,8 +1,8 @@
-//! Calibration files of others, read; and rigs measured against what their cameras saw.
+//! Calibration files of other programs, and rigs compared with detections in their cameras.
 
 #![expect(
     clippy::print_stdout,
-    reason = "the numbers measured are for people to read"
+    reason = "the tests print the figures that they measure"
 )]
 
 use std::fs;
@@ -39,7 +39,7 @@ const OPENPOSE: [(&str, usize); 21] = [
     ("LWrist", 9),
 ];
 
-/// Where each marker of a person was seen.
+/// The position of each marker of a person in a view.
 type Person = [Option<Point2<f64>>; 21];
 
 fn balancing() -> Option<PathBuf> {
@@ -84,14 +84,14 @@ fn reference(folder: &Path) -> Vec<[Point3<f64>; 21]> {
         let row: Vec<f64> = line
             .split_whitespace()
             .skip(2)
-            .map(|word| word.parse().unwrap())
+            .map(|number| number.parse().unwrap())
             .collect();
         std::array::from_fn(|i| Point3::new(row[3 * i + 2], row[3 * i], row[3 * i + 1]))
     })
     .collect()
 }
 
-/// The keypoints of every person that OpenPose found, `None` where it is not sure.
+/// The keypoints of every person detected by OpenPose, `None` where the confidence is low.
 fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<Person> {
     let path = folder.join(format!("openpose/{camera}_json/{camera}.{frame:04}.json"));
     let file: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
@@ -100,9 +100,9 @@ fn detections(folder: &Path, camera: &str, frame: usize) -> Vec<Person> {
         .iter()
         .map(|person| {
             OPENPOSE.map(|(_, place)| {
-                let [x, y, sure] =
+                let [x, y, confidence] =
                     [0, 1, 2].map(|i| person["pose_keypoints_2d"][3 * place + i].as_f64().unwrap());
-                (sure > 0.3).then(|| Point2::new(x, y))
+                (confidence > 0.3).then(|| Point2::new(x, y))
             })
         })
         .collect()
@@ -115,11 +115,11 @@ fn errors(camera: &Camera, truth: &[Point3<f64>; 21], seen: &Person) -> Vec<f64>
         .collect()
 }
 
-/// For each frame and camera the person nearest to the reference, which passes over the bystander.
+/// For each frame and camera the person nearest to the reference, not the bystander.
 fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Person>> {
     let nearest = |frame: usize, camera: &Camera| {
         let people = detections(folder, &camera.name, frame).into_iter();
-        let away = |person: &Person| {
+        let distance = |person: &Person| {
             let errors = errors(camera, &truth[frame], person);
             if errors.len() < 5 {
                 f64::INFINITY
@@ -127,8 +127,8 @@ fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Pe
                 median(errors)
             }
         };
-        let best = people.min_by(|a, b| away(a).total_cmp(&away(b)));
-        best.filter(|person| away(person) < 200.0)
+        let best = people.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        best.filter(|person| distance(person) < 200.0)
             .unwrap_or([None; 21])
     };
     (0..truth.len())
@@ -141,14 +141,14 @@ fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Pe
         .collect()
 }
 
-/// What triangulating the detections of `n` frames gives.
+/// The result of triangulating the detections of all frames.
 struct Fit {
     /// Median of all reprojection errors, pixels at full size.
     residual_px: f64,
     /// Median of those of each camera.
     by_camera_px: Vec<f64>,
     /// Median distance from the reference, metres.
-    away: f64,
+    distance: f64,
     /// Joints that could be triangulated, and that could not.
     counts: [usize; 2],
 }
@@ -161,7 +161,7 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
         loss_px: 20.0,
         ..Settings::default()
     };
-    let (mut away, mut residuals, mut counts) =
+    let (mut distance, mut residuals, mut counts) =
         (Vec::new(), vec![Vec::new(); rig.cameras().len()], [0, 0]);
     for (truth, views) in truth.iter().zip(&seen) {
         for (joint, point) in truth.iter().enumerate() {
@@ -179,7 +179,7 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
                 .collect();
             match geometry::triangulate(&observations, &settings) {
                 Ok(got) => {
-                    away.push((got.in_world - point).norm());
+                    distance.push((got.in_world - point).norm());
                     used.iter()
                         .zip(got.residuals_px)
                         .for_each(|((i, ..), px)| residuals[*i].push(px));
@@ -193,7 +193,7 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
     Fit {
         residual_px,
         by_camera_px: residuals.into_iter().map(median).collect(),
-        away: median(away),
+        distance: median(distance),
         counts,
     }
 }
@@ -213,7 +213,7 @@ fn reprojection(folder: &Path, rig: &Rig) -> f64 {
 }
 
 #[test]
-fn the_qualisys_file_and_the_toml_made_from_it_agree_but_for_the_distortion() {
+fn the_qualisys_file_and_the_toml_made_from_it_agree_except_for_the_distortion() {
     let Some(folder) = balancing() else { return };
     let qualisys = files::read(&folder.join("calibration/Calib.qca.txt"), &z_up()).unwrap();
     let toml = files::read(&folder.join("calibration/Calib_qualisys.toml"), &z_up()).unwrap();
@@ -240,7 +240,7 @@ fn the_qualisys_file_and_the_toml_made_from_it_agree_but_for_the_distortion() {
 }
 
 #[test]
-fn our_rigs_are_those_of_the_files() {
+fn the_rigs_in_configs_agree_with_the_original_files() {
     let Some(folder) = balancing() else { return };
     let qualisys = files::read(&folder.join("calibration/Calib.qca.txt"), &z_up()).unwrap();
     let shipped = our_rig("pose2sim-balancing-shipped.toml");
@@ -252,7 +252,7 @@ fn our_rigs_are_those_of_the_files() {
 }
 
 #[test]
-fn the_calibration_of_panoptic_is_a_dome_around_its_floor() {
+fn the_cameras_of_panoptic_are_on_a_dome_above_its_floor() {
     let Some(folder) = shared_dir().map(|it| it.join("data/panoptic")) else {
         return;
     };
@@ -278,7 +278,7 @@ fn the_calibration_of_panoptic_is_a_dome_around_its_floor() {
 }
 
 #[test]
-fn every_rig_of_ours_is_plausible() {
+fn every_rig_in_configs_is_plausible() {
     for name in [
         "pose2sim-balancing",
         "pose2sim-balancing-shipped",
@@ -296,7 +296,7 @@ fn every_rig_of_ours_is_plausible() {
 }
 
 #[test]
-fn the_refined_rig_explains_the_detections_better_than_the_shipped_one() {
+fn the_refined_rig_fits_the_detections_better_than_the_shipped_one() {
     let Some(folder) = balancing() else { return };
     let rigs = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"].map(our_rig);
     let [refined, shipped] = rigs.each_ref().map(|rig| fit(&folder, rig));
@@ -304,16 +304,16 @@ fn the_refined_rig_explains_the_detections_better_than_the_shipped_one() {
         let Fit {
             residual_px,
             by_camera_px,
-            away,
+            distance,
             counts,
         } = fit;
         println!(
             "{name}: {residual_px:.2} px {by_camera_px:.2?}, {:.1} cm from the reference, {counts:?}",
-            100.0 * away
+            100.0 * distance
         );
     }
     assert!(refined.residual_px < 8.0 && refined.residual_px < 0.75 * shipped.residual_px);
-    assert!(refined.away < 0.04 && refined.counts[1] * 50 < refined.counts[0]);
+    assert!(refined.distance < 0.04 && refined.counts[1] * 50 < refined.counts[0]);
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn the_reference_lies_on_the_detections() {
 }
 
 #[test]
-fn the_camera_that_is_off_stands_out_by_its_epipolar_error() {
+fn the_inaccurate_camera_has_the_largest_epipolar_error() {
     let Some(folder) = balancing() else { return };
     let rig = our_rig("pose2sim-balancing-shipped.toml");
     let truth = reference(&folder);
@@ -362,7 +362,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
         .map(|c| geometry::upright_roll(c, &rig).unwrap().to_degrees())
         .collect();
     println!("{rolls:.1?} degrees");
-    // Found at the mid-hip of a frame, which is not quite the focus of the rig; they count the other way.
+    // Computed at the mid-hip of a frame, which is not exactly the focus of the rig; with the opposite sign.
     let expect: [f64; 4] = [-11.8, 2.3, 0.8, 27.9];
     assert!(
         rolls
@@ -374,7 +374,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
 }
 
 #[test]
-fn caliscope_reads_and_measures_its_board() {
+fn a_caliscope_rig_reproduces_the_spacing_of_its_board() {
     let Some(folder) = shared_dir().map(|dir| dir.join("data/caliscope/post_optimization")) else {
         return;
     };
@@ -431,11 +431,14 @@ fn caliscope_reads_and_measures_its_board() {
 type Corner = (u32, Point2<f64>);
 type Views = Vec<Option<Point2<f64>>>;
 
-/// What each camera saw of each corner at each instant, and the instant and place of the corner on the board.
+/// The position of each corner at each instant in each camera, and the instant and place of the corner on the board.
 fn board_corners(path: &Path) -> (Vec<Views>, Vec<Corner>) {
     let mut corners = std::collections::BTreeMap::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {
-        let row: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
+        let row: Vec<f64> = line
+            .split(',')
+            .map(|number| number.parse().unwrap())
+            .collect();
         let place = Point2::new(row[8], row[9]);
         let entry = corners
             .entry((row[0] as u32, row[5] as u32))

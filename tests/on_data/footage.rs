@@ -1,4 +1,4 @@
-//! The four videos of pose2sim's balancing trial: sizes, counts, first and last frames, and what they cost.
+//! The four videos of pose2sim's balancing trial: sizes, counts, first and last frames, and decoding times.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use footage::{Affine, Fill, Size, Source, SourceKind, SourceSpec, Warp};
 
 use crate::shared_dir;
 
-/// What the pipeline sees of a frame.
+/// Size of the pipeline's frames.
 const OUTPUT: Size = Size::new(272, 480);
 
 /// A quarter of the size, turned by 28 degrees about the centre: the roll of cam04.
@@ -31,7 +31,7 @@ fn mean(rgb: &[u8]) -> f64 {
     rgb.iter().map(|&it| f64::from(it)).sum::<f64>() / rgb.len() as f64
 }
 
-/// Reads a camera to the end; returns the cost of its frames, decoding and warping.
+/// Reads a video to the end; returns the mean times of decoding and warping a frame.
 fn read(path: &str, width: usize) -> [Duration; 2] {
     let mut source = Source::open(&SourceSpec::new(path)).unwrap();
     let info = source.info().clone();
@@ -53,7 +53,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
         let began = Instant::now();
         warp.apply(frame.rgb, &mut out);
         warped += began.elapsed();
-        // A room with the lights on, and no frame that is a plain colour.
+        // A bright room, and no frame of a uniform colour.
         assert!(
             (60.0..200.0).contains(&mean(&out)),
             "{path} {index}: {}",
@@ -82,7 +82,7 @@ fn all_frames_of_all_cameras_are_read() {
 }
 
 #[test]
-fn the_last_frame_comes_first_when_asked_for() {
+fn reading_can_start_at_the_last_frame() {
     let Some(shared) = shared_dir() else { return };
     let path = shared.join("data/pose2sim_balancing/videos/cam02.mp4");
     let all = SourceSpec::new(path.to_str().unwrap());

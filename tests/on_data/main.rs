@@ -1,4 +1,4 @@
-//! What must hold on real data: runs only where the data folder lies beside the repository.
+//! Tests on real data: they run only where the data folder lies beside the repository.
 //!
 //! `cargo test --release -p system-tests --features data --test on_data`
 
@@ -6,7 +6,7 @@
 #![expect(
     clippy::print_stdout,
     clippy::print_stderr,
-    reason = "the figures are what these tests are run for"
+    reason = "the tests print the figures that they measure"
 )]
 
 mod annotations;
@@ -26,7 +26,7 @@ mod tracked;
 
 use std::path::{Path, PathBuf};
 
-/// The folder with data and reference numbers, or `None` (and a line that says so) where it is absent.
+/// The folder with data and reference numbers; `None`, with a message that the test is skipped, if it is absent.
 fn shared_dir() -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let dir = root.join("../shared");

@@ -1,4 +1,4 @@
-//! The released models, type tables and expected errors read as their descriptions say.
+//! The released models, type tables and expected errors agree with their descriptions.
 
 use std::fs;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ fn within(ranges: [f64; 2], low: f64, high: f64) {
 }
 
 #[test]
-fn the_released_models_have_the_counts_of_their_description() {
+fn the_released_models_have_the_documented_sizes() {
     for (name, side) in MODELS.into_iter().zip([6, 4, 5]) {
         let Some(it) = summary(name) else { return };
         assert_eq!(it.parts.len(), 26);
@@ -46,7 +46,7 @@ fn the_released_models_have_the_counts_of_their_description() {
 }
 
 #[test]
-fn the_released_models_have_the_numbers_of_their_description() {
+fn the_released_models_have_the_documented_values() {
     let Some(he) = summary(MODELS[0]) else { return };
     let umpm = summary(MODELS[1]).unwrap();
     let parse = summary(MODELS[2]).unwrap();
@@ -80,7 +80,7 @@ fn the_released_models_have_the_numbers_of_their_description() {
 }
 
 #[test]
-fn importing_a_model_loses_nothing() {
+fn an_imported_model_equals_the_original() {
     for name in MODELS {
         let Some(folder) = data("models") else { return };
         let model = files::read(&folder.join(name)).unwrap();
@@ -116,28 +116,28 @@ fn a_truncated_model_is_refused() {
 }
 
 #[test]
-fn a_model_whose_header_disagrees_is_refused() {
+fn a_model_with_an_inconsistent_header_is_refused() {
     let Some(path) = data("models/umpm_fmp.txt") else {
         return;
     };
     let whole = fs::read_to_string(path).unwrap();
-    let said = |from: &str, to: &str| {
+    let error = |from: &str, to: &str| {
         assert!(whole.contains(from), "{from}");
         text::parse(&whole.replacen(from, to, 1))
             .unwrap_err()
             .to_string()
     };
     assert_eq!(
-        said("filtersSz 156", "filtersSz 157"),
+        error("filtersSz 156", "filtersSz 157"),
         "line 8 (token 82160): `filters_w` says number of filters = 156, expected 157"
     );
-    let misread = said("filters_w 4 4 32", "filters_w 5 4 32");
+    let misread = error("filters_w 4 4 32", "filters_w 5 4 32");
     assert!(
         misread.starts_with("line 7 (token 2463): `filters_w` expects a whole number"),
         "{misread}"
     );
     assert_eq!(
-        said("len 81373", "len 81374"),
+        error("len 81373", "len 81374"),
         "line 23 (token 84868): `len` says len = 81374, expected 81373"
     );
 }
@@ -148,7 +148,7 @@ fn table(name: &str) -> Option<Compatibility> {
 }
 
 #[test]
-fn the_released_type_tables_of_a_pair_agree_on_one_joint() {
+fn the_conditional_type_tables_of_a_pair_have_one_joint_distribution() {
     for (there, back, unseen) in [
         ("he_C1wrtC2.csv", "he_C2wrtC1.csv", [0, 2]),
         ("umpm_LwrtR.csv", "umpm_RwrtL.csv", [8, 6]),
@@ -163,17 +163,18 @@ fn the_released_type_tables_of_a_pair_agree_on_one_joint() {
             let sum: f64 = (0..36).map(|it| joint.value(part, it / 6, it % 6)).sum();
             assert!((sum - 1.0).abs() < 1e-9, "part {part}: {sum}");
         }
-        let again = joint.conditional();
+        let conditional = joint.conditional();
         for cell in 0..26 * 36 {
             let (part, first, second) = (cell / 36, cell / 6 % 6, cell % 6);
-            let difference = again.value(part, first, second) - there.value(part, first, second);
+            let difference =
+                conditional.value(part, first, second) - there.value(part, first, second);
             assert!(difference.abs() < 1e-4, "part {part}");
         }
     }
 }
 
 #[test]
-fn rows_of_a_type_table_belong_to_the_view_that_its_name_begins_with() {
+fn rows_of_a_type_table_belong_to_the_first_view_of_its_name() {
     let (Some(there), Some(back)) = (table("he_C1wrtC2.csv"), table("he_C2wrtC1.csv")) else {
         return;
     };
@@ -206,7 +207,7 @@ fn predictions() -> Option<Table> {
 }
 
 #[test]
-fn the_released_predictions_are_read_whole() {
+fn the_released_predictions_are_read_completely() {
     let Some(table) = predictions() else { return };
     assert_eq!(table.n_rows(), 13479);
     let first = table.get("S1", "Box", 6, "C1").unwrap();
@@ -223,7 +224,7 @@ fn the_released_predictions_are_read_whole() {
 }
 
 #[test]
-fn the_thresholds_switch_off_as_many_parts_as_described() {
+fn the_thresholds_switch_off_the_documented_share_of_parts() {
     let Some(path) = data("humaneva/error_predictions_he.csv") else {
         return;
     };

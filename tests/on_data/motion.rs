@@ -1,4 +1,4 @@
-//! Motion capture files of c3d.org and others: six encodings of one trial, and files that are broken.
+//! Motion capture files of c3d.org and others: six encodings of one trial, and invalid files.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn read(file: &Path) -> C3d {
     C3d::parse(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// * `step_mm`: what the integers count in; reals may hold what was rounded away.
+/// * `step_mm`: the unit of the integers; reals may be more precise.
 fn assert_same_points(dir: &Path, files: [&str; 6], step_mm: f64) {
     let trials = files.map(|it| read(&dir.join(it)));
     let first = &trials[0];
@@ -61,7 +61,7 @@ fn the_six_encodings_of_a_trial_give_the_same_points() {
 }
 
 #[test]
-fn other_laboratories_files_are_read_and_an_empty_one_is_named() {
+fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d/others");
     let walk = read(&dir.join("cmu_02_05.c3d"));
@@ -99,7 +99,7 @@ fn other_laboratories_files_are_read_and_an_empty_one_is_named() {
     );
 }
 
-/// How tall the person stands at most, and how far a leg's length strays from its median, metres.
+/// The largest height of the person, and the spread of the length of a leg, metres.
 fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
     let norm = |a: [f64; 3], b: [f64; 3]| {
         let square = (0..3).map(|it| (a[it] - b[it]).powi(2));
@@ -120,7 +120,7 @@ fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
 }
 
 #[test]
-fn files_of_three_laboratories_become_joints_by_the_presets() {
+fn files_of_three_laboratories_are_converted_by_the_presets() {
     let Some(dir) = shared_dir() else { return };
     let data = dir.join("data");
     let options = MotionOptions::default();
@@ -143,7 +143,7 @@ fn files_of_three_laboratories_become_joints_by_the_presets() {
         assert!(height.contains(&tall), "{file}: {tall}");
         assert!(noise < 0.1, "{file}: {noise}");
     }
-    // Markers are not seen for a second and more: the frames are named, and others can be taken.
+    // Markers are missing for more than a second: the error has the frames, and the frames before can be read.
     let file = data.join("c3d/others/mocap36.c3d");
     let MotionError::Gap { frames, .. } = read_motion(&file, None, &options).unwrap_err() else {
         panic!("a gap")
@@ -163,7 +163,7 @@ fn files_of_three_laboratories_become_joints_by_the_presets() {
 }
 
 #[test]
-fn files_without_a_whole_person_or_of_nothing_are_refused() {
+fn files_without_a_complete_person_are_refused() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d");
     for file in ["trc/Knee.trc", "others/Gait.c3d", "sample01/Eb015pr.c3d"] {

@@ -1,8 +1,8 @@
-//! Pairs of views under the released energy, against the runs of the authors' program.
+//! Pairs of views with the released energy, compared with runs of the authors' program.
 
 #![expect(
     clippy::print_stdout,
-    reason = "figures for whoever reads the test's output"
+    reason = "the tests print the figures that they measure"
 )]
 
 use std::path::Path;
@@ -23,7 +23,7 @@ use viewquality::{Table, Tau, TrainingErrors};
 use crate::shared_dir;
 use crate::single_view::{Evidence, Picture, json};
 
-/// The released type tables are about 26 parts with six types each.
+/// The released type tables have 26 parts with six types each.
 const SIX_TYPES: [usize; 26] = [6; 26];
 
 fn number(value: &Value) -> f64 {
@@ -34,7 +34,7 @@ fn matrix(rows: &Value) -> Matrix3<f64> {
     Matrix3::from_fn(|row, col| number(&rows[row][col]))
 }
 
-/// A camera without distortion, as the runs had it; the file's lengths are millimetres.
+/// A camera without distortion, as in the runs; the file's lengths are millimetres.
 fn pinhole(
     name: &str,
     focal: [f64; 2],
@@ -84,7 +84,7 @@ pub(crate) fn umpm(shared: &Path, name: &str, shift: f64) -> Camera {
     )
 }
 
-/// How far our epipolar lines in B are from those of a run, within the image, pixels.
+/// The largest distance of our epipolar lines in B from those of a run, within the image, pixels.
 fn lines_off(cameras: &[Camera; 2], run: &Value) -> f64 {
     let ours = geometry::epipolar::fundamental(&cameras[0], &cameras[1]);
     // The run's pixels count from 1.
@@ -111,23 +111,23 @@ fn run_file(shared: &Path, name: &str) -> Value {
 }
 
 #[test]
-fn the_epipolar_lines_are_those_of_the_runs() {
+fn epipolar_lines_agree_with_the_runs() {
     let Some(shared) = shared_dir() else { return };
     let he = run_file(&shared, "mv_C1_C2");
     let off = |shift| lines_off(&["C1", "C2"].map(|it| humaneva(&shared, it, shift)), &he);
     println!("HumanEva: {:.1e} px, {:.1e} px", off(-1.0), off(0.0));
-    // The runs took HumanEva's principal point for one that counts pixels from 1, ...
+    // The runs assumed that HumanEva's principal point counts pixels from 1, ...
     assert!(off(-1.0) < 1e-3 && off(0.0) > 0.3);
     let l_r = run_file(&shared, "umpm_mv_L_R");
     let off = |shift| lines_off(&["l", "r"].map(|it| umpm(&shared, it, shift)), &l_r);
     println!("UMPM: {:.1e} px, {:.1e} px", off(0.0), off(-1.0));
-    // ... and UMPM's for one that counts from 0. Its rotations have six digits and are no rotations
-    // beyond them, which we mend and the runs did not.
+    // ... and UMPM's from 0. UMPM's rotations have six digits only and are not exactly orthogonal; we
+    // orthogonalise them and the runs did not.
     assert!(off(0.0) < 0.02 && off(-1.0) > 0.3);
 }
 
 #[test]
-fn the_heat_of_a_line_is_that_of_the_program() {
+fn the_heat_map_of_a_line_agrees_with_the_program() {
     let Some(shared) = shared_dir() else { return };
     let ends = [[0.5, 100.25], [640.5, 333.75]];
     for [rows, cols] in [[10, 13], [20, 27], [46, 59], [123, 163]] {
@@ -238,7 +238,7 @@ pub(crate) fn tables(shared: &Path, set: &str, [first, second]: [&str; 2]) -> Ty
     }
 }
 
-/// Prints what differs between a run of ours and the program's, and refuses more than the rounding.
+/// Prints the differences between our run and the program's, and asserts that they are rounding errors.
 fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
     let theirs = run["iterations"].as_array().unwrap();
     let view = |name: &Value| usize::from(name == "B");
@@ -286,7 +286,7 @@ fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
 }
 
 #[test]
-fn released_runs_on_humaneva_are_repeated() {
+fn released_runs_on_humaneva_are_reproduced() {
     let Some(shared) = shared_dir() else { return };
     let pair = Pair::humaneva(&shared);
     let tables = tables(&shared, "he", ["C1", "C2"]);
@@ -325,7 +325,7 @@ fn released_runs_on_humaneva_are_repeated() {
 }
 
 #[test]
-fn released_runs_on_umpm_are_repeated() {
+fn released_runs_on_umpm_are_reproduced() {
     let Some(shared) = shared_dir() else { return };
     let pair = Pair::umpm(&shared);
     let tables = tables(&shared, "umpm", ["L", "R"]);
@@ -336,9 +336,8 @@ fn released_runs_on_umpm_are_repeated() {
     }
 }
 
-/// Under the paper's energy nothing ever gets worse, on real evidence too.
 #[test]
-fn the_energy_of_the_paper_never_falls_on_real_pairs() {
+fn the_energy_of_the_paper_never_decreases_on_real_pairs() {
     let Some(shared) = shared_dir() else { return };
     for pair in [Pair::humaneva(&shared), Pair::umpm(&shared)] {
         let ours = pair.fuse(&Settings::default(), [0, 1], None, [None; 2]);

@@ -1,4 +1,4 @@
-//! A hundred images of the PARSE test set against Yang & Ramanan's own detections.
+//! A hundred images of the PARSE test set, compared with the detections of Yang & Ramanan's program.
 //!
 //! With another JPEG decoder (`image` 0.25) the PCP is 69.8 and 22 detections are the same.
 
@@ -20,7 +20,7 @@ struct Outcome {
     truth: Joints,
     ours: Joints,
     theirs: Joints,
-    /// Of the best of their detections that lies on the person who is annotated.
+    /// The joints of their best detection on the annotated person.
     theirs_covering: Joints,
     score_off: f64,
     same_level: bool,
@@ -28,7 +28,7 @@ struct Outcome {
 }
 
 #[test]
-fn pcp_on_images_101_to_200_is_that_of_the_original_program() {
+fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let Some(shared) = shared_dir() else { return };
     let model = Arc::new(fmp::files::read(&shared.join("data/models/parse_fmp.mat")).unwrap());
     let extractor = Extractor::new(Arc::clone(&model));
@@ -59,7 +59,7 @@ fn pcp_on_images_101_to_200_is_that_of_the_original_program() {
     let pcp = |report: &Report| {
         [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|it| report.pcp(it).percent())
     };
-    // As the reference counts them; its PCK is recorded for all 205 images only: 73.1.
+    // As recorded in the reference; its PCK is recorded for all 205 images only: 73.1.
     assert_eq!(pcp(&theirs).map(|it| (it * 10.0).round()), [713.0, 634.0]);
     assert!((covering.pck(0).percent() - 73.1).abs() < 1.0);
     for (got, expected) in pcp(&ours).into_iter().zip(pcp(&theirs)) {

@@ -1,4 +1,4 @@
-//! The model that ships, on people it was not trained on.
+//! The shipped model on people it was not trained on.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::shared_dir;
 type Joints = [[f64; 2]; 14];
 
 #[test]
-fn the_model_that_ships_is_as_good_as_its_card_says() {
+fn the_shipped_model_has_the_accuracy_of_its_card() {
     let Some(shared) = shared_dir() else { return };
     let file =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models/person.fmp");
@@ -44,11 +44,11 @@ fn the_model_that_ships_is_as_good_as_its_card_says() {
     let report = evaluate(found.iter().map(|(found, truth)| (Some(found), truth)));
     println!("{report}");
     let pcp = [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|it| report.pcp(it).percent());
-    // Other decoders of the images may move single sticks.
+    // Other image decoders may change single limbs.
     for (got, card) in pcp.into_iter().zip(CARD) {
         assert!((got - card).abs() <= 0.5, "PCP {got}, the card says {card}");
     }
 }
 
-/// PCP by mean of ends and by both ends, as `configs/models/person.md` has them.
+/// PCP by mean of ends and by both ends, from `configs/models/person.md`.
 const CARD: [f64; 2] = [73.3, 67.4];

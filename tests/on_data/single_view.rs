@@ -1,4 +1,4 @@
-//! Single-view detection against the reference programs: every stage, then whole images.
+//! Single-view detection compared with the reference programs: every step, then whole images.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use testkit::npy::Array;
 
 use crate::shared_dir;
 
-/// Pixels of an image file, as the detector takes them.
+/// Pixels of an image file, as input of the detector.
 pub(crate) struct Picture {
     width: usize,
     height: usize,
@@ -32,8 +32,8 @@ impl Picture {
 
     /// Reads a JPEG file with libjpeg's arithmetic.
     ///
-    /// Decoders differ by one to three grey levels in a seventh of the samples, and that is enough
-    /// to exchange hard orientation decisions and nearly equal detections.
+    /// Decoders differ by one to three grey levels in a seventh of the samples, which is enough
+    /// to change orientation bins and the order of nearly equal detections.
     pub(crate) fn read_as_libjpeg(path: &Path) -> Self {
         let mut image = mozjpeg::Decompress::new_path(path).unwrap().rgb().unwrap();
         Self {
@@ -97,7 +97,7 @@ fn difference(theirs: &Array, ours: impl Fn(&[usize]) -> f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The image and the model that the test vectors were made of.
+/// The image and the model of the test vectors, with the image pyramid.
 struct Stages {
     vectors: PathBuf,
     model: Model,
@@ -133,19 +133,22 @@ impl Stages {
 }
 
 #[test]
-fn the_pyramid_equals_the_vectors_bit_for_bit() {
+fn the_pyramid_equals_the_test_vectors_exactly() {
     let Some(shared) = shared_dir() else { return };
-    let it = Stages::new(&shared);
-    let scales = it.array("pyramid_scale");
-    assert_eq!(scales.values.len(), it.layout.levels.len());
-    assert_eq!(difference(&scales, |at| it.layout.levels[at[0]].scale), 0.0);
+    let stages = Stages::new(&shared);
+    let scales = stages.array("pyramid_scale");
+    assert_eq!(scales.values.len(), stages.layout.levels.len());
+    assert_eq!(
+        difference(&scales, |at| stages.layout.levels[at[0]].scale),
+        0.0
+    );
     for (name, level) in [
         ("resize_level3_rgb", 2),
         ("reduce_level11_rgb", 10),
         ("reduce_level13_rgb", 12),
         ("reduce_level21_rgb", 20),
     ] {
-        let (theirs, image) = (it.array(name), &it.images[level]);
+        let (theirs, image) = (stages.array(name), &stages.images[level]);
         assert_eq!(theirs.shape, [image.height(), image.width(), 3], "{name}");
         let off = difference(&theirs, |at| image.row(at[2], at[0])[at[1]]);
         assert_eq!(off, 0.0, "{name}");
@@ -153,50 +156,50 @@ fn the_pyramid_equals_the_vectors_bit_for_bit() {
 }
 
 #[test]
-fn features_match_the_vectors_to_rounding() {
+fn features_equal_the_test_vectors_up_to_rounding() {
     let Some(shared) = shared_dir() else { return };
-    let it = Stages::new(&shared);
+    let stages = Stages::new(&shared);
     for (name, level, pad) in [
         ("features_level1_unpadded", 0, 5),
         ("features_level11_unpadded", 10, 5),
         ("features_level13_unpadded", 12, 5),
         ("features_level2_padded", 1, 0),
     ] {
-        let map = reference::features(&it.model, &it.layout, &it.images[level]);
-        let cols = it.layout.levels[level].padded[1];
+        let map = reference::features(&stages.model, &stages.layout, &stages.images[level]);
+        let cols = stages.layout.levels[level].padded[1];
         let at = |at: &[usize]| ((at[0] + pad) * cols + at[1] + pad) * fmp::N_CHANNELS + at[2];
-        let off = difference(&it.array(name), |index| map[at(index)]);
+        let off = difference(&stages.array(name), |index| map[at(index)]);
         assert!(off < 1e-14, "{name}: {off:e}");
     }
 }
 
 #[test]
-fn responses_votes_and_root_scores_match_the_vectors() {
+fn responses_messages_and_root_scores_equal_the_test_vectors() {
     let Some(shared) = shared_dir() else { return };
-    let it = Stages::new(&shared);
-    let (responses, size) = it.responses();
-    let theirs = it.array("responses_level2_all156_filter_col_row");
+    let stages = Stages::new(&shared);
+    let (responses, size) = stages.responses();
+    let theirs = stages.array("responses_level2_all156_filter_col_row");
     assert_eq!(theirs.shape, [156, size[1], size[0]]);
     let off = difference(&theirs, |at| responses[at[0]][at[2] * size[1] + at[1]]);
     assert!(off < 1e-12, "responses: {off:e}");
 
     let cell = |at: &[usize]| at[0] * size[1] + at[1];
-    let edge = it.model.spec().parts[25].edge.as_ref().unwrap();
+    let edge = stages.model.spec().parts[25].edge.as_ref().unwrap();
     let votes = reference::votes(edge, &responses[150..156], size);
-    let off = difference(&it.array("message_part26_to_25"), |at| {
+    let off = difference(&stages.array("message_part26_to_25"), |at| {
         votes[at[2]].score[cell(at)]
     });
     assert!(off < 1e-12, "vote: {off:e}");
     let from_1 = |name: &str, of: fn(&Placement) -> u16| {
         let pointer = |at: &[usize]| f64::from(of(&votes[at[2]].child[cell(at)])) + 1.0;
-        assert_eq!(difference(&it.array(name), pointer), 0.0, "{name}");
+        assert_eq!(difference(&stages.array(name), pointer), 0.0, "{name}");
     };
     from_1("message_part26_Ix1based", |it| it.x);
     from_1("message_part26_Iy1based", |it| it.y);
     from_1("message_part26_Ik1based", |it| it.mixture.into());
 
-    let solved = reference::solve(&it.model, &responses, size);
-    let off = difference(&it.array("root_scores_level2_by_type"), |at| {
+    let solved = reference::solve(&stages.model, &responses, size);
+    let off = difference(&stages.array("root_scores_level2_by_type"), |at| {
         solved.root[at[2]][cell(at)]
     });
     assert!(off < 1e-11, "root scores: {off:e}");
@@ -204,34 +207,37 @@ fn responses_votes_and_root_scores_match_the_vectors() {
 }
 
 #[test]
-fn the_distance_transform_matches_its_vector() {
+fn the_distance_transform_equals_its_test_vector() {
     let Some(shared) = shared_dir() else { return };
-    let it = Stages::new(&shared);
-    let (responses, size) = it.responses();
-    let Springs::PerChildType(springs) = &it.model.spec().parts[25].edge.as_ref().unwrap().springs
+    let stages = Stages::new(&shared);
+    let (responses, size) = stages.responses();
+    let Springs::PerChildType(springs) =
+        &stages.model.spec().parts[25].edge.as_ref().unwrap().springs
     else {
         panic!("one spring per type");
     };
     let Spring { w, anchor } = springs[0];
     let got = transform_f64(&responses[150], size, &kernels::Spring { w, anchor });
     let cell = |at: &[usize]| at[0] * size[1] + at[1];
-    let off = difference(&it.array("dt_part26_type1_score"), |at| got.score[cell(at)]);
+    let off = difference(&stages.array("dt_part26_type1_score"), |at| {
+        got.score[cell(at)]
+    });
     assert!(off < 1e-12, "{off:e}");
-    let off = difference(&it.array("dt_part26_type1_Ix1based"), |at| {
+    let off = difference(&stages.array("dt_part26_type1_Ix1based"), |at| {
         got.x[cell(at)] as f64 + 1.0
     });
     assert_eq!(off, 0.0);
-    let off = difference(&it.array("dt_part26_type1_Iy1based"), |at| {
+    let off = difference(&stages.array("dt_part26_type1_Iy1based"), |at| {
         got.y[cell(at)] as f64 + 1.0
     });
     assert_eq!(off, 0.0);
 }
 
-/// How far a score may be from that of the authors' program, whose sums are plain and in double
-/// precision; 8.7e-6 was measured, the same on every instruction set.
+/// Tolerance of scores: the authors' program uses plain sums in double precision. 8.7e-6 was measured, the
+/// same on every instruction set.
 const SCORES: f64 = 1e-5;
 
-/// Compares the shipped path with what the authors' program printed for a whole image.
+/// Compares the optimised implementation with the output of the authors' program for a whole image.
 fn check_image(shared: &Path, name: &str, picture: &Picture, model: &Arc<Model>) {
     let theirs = json(&shared.join(format!("reference/single_view/{name}.json")));
     let evidence = Evidence::of(&Extractor::new(Arc::clone(model)), model, picture);
@@ -320,7 +326,7 @@ fn model(shared: &Path, name: &str) -> Arc<Model> {
 }
 
 #[test]
-fn humaneva_and_umpm_images_give_the_pose_of_the_authors_program() {
+fn poses_on_humaneva_and_umpm_images_agree_with_the_authors_program() {
     let Some(shared) = shared_dir() else { return };
     let humaneva = model(&shared, "humaneva_fmp.txt");
     let umpm = model(&shared, "umpm_fmp.txt");
@@ -348,7 +354,7 @@ fn humaneva_and_umpm_images_give_the_pose_of_the_authors_program() {
 }
 
 #[test]
-fn grey_odd_and_portrait_images_give_the_pose_of_the_authors_program() {
+fn poses_on_grey_odd_sized_and_portrait_images_agree_with_the_authors_program() {
     let Some(shared) = shared_dir() else { return };
     let model = model(&shared, "parse_fmp.mat");
     let jpeg = Picture::read_as_libjpeg(&shared.join("data/parse/im0101.jpg"));

@@ -1,4 +1,4 @@
-//! Following the best pose through real footage, against a full search of every frame.
+//! Tracking the best pose through real footage, compared with a full search of every frame.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,12 +9,12 @@ use nalgebra::Point3;
 use pipeline::{Combine, Estimator, EstimatorSettings, ViewSettings, ViewStep};
 use skeleton::PARSE14;
 
-use crate::balancing::{Clip, SIZE, clip, judge, reference};
+use crate::balancing::{Clip, SIZE, clip, compare, reference};
 use crate::shared_dir;
 
-/// Frames of every camera that are looked at in turn.
+/// Frames of every camera that are searched in order.
 const N_FRAMES: usize = 60;
-/// Of these the ones that are fused as well.
+/// The first of these that are fused too.
 const N_FUSED: usize = 12;
 
 /// Poses by view and frame, and the share of searches that were full.
@@ -24,7 +24,7 @@ struct Searched {
 }
 
 #[test]
-fn following_the_best_pose_finds_nearly_what_a_full_search_finds() {
+fn tracking_is_nearly_as_accurate_as_a_full_search() {
     let Some(dir) = shared_dir() else { return };
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let rig = root.join("configs/rigs/pose2sim-balancing.toml");
@@ -72,7 +72,7 @@ fn following_the_best_pose_finds_nearly_what_a_full_search_finds() {
         reached.push((same, errors));
     }
     // Reached: 82.9 % of the poses the same, 34.4 px at the median against 34.5 (left and
-    // right are as one view alone takes them).
+    // right are those of the single view).
     let (share, of_default) = reached[0];
     assert!(share > 0.75, "the same pose in {share} of the frames");
     assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);
@@ -87,7 +87,7 @@ fn image(clip: &Clip, view: usize, frame: usize) -> Rgb8View<'_> {
     Rgb8View::new(width, height, &clip.frames[view][frame]).unwrap()
 }
 
-/// The best pose of every frame of every view, each view on its own.
+/// The best pose of every frame of every view, each view independently.
 fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
     let settings = ViewSettings {
         track,
@@ -169,7 +169,7 @@ fn fused(
             .map(|view| Some(image(clip, view, frame)))
             .collect();
         let got = estimator.estimate(&images, &vec![None; images.len()]);
-        let errors = judge(&got, &estimator, &clip.cameras, truth);
+        let errors = compare(&got, &estimator, &clip.cameras, truth);
         all.joints_cm.extend(errors.joints_cm);
     }
     all.median_and_p90()
