@@ -22,12 +22,11 @@ const LAYERS: &[&[&str]] = &[
         "pipeline",
         "evaluation",
         "datasets",
-        "modelpage",
         "consistency",
-        "runpage",
     ],
     &["wire", "training", "qualitytraining", "sequences"],
     &["experiment", "stage"],
+    &["report"],
     &[
         "capture",
         "pose",

@@ -2,10 +2,10 @@
 //!
 //! [`Film`] gives the frames of a sequence, [`Bench`] solves each of them once in every view and then
 //! by every [`Version`], [`Record`] keeps what was found (so that a run can go on), [`score`] compares
-//! it with the truth, and [`Summary`] adds up: as JSON, as one page of HTML ([`html`]) and as LaTeX
-//! ([`latex`]), the paper's own numbers beside ours ([`published()`]).
+//! it with the truth, and [`Summary`] adds up: as JSON and as LaTeX ([`latex()`]), the paper's own numbers
+//! beside ours ([`published()`]).
 //!
-//! [`Pictures`] are single pictures of annotated people, with a page of their own ([`pictures_html`]).
+//! [`Pictures`] are single pictures of annotated people.
 //!
 //! Solving and scoring are apart: other thresholds and other truths need no second run.
 #![forbid(unsafe_code)]
@@ -21,17 +21,17 @@ mod record;
 mod score;
 mod summary;
 
+mod latex;
 mod pictures;
 mod published;
-mod report;
 
 pub use bench::{Bench, Expectation, Expected, Look, Setup, Trial};
 pub use film::{Film, FilmError, FilmSettings};
-pub use pictures::{Intervals, Judged, Pictures};
+pub use latex::{latex, number, overall, pictures_latex};
+pub use pictures::{Intervals, Judged, Pictures, Table};
 pub use predicted::{Judgement, Predicted, judge};
 pub use published::published;
 pub use record::{Found, Header, Record, RecordError, read_records};
-pub use report::{Page, html, latex, pictures_html, pictures_latex};
 pub use score::{FrameScore, Joints, score, seen};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
 pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};

@@ -73,6 +73,11 @@ impl Pictures {
         }
     }
 
+    /// The tables of the data set: PCP and PCK of either kind of detection, percent.
+    pub fn tables(&self, bootstrap: &Bootstrap) -> Vec<Table> {
+        tables(self, bootstrap)
+    }
+
     fn pairs(&self, which: Judged) -> impl Iterator<Item = (Option<&Joints>, &Joints)> {
         let place = which as usize;
         let found = self.found.iter().map(move |it| it[place].as_ref());
@@ -86,15 +91,18 @@ const RULES: [(PcpRule, &str); 2] = [
     (PcpRule::BothEnds, "both ends"),
 ];
 
-/// A table: its title, the names of its columns, and its rows.
-pub(crate) struct Table {
-    pub(crate) title: String,
-    pub(crate) columns: Vec<String>,
-    pub(crate) rows: Vec<(String, Vec<f64>, Option<[f64; 2]>)>,
+/// A table of percentages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Its title.
+    pub title: String,
+    /// The names of its columns.
+    pub columns: Vec<String>,
+    /// Its rows: name, a number for every column, and the confidence interval of the last.
+    pub rows: Vec<(String, Vec<f64>, Option<[f64; 2]>)>,
 }
 
-/// The tables of a data set: PCP and PCK of either kind of detection, percent.
-pub(crate) fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
+fn tables(set: &Pictures, bootstrap: &Bootstrap) -> Vec<Table> {
     let mut tables = Vec::new();
     for which in Judged::ALL {
         let report = set.report(which);
@@ -150,7 +158,7 @@ fn columns<'a>(names: impl Iterator<Item = &'a str>, last: &'a str) -> Vec<Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{pictures_html, pictures_latex};
+    use crate::pictures_latex;
 
     fn person(x: f64) -> Joints {
         core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64])
@@ -196,20 +204,8 @@ mod tests {
     }
 
     #[test]
-    fn the_page_and_the_tables_say_every_number_and_escape_names() {
-        let (sets, bootstrap) = ([pictures()], Bootstrap::default());
-        let about = [("model".to_owned(), "<m>".to_owned())];
-        let page = pictures_html(&sets, &about, &bootstrap);
-        for text in [
-            "parse &amp; co",
-            "&lt;m&gt;",
-            "33.3",
-            "66.7",
-            "within 0.2 of size",
-        ] {
-            assert!(page.contains(text), "{text}");
-        }
-        let tex = pictures_latex(&sets, &bootstrap);
+    fn the_tables_for_latex_say_every_number_and_escape_names() {
+        let tex = pictures_latex(&[pictures()], &Bootstrap::default());
         assert_eq!(tex.matches("\\begin{table}").count(), 4);
         assert!(
             tex.contains("parse \\& co") && tex.contains("66.7"),

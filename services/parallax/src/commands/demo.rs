@@ -223,7 +223,7 @@ fn conclude(
     let report = Report::new(run, &arguments.limits);
     let json = report.json(run);
     let page = page::page(run, &report, stage, results);
-    write_reports(stage, [format!("{json:#}\n"), runpage::html(&page)])?;
+    write_reports(stage, [format!("{json:#}\n"), ::report::run::html(&page)])?;
     if arguments.json {
         output::json(&json)?;
     } else if !globals.quiet {

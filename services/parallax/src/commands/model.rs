@@ -72,7 +72,7 @@ fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failur
         [] => None,
         images => Some(examples::gather(&model, &inputs::images(images)?)?),
     };
-    let page = modelpage::html(&model, examples.as_ref());
+    let page = report::model::html(&model, examples.as_ref());
     std::fs::write(html, page).map_err(|error| inputs::in_file(html, &error))?;
     output::message(format_args!("wrote {}", html.display()));
     Ok(ExitCode::SUCCESS)

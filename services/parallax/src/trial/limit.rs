@@ -1,6 +1,6 @@
 //! A measured number against the limit that was asked for.
 
-use runpage::Limit;
+use report::run::Limit;
 
 /// Holds if the number is at least what was asked for.
 pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {

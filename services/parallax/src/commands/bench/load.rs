@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use messages::MAX_VIEWS;
-use runpage::Limit;
+use report::run::Limit;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use runpage::Limit;
+use report::run::Limit;
 use runtime::{ExitKind, Failure};
 use serde_json::{Value, json};
 

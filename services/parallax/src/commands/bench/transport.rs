@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
-use runpage::Limit;
+use report::run::Limit;
 use runtime::{ExitKind, Failure, OrFail as _, Policy, RealTime, Scheduling, Stop};
 use serde_json::{Value, json};
 

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 use messages::Status;
-use runpage::Limit;
+use report::run::Limit;
 use runtime::Failure;
 use serde::Serialize;
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! What must hold when a process is struck: numbers in, verdicts out.
 
 use clap::Args;
-use runpage::Limit;
+use report::run::Limit;
 
 use super::census::Sample;
 use super::scenario::service_of;

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use runpage::Limit;
+use report::run::Limit;
 use serde_json::{Value, json};
 
 use super::judge::{Barraged, Orphaned};

@@ -1,7 +1,7 @@
 //! The limits by which the demo judges itself.
 
 use clap::Args;
-use runpage::Limit;
+use report::run::Limit;
 
 use super::score::Score;
 use crate::trial::cost::Cost;

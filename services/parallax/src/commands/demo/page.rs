@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
-use runpage::{Eye, Mark, Page, Picture, Space, Strip, Table};
+use report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use serde_json::Value;
 use skeleton::PARSE14;
 
@@ -91,7 +91,7 @@ fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
 }
 
 fn space(run: &Run<'_>, stage: &Stage) -> Space {
-    let moment = |(it, truth): (&Moment, &Vec<Point>)| runpage::Moment {
+    let moment = |(it, truth): (&Moment, &Vec<Point>)| report::run::Moment {
         frame: it.frame,
         seconds: it.frame as f64 / run.rate_hz,
         found: it.joints.clone(),

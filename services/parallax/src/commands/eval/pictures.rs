@@ -7,7 +7,8 @@ use std::process::ExitCode;
 
 use datasets::People;
 use evaluation::Bootstrap;
-use experiment::{Intervals, Judged, Pictures, pictures_html, pictures_latex};
+use experiment::{Intervals, Judged, Pictures, pictures_latex};
+use report::evaluation::pictures_html;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 

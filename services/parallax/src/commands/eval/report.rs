@@ -3,9 +3,8 @@
 use std::fs;
 
 use evaluation::Bootstrap;
-use experiment::{
-    FrameScore, Group, Measured, Page, Summary, html, judge, latex, score, summarise,
-};
+use experiment::{FrameScore, Group, Measured, Summary, judge, latex, score, summarise};
+use report::evaluation::{Page, html};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::Arguments;

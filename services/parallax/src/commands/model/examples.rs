@@ -6,8 +6,8 @@ use std::sync::Arc;
 use datasets::Picture;
 use fmp::{Layout, Model, Pose};
 use footage::{Canvas, Fill, Size, Warp, resize_map};
-use modelpage::Examples;
 use rayon::prelude::*;
+use report::model::Examples;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::search::Search;

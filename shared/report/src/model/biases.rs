@@ -2,10 +2,11 @@
 
 use fmp::Edge;
 
-use crate::svg::{put, type_colour};
+use super::colours::type_colour;
+use crate::html::put;
 
 /// Rows are the parent's types, columns those of the part; the colours span the table's own largest bias.
-pub(crate) fn table(edge: &Edge) -> String {
+pub(super) fn table(edge: &Edge) -> String {
     let all = || edge.bias.iter().flatten().filter(|it| it.is_finite());
     let largest = all().fold(0.0_f64, |largest, it| largest.max(it.abs()));
     let n_own = edge.bias.first().map_or(0, Vec::len);

@@ -1,21 +1,20 @@
 //! A model as one HTML page that explains it to a person: filters, tree, springs, biases, numbers.
 //!
-//! The page needs nothing but itself: no script, no font, no picture from elsewhere. It is well-formed
-//! XML too, which is how the tests read it.
-#![forbid(unsafe_code)]
+//! The page has no script. It is well-formed XML too, which is how the tests read it.
 
 mod biases;
+mod colours;
 mod examples;
 mod figure;
 mod glyph;
 mod springs;
-mod svg;
 
 use fmp::{Model, files::describe};
 
-pub use examples::Examples;
+use crate::html::{STYLE, escaped, put};
 use figure::Figure;
-use svg::{escaped, put};
+
+pub use examples::Examples;
 
 /// Draws a model.
 ///
@@ -35,7 +34,7 @@ pub fn html(model: &Model, examples: Option<&Examples>) -> String {
     page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n");
     put(
         &mut page,
-        format_args!("<title>{title}</title>\n<style>{LOOK}{STYLE}</style>\n"),
+        format_args!("<title>{title}</title>\n<style>{STYLE}{MORE_STYLE}</style>\n"),
     );
     put(
         &mut page,
@@ -59,9 +58,8 @@ pub fn html(model: &Model, examples: Option<&Examples>) -> String {
 /// How much of the score a part loses on the ellipse that is drawn for its spring.
 pub const SPRING_COST: f64 = 0.05;
 
-/// How all pages of Parallax look; `runpage` has it for those that may depend on it.
-const LOOK: &str = include_str!("../../runpage/src/page.css");
-const STYLE: &str = "
+/// What only this page needs.
+const MORE_STYLE: &str = "
 body { max-width: 84em; }
 h3 { margin: 0 0 .5em; }
 h3 small { font-weight: normal; margin-left: .6em; }

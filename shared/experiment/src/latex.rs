@@ -1,9 +1,8 @@
 //! The paper's tables for LaTeX.
 
-use evaluation::SEGMENT_NAMES;
+use evaluation::{Bootstrap, SEGMENT_NAMES};
 
-use super::number;
-use crate::{Group, Summary, Version, published};
+use crate::{Group, Pictures, Summary, Version, published};
 
 /// Tables of PCP3D: a row for each group, then a row for each version with all parts; the paper's numbers in
 /// parentheses, where it has any.
@@ -42,8 +41,30 @@ pub fn latex(summary: &Summary, versions: &[Version]) -> String {
     out.replace('–', "--")
 }
 
+/// The tables of single pictures.
+pub fn pictures_latex(sets: &[Pictures], bootstrap: &Bootstrap) -> String {
+    let mut out = String::new();
+    for table in sets.iter().flat_map(|it| it.tables(bootstrap)) {
+        begin(&mut out, &escape(&table.title), 1 + table.columns.len());
+        let names = [vec![String::new()], table.columns.clone()].concat();
+        line(&mut out, &names);
+        out.push_str("\\hline\n");
+        for (name, values, _) in table.rows {
+            let values = values.iter().map(|it| number(Some(*it), 1));
+            line(&mut out, &[vec![name], values.collect()].concat());
+        }
+        end(&mut out);
+    }
+    out
+}
+
+/// A number with so many digits after the point, or a dash.
+pub fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |it| format!("{it:.digits$}"))
+}
+
 /// The largest group of every data set.
-pub(super) fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
+pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     let last = |(nth, it): &(usize, &Group)| {
         summary.groups[nth + 1..]
             .iter()
@@ -69,7 +90,7 @@ fn cells(group: &Group, versions: &[Version]) -> Vec<String> {
     versions.iter().zip(&group.versions).map(cell).collect()
 }
 
-pub(super) fn begin(out: &mut String, caption: &str, n_columns: usize) {
+fn begin(out: &mut String, caption: &str, n_columns: usize) {
     let columns = "c".repeat(n_columns);
     let lines = [
         "\\begin{table}".to_owned(),
@@ -80,19 +101,63 @@ pub(super) fn begin(out: &mut String, caption: &str, n_columns: usize) {
     out.push_str(&lines.join("\n"));
 }
 
-pub(super) fn end(out: &mut String) {
+fn end(out: &mut String) {
     out.push_str("\\hline\n\\end{tabular}\n\\end{table}\n");
 }
 
-pub(super) fn line(out: &mut String, cells: &[String]) {
+fn line(out: &mut String, cells: &[String]) {
     out.push_str(&cells.join(" & "));
     out.push_str(" \\\\\n");
 }
 
-pub(super) fn escape(text: &str) -> String {
+fn escape(text: &str) -> String {
     let escape = |it: char| match it {
         '_' | '&' | '%' | '#' | '$' | '{' | '}' => format!("\\{it}"),
         it => it.to_string(),
     };
     text.chars().map(escape).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{FrameScore, Measured, summarise};
+
+    fn made_up() -> (Summary, Vec<Version>) {
+        let versions: Vec<Version> = ["fmp", "geometry", "geometry+all-views"]
+            .map(|it| it.parse().unwrap())
+            .to_vec();
+        let score = |error: f64| FrameScore {
+            segments: vec![Some(error); 12],
+            joints_m: vec![Some(0.1 * error); 14],
+            views: vec![Some((Some([[10.0 * error, 0.0]; 14]), [[0.0; 2]; 14]))],
+            iterations: vec![4],
+            ..FrameScore::default()
+        };
+        let measured = |subject: &str| Measured {
+            dataset: "HumanEva".to_owned(),
+            subject: subject.to_owned(),
+            action: "Box".to_owned(),
+            scores: vec![[0.7, 0.45, 0.3].map(score).to_vec(); 5],
+        };
+        let names: Vec<String> = versions.iter().map(ToString::to_string).collect();
+        let summary = summarise(
+            &[measured("S1"), measured("S2")],
+            &names,
+            &Bootstrap::default(),
+        );
+        (summary, versions)
+    }
+
+    #[test]
+    fn the_tables_have_our_numbers_and_the_papers() {
+        let (summary, versions) = made_up();
+        let text = latex(&summary, &versions);
+        assert!(
+            text.contains("HumanEva & S1 & Box & 0.00 (77.34) & 100.00 (82.70) & 100.00 \\\\"),
+            "{text}"
+        );
+        assert!(text.contains("HumanEva & All & Box & 0.00 (67.14)"));
+        assert_eq!(text.matches("\\begin{table}").count(), 2);
+    }
 }

@@ -1,9 +1,9 @@
 //! The paper's figures as SVG: bars of every part, curves over the threshold, histograms of changes.
 
 use evaluation::SEGMENT_NAMES;
+use experiment::{ChangesOf, Group};
 
-use super::escape;
-use crate::{ChangesOf, Group};
+use crate::html::{escaped, put};
 
 /// One colour for each version, told apart without red and green alone, on light and on dark.
 const COLOURS: [&str; 8] = [
@@ -58,7 +58,7 @@ impl Plot {
 
     fn word(&mut self, x: f64, text: &str) {
         let y = TOP + HEIGHT + 16.0;
-        let text = escape(text);
+        let text = escaped(text);
         put(
             &mut self.out,
             format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"mid\">{text}</text>"),
@@ -75,7 +75,7 @@ impl Plot {
                 x[0],
                 TOP + HEIGHT - height,
                 x[1] - x[0],
-                escape(title)
+                escaped(title)
             ),
         );
     }
@@ -148,7 +148,7 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
                 "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"><title>{}</title></polyline>",
                 points.join(" "),
                 colour(version),
-                escape(title)
+                escaped(title)
             ),
         );
     }
@@ -190,8 +190,4 @@ fn width(changes: &ChangesOf) -> f64 {
         [a, b, ..] => b[0] - a[0],
         _ => 1.0,
     }
-}
-
-fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
-    out.push_str(&std::fmt::format(text));
 }

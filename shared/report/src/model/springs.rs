@@ -2,21 +2,22 @@
 
 use fmp::{Edge, Spring, Springs};
 
-use crate::SPRING_COST;
-use crate::svg::{put, type_colour};
+use super::SPRING_COST;
+use super::colours::type_colour;
+use crate::html::put;
 
 /// Where a spring rests, and where it costs [`SPRING_COST`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Ellipse {
+pub(super) struct Ellipse {
     /// Offset of the child from its parent, cells.
-    pub(crate) centre: [f64; 2],
+    pub(super) centre: [f64; 2],
     /// Half axes, cells.
-    pub(crate) radius: [f64; 2],
+    pub(super) radius: [f64; 2],
 }
 
 impl Ellipse {
     /// The spring costs `w0 d^2 + w1 d` an axis with `d = anchor - offset`: least at `d = -w1 / (2 w0)`.
-    pub(crate) fn of(spring: &Spring) -> Self {
+    pub(super) fn of(spring: &Spring) -> Self {
         let axis = |it: usize| [spring.w[2 * it], spring.w[2 * it + 1]];
         let [x, y] = spring.anchor.map(f64::from);
         let rest = |[square, linear]: [f64; 2]| linear / (2.0 * square);
@@ -28,7 +29,7 @@ impl Ellipse {
 }
 
 /// The child's type and the ellipse, of all springs.
-pub(crate) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
+pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
     match &edge.springs {
         Springs::PerChildType(all) => all.iter().map(Ellipse::of).enumerate().collect(),
         Springs::PerTypePair(rows) => rows
@@ -40,7 +41,7 @@ pub(crate) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
 }
 
 /// The spring of a pair of types; `None` where the pair never occurs.
-pub(crate) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Option<Ellipse> {
+pub(super) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Option<Ellipse> {
     match &edge.springs {
         Springs::PerChildType(all) => all.get(own_type).map(Ellipse::of),
         Springs::PerTypePair(rows) => rows
@@ -52,7 +53,7 @@ pub(crate) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Optio
 }
 
 /// All springs of a part around the parent, in cells.
-pub(crate) fn panel(edge: &Edge) -> String {
+pub(super) fn panel(edge: &Edge) -> String {
     const SIDE: f64 = 150.0;
     let all = ellipses(edge);
     let reach = all

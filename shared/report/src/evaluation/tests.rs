@@ -3,10 +3,10 @@
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use evaluation::{Bootstrap, SEGMENT_NAMES};
+use experiment::{FrameScore, Measured, Pictures, summarise};
 
 use super::figure::{tick, top};
-use super::{Page, escape, html, latex};
-use crate::{FrameScore, Measured, Summary, Version, summarise};
+use super::*;
 
 fn made_up() -> (Summary, Vec<Version>) {
     let versions: Vec<Version> = ["fmp", "geometry", "geometry+all-views"]
@@ -65,26 +65,6 @@ fn the_page_holds_every_table_and_figure_and_needs_nothing_else() {
 }
 
 #[test]
-fn the_tables_have_our_numbers_and_the_papers() {
-    let (summary, versions) = made_up();
-    let text = latex(&summary, &versions);
-    assert!(
-        text.contains("HumanEva & S1 & Box & 0.00 (77.34) & 100.00 (82.70) & 100.00 \\\\"),
-        "{text}"
-    );
-    assert!(text.contains("HumanEva & All & Box & 0.00 (67.14)"));
-    assert_eq!(text.matches("\\begin{table}").count(), 2);
-}
-
-#[test]
-fn text_means_itself() {
-    assert_eq!(
-        escape("<a href=\"x\">&"),
-        "&lt;a href=&quot;x&quot;&gt;&amp;"
-    );
-}
-
-#[test]
 fn what_stands_beside_an_axis_is_what_it_means() {
     for (value, text) in [
         (0.75, "0.75"),
@@ -122,10 +102,35 @@ fn the_page_looks_like_that_of_a_run_and_is_no_wider_than_a_telephone() {
         versions: &versions,
         about: &about,
     });
-    assert!(page.contains(runpage::STYLE));
+    assert!(page.contains(STYLE));
     let folder = tempfile::tempdir().unwrap();
     match testkit::browser::too_wide(&page, folder.path(), 420).unwrap() {
         Some(wide) => assert_eq!(wide, Vec::<String>::new()),
         None => eprintln!("skipped: no browser is installed"),
+    }
+}
+
+#[test]
+fn the_page_of_pictures_says_every_number_and_escapes_names() {
+    let person =
+        |x: f64| core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64]);
+    let (here, there) = (Some(person(0.0)), Some(person(500.0)));
+    // Two of three pictures have their person, of whom one is found elsewhere by the best detection.
+    let set = Pictures {
+        name: "parse & co".to_owned(),
+        n_left_out: 1,
+        truths: vec![person(0.0); 3],
+        found: vec![[here, here], [there, here], [None, None]],
+    };
+    let about = [("model".to_owned(), "<m>".to_owned())];
+    let page = pictures_html(&[set], &about, &Bootstrap::default());
+    for text in [
+        "parse &amp; co",
+        "&lt;m&gt;",
+        "33.3",
+        "66.7",
+        "within 0.2 of size",
+    ] {
+        assert!(page.contains(text), "{text}");
     }
 }

@@ -1,10 +1,14 @@
-//! The page: what was run, the tables with the paper's numbers beside ours, the figures.
+//! An evaluation as one HTML page: what was run, the tables with the paper's numbers beside ours, the figures.
 
-use super::figure::{bars, colour, curves, histogram};
-use super::table::overall;
-use super::{escape, number};
-use crate::{Group, Numbers, Summary, Version, published};
-use runpage::STYLE;
+mod figure;
+mod pictures;
+
+use experiment::{Group, Numbers, Summary, Version, number, overall, published};
+
+use crate::html::{STYLE, escaped, put};
+use figure::{bars, colour, curves, histogram};
+
+pub use pictures::pictures_html;
 
 /// What the page says besides the numbers.
 #[derive(Debug, Clone)]
@@ -29,7 +33,7 @@ pub fn html(page: &Page<'_>) -> String {
             format_args!(
                 "<b><span style=\"background:{}\"></span>{}</b>",
                 colour(version),
-                escape(title)
+                escaped(title)
             ),
         );
     }
@@ -40,9 +44,9 @@ pub fn html(page: &Page<'_>) -> String {
             &mut out,
             format_args!(
                 "<h2>{}, {} {}</h2>\n",
-                escape(&group.dataset),
-                escape(&group.subject),
-                escape(&group.action)
+                escaped(&group.dataset),
+                escaped(&group.subject),
+                escaped(&group.action)
             ),
         );
         measures(&mut out, group, &titles);
@@ -54,7 +58,7 @@ pub fn html(page: &Page<'_>) -> String {
 }
 
 /// The beginning of a page, up to its heading.
-pub(super) fn head() -> String {
+fn head() -> String {
     let mut out = String::from("<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n");
     out.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n");
     out.push_str("<title>Parallax: evaluation</title>\n<style>\n");
@@ -64,15 +68,15 @@ pub(super) fn head() -> String {
 }
 
 /// What was run: key and value.
-pub(super) fn about_table(out: &mut String, about: &[(String, String)]) {
+fn about_table(out: &mut String, about: &[(String, String)]) {
     out.push_str("<div class=\"scroll\"><table>\n");
     for (key, value) in about {
         put(
             out,
             format_args!(
                 "<tr><td>{}</td><td class=\"name\">{}</td></tr>\n",
-                escape(key),
-                escape(value)
+                escaped(key),
+                escaped(value)
             ),
         );
     }
@@ -91,11 +95,11 @@ fn scores(out: &mut String, page: &Page<'_>, titles: &[String]) {
         ),
     );
     for title in titles {
-        put(out, format_args!("<th>{}", escape(title)));
+        put(out, format_args!("<th>{}", escaped(title)));
     }
     out.push_str("</tr>\n");
     for group in &page.summary.groups {
-        let names = [&group.dataset, &group.subject, &group.action].map(|it| escape(it));
+        let names = [&group.dataset, &group.subject, &group.action].map(|it| escaped(it));
         put(
             out,
             format_args!(
@@ -169,7 +173,7 @@ fn measures(out: &mut String, group: &Group, titles: &[String]) {
     ];
     out.push_str("<div class=\"scroll\"><table>\n<tr><th>");
     for title in titles {
-        put(out, format_args!("<th>{}", escape(title)));
+        put(out, format_args!("<th>{}", escaped(title)));
     }
     out.push_str("</tr>\n");
     for (name, cell) in rows {
@@ -198,7 +202,7 @@ fn predictions(out: &mut String, summary: &Summary) {
             out,
             format_args!(
                 "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}</tr>\n",
-                escape(&it.part),
+                escaped(&it.part),
                 it.n,
                 number(it.above, 1),
                 number(it.caught, 1),
@@ -226,14 +230,13 @@ fn figures(out: &mut String, group: &Group, titles: &[String]) {
             out,
             format_args!(
                 "<h3>Changes in images against {}: {}</h3>\n{}\n",
-                escape(&titles[0]),
-                escape(title),
+                escaped(&titles[0]),
+                escaped(title),
                 histogram(&it.changes)
             ),
         );
     }
 }
 
-pub(super) fn put(out: &mut String, text: std::fmt::Arguments<'_>) {
-    out.push_str(&std::fmt::format(text));
-}
+#[cfg(test)]
+mod tests;

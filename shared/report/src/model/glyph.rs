@@ -2,19 +2,19 @@
 
 use fmp::{Filter, Model, N_CHANNELS};
 
-use crate::svg::put;
+use crate::html::put;
 
 /// Undirected orientations of the features.
 const N_ORIENTATIONS: usize = 9;
 
 /// Side of a cell in the glyphs' own unit.
-pub(crate) const CELL: f64 = 10.0;
+pub(super) const CELL: f64 = 10.0;
 
 /// Steps of brightness; the strokes of one step are one path.
 const N_STEPS: usize = 6;
 
 /// Definitions of all glyphs, `f0` and on, for `<use>`.
-pub(crate) fn symbols(model: &Model) -> String {
+pub(super) fn symbols(model: &Model) -> String {
     let mut out = String::from("<svg class=\"hidden\"><defs>\n");
     for (index, filter) in model.spec().filters.iter().enumerate() {
         put(
@@ -29,7 +29,7 @@ pub(crate) fn symbols(model: &Model) -> String {
 }
 
 /// The glyph of a type, with its number and the largest weight of an orientation.
-pub(crate) fn of_type(model: &Model, part: usize, mixture: usize) -> String {
+pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> String {
     let index = model.spec().parts[part].filter_of_type[mixture];
     let filter = model.filter(part, mixture);
     let [width, height] = [filter.cols, filter.rows].map(|it| it as f64 * CELL);

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use roxmltree::{Document, ParsingOptions};
 
 use super::*;
-use crate::springs::Ellipse;
+use crate::model::springs::Ellipse;
 
 const SPRING: Spring = Spring {
     w: [0.0125, 0.025, 0.05, -0.2],

@@ -5,7 +5,6 @@
 use serde_json::Value;
 
 use super::*;
-use crate::{Eye, Moment};
 
 fn page() -> Page {
     let moment = |frame: u64, gone: Option<&str>| Moment {

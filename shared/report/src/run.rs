@@ -1,11 +1,18 @@
-//! The page: what it says, and in which order.
+//! A run as one HTML page: limits that held or did not, the skeleton in space, who was there when, tables, pictures.
+//!
+//! The page forbids every request by its policy. The view of the skeleton is a canvas that a short script of ours draws
+//! (`space.js`): drag to turn, play, pause, step.
+
+mod space;
+mod timeline;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::space::Space;
-use crate::text::{escaped, in_script, put};
-use crate::timeline::{self, Mark};
+use crate::html::{STYLE, escaped, in_script, put};
+
+pub use space::{Eye, Moment, Point, Space};
+pub use timeline::Mark;
 
 /// What the page says.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,9 +81,7 @@ pub struct Picture {
 
 const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-/// How all pages of Parallax look: light or dark as the reader has it, and no wider than a telephone.
-pub const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
+const SCRIPT: &str = include_str!("run/space.js");
 
 /// One page that needs no other file and asks for none.
 pub fn html(page: &Page) -> String {

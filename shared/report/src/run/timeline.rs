@@ -1,7 +1,7 @@
 //! Who was there when: a row for every view, a tick for every result.
 
-use crate::space::Space;
-use crate::text::{escaped, put};
+use super::space::Space;
+use crate::html::{escaped, put};
 
 /// Something that happened.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::svg::put;
+use crate::html::put;
 
 /// Side of an example on the page, pixels.
 const SIDE: usize = 42;
@@ -17,7 +17,7 @@ pub struct Examples {
 }
 
 /// The examples of a type, in rows.
-pub(crate) fn of_type(examples: &Examples, part: usize, mixture: usize) -> String {
+pub(super) fn of_type(examples: &Examples, part: usize, mixture: usize) -> String {
     let found = examples.png.get(part).and_then(|it| it.get(mixture));
     let mut out = String::from("<div class=\"examples\">");
     for png in found.into_iter().flatten() {

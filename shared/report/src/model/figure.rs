@@ -2,13 +2,14 @@
 
 use fmp::Model;
 
-use crate::glyph::CELL;
-use crate::springs::{Ellipse, ellipses, of_pair};
-use crate::svg::{escaped, part_colour, put};
+use super::colours::part_colour;
+use super::glyph::CELL;
+use super::springs::{Ellipse, ellipses, of_pair};
+use crate::html::{escaped, put};
 
 /// Where every part is drawn.
 #[derive(Debug)]
-pub(crate) struct Figure {
+pub(super) struct Figure {
     types: Vec<usize>,
     /// Top left corner of the filter, cells.
     corner: Vec<[f64; 2]>,
@@ -22,7 +23,7 @@ pub(crate) struct Figure {
 const SCALE: f64 = 20.0;
 
 impl Figure {
-    pub(crate) fn new(model: &Model) -> Self {
+    pub(super) fn new(model: &Model) -> Self {
         let types = ordinary_types(model);
         let (mut corner, mut spring) = (Vec::new(), Vec::new());
         for (part, spec) in model.spec().parts.iter().enumerate() {
@@ -51,7 +52,7 @@ impl Figure {
     }
 
     /// The filters, each where its spring would rest.
-    pub(crate) fn filters(&self, model: &Model) -> String {
+    pub(super) fn filters(&self, model: &Model) -> String {
         let mut out = self.open("dark", CELL);
         for (part, [x, y]) in self.corner.iter().enumerate() {
             let index = model.spec().parts[part].filter_of_type[self.types[part]];
@@ -69,7 +70,7 @@ impl Figure {
     }
 
     /// The tree, with ellipses for the springs.
-    pub(crate) fn tree(&self, model: &Model) -> String {
+    pub(super) fn tree(&self, model: &Model) -> String {
         let mut out = self.open("light", 1.0);
         let centre = |part: usize| {
             let filter = model.filter(part, self.types[part]);
@@ -194,7 +195,7 @@ fn best(values: impl Iterator<Item = f64>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::planted;
+    use crate::model::tests::planted;
 
     #[test]
     fn the_types_that_rest_in_the_middle_are_drawn() {

@@ -1,0 +1,18 @@
+//! Pages for people: of a run, of a model, of an evaluation. One look, one way to escape.
+//!
+//! Every page is one HTML file that needs nothing but itself: no font, no picture, no style from elsewhere, and no
+//! script but the one of [`run`] that draws the skeleton in space.
+//!
+//! Pages are put together as text. Templates were considered: most of these pages is SVG made in loops of numbers with
+//! a fixed count of digits, which templates do not shorten, and the page of a model is XML, too, whose empty elements
+//! end with a slash; `maud` writes those of HTML only. So every text from outside goes through one function, and
+//! each page has a test with text that would break it.
+#![forbid(unsafe_code)]
+
+mod html;
+
+pub mod evaluation;
+pub mod model;
+pub mod run;
+
+pub use html::STYLE;
