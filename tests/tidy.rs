@@ -13,17 +13,12 @@ use std::process::Command;
 const LAYERS: &[&[&str]] = &[
     &["skeleton"],
     &[
-        "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d",
+        "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles",
     ],
     &["metrics", "recording", "fmp", "scene"],
     &["runtime"],
     &["multiview", "viewquality"],
-    &[
-        "pipeline",
-        "evaluation",
-        "datasets",
-        "consistency",
-    ],
+    &["pipeline", "evaluation", "datasets", "consistency"],
     &["wire", "training", "qualitytraining", "sequences"],
     &["experiment", "stage"],
     &["report"],

@@ -2,6 +2,7 @@
 
 use core::fmt::Write as _;
 
+use runfiles::{LatencyReport, Percentiles};
 use serde_json::{Value, json};
 
 /// The longest time from capture to result that 99 of 100 frames may take, and what they took.
@@ -20,15 +21,15 @@ pub(crate) struct Budget {
 impl Budget {
     /// Judges a run.
     ///
-    /// * `latency`: as the recorder wrote it; null if it did not.
-    pub(crate) fn new(limit_ms: f64, latency: &Value) -> Self {
-        let end_to_end = &latency["end_to_end"];
-        let n_frames = end_to_end["count"].as_u64().unwrap_or(0);
+    /// * `latency`: where the time went; none if that is not known.
+    pub(crate) fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
+        let measured = latency.map(|it| it.end_to_end);
+        let measured = measured.filter(|it| it.count > 0);
         Self {
             limit_ms,
-            n_frames,
-            p99_ms: end_to_end["p99_ms"].as_f64().filter(|_| n_frames > 0),
-            table: table(latency),
+            n_frames: measured.map_or(0, |it| it.count),
+            p99_ms: measured.map(|it| it.p99_ms),
+            table: latency.map_or_else(String::new, table),
         }
     }
 
@@ -80,30 +81,25 @@ impl Budget {
 }
 
 /// Percentiles of every stage and of the whole, with a title; empty where nothing was measured.
-///
-/// * `latency`: as the recorder wrote it.
-pub(crate) fn table(latency: &Value) -> String {
-    let rows = ["capture", "pose", "quality", "fuse", "triangulate"];
-    let stages = rows.map(|it| (it, &latency["stages"][it]));
-    let whole = ("end to end", &latency["end_to_end"]);
-    let keys = ["p50_ms", "p99_ms", "p99_9_ms", "max_ms"];
+pub(crate) fn table(latency: &LatencyReport) -> String {
     let mut text = String::new();
-    for (name, it) in stages.into_iter().chain([whole]) {
-        if it["count"].as_u64().unwrap_or(0) == 0 {
-            continue;
-        }
+    for (name, it) in rows(latency).filter(|(_, it)| it.count > 0) {
         if text.is_empty() {
             let titles = ["p50", "p99", "p99.9", "max"];
             row(&mut text, "  latency, ms", titles.map(str::to_owned));
         }
-        let cells = keys.map(|key| {
-            it[key]
-                .as_f64()
-                .map_or("-".to_owned(), |it| format!("{it:.1}"))
-        });
+        let times = [it.p50_ms, it.p99_ms, it.p99_9_ms, it.max_ms];
+        let cells = times.map(|ms| format!("{ms:.1}"));
         row(&mut text, &format!("    {name}"), cells);
     }
     text
+}
+
+/// The stages that were measured, in the order of the data, and the whole.
+pub(crate) fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
+    let names = ["capture", "pose", "quality", "fuse", "triangulate"].into_iter();
+    let stages = names.filter_map(|name| Some((name, *latency.stages.get(name)?)));
+    stages.chain([("end to end", latency.end_to_end)])
 }
 
 fn row(text: &mut String, name: &str, cells: [String; 4]) {
@@ -116,16 +112,24 @@ fn row(text: &mut String, name: &str, cells: [String; 4]) {
 mod tests {
     use super::*;
 
-    fn latency(count: u64) -> Value {
-        let it = json!({
-            "count": count, "p50_ms": 20.0, "p99_ms": 50.0, "p99_9_ms": 60.04, "max_ms": 123.0,
-        });
-        json!({ "stages": { "pose": it }, "end_to_end": it })
+    fn latency(count: u64) -> LatencyReport {
+        let end_to_end = Percentiles {
+            count,
+            max_ms: 123.0,
+            p50_ms: 20.0,
+            p99_9_ms: 60.04,
+            p99_ms: 50.0,
+        };
+        LatencyReport {
+            end_to_end,
+            stages: [("pose".to_owned(), end_to_end)].into(),
+            ..LatencyReport::default()
+        }
     }
 
     #[test]
     fn a_run_as_slow_as_it_may_be_holds_its_budget() {
-        let budget = Budget::new(50.0, &latency(100));
+        let budget = Budget::new(50.0, Some(&latency(100)));
         assert!(budget.is_held() && !budget.is_exceeded());
         assert_eq!(
             budget.verdict(),
@@ -135,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_slower_one_misses_it_and_says_where_the_time_went() {
-        let budget = Budget::new(49.9, &latency(100));
+        let budget = Budget::new(49.9, Some(&latency(100)));
         assert!(budget.is_exceeded());
         let expected = "\
 latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
@@ -148,9 +152,9 @@ latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
 
     #[test]
     fn what_was_not_measured_is_neither_held_nor_exceeded() {
-        for latency in [Value::Null, json!({}), latency(0)] {
-            let budget = Budget::new(1e9, &latency);
-            assert!(!budget.is_held() && !budget.is_exceeded(), "{latency}");
+        for latency in [None, Some(LatencyReport::default()), Some(latency(0))] {
+            let budget = Budget::new(1e9, latency.as_ref());
+            assert!(!budget.is_held() && !budget.is_exceeded(), "{latency:?}");
             assert!(budget.complaint().contains("could not be judged"));
             assert_eq!(budget.json()["p99_ms"], Value::Null);
         }

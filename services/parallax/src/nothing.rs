@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
+use runfiles::Summary;
 use runtime::{ExitKind, Failure};
-use serde_json::Value;
 
 use crate::views::ViewReport;
 
@@ -15,13 +15,12 @@ pub(crate) fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
 
 /// Why a run has no result in space, if that is for a reason other than that nobody was to be seen.
 ///
-/// * `summary`: of the recorder.
-pub(crate) fn why(summary: &Value, views: &[ViewReport]) -> Option<String> {
-    let count = |key: &str| summary[key].as_u64().unwrap_or(0);
+/// * `summary`: of the process `results`.
+pub(crate) fn why(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     if views.iter().all(|it| it.frames == 0) {
         return Some("the footage has no frame".to_owned());
     }
-    if count("frames") == 0 {
+    if summary.frames == 0 {
         let views: Vec<String> = views.iter().map(ToString::to_string).collect();
         return Some(format!(
             "no frame got a result ({}); this machine may be too slow for so many views: fewer or smaller \
@@ -30,11 +29,11 @@ pub(crate) fn why(summary: &Value, views: &[ViewReport]) -> Option<String> {
         ));
     }
     let has_people = views.iter().any(|it| it.used > 0);
-    if count("frames_with_pose") == 0 && views.len() > 1 && has_people {
+    if summary.frames_with_pose == 0 && views.len() > 1 && has_people {
         return Some(format!(
             "views show somebody, but none of {} results has a joint in space: see `calib check`, and \
              whether the footage is of one moment",
-            count("frames")
+            summary.frames
         ));
     }
     None
@@ -43,8 +42,6 @@ pub(crate) fn why(summary: &Value, views: &[ViewReport]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-
-    use serde_json::json;
 
     use super::*;
 
@@ -64,7 +61,11 @@ mod tests {
     }
 
     fn why_of(frames: u64, with_pose: u64, views: &[ViewReport]) -> String {
-        let summary = json!({ "frames": frames, "frames_with_pose": with_pose });
+        let summary = Summary {
+            frames,
+            frames_with_pose: with_pose,
+            ..Summary::default()
+        };
         why(&summary, views).unwrap_or_default()
     }
 

@@ -1,6 +1,7 @@
 //! What a user sees of a run: its progress, and at the end what became of it.
 
 mod cameras;
+mod recorded;
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -10,6 +11,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use messages::Refusal;
 use metrics::Reading;
+use runfiles::{CameraFit, LatencyReport, Summary};
 use runtime::ExitKind;
 use serde_json::{Value, json};
 use supervise::{Event, Outcome};
@@ -20,6 +22,8 @@ use crate::nothing;
 use crate::output;
 use crate::plan::Resolved;
 use crate::views::ViewReport;
+
+pub(crate) use recorded::Recorded;
 
 /// Pause between two lines where no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);
@@ -136,8 +140,8 @@ pub(crate) struct Report {
     budget: Option<Budget>,
     /// What every process has said last of its times and counts.
     measured: BTreeMap<String, Value>,
-    /// `summary.json`, as the recorder wrote it; null if it did not.
-    recorded: Value,
+    /// `summary.json`.
+    recorded: Recorded,
 }
 
 impl Report {
@@ -151,10 +155,9 @@ impl Report {
         elapsed: Duration,
     ) -> Self {
         let folder = &resolved.deployment.output;
-        let recorded = std::fs::read_to_string(folder.join("summary.json")).unwrap_or_default();
-        let recorded: Value = serde_json::from_str(&recorded).unwrap_or(Value::Null);
-        let recorded = Some(recorded).filter(|it| it["session"] == session);
-        let recorded = recorded.unwrap_or(Value::Null);
+        let cameras = resolved.deployment.cameras.iter();
+        let cameras: Vec<&str> = cameras.map(|it| it.name.as_str()).collect();
+        let recorded = Recorded::read(folder, session, &cameras);
         let processes = &outcome.processes;
         let given_up = processes
             .iter()
@@ -179,12 +182,12 @@ impl Report {
                 .map(|it| (it.name.clone(), it.counts.refused))
                 .collect(),
             is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
-            views: ViewReport::all(resolved, outcome, &recorded["summary"]),
+            views: ViewReport::all(resolved, outcome, recorded.summary()),
             budget: resolved
                 .deployment
                 .supervise
                 .latency_budget_ms
-                .map(|it| Budget::new(it, &recorded["latency"])),
+                .map(|it| Budget::new(it, recorded.latency())),
             measured: measured(outcome),
             recorded,
         }
@@ -216,26 +219,18 @@ impl Report {
 
     /// Cameras that do not stand where the calibration says.
     pub(crate) fn misplaced(&self) -> Vec<String> {
-        let fits = self.recorded["summary"]["calibration"].as_object();
-        let fits = fits.into_iter().flatten();
-        let suspected = fits.filter(|it| it.1["suspected"] == true);
-        suspected.map(|it| it.0.clone()).collect()
+        let suspected = self.suspected();
+        suspected.map(|(camera, _)| camera.clone()).collect()
     }
 
-    /// Two cameras that look as if each had the footage of the other.
-    fn exchanged(&self) -> Option<&Value> {
-        let found = &self.recorded["summary"]["exchanged"];
-        found.is_object().then_some(found)
+    fn suspected(&self) -> impl Iterator<Item = (&String, &CameraFit)> {
+        let summary = self.recorded.summary().into_iter();
+        let fits = summary.flat_map(|it| &it.calibration);
+        fits.filter(|(_, fit)| fit.suspected)
     }
 
-    /// Cameras that do not see one person where the rig says.
-    fn contradicted(&self) -> Option<&Value> {
-        let found = &self.recorded["summary"]["contradicted"];
-        found.is_object().then_some(found)
-    }
-
-    /// What the recorder wrote about the run; null if it did not.
-    pub(crate) fn recorded(&self) -> &Value {
+    /// What the process `results` wrote about the run.
+    pub(crate) fn recorded(&self) -> &Recorded {
         &self.recorded
     }
 
@@ -254,30 +249,31 @@ impl Report {
         }
     }
 
-    /// Whether views, frames or processes were lost on the way. Of an interrupted run nothing is said.
+    /// Whether views, frames or processes were lost on the way, or it is not known. Of an interrupted run nothing is
+    /// said.
     fn is_degraded(&self) -> bool {
-        let count = |key: &str| self.recorded["summary"][key].as_u64().unwrap_or(0);
-        let lost: &[&str] = if self.is_lossless {
-            &["frames_missed", "frames_not_recorded", "writes_failed"]
-        } else {
-            &["frames_not_recorded", "writes_failed"]
-        };
         !self.interrupted
             && (self.why_nothing().is_some()
                 || !self.given_up.is_empty()
                 || !self.restarts.is_empty()
-                || self.recorded.is_null()
-                || self.exchanged().is_some()
-                || self.contradicted().is_some()
-                || (self.is_lossless && count("frames") < self.n_frames)
-                || lost.iter().any(|it| count(it) > 0)
+                || self.recorded.summary().is_none_or(|it| self.is_lossy(it))
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
+    }
+
+    /// Whether frames were lost, or the cameras contradict each other.
+    fn is_lossy(&self, it: &Summary) -> bool {
+        let is_incomplete = it.frames_missed > 0 || it.frames < self.n_frames;
+        it.exchanged.is_some()
+            || it.contradicted.is_some()
+            || (self.is_lossless && is_incomplete)
+            || it.frames_not_recorded > 0
+            || it.writes_failed > 0
     }
 
     /// Why there is no result in space; nothing is said of an interrupted run.
     fn why_nothing(&self) -> Option<String> {
-        let is_told = !self.interrupted && !self.recorded.is_null();
-        is_told.then(|| nothing::why(&self.recorded["summary"], &self.views))?
+        let summary = self.recorded.summary().filter(|_| !self.interrupted)?;
+        nothing::why(summary, &self.views)
     }
 
     /// For programs.
@@ -299,7 +295,7 @@ impl Report {
             "views": self.views,
             "latency_budget": self.budget.as_ref().map(Budget::json),
             "processes": self.measured,
-            "recorded": self.recorded,
+            "recorded": self.recorded.json(),
         })
     }
 
@@ -324,33 +320,33 @@ impl Report {
             self.name, self.n_frames, self.seconds
         )?;
         writeln!(text, "  results       {}", self.folder)?;
-        let it = &self.recorded["summary"];
-        if self.recorded.is_null() {
-            writeln!(
-                text,
-                "  recorded      nothing: the recorder wrote no summary"
-            )?;
-        } else {
+        if let Some(problem) = self.recorded.problem() {
+            writeln!(text, "  recorded      {problem}")?;
+        }
+        if let Some(it) = self.recorded.summary() {
             writeln!(
                 text,
                 "  3D            {} of {} frames",
-                it["frames_with_pose"], self.n_frames
+                it.frames_with_pose, self.n_frames
             )?;
-            if let Some(px) = it["reprojection_px"].as_f64() {
+            if let Some(px) = it.reprojection_px {
                 writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
             }
-            self.write_views(text)?;
-            self.write_misplaced(text)?;
-            self.write_latency(text)?;
+            self.write_views(text, it)?;
+            self.write_misplaced(text, it)?;
         }
-        writeln!(
-            text,
-            "  lost          {} messages dropped, {} frames missed, {} frames with views missing, {} writes failed",
-            self.n_dropped,
-            it["frames_missed"].as_u64().unwrap_or(0),
-            it["frames_with_views_missing"].as_u64().unwrap_or(0),
-            it["writes_failed"].as_u64().unwrap_or(0),
-        )?;
+        if let Some(latency) = self.recorded.latency() {
+            write_latency(text, latency)?;
+        }
+        write!(text, "  lost          {} messages dropped", self.n_dropped)?;
+        if let Some(it) = self.recorded.summary() {
+            write!(
+                text,
+                ", {} frames missed, {} frames with views missing, {} writes failed",
+                it.frames_missed, it.frames_with_views_missing, it.writes_failed
+            )?;
+        }
+        writeln!(text)?;
         if let Some(budget) = &self.budget {
             writeln!(text, "  budget        {}", budget.verdict())?;
         }
@@ -374,17 +370,12 @@ impl Report {
         Ok(())
     }
 
-    fn write_views(&self, text: &mut String) -> core::fmt::Result {
+    fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {
         if let Some(why) = self.why_nothing() {
             writeln!(text, "  no results    {why}")?;
         }
-        let used = &self.recorded["summary"]["views_used"];
-        let used: Vec<String> = used
-            .as_array()
-            .into_iter()
-            .flatten()
-            .map(|it| format!("{} {}", it[0].as_str().unwrap_or_default(), it[1]))
-            .collect();
+        let used = summary.views_used.iter();
+        let used: Vec<String> = used.map(|(view, n)| format!("{view} {n}")).collect();
         writeln!(text, "  views used    {}", used.join(", "))?;
         for view in self.views.iter().filter(|it| it.used < it.frames) {
             writeln!(text, "    {view}")?;
@@ -392,21 +383,20 @@ impl Report {
         Ok(())
     }
 
-    fn write_misplaced(&self, text: &mut String) -> core::fmt::Result {
-        if let Some(it) = self.exchanged() {
+    fn write_misplaced(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {
+        if let Some(it) = &summary.exchanged {
             text.push_str(&cameras::exchanged(it));
         }
-        if let Some(it) = self.contradicted() {
+        if let Some(it) = &summary.contradicted {
             text.push_str(&cameras::contradicted(it));
         }
-        for camera in self.misplaced() {
-            let it = &self.recorded["summary"]["calibration"][&camera];
-            let px = |key: &str| it[key].as_f64().unwrap_or(f64::NAN);
+        for (camera, fit) in self.suspected() {
+            let px = |it: Option<f64>| it.unwrap_or(f64::NAN);
             writeln!(
                 text,
                 "  calibration   {camera} does not stand where it says: cameras are {:.0} px apart with it, {:.0} px without",
-                px("residual_px"),
-                px("without_px"),
+                px(fit.residual_px),
+                px(fit.without_px),
             )?;
         }
         Ok(())
@@ -443,24 +433,20 @@ impl Report {
             peaks.join(", ")
         )
     }
+}
 
-    fn write_latency(&self, text: &mut String) -> core::fmt::Result {
-        let latency = &self.recorded["latency"];
-        text.push_str(&budget::table(latency));
-        let share = |key: &str| {
-            latency[key]
-                .as_f64()
-                .map(|it| format!("{:.2} %", 100.0 * it))
-        };
-        if let (Some(waiting), Some(transport)) = (share("share_waiting"), share("share_transport"))
-        {
-            writeln!(
-                text,
-                "    of the end-to-end time {waiting} is waiting for busy processes, {transport} transport"
-            )?;
-        }
-        Ok(())
+fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Result {
+    text.push_str(&budget::table(latency));
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    if let (Some(waiting), Some(transport)) = (latency.share_waiting, latency.share_transport) {
+        writeln!(
+            text,
+            "    of the end-to-end time {} is waiting for busy processes, {} transport",
+            percent(waiting),
+            percent(transport)
+        )?;
     }
+    Ok(())
 }
 
 /// What every process has said last of its times and counts; null where that cannot be read.

@@ -4,9 +4,8 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use messages::Status;
-use results::Missing;
+use runfiles::{Missing, Summary};
 use serde::Serialize;
-use serde_json::Value;
 use supervise::{Counts, Outcome};
 
 use crate::plan::Resolved;
@@ -34,14 +33,18 @@ pub(crate) struct ViewReport {
     pub faults: BTreeMap<String, u64>,
     /// Results without this view, by reason.
     #[serde(skip)]
-    pub missing: Vec<(String, u64)>,
+    pub missing: Vec<(Missing, u64)>,
 }
 
 impl ViewReport {
-    /// Puts together what the supervisor and the recorder know.
+    /// Puts together what the supervisor and the process `results` know.
     ///
-    /// * `summary`: of the recorder.
-    pub(crate) fn all(resolved: &Resolved, outcome: &Outcome, summary: &Value) -> Vec<Self> {
+    /// * `summary`: of `results`, if there is one.
+    pub(crate) fn all(
+        resolved: &Resolved,
+        outcome: &Outcome,
+        summary: Option<&Summary>,
+    ) -> Vec<Self> {
         let counts = |process: String| {
             let found = outcome.processes.iter().find(|it| it.name == process);
             found.map_or_else(Counts::default, |it| it.counts)
@@ -55,23 +58,26 @@ impl ViewReport {
     }
 
     /// * `counts`: of its camera and of its pose process.
-    fn new(name: &str, frames: u64, [camera, pose]: [Counts; 2], summary: &Value) -> Self {
-        let missing: Vec<(String, u64)> = summary["views_missing"][name]
-            .as_object()
-            .into_iter()
-            .flatten()
-            .map(|(reason, n)| (reason.clone(), n.as_u64().unwrap_or(0)))
-            .collect();
-        let used = summary["views_present"][name].as_u64().unwrap_or(0);
-        let empty = missing.iter().filter(|it| is_empty(&it.0));
+    fn new(
+        name: &str,
+        frames: u64,
+        [camera, pose]: [Counts; 2],
+        summary: Option<&Summary>,
+    ) -> Self {
+        // Where there is no summary, no frame is known to be used.
+        let reasons = summary.and_then(|it| it.views_missing.get(name));
+        let missing: Vec<(Missing, u64)> = reasons.cloned().into_iter().flatten().collect();
+        let used = summary.and_then(|it| it.views_present.get(name));
+        let used = used.copied().unwrap_or(0);
+        let empty = missing.iter().filter(|it| it.0.is_answer());
         let empty: u64 = empty.map(|it| it.1).sum();
         // The last count of a process that was killed may be missing.
         let answered = pose.n_sent.max(used + empty);
         let passed = (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
-        let of = |reason: &str| missing.iter().find(|it| it.0 == reason);
-        let lost = of(Missing::Lost.reason()).map_or(0, |it| it.1).min(passed);
+        let of = |reason: &str| missing.iter().find(|it| it.0.text() == reason);
+        let lost = of(Missing::PROCESS_LOST).map_or(0, |it| it.1).min(passed);
         let faults = Status::CAMERA_FAULTS.iter();
-        let faults = faults.filter_map(|it| of(it.reason()).cloned()).collect();
+        let faults = faults.filter_map(|it| Some((it.reason().to_owned(), of(it.reason())?.1)));
         Self {
             name: name.to_owned(),
             frames,
@@ -81,27 +87,21 @@ impl ViewReport {
             dropped: passed - lost,
             lost,
             unanswered: frames.saturating_sub(answered + passed),
-            faults,
+            faults: faults.collect(),
             missing,
         }
     }
 
     /// Whether it is missing for a reason that nobody asked for.
     pub(crate) fn is_lost(&self, is_lossless: bool) -> bool {
-        let is_asked_for = |reason: &str| match reason {
-            "no detection" => true,
-            "late" | "dropped" => !is_lossless,
-            _ => false,
+        let is_asked_for = |reason: &Missing| match reason {
+            Missing::Late | Missing::Dropped => !is_lossless,
+            other => other.text() == Status::NO_DETECTION.reason(),
         };
         self.missing
             .iter()
             .any(|(reason, n)| *n > 0 && !is_asked_for(reason))
     }
-}
-
-/// Whether a view that is missing for this reason has answered.
-fn is_empty(reason: &str) -> bool {
-    !["late", "dropped", "process lost", "end of footage"].contains(&reason)
 }
 
 impl fmt::Display for ViewReport {
@@ -128,7 +128,7 @@ impl fmt::Display for ViewReport {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
+    use serde_json::{Value, json};
 
     use super::*;
 
@@ -142,8 +142,13 @@ mod tests {
             n_dropped: 3,
             ..Counts::default()
         };
-        let summary = json!({ "views_present": { "a": 9 }, "views_missing": { "a": missing } });
-        ViewReport::new("a", 20, [camera, pose], &summary)
+        let missing = serde_json::from_value(missing.clone()).unwrap();
+        let summary = Summary {
+            views_present: [("a".to_owned(), 9)].into(),
+            views_missing: [("a".to_owned(), missing)].into(),
+            ..Summary::default()
+        };
+        ViewReport::new("a", 20, [camera, pose], Some(&summary))
     }
 
     #[test]

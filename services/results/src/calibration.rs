@@ -4,45 +4,9 @@ use std::collections::BTreeMap;
 
 use geometry::{RigWatch, SwapWatch};
 use messages::Status;
-use serde::Serialize;
+use runfiles::{CameraFit, Contradicted, Exchanged};
 
 use crate::{FrameRecord, Scene};
-
-/// How well a camera fits the others, over the last frames.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct CameraFit {
-    /// How far apart cameras see the same parts if it is one of them, pixels of its footage; unknown of
-    /// fewer than three cameras, and while too little was seen.
-    pub residual_px: Option<f64>,
-    /// The same of the others without it.
-    pub without_px: Option<f64>,
-    /// Whether it was found, at any time of the run, not to stand where the calibration says.
-    pub suspected: bool,
-}
-
-/// Two cameras that look as if each had the footage of the other.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Exchanged {
-    /// The two.
-    pub cameras: [String; 2],
-    /// By how much rays to the same part miss each other as it is, degrees: the median.
-    pub degrees: f64,
-    /// The same with the two exchanged.
-    pub exchanged_degrees: f64,
-    /// Whether it is these two: of cameras in a ring others may fit almost as well.
-    pub sure: bool,
-}
-
-/// Cameras that do not see one person where the rig says.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Contradicted {
-    /// By how much rays to the same part miss each other, degrees: the median.
-    pub degrees: f64,
-    /// What is usual at most, degrees.
-    pub usual_degrees: f64,
-    /// The two cameras whose exchange fits best, if any fits better.
-    pub likely: Option<[String; 2]>,
-}
 
 /// Follows all cameras over a run.
 #[derive(Debug)]

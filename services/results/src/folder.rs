@@ -4,7 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use runfiles::RunSummary;
 
 /// The file that says that a folder of pictures was made by a run.
 const MARK: &str = ".parallax";
@@ -55,9 +55,8 @@ impl Folder {
 
     /// Whether a run has left all its files there under their final names.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
-        let text = fs::read_to_string(dir.join("summary.json")).unwrap_or_default();
-        let value: Value = serde_json::from_str(&text).unwrap_or_default();
-        value["session"] == session
+        let text = fs::read_to_string(dir.join(RunSummary::FILE)).unwrap_or_default();
+        RunSummary::parse_session(&text) == Ok(session)
     }
 
     /// Begins a file.

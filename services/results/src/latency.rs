@@ -4,46 +4,12 @@ use std::collections::BTreeMap;
 
 use hdrhistogram::{CreationError, Histogram};
 use messages::{Status, Timing};
-use serde::Serialize;
+use runfiles::{LatencyReport, Percentiles};
 
 use crate::FrameRecord;
 
 /// Longest duration told apart, microseconds: an hour.
 const LONGEST_MICROS: u64 = 3_600_000_000;
-
-/// Percentiles of one duration, milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Percentiles {
-    /// How many were measured.
-    pub count: u64,
-    /// Half are shorter.
-    pub p50_ms: f64,
-    /// 99 of 100 are shorter.
-    pub p99_ms: f64,
-    /// 999 of 1000 are shorter; the longest where fewer were measured.
-    pub p99_9_ms: f64,
-    /// The longest.
-    pub max_ms: f64,
-}
-
-/// What became of the time, over all frames.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Report {
-    /// Computing time of every stage.
-    pub stages: BTreeMap<&'static str, Percentiles>,
-    /// From sent to received, the receiver being free: what the transport costs.
-    pub transport: BTreeMap<&'static str, Percentiles>,
-    /// From sent to received while the receiver was still busy with something earlier.
-    pub waiting: BTreeMap<&'static str, Percentiles>,
-    /// From capture to the result.
-    pub end_to_end: Percentiles,
-    /// Share of the end-to-end time that is not computation on the way that took longest.
-    pub share_not_computation: Option<f64>,
-    /// Share of the end-to-end time that is transport.
-    pub share_transport: Option<f64>,
-    /// Share of the end-to-end time spent waiting for busy processes.
-    pub share_waiting: Option<f64>,
-}
 
 /// Collects durations frame by frame.
 ///
@@ -222,17 +188,17 @@ impl Latency {
     }
 
     /// What became of the time so far.
-    pub fn report(&self) -> Report {
+    pub fn report(&self) -> LatencyReport {
         let of = |kind| {
             let those = self.histograms.iter().filter(move |it| it.0.0 == kind);
             those
                 .filter(|it| !it.1.is_empty())
-                .map(|(key, it)| (key.1, percentiles(it)))
+                .map(|(key, it)| (key.1.to_owned(), percentiles(it)))
                 .collect::<BTreeMap<_, _>>()
         };
         let whole = self.total.end_to_end as f64;
         let share = |nanos: u64| (whole > 0.0).then(|| nanos as f64 / whole);
-        Report {
+        LatencyReport {
             stages: of(Kind::Stage),
             transport: of(Kind::Transport),
             waiting: of(Kind::Waiting),

@@ -32,17 +32,15 @@ mod job;
 mod service;
 mod writer;
 
-pub use calibration::{CameraFit, Contradicted, Exchanged};
 pub use config::Config;
 pub use folder::{Folder, FolderError, remove_pictures};
 pub use frame::{Absent, FrameRecord, Picture, ViewRecord};
 pub use job::Job;
-pub use latency::{Latency, Percentiles, Report};
+pub use latency::Latency;
 pub use missing::Missing;
 pub use output::{Output, OutputError};
 pub use scene::{Scene, View};
 pub use service::run;
-pub use summary::Summary;
 
 #[cfg(test)]
 mod testing;

@@ -22,10 +22,10 @@ impl Missing {
     pub fn reason(self) -> &'static str {
         match self {
             Self::Empty(status) => status.reason(),
-            Self::Late => "late",
-            Self::Dropped => "dropped",
-            Self::Lost => "process lost",
-            Self::Ended => "end of footage",
+            Self::Late => runfiles::Missing::LATE,
+            Self::Dropped => runfiles::Missing::DROPPED,
+            Self::Lost => runfiles::Missing::PROCESS_LOST,
+            Self::Ended => runfiles::Missing::END_OF_FOOTAGE,
         }
     }
 }

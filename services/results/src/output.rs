@@ -4,18 +4,17 @@ use std::fs;
 use std::io;
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
+use runfiles::{
+    FrameLine, LatencyReport, Line, RunSummary, Summary, TimesLine, VERSION, ViewLine, ViewSummary,
+};
 
-use crate::latency::Report;
 use crate::lines::Lines;
 use crate::summary::Tally;
 use crate::{
-    Absent, Config, Folder, FolderError, FrameRecord, Latency, Scene, Summary, overlay, pose2d,
-    pose3d, times, trc,
+    Absent, Config, Folder, FolderError, FrameRecord, Latency, Scene, overlay, pose2d, pose3d,
+    times, trc,
 };
 
-const LATENCY: &str = "latency.json";
-const SUMMARY: &str = "summary.json";
 const TRC: &str = "pose3d.trc";
 /// Room that is taken for what is said about the run: several times what sixteen views need.
 const RESERVED_BYTES: usize = 32 << 10;
@@ -65,7 +64,7 @@ impl Output {
         n_workers: usize,
         mut folder: Folder,
     ) -> Result<Self, OutputError> {
-        for name in [LATENCY, SUMMARY] {
+        for name in [LatencyReport::FILE, RunSummary::FILE] {
             folder.reserve(name, RESERVED_BYTES)?;
         }
         let mut lines =
@@ -74,8 +73,8 @@ impl Output {
         if pose3d_csv.is_empty() {
             pose3d_csv.append(&format!("{}\n", pose3d::CSV_HEADER))?;
         }
-        let (pose3d_jsonl, pose2d_jsonl) = (lines("pose3d.jsonl")?, lines("pose2d.jsonl")?);
-        let times_jsonl = lines("times.jsonl")?;
+        let (pose3d_jsonl, pose2d_jsonl) = (lines(FrameLine::FILE)?, lines(ViewLine::FILE)?);
+        let times_jsonl = lines(TimesLine::FILE)?;
         let trc_rows = if config.trc { Some(lines(TRC)?) } else { None };
         let overlays = if config.overlay_every > 0 {
             Some(folder.folder("overlays")?)
@@ -91,7 +90,7 @@ impl Output {
             overlays,
             epipolar_part: config.epipolar_part.saturating_sub(1),
             latency: Latency::new(n_workers)?,
-            tally: Tally::resume(&scene, &folder.part("pose3d.jsonl")),
+            tally: Tally::resume(&scene, &folder.part(FrameLine::FILE)),
             scene,
             folder,
         })
@@ -131,7 +130,7 @@ impl Output {
         let rows = pose3d::csv_rows(scene, &nothing);
         let row = trc::row(scene, self.tally.n_lines(), &nothing);
         let outcomes = [
-            self.pose3d_jsonl.append(&format!("{line}\n")),
+            append(&mut self.pose3d_jsonl, [line]),
             self.pose3d_csv.append(&rows),
             self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
         ];
@@ -146,15 +145,14 @@ impl Output {
         self.tally.add(&self.scene, record);
         self.latency.add(record);
         let (scene, pose) = (&self.scene, &record.pose3d);
-        let line = pose3d::json_line(scene, record);
+        let line = pose3d::line(scene, record);
         let rows = pose3d::csv_rows(scene, pose);
-        let lines = pose2d::json_lines(scene, record);
         let row = trc::row(scene, self.tally.n_lines(), pose);
         let outcomes = [
-            self.pose3d_jsonl.append(&format!("{line}\n")),
+            append(&mut self.pose3d_jsonl, [line]),
             self.pose3d_csv.append(&rows),
-            self.pose2d_jsonl.append(&lines),
-            self.times_jsonl.append(&times::json_line(scene, record)),
+            append(&mut self.pose2d_jsonl, pose2d::lines(scene, record)),
+            append(&mut self.times_jsonl, [times::line(scene, record)]),
             self.trc_rows.as_mut().map_or(Ok(()), |it| it.append(&row)),
         ];
         for outcome in outcomes {
@@ -207,12 +205,9 @@ impl Output {
             }
             self.note(outcome);
         }
-        let outcome = serde_json::to_value(&report).map_err(io::Error::from);
-        let outcome = outcome.and_then(|it| self.folder.fill(LATENCY, &format!("{it:#}\n")));
-        self.note(outcome);
-        let whole = self.whole(&self.summary(), &report, session);
-        let outcome = self.folder.fill(SUMMARY, &format!("{whole:#}\n"));
-        self.note(outcome);
+        self.fill(LatencyReport::FILE, report.to_text());
+        let whole = self.whole(self.summary(), report, session);
+        self.fill(RunSummary::FILE, whole.to_text());
         for error in self.folder.finish() {
             let is_first = self.tally.failed(&error);
             tracing::error!(%error, is_first, "a file keeps the name of a part");
@@ -234,29 +229,33 @@ impl Output {
         fs::rename(&headed, &path)
     }
 
-    fn whole(&self, summary: &Summary, report: &Report, session: u64) -> Value {
-        let views: Vec<Value> = self
-            .scene
-            .views
-            .iter()
-            .map(|it| {
-                json!({
-                    "name": it.name,
-                    "frame_size": it.framing.out_size(),
-                    "source_from_frame": it.framing.source_from_output(),
-                })
-            })
-            .collect();
-        json!({
-            "schema_version": 1,
-            "session": session,
-            "summary": summary,
-            "latency": report,
-            "views": views,
-            "joints": self.scene.joints.name,
-            "frame_rate_hz": self.scene.frame_rate_hz,
-            "trc_axes": if self.scene.up_in_world.is_some() { "y up" } else { "the world's: the rig does not say which way is up" },
-        })
+    fn fill(&mut self, name: &str, text: Result<String, serde_json::Error>) {
+        let outcome = text.map_err(io::Error::from);
+        let outcome = outcome.and_then(|text| self.folder.fill(name, &text));
+        self.note(outcome);
+    }
+
+    fn whole(&self, summary: Summary, latency: LatencyReport, session: u64) -> RunSummary {
+        let scene = &self.scene;
+        let views = scene.views.iter().map(|it| ViewSummary {
+            frame_size: it.framing.out_size(),
+            name: it.name.clone(),
+            source_from_frame: it.framing.source_from_output(),
+        });
+        let axes = match scene.up_in_world {
+            Some(_) => "y up",
+            None => "the world's: the rig does not say which way is up",
+        };
+        RunSummary {
+            frame_rate_hz: scene.frame_rate_hz,
+            joints: scene.joints.name.to_owned(),
+            latency,
+            schema_version: VERSION,
+            session,
+            summary,
+            trc_axes: axes.to_owned(),
+            views: views.collect(),
+        }
     }
 
     /// Reports the first failure, counts all.
@@ -269,9 +268,19 @@ impl Output {
     }
 }
 
+/// Appends lines, all or none.
+fn append<L: Line>(file: &mut Lines, lines: impl IntoIterator<Item = L>) -> io::Result<()> {
+    let mut text = String::new();
+    for line in lines {
+        text += &runfiles::to_line(&line)?;
+    }
+    file.append(&text)
+}
+
 #[cfg(test)]
 mod tests {
     use messages::{Searched, Status};
+    use serde_json::{Value, json};
 
     use super::*;
     use crate::Missing;
@@ -351,9 +360,9 @@ mod tests {
             searched(4, Searched::TRACKED, 300),
             without,
         ]);
-        let of_right = [("full", 1), ("tracked", 2)];
+        let of_right = [("full".to_owned(), 1), ("tracked".to_owned(), 2)];
         assert_eq!(summary.searches["right"], of_right.into());
-        assert_eq!(summary.searches["left"], [("full", 4)].into());
+        assert_eq!(summary.searches["left"], [("full".to_owned(), 4)].into());
         assert_eq!(summary.evidence_bytes_per_frame["right"], 500);
         let text = text(&dir, "pose2d.jsonl");
         let lines = text

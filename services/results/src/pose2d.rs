@@ -1,98 +1,99 @@
 //! `pose2d.jsonl`: every view, before and after fusion, in pixels of the footage.
 
 use messages::{FusedView, MAX_PARTS, Status};
-use serde_json::{Value, json};
+use runfiles::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 
+use crate::scene::View;
 use crate::{FrameRecord, Scene};
 
-/// The lines of one frame, one a view, each with its end.
+/// The lines of one frame, one a view.
 ///
 /// `single` names parts as the model does, by the side of the image; `fused` by the side of the body:
 /// the two differ where `facing` is `behind`. Types and levels count from 1, as in the reference.
 ///
 /// `sigma_px` is what was predicted for this frame. `sigma_used` is what fusion had of the view in time:
-/// 0 the same, n what was predicted n frames before, `null` nothing, and every part counted as usable.
-pub(crate) fn json_lines(scene: &Scene, record: &FrameRecord) -> String {
-    (0..scene.views.len())
-        .map(|view| format!("{}\n", line(scene, record, view)))
-        .collect::<Vec<_>>()
-        .concat()
+/// 0 the same, n what was predicted n frames before, none nothing, and every part counted as usable.
+pub(crate) fn lines(scene: &Scene, record: &FrameRecord) -> impl Iterator<Item = ViewLine> {
+    (0..scene.views.len()).map(|view| line(scene, record, view))
 }
 
-fn line(scene: &Scene, record: &FrameRecord, view: usize) -> Value {
+fn line(scene: &Scene, record: &FrameRecord, view: usize) -> ViewLine {
     let pose = &record.pose3d;
     let it = &scene.views[view];
     let fused = pose
         .views
         .get(view)
-        .filter(|_| view < pose.n_views as usize);
-    let status = record.views.get(view).and_then(|it| it.pose.as_ref());
-    let sigma = record.sigma_px(scene, view).map(|sigma| {
-        let scale = it.source_scale();
-        sigma
-            .iter()
-            .map(|px| f64::from(*px) * scale)
-            .collect::<Vec<_>>()
-    });
-    json!({
-        "frame": pose.stamp.frame,
-        "time_s": scene.time_s(pose.stamp.frame),
-        "view": it.name,
-        "status": status.map_or("nothing came", |it| it.status.reason()),
-        "search": status.filter(|it| it.status == Status::OK).map(|it| it.searched.name()),
-        "facing": fused.filter(|it| it.status == Status::OK).map(facing),
-        "single": single(scene, record, view),
-        "fused": fused.filter(|it| it.status == Status::OK).map(|fused| {
-            let n = (fused.n_parts as usize).min(MAX_PARTS);
-            let centres = fused.centres_px[..n].iter().map(|at| it.in_source(*at));
-            json!({
-                "energy": fused.energy,
-                "pairs": fused.n_pairs,
-                "parts": centres.map(|[x, y]| json!({ "x": x, "y": y })).collect::<Vec<_>>(),
-            })
-        }),
-        "sigma_px": sigma,
-        "sigma_used": record.sigma_used(view),
-    })
-}
-
-fn facing(view: &FusedView) -> &'static str {
-    if view.exchanged == 1 {
-        "behind"
-    } else {
-        "front"
+        .filter(|fused| view < pose.n_views as usize && fused.status == Status::OK);
+    let answer = record.views.get(view).and_then(|it| it.pose.as_ref());
+    let status = answer.map_or("nothing came", |it| it.status.reason());
+    let search = answer.filter(|it| it.status == Status::OK);
+    let scale = it.source_scale();
+    let sigma = record.sigma_px(scene, view);
+    ViewLine {
+        facing: fused.map(facing),
+        frame: pose.stamp.frame,
+        fused: fused.map(|fused| fused_pose(it, fused)),
+        search: search.map(|it| it.searched.name().to_owned()),
+        sigma_px: sigma.map(|sigma| sigma.iter().map(|px| f64::from(*px) * scale).collect()),
+        sigma_used: record.sigma_used(view),
+        single: single(scene, record, view),
+        status: status.to_owned(),
+        time_s: scene.time_s(pose.stamp.frame),
+        view: it.name.clone(),
     }
 }
 
-fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Value {
+fn facing(view: &FusedView) -> Facing {
+    if view.exchanged == 1 {
+        Facing::Behind
+    } else {
+        Facing::Front
+    }
+}
+
+fn fused_pose(view: &View, fused: &FusedView) -> FusedPose {
+    let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
+    let centres = fused.centres_px[..n_parts].iter();
+    let centres = centres.map(|at| view.in_source(*at).map(finite));
+    FusedPose {
+        energy: finite(fused.energy),
+        pairs: fused.n_pairs,
+        parts: centres.map(|[x, y]| Part { x, y }).collect(),
+    }
+}
+
+fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Option<SinglePose> {
     let candidates = record.candidates(scene, view);
-    let Some(best) = candidates.first() else {
-        return Value::Null;
-    };
+    let best = candidates.first()?;
     let it = &scene.views[view];
-    let parts: Vec<Value> = (0..best.parts.len())
-        .map(|part| {
-            let [x, y] = it.in_source(best.centre(&scene.model, &it.layout, part));
-            json!({ "x": x, "y": y, "type": best.parts[part].mixture + 1 })
-        })
-        .collect();
-    json!({
-        "score": best.score,
-        "level": best.level + 1,
-        "candidates": candidates.len(),
-        "parts": parts,
+    let part = |part: usize| {
+        let centre = best.centre(&scene.model, &it.layout, part);
+        let [x, y] = it.in_source(centre).map(finite);
+        let part_type = u64::from(best.parts[part].mixture) + 1;
+        TypedPart { part_type, x, y }
+    };
+    Some(SinglePose {
+        candidates: candidates.len() as u64,
+        level: u64::from(best.level) + 1,
+        parts: (0..best.parts.len()).map(part).collect(),
+        score: finite(f64::from(best.score)),
     })
+}
+
+fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|it| it.is_finite())
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::{Value, json};
+
     use super::*;
     use crate::testing::{record, scene};
 
     fn lines(record: &FrameRecord) -> Vec<Value> {
-        json_lines(&scene(), record)
-            .lines()
-            .map(|it| serde_json::from_str(it).unwrap())
+        super::lines(&scene(), record)
+            .map(|line| serde_json::to_value(line).unwrap())
             .collect()
     }
 

@@ -4,12 +4,9 @@ use std::collections::BTreeMap;
 
 use bytemuck::Zeroable as _;
 use messages::{Joint3d, Pose3d, Status};
-use serde_json::{Map, Value, json};
+use runfiles::{FrameLine, JointLine, PlacedJoint};
 
 use crate::{Absent, FrameRecord, Scene};
-
-/// Status of a frame without a result.
-pub(crate) const NO_RESULT: &str = "no result";
 
 /// First line of `pose3d.csv`; one row a joint follows, empty where there is no position.
 pub(crate) const CSV_HEADER: &str = "frame,time_s,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
@@ -34,50 +31,59 @@ pub(crate) fn is_placed(joint: &Joint3d) -> bool {
     joint.status == Status::OK && joint.in_world.iter().all(|it| it.is_finite())
 }
 
-/// One line of `pose3d.jsonl`, without its end.
-pub(crate) fn json_line(scene: &Scene, record: &FrameRecord) -> String {
+/// The line of a result.
+pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
     let pose = &record.pose3d;
-    let joints: Map<String, Value> = joints(scene, pose)
-        .map(|(name, it)| (name.to_owned(), joint(scene, it)))
-        .collect();
-    json!({
-        "frame": pose.stamp.frame,
-        "time_s": scene.time_s(pose.stamp.frame),
-        "status": pose.status.reason(),
-        "views_present": scene.names(pose.views_present),
-        "views_missing": missing(scene, record),
-        "views_used": scene.names(pose.views_used),
-        "pairs": pose.n_pairs,
-        "facing_margin": pose.facing_margin,
-        "joints": joints,
-    })
-    .to_string()
+    let joints = joints(scene, pose);
+    let missing = missing(scene, record).into_iter();
+    FrameLine {
+        facing_margin: finite(pose.facing_margin),
+        frame: pose.stamp.frame,
+        joints: joints
+            .map(|(name, it)| (name.to_owned(), joint(scene, it)))
+            .collect(),
+        pairs: pose.n_pairs,
+        reason: None,
+        status: pose.status.reason().to_owned(),
+        time_s: scene.time_s(pose.stamp.frame),
+        views_missing: missing
+            .map(|(name, reason)| (name.to_owned(), reason.into()))
+            .collect(),
+        views_present: owned(scene.names(pose.views_present)),
+        views_used: owned(scene.names(pose.views_used)),
+    }
 }
 
-/// The line of a frame that has no result: the reason, and what every view has to say for itself.
-pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> String {
+/// The line of a frame that has no result: the reason, and why every view has no part in it.
+pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
     let views = scene.views.iter().enumerate();
     let why = |view: usize| {
         it.views
             .get(view)
             .map_or(it.reason.as_str(), |it| it.reason())
     };
-    let missing: BTreeMap<&str, &str> = views
-        .map(|(view, it)| (it.name.as_str(), why(view)))
-        .collect();
-    json!({
-        "frame": it.frame,
-        "time_s": scene.time_s(it.frame),
-        "status": NO_RESULT,
-        "reason": it.reason,
-        "views_present": [],
-        "views_missing": missing,
-        "views_used": [],
-        "pairs": 0,
-        "facing_margin": null,
-        "joints": {},
-    })
-    .to_string()
+    FrameLine {
+        facing_margin: None,
+        frame: it.frame,
+        joints: BTreeMap::new(),
+        pairs: 0,
+        reason: Some(it.reason.clone()),
+        status: FrameLine::NO_RESULT.to_owned(),
+        time_s: scene.time_s(it.frame),
+        views_missing: views
+            .map(|(view, it)| (it.name.clone(), why(view).into()))
+            .collect(),
+        views_present: Vec::new(),
+        views_used: Vec::new(),
+    }
+}
+
+fn owned(names: Vec<&str>) -> Vec<String> {
+    names.into_iter().map(str::to_owned).collect()
+}
+
+fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|it| it.is_finite())
 }
 
 /// A result without any joint, for the files that have rows of numbers.
@@ -103,16 +109,16 @@ pub(crate) fn missing<'a>(
         .collect()
 }
 
-/// Numbers that are none become `null` in JSON, never `NaN`.
-fn joint(scene: &Scene, it: &Joint3d) -> Value {
+fn joint(scene: &Scene, it: &Joint3d) -> JointLine {
     if !is_placed(it) {
-        return json!({ "status": it.status.reason() });
+        let status = it.status.reason().to_owned();
+        return JointLine::Missing { status };
     }
-    json!({
-        "position_m": it.in_world,
-        "covariance_m2": it.covariance,
-        "reprojection_px": it.reprojection_px,
-        "views": scene.names(it.views_used),
+    JointLine::Placed(PlacedJoint {
+        covariance_m2: it.covariance,
+        position_m: it.in_world,
+        reprojection_px: finite(it.reprojection_px),
+        views: owned(scene.names(it.views_used)),
     })
 }
 
@@ -152,6 +158,8 @@ fn cell(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::{Value, json};
+
     use super::*;
     use crate::Missing;
     use crate::testing::{pose3d, record, scene};
@@ -162,7 +170,7 @@ mod tests {
         record.pose3d.views_present = 0b10;
         record.pose3d.views_used = 0b10;
         record.views[0].missing = Some(Missing::Lost);
-        let line: Value = serde_json::from_str(&json_line(&scene(), &record)).unwrap();
+        let line: Value = serde_json::to_value(line(&scene(), &record)).unwrap();
         assert_eq!(line["frame"], 7);
         assert_eq!(line["views_present"], json!(["right"]));
         assert_eq!(line["views_missing"], json!({ "left": "process lost" }));
@@ -177,7 +185,7 @@ mod tests {
         pose.facing_margin = f64::INFINITY;
         pose.joints[0].reprojection_px = f64::NAN;
         pose.joints[1].in_world[2] = f64::NAN;
-        let text = json_line(&scene(), &record);
+        let text = runfiles::to_line(&line(&scene(), &record)).unwrap();
         let line: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(
             line["joints"]["right ankle"]["reprojection_px"],

@@ -5,53 +5,11 @@ use std::fs;
 use std::path::Path;
 
 use messages::Status;
-use serde::Serialize;
-use serde_json::Value;
+use runfiles::{FrameLine, Missing, Summary};
 
 use crate::calibration::Calibration;
-use crate::pose3d::{NO_RESULT, is_placed, joints, missing};
-use crate::{CameraFit, Contradicted, Exchanged, FrameRecord, Scene};
-
-/// What was seen and what was missed, over the whole run.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Summary {
-    /// Results that were received.
-    pub frames: u64,
-    /// Of these with a skeleton.
-    pub frames_with_pose: u64,
-    /// Of these without every view of the rig.
-    pub frames_with_views_missing: u64,
-    /// How many results every view has a part in, by name.
-    pub views_present: BTreeMap<String, u64>,
-    /// Of how many results every view is missing, by name, for every reason.
-    pub views_missing: BTreeMap<String, BTreeMap<String, u64>>,
-    /// How often every view was used, by name.
-    pub views_used: Vec<(String, u64)>,
-    /// How many frames of every view were searched in full and how many near the last pose only, by
-    /// name; since the recorder was started last.
-    pub searches: BTreeMap<String, BTreeMap<&'static str, u64>>,
-    /// Evidence that a view handed on in shared memory, mean bytes per frame, by name; since the
-    /// recorder was started last.
-    pub evidence_bytes_per_frame: BTreeMap<String, u64>,
-    /// Root mean square reprojection error over all joints, pixels of the frame.
-    pub reprojection_px: Option<f64>,
-    /// How well every camera fits the others, by name; since the recorder was started last.
-    pub calibration: BTreeMap<String, CameraFit>,
-    /// Two cameras that look as if each had the footage of the other.
-    pub exchanged: Option<Exchanged>,
-    /// Cameras that do not see one person where the rig says, for another reason or one that is not clear.
-    pub contradicted: Option<Contradicted>,
-    /// Frames of all views that the cameras' side dropped.
-    pub frames_dropped_by_capture: u64,
-    /// Frames without a result; each has a line that says why.
-    pub frames_missed: u64,
-    /// Results that came but were not written, because writing was too slow.
-    pub frames_not_recorded: u64,
-    /// Writes that failed.
-    pub writes_failed: u64,
-    /// The first of those failures.
-    pub first_failure: Option<String>,
-}
+use crate::pose3d::{is_placed, joints, missing};
+use crate::{FrameRecord, Scene};
 
 /// Counts frame by frame.
 #[derive(Debug)]
@@ -93,32 +51,23 @@ impl Tally {
     pub(crate) fn resume(scene: &Scene, file: &Path) -> Self {
         let mut tally = Self::new(scene);
         let text = fs::read_to_string(file).unwrap_or_default();
-        for line in text.lines() {
-            if let Ok(value) = serde_json::from_str::<Value>(line) {
-                tally.line(scene, &value);
-            }
+        for line in runfiles::lines(&text).flatten() {
+            tally.line(scene, &line);
         }
         tally
     }
 
-    fn line(&mut self, scene: &Scene, value: &Value) {
-        let Some(frame) = value["frame"].as_u64() else {
-            return;
-        };
-        let used = value["views_used"].as_array();
-        let is_used = |name: &str| used.is_some_and(|it| it.iter().any(|it| *it == name));
-        let missing = value["views_missing"].as_object();
-        let why = |name: &str| missing.and_then(|it| it.get(name)).and_then(Value::as_str);
-        if value["status"] == NO_RESULT {
-            return self.without(frame);
+    fn line(&mut self, scene: &Scene, line: &FrameLine) {
+        if !line.has_result() {
+            return self.without(line.frame);
         }
-        self.frame(scene, frame, value["status"] == Status::OK.reason());
+        let is_used = |name: &str| line.views_used.iter().any(|used| used == name);
+        let why = |name: &str| line.views_missing.get(name).map(Missing::text);
+        self.frame(scene, line.frame, line.has_pose());
         self.views(&is_used, &why);
-        let joints = value["joints"].as_object();
-        for joint in joints.into_iter().flat_map(|it| it.values()) {
-            if let Some(px) = joint["reprojection_px"].as_f64() {
-                self.pixels(px);
-            }
+        let placed = line.joints.values().filter_map(|joint| joint.placed());
+        for px in placed.filter_map(|joint| joint.reprojection_px) {
+            self.pixels(px);
         }
     }
 
@@ -158,7 +107,7 @@ impl Tally {
             *n += 1;
             let summary = &mut self.summary;
             let of_view = summary.searches.entry(view.name.clone()).or_default();
-            *of_view.entry(pose.searched.name()).or_default() += 1;
+            *of_view.entry(pose.searched.name().to_owned()).or_default() += 1;
             let mean = *bytes / *n;
             summary
                 .evidence_bytes_per_frame
@@ -186,7 +135,7 @@ impl Tally {
             };
             n_missing += 1;
             let reasons = summary.views_missing.entry(name.clone()).or_default();
-            *reasons.entry(reason.to_owned()).or_default() += 1;
+            *reasons.entry(reason.into()).or_default() += 1;
         }
         summary.frames_with_views_missing += u64::from(n_missing > 0);
         for (name, count) in &mut summary.views_used {

@@ -1,43 +1,36 @@
 //! `times.jsonl`: when every frame was taken, answered and turned into a result, and by which life of a process.
 
 use messages::Status;
-use serde_json::{Map, Value, json};
+use runfiles::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 
 use crate::{FrameRecord, Scene};
 
-/// One line of `times.jsonl`, with its end: milliseconds since the run was planned (`CLOCK_MONOTONIC`).
-///
-/// A view is null if nothing of it came; `epoch` counts the restarts of the process that sent. What differs
-/// from run to run stands here and in no other file of lines.
-pub(crate) fn json_line(scene: &Scene, record: &FrameRecord) -> String {
+/// The line of a frame. What differs from run to run stands here and in no other file of lines.
+pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> TimesLine {
     let pose = &record.pose3d;
-    let views = scene.views.iter().zip(&record.views);
     let ms = |nanos: u64| milliseconds(nanos, pose.stamp.session);
-    let views: Map<String, Value> = views
-        .map(|(view, it)| {
-            let camera = it.frame.filter(|it| it.status == Status::OK).map(|it| {
-                json!({
-                    "epoch": it.stamp.epoch,
-                    "captured_ms": ms(it.stamp.captured_at_nanos),
-                    "sent_ms": ms(it.timing.sent_at_nanos),
-                })
-            });
-            let answer = it.pose.map(
-                |it| json!({ "epoch": it.stamp.epoch, "sent_ms": ms(it.timing.sent_at_nanos) }),
-            );
-            (
-                view.name.clone(),
-                json!({ "camera": camera, "pose": answer }),
-            )
-        })
-        .collect();
-    let line = json!({
-        "frame": record.frame(),
-        "epoch": pose.stamp.epoch,
-        "sent_ms": ms(pose.timing.sent_at_nanos),
-        "views": views,
+    let views = scene.views.iter().zip(&record.views);
+    let views = views.map(|(view, it)| {
+        let camera = it.frame.filter(|it| it.status == Status::OK);
+        let times = ViewTimes {
+            camera: camera.map(|it| CameraTimes {
+                captured_ms: ms(it.stamp.captured_at_nanos),
+                epoch: it.stamp.epoch,
+                sent_ms: ms(it.timing.sent_at_nanos),
+            }),
+            pose: it.pose.map(|it| PoseTimes {
+                epoch: it.stamp.epoch,
+                sent_ms: ms(it.timing.sent_at_nanos),
+            }),
+        };
+        (view.name.clone(), times)
     });
-    format!("{line}\n")
+    TimesLine {
+        epoch: pose.stamp.epoch,
+        frame: record.frame(),
+        sent_ms: ms(pose.timing.sent_at_nanos),
+        views: views.collect(),
+    }
 }
 
 /// Since the beginning; 0 for what was before it.
@@ -48,6 +41,7 @@ fn milliseconds(nanos: u64, since: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use messages::{FrameHeader, Stamp, Timing};
+    use serde_json::{Value, json};
 
     use super::*;
     use crate::testing::{record, scene};
@@ -70,7 +64,7 @@ mod tests {
             ..FrameHeader::default()
         });
         record.views[1].pose = None;
-        let line: Value = serde_json::from_str(&json_line(&scene(), &record)).unwrap();
+        let line: Value = serde_json::to_value(line(&scene(), &record)).unwrap();
         assert_eq!(
             (&line["frame"], &line["sent_ms"]),
             (&json!(7), &json!(40.5))
@@ -89,7 +83,7 @@ mod tests {
             status: Status::NO_FRAME,
             ..FrameHeader::default()
         });
-        let line: Value = serde_json::from_str(&json_line(&scene(), &record)).unwrap();
+        let line: Value = serde_json::to_value(line(&scene(), &record)).unwrap();
         assert_eq!(line["views"]["left"]["camera"], Value::Null);
     }
 }

@@ -7,6 +7,7 @@ use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
 use multiview::Compatibility;
+use runfiles::{FrameLine, LatencyReport, Line, RunSummary, TimesLine, ViewLine};
 use scene::Address;
 use scene::truth::{Frame, Header};
 use training::Checkpoint;
@@ -212,5 +213,33 @@ pub fn scene_text(input: &[u8]) {
                 );
             }
         }
+    }
+}
+
+/// The files that a run leaves behind: what was read is written so that it reads back to the same text.
+pub fn run_files(input: &[u8]) {
+    fn lines<L: Line>(input: &str) {
+        for line in runfiles::lines::<L>(input).flatten() {
+            let written = runfiles::to_line(&line).expect("it was read");
+            let again = runfiles::lines::<L>(&written).next();
+            let again = again.expect("a line").expect("it was written");
+            assert_eq!(runfiles::to_line(&again).expect("it was read"), written);
+        }
+    }
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    lines::<FrameLine>(input);
+    lines::<ViewLine>(input);
+    lines::<TimesLine>(input);
+    if let Ok(run) = RunSummary::parse(input) {
+        let written = run.to_text().expect("it was read");
+        let again = RunSummary::parse(&written).expect("it was written");
+        assert_eq!(again, run);
+    }
+    if let Ok(report) = LatencyReport::parse(input) {
+        let written = report.to_text().expect("it was read");
+        let again = LatencyReport::parse(&written).expect("it was written");
+        assert_eq!(again, report);
     }
 }

@@ -6,7 +6,8 @@ mod messages;
 
 pub use files::{
     calibration, consistency, model_mat, model_own, model_text, motion_c3d, people_lines,
-    people_mat, quality_network, quality_table, scene_text, training_checkpoint, type_table,
+    people_mat, quality_network, quality_table, run_files, scene_text, training_checkpoint,
+    type_table,
 };
 pub use messages::{wire_fusion, wire_messages};
 
@@ -14,7 +15,7 @@ pub use messages::{wire_fusion, wire_messages};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 15] = [
+pub const TARGETS: [Target; 16] = [
     ("calibration", calibration),
     ("consistency", consistency),
     ("model_mat", model_mat),
@@ -25,6 +26,7 @@ pub const TARGETS: [Target; 15] = [
     ("people_mat", people_mat),
     ("quality_network", quality_network),
     ("quality_table", quality_table),
+    ("run_files", run_files),
     ("scene_text", scene_text),
     ("training_checkpoint", training_checkpoint),
     ("type_table", type_table),

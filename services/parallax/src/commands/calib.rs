@@ -7,6 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use geometry::files::{Format, ReadOptions, Unit};
 use geometry::{Camera, Rig, upright_roll};
 use nalgebra::{Point2, UnitVector3, Vector3};
+use runfiles::ViewLine;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
@@ -248,28 +249,18 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
 fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failure> {
     let n_cameras = rig.cameras().len();
     let mut frames = std::collections::BTreeMap::<u64, Vec<Vec<Option<Point2<f64>>>>>::new();
-    for (index, line) in inputs::text(file)?.lines().enumerate() {
-        let value: Value = serde_json::from_str(line).map_err(|error| {
-            Failure::new(
-                ExitKind::Input,
-                format!("{}:{}: {error}", file.display(), index + 1),
-            )
-        })?;
-        let view = value["view"].as_str().unwrap_or_default();
-        let Some(camera) = rig.cameras().iter().position(|it| it.name == view) else {
+    for line in runfiles::lines::<ViewLine>(&inputs::text(file)?) {
+        let line = line.map_err(|error| inputs::in_file(file, &error))?;
+        let Some(camera) = rig.cameras().iter().position(|it| it.name == line.view) else {
             continue;
         };
-        let points = frames
-            .entry(value["frame"].as_u64().unwrap_or(0))
-            .or_default();
-        let parts = value["fused"]["parts"]
-            .as_array()
-            .map_or(&[][..], Vec::as_slice);
-        for (part, it) in parts.iter().enumerate() {
+        let points = frames.entry(line.frame).or_default();
+        let parts = line.fused.iter().flat_map(|it| &it.parts);
+        for (part, it) in parts.enumerate() {
             if points.len() <= part {
                 points.push(vec![None; n_cameras]);
             }
-            let at = it["x"].as_f64().zip(it["y"].as_f64());
+            let at = it.x.zip(it.y);
             points[part][camera] = at.map(|(x, y)| Point2::new(x, y));
         }
     }

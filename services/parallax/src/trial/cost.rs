@@ -121,12 +121,14 @@ fn longest_pause(moments: &[Moment], from: f64, to: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::{Answer, Seen, Shot};
+    use runfiles::{CameraTimes, PoseTimes};
+
+    use super::super::results::Seen;
     use super::*;
 
     /// A result sent at a time; the camera's frame by the life that sent it.
     fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> Moment {
-        let shot = epoch.map(|epoch| Shot {
+        let shot = epoch.map(|epoch| CameraTimes {
             epoch,
             captured_ms: sent_ms - 20.0,
             sent_ms: sent_ms - 10.0,
@@ -139,7 +141,7 @@ mod tests {
             views: vec![Seen {
                 missing: shot.is_none().then(|| "process lost".to_owned()),
                 shot,
-                answer: epoch.map(|epoch| Answer {
+                answer: epoch.map(|epoch| PoseTimes {
                     epoch,
                     sent_ms: sent_ms - 5.0,
                 }),

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use runfiles::{CameraTimes, FrameLine, Line, PoseTimes, TimesLine};
 use runtime::Failure;
-use serde::Deserialize;
 use skeleton::PARSE14;
 
 use super::Point;
@@ -30,27 +30,9 @@ pub(crate) struct Seen {
     /// Why it has no part in the result, if it has none.
     pub missing: Option<String>,
     /// The frame that its camera sent.
-    pub shot: Option<Shot>,
+    pub shot: Option<CameraTimes>,
     /// The answer of its pose process.
-    pub answer: Option<Answer>,
-}
-
-/// An answer of a pose process.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub(crate) struct Answer {
-    /// How often the process had been restarted.
-    pub epoch: u32,
-    /// Milliseconds since the run was planned.
-    pub sent_ms: f64,
-}
-
-/// A frame that a camera sent; milliseconds since the run was planned.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub(crate) struct Shot {
-    /// How often the camera's process had been restarted.
-    pub epoch: u32,
-    pub captured_ms: f64,
-    pub sent_ms: f64,
+    pub answer: Option<PoseTimes>,
 }
 
 impl Moment {
@@ -70,76 +52,60 @@ impl Moment {
 ///
 /// * `cameras`: names, in the order of the rig.
 pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
-    let text = |name: &str| inputs::text(&folder.join(name));
-    let [poses, times] = [text("pose3d.jsonl")?, text("times.jsonl")?];
-    parse(&poses, &times, cameras).map_err(|error| inputs::in_file(folder, &error))
+    let frames: Vec<FrameLine> = lines(folder)?;
+    let times: Vec<TimesLine> = lines(folder)?;
+    Ok(join(&frames, times, cameras))
 }
 
-/// A line of `pose3d.jsonl`.
-#[derive(Debug, Deserialize)]
-struct PoseLine {
-    frame: u64,
-    joints: BTreeMap<String, Joint>,
-    views_missing: BTreeMap<String, String>,
+/// Reads a file of lines.
+fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
+    let file = folder.join(L::FILE);
+    let text = inputs::text(&file)?;
+    let lines = runfiles::lines(&text).collect::<Result<_, _>>();
+    lines.map_err(|error| inputs::in_file(&file, &error))
 }
 
-#[derive(Debug, Deserialize)]
-struct Joint {
-    position_m: Option<Point>,
-}
-
-/// A line of `times.jsonl`.
-#[derive(Debug, Deserialize)]
-struct TimeLine {
-    frame: u64,
-    epoch: u32,
-    sent_ms: f64,
-    views: BTreeMap<String, TimesOfView>,
-}
-
-#[derive(Debug, Deserialize)]
-struct TimesOfView {
-    camera: Option<Shot>,
-    pose: Option<Answer>,
-}
-
-/// Results that stand in one of the two texts only are left out: they were not written.
-fn parse(poses: &str, times: &str, cameras: &[String]) -> Result<Vec<Moment>, serde_json::Error> {
-    let times = times.lines().map(serde_json::from_str::<TimeLine>);
-    let times = times.map(|it| it.map(|it| (it.frame, it)));
-    let times: BTreeMap<u64, TimeLine> = times.collect::<Result<_, _>>()?;
-    let mut moments = Vec::new();
-    for line in poses.lines() {
-        let line: PoseLine = serde_json::from_str(line)?;
-        let Some(time) = times.get(&line.frame) else {
-            continue;
-        };
-        let joint = |name: &str| line.joints.get(name).and_then(|it| it.position_m);
+/// Results that stand in one of the two files only are left out: they were not written.
+fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<Moment> {
+    let times = times.into_iter().map(|it| (it.frame, it));
+    let times: BTreeMap<u64, TimesLine> = times.collect();
+    let both = frames
+        .iter()
+        .filter_map(|it| Some((it, times.get(&it.frame)?)));
+    both.map(|(line, time)| {
+        let joint = |name: &str| Some(line.joints.get(name)?.placed()?.position_m);
         let view = |name: &String| Seen {
-            missing: line.views_missing.get(name).cloned(),
+            missing: line.views_missing.get(name).map(ToString::to_string),
             shot: time.views.get(name).and_then(|it| it.camera),
             answer: time.views.get(name).and_then(|it| it.pose),
         };
-        moments.push(Moment {
+        Moment {
             frame: line.frame,
             epoch: time.epoch,
             sent_ms: time.sent_ms,
             joints: PARSE14.joints.iter().map(|it| joint(it.name)).collect(),
             views: cameras.iter().map(view).collect(),
-        });
-    }
-    Ok(moments)
+        }
+    })
+    .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const POSES: &str = r#"{"frame":4,"joints":{"head":{"position_m":[1.0,2.0,3.0]},"neck":{"status":"too few views"}},"views_missing":{"c2":"late"},"pairs":1}
-{"frame":5,"joints":{},"views_missing":{}}
+    const POSES: &str = r#"{"facing_margin":null,"frame":4,"joints":{"head":{"covariance_m2":[1,0,0,1,0,1],"position_m":[1.0,2.0,3.0],"reprojection_px":1.5,"views":["c1"]},"neck":{"status":"too few views"}},"pairs":1,"status":"ok","time_s":null,"views_missing":{"c2":"late"},"views_present":["c1"],"views_used":["c1"]}
+{"facing_margin":null,"frame":5,"joints":{},"pairs":0,"reason":"late","status":"no result","time_s":null,"views_missing":{},"views_present":[],"views_used":[]}
 "#;
     const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":3,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":{"epoch":2,"sent_ms":20.0}},"c2":{"camera":null,"pose":null}}}
 "#;
+
+    fn parse(poses: &str, times: &str, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("pose3d.jsonl"), poses).unwrap();
+        std::fs::write(folder.path().join("times.jsonl"), times).unwrap();
+        read(folder.path(), cameras)
+    }
 
     #[test]
     fn both_files_say_what_is_known_of_a_frame() {
@@ -162,5 +128,10 @@ mod tests {
     fn a_line_that_is_none_is_an_error() {
         parse("{\"frame\":1", TIMES, &[]).unwrap_err();
         parse(POSES, "x\n", &[]).unwrap_err();
+        let wrong = TIMES.replace("\"epoch\":3", "\"epoch\":-3");
+        let error = parse(POSES, &wrong, &[]).unwrap_err().to_string();
+        for told in ["times.jsonl", "line 1", "`epoch`", "-3"] {
+            assert!(error.contains(told), "{error}");
+        }
     }
 }

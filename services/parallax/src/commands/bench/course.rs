@@ -4,6 +4,7 @@ use core::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::PathBuf;
 
+use runfiles::Percentiles;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 use serde_json::{Value, json};
@@ -269,7 +270,7 @@ impl Course {
 fn measured(case: Case, moments: &[Moment], cpu_seconds: f64, report: &Report) -> Measured {
     let took = |it: &Moment| Some(it.sent_ms - it.captured_ms()?);
     let run = report.json();
-    let stages = &report.recorded()["latency"]["stages"];
+    let stages = report.recorded().latency().map(|it| &it.stages);
     Measured {
         case,
         n_results: moments.len(),
@@ -277,7 +278,7 @@ fn measured(case: Case, moments: &[Moment], cpu_seconds: f64, report: &Report) -
         end_to_end: Spread::of(moments.iter().filter_map(took).collect()),
         stages: STAGES
             .into_iter()
-            .filter_map(|it| Some((it, spread(&stages[it])?)))
+            .filter_map(|it| Some((it, spread(stages?.get(it)?))))
             .collect(),
         cpu_seconds,
         n_dropped: run["dropped"].as_u64().unwrap_or(0),
@@ -292,16 +293,15 @@ fn rate_hz(moments: &[Moment]) -> Option<f64> {
     (last > first).then(|| 1e3 * (moments.len() - 1) as f64 / (last - first))
 }
 
-/// Percentiles as the recorder writes them.
-fn spread(value: &Value) -> Option<Spread> {
-    let ms = |key: &str| value[key].as_f64();
-    Some(Spread {
-        n: value["count"].as_u64()? as usize,
-        p50: ms("p50_ms")?,
-        p99: ms("p99_ms")?,
-        p99_9: ms("p99_9_ms")?,
-        max: ms("max_ms")?,
-    })
+/// Percentiles as they are written.
+fn spread(it: &Percentiles) -> Spread {
+    Spread {
+        n: it.count as usize,
+        p50: it.p50_ms,
+        p99: it.p99_ms,
+        p99_9: it.p99_9_ms,
+        max: it.max_ms,
+    }
 }
 
 /// Leaves the first cameras, and of the settings what speaks of no others.
@@ -333,11 +333,13 @@ fn parse_stat(stat: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use runfiles::CameraTimes;
+
     use super::*;
-    use crate::trial::results::{Seen, Shot};
+    use crate::trial::results::Seen;
 
     fn moment(captured_ms: f64, sent_ms: f64) -> Moment {
-        let shot = Shot {
+        let shot = CameraTimes {
             epoch: 0,
             captured_ms,
             sent_ms: captured_ms + 1.0,
@@ -371,9 +373,14 @@ mod tests {
     }
 
     #[test]
-    fn percentiles_are_read_as_the_recorder_writes_them() {
-        let written =
-            json!({ "count": 3, "p50_ms": 1.0, "p99_ms": 2.0, "p99_9_ms": 3.0, "max_ms": 4.0 });
+    fn percentiles_are_read_as_they_are_written() {
+        let written = Percentiles {
+            count: 3,
+            max_ms: 4.0,
+            p50_ms: 1.0,
+            p99_9_ms: 3.0,
+            p99_ms: 2.0,
+        };
         let expected = Spread {
             n: 3,
             p50: 1.0,
@@ -381,8 +388,7 @@ mod tests {
             p99_9: 3.0,
             max: 4.0,
         };
-        assert_eq!(spread(&written), Some(expected));
-        assert_eq!(spread(&Value::Null), None);
+        assert_eq!(spread(&written), expected);
     }
 
     #[test]

@@ -55,16 +55,20 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     let mut after = ran.aftermath(|_| 0);
     let is_named = after.accused.contains(&camera);
     after.accused.retain(|it| *it != camera);
-    let fits = ran.json()["recorded"]["summary"]["calibration"].clone();
-    let px = |key: &str| {
-        let px = fits[&camera][key].as_f64();
-        px.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.0} px"))
-    };
+    let summary = ran
+        .report
+        .as_ref()
+        .ok()
+        .and_then(|it| it.recorded().summary());
+    let fits = summary.map(|it| &it.calibration);
+    let fit = fits.and_then(|it| it.get(&camera)).copied();
+    let fit = fit.unwrap_or_default();
+    let px = |px: Option<f64>| px.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.0} px"));
     let measured = format!(
         "{camera} turned by {DEGREES} degrees: {}; cameras are {} apart with it, {} without; {} results",
         if is_named { "named" } else { "not named" },
-        px("residual_px"),
-        px("without_px"),
+        px(fit.residual_px),
+        px(fit.without_px),
         after.n_results,
     );
     let named = at_least("it is named", 1.0, Some(f64::from(u8::from(is_named))));

@@ -87,10 +87,11 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use runfiles::CameraTimes;
     use supervise::Event;
 
     use super::*;
-    use crate::trial::results::{Seen, Shot};
+    use crate::trial::results::Seen;
     use crate::trial::strike::Times;
 
     const SECOND: u64 = 1_000_000_000;
@@ -98,7 +99,7 @@ mod tests {
 
     fn moment(captured_s: f64, sent_s: f64) -> Moment {
         let [captured_ms, sent_ms] = [captured_s, sent_s].map(|it| it * 1000.0);
-        let shot = Shot {
+        let shot = CameraTimes {
             epoch: 0,
             captured_ms,
             sent_ms: captured_ms,

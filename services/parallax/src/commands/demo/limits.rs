@@ -55,8 +55,8 @@ pub(super) struct Measured<'a> {
     pub views: &'a [ViewReport],
     /// Processes that ended without being asked to, other than the one that was killed.
     pub failed: &'a [String],
-    /// Results that were not written.
-    pub n_unwritten: u64,
+    /// Results that were not written, if that is known.
+    pub n_unwritten: Option<u64>,
 }
 
 /// Judges a run.
@@ -101,7 +101,7 @@ pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
             Some(unanswered as f64),
         ),
         none_of("processes that failed by themselves", it.failed),
-        at_most("results not written", 0.0, Some(it.n_unwritten as f64)),
+        at_most("results not written", 0.0, it.n_unwritten.map(|n| n as f64)),
     ]);
     limits
 }
@@ -172,7 +172,7 @@ mod tests {
         cost: Option<Cost>,
         views: Vec<ViewReport>,
         failed: Vec<String>,
-        n_unwritten: u64,
+        n_unwritten: Option<u64>,
         slowness: f64,
         spread: f64,
     }
@@ -185,7 +185,7 @@ mod tests {
                 cost: Some(cost()),
                 views: vec![view(1), view(1)],
                 failed: Vec::new(),
-                n_unwritten: 0,
+                n_unwritten: Some(0),
                 slowness: 1.0,
                 spread: 1.0,
             };
@@ -259,7 +259,11 @@ mod tests {
         for (change, expected) in changes {
             assert_eq!(missed(change), [expected]);
         }
-        assert_eq!(missed(|it| it.n_unwritten = 1), ["results not written"]);
+        assert_eq!(
+            missed(|it| it.n_unwritten = Some(1)),
+            ["results not written"]
+        );
+        assert_eq!(missed(|it| it.n_unwritten = None), ["results not written"]);
     }
 
     #[test]

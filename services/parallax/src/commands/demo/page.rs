@@ -4,11 +4,11 @@ use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
 use report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
-use serde_json::Value;
 use skeleton::PARSE14;
 
 use super::report::Report;
 use super::{Run, VICTIM};
+use crate::budget;
 use crate::trial::Point;
 use crate::trial::cost::Cost;
 use crate::trial::results::Moment;
@@ -209,19 +209,12 @@ fn latency(run: &Run<'_>) -> Table {
     let note = "Milliseconds of computing, by stage; end to end is from the capture of a frame to its skeleton in \
                 space, waiting for busy processes included. The cameras draw their pictures, which real ones do not.";
     let mut table = table("Latency", note, ["stage", "frames", "p50", "p99", "max"]);
-    let latency = &run.ran.recorded()["latency"];
-    let stages = ["capture", "pose", "quality", "fuse", "triangulate"]
-        .map(|it| (it, &latency["stages"][it]));
-    let all = stages
-        .into_iter()
-        .chain([("end to end", &latency["end_to_end"])]);
-    let cell = |it: &Value| number(it.as_f64(), 1);
-    table.rows = all
-        .filter(|it| !it.1.is_null())
+    let latency = run.ran.recorded().latency();
+    let rows = latency.into_iter().flat_map(budget::rows);
+    table.rows = rows
         .map(|(name, it)| {
-            let count = it["count"].as_u64().unwrap_or(0).to_string();
-            let times = ["p50_ms", "p99_ms", "max_ms"].map(|key| cell(&it[key]));
-            [vec![name.to_owned(), count], times.into()].concat()
+            let times = [it.p50_ms, it.p99_ms, it.max_ms].map(|ms| number(Some(ms), 1));
+            [vec![name.to_owned(), it.count.to_string()], times.into()].concat()
         })
         .collect();
     table

@@ -46,8 +46,7 @@ impl Report {
             .killed
             .map(|it| Cost::new(Trace::Camera(VICTIM), it, run.session, run.moments));
         let posed = run.moments.iter().filter(|it| it.is_posed()).count();
-        let count = |key: &str| run.ran.recorded()["summary"][key].as_u64();
-        let unwritten = ["writes_failed", "frames_not_recorded"].map(count);
+        let summary = run.ran.recorded().summary();
         let was_killed = cost.as_ref().is_some_and(|it| it.killed_at_ms.is_some());
         let killed = format!("capture-{VICTIM}");
         let measured = Measured {
@@ -62,7 +61,7 @@ impl Report {
             failed: &run
                 .ran
                 .failed_by_themselves(|it| u32::from(was_killed && it == killed)),
-            n_unwritten: unwritten.iter().flatten().sum(),
+            n_unwritten: summary.map(|it| it.writes_failed + it.frames_not_recorded),
         };
         let limits = limits::judge(asked, &measured);
         Self {

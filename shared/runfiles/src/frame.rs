@@ -1,0 +1,122 @@
+//! `pose3d.jsonl`: a line for every frame, its skeleton or why there is none.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Missing;
+use crate::nullable::{nullable, numbers};
+
+/// A line of `pose3d.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameLine {
+    /// By how much the decision which way the person faces was won; none where it was not made.
+    #[serde(deserialize_with = "nullable")]
+    pub facing_margin: Option<f64>,
+    /// Number of the frame in the footage.
+    pub frame: u64,
+    /// The joints, by name; none in a line without a result.
+    pub joints: BTreeMap<String, JointLine>,
+    /// Pairs of views that have a part in the result.
+    pub pairs: u32,
+    /// Why there is no result; only in a line without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// [`FrameLine::OK`], [`FrameLine::NO_RESULT`], or why the result has no skeleton.
+    pub status: String,
+    /// When the frame was taken, seconds after frame 0 of the footage, where its rate is known.
+    #[serde(deserialize_with = "nullable")]
+    pub time_s: Option<f64>,
+    /// The views that have no part in the result.
+    pub views_missing: BTreeMap<String, Missing>,
+    /// The views that have a part in the result.
+    pub views_present: Vec<String>,
+    /// The views that some joint was triangulated from.
+    pub views_used: Vec<String>,
+}
+
+impl FrameLine {
+    /// Status of a frame with a skeleton.
+    pub const OK: &'static str = "ok";
+    /// Status of a frame without a result.
+    pub const NO_RESULT: &'static str = "no result";
+
+    /// Whether there is a result, with a skeleton or without.
+    pub fn has_result(&self) -> bool {
+        self.status != Self::NO_RESULT
+    }
+
+    /// Whether there is a skeleton.
+    pub fn has_pose(&self) -> bool {
+        self.status == Self::OK
+    }
+}
+
+/// A joint of a line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, try_from = "AnyJoint")]
+pub enum JointLine {
+    /// It has a position.
+    Placed(PlacedJoint),
+    /// It has none.
+    Missing {
+        /// Why.
+        status: String,
+    },
+}
+
+/// A joint with a position.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlacedJoint {
+    /// Covariance of the position, square metres: xx, xy, xz, yy, yz, zz. NaN where it is not known.
+    pub covariance_m2: [f64; 6],
+    /// In the world, metres.
+    pub position_m: [f64; 3],
+    /// Root mean square distance to what the views found, pixels of their frames; none where it is not known.
+    pub reprojection_px: Option<f64>,
+    /// The views that it was triangulated from.
+    pub views: Vec<String>,
+}
+
+impl JointLine {
+    /// The joint, if it has a position.
+    pub fn placed(&self) -> Option<&PlacedJoint> {
+        match self {
+            Self::Placed(it) => Some(it),
+            Self::Missing { .. } => None,
+        }
+    }
+}
+
+/// The fields of either kind.
+#[derive(Deserialize)]
+struct AnyJoint {
+    status: Option<String>,
+    covariance_m2: Option<Covariance>,
+    position_m: Option<[f64; 3]>,
+    /// May be null, so that it may not be missing is not checked.
+    reprojection_px: Option<f64>,
+    views: Option<Vec<String>>,
+}
+
+#[derive(Deserialize)]
+struct Covariance(#[serde(deserialize_with = "numbers")] [f64; 6]);
+
+impl TryFrom<AnyJoint> for JointLine {
+    type Error = String;
+
+    fn try_from(any: AnyJoint) -> Result<Self, String> {
+        if let Some(status) = any.status {
+            return Ok(Self::Missing { status });
+        }
+        let missing = |field: &str| {
+            format!("missing field `{field}`, which a joint without `status` must have")
+        };
+        Ok(Self::Placed(PlacedJoint {
+            covariance_m2: any.covariance_m2.ok_or_else(|| missing("covariance_m2"))?.0,
+            position_m: any.position_m.ok_or_else(|| missing("position_m"))?,
+            reprojection_px: any.reprojection_px,
+            views: any.views.ok_or_else(|| missing("views"))?,
+        }))
+    }
+}

@@ -1,0 +1,39 @@
+//! The files that a run leaves behind, as types: written by `results`, read by everything that comes after a run.
+//!
+//! | file | type | one for each |
+//! |---|---|---|
+//! | `pose3d.jsonl` | [`FrameLine`] | frame, with a result or without |
+//! | `pose2d.jsonl` | [`ViewLine`] | view of a frame that has a result |
+//! | `times.jsonl` | [`TimesLine`] | frame that has a result |
+//! | `latency.json` | [`LatencyReport`] | run |
+//! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
+//!
+//! Text in, types out: this crate opens no file. A field that is missing, unknown in its type or out of range is a
+//! [`ReadError`] that names the line and the field; no field has a default. Unknown fields are passed over, so that a
+//! program reads what a later one has written as long as [`VERSION`] is the same.
+//!
+//! Fields are written in alphabetical order, so they are declared in that order.
+#![forbid(unsafe_code)]
+
+mod frame;
+mod latency;
+mod missing;
+mod nullable;
+mod read;
+mod summary;
+mod times;
+mod view;
+
+pub use frame::{FrameLine, JointLine, PlacedJoint};
+pub use latency::{LatencyReport, Percentiles};
+pub use missing::Missing;
+pub use read::{Line, ReadError, lines, to_line};
+pub use summary::{CameraFit, Contradicted, Exchanged, RunSummary, Summary, ViewSummary};
+pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
+pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
+
+/// Version of all files of a run; it rises when a field changes its meaning or is removed.
+pub const VERSION: u64 = 1;
+
+#[cfg(test)]
+mod tests;
