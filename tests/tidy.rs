@@ -11,7 +11,13 @@ use std::process::Command;
 
 /// A crate may depend only on crates in rows above its own.
 const LAYERS: &[&[&str]] = &[
-    &["skeleton"],
+    &[
+        "skeleton",
+        "causes",
+        "checksum",
+        "files",
+        "statistics",
+    ],
     &[
         "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles",
     ],

@@ -6,12 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ::footage::{Fill, Size, Source, SourceSpec, Warp};
-use evaluation::{Trc, percentile};
+use evaluation::Trc;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
 use pipeline::{Combine, Estimator, EstimatorSettings};
 use skeleton::PARSE14;
+use statistics::Sorted;
 
 use crate::shared_dir;
 
@@ -42,7 +43,8 @@ pub(crate) struct Errors {
 
 impl Errors {
     pub(crate) fn median_and_p90(&self) -> [f64; 2] {
-        [0.5, 0.9].map(|share| percentile(&self.joints_cm, share).unwrap())
+        let sorted = Sorted::new(&self.joints_cm[..]);
+        [0.5, 0.9].map(|share| sorted.interpolated(share).unwrap())
     }
 
     fn describe(&self) -> String {

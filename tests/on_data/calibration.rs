@@ -62,10 +62,8 @@ fn z_up() -> ReadOptions {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    assert!(!values.is_empty());
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+fn median(values: Vec<f64>) -> f64 {
+    statistics::Sorted::new(values).upper_median().unwrap()
 }
 
 /// The reference of each frame, in the world of the rig: TRC (X, Y, Z) = world (y, z, x).

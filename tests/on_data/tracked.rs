@@ -147,7 +147,8 @@ fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched
             }
         }
     }
-    [0.5, 0.9].map(|share| evaluation::percentile(&all, share).unwrap())
+    let all = statistics::Sorted::new(all);
+    [0.5, 0.9].map(|share| all.interpolated(share).unwrap())
 }
 
 /// Median and 90th percentile of the joints' errors in the world, all views fused, cm.

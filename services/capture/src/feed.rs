@@ -271,14 +271,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_opened_says_why() {
-        let refused = |spec: &SourceSpec| {
-            let error: &dyn std::error::Error = &Feed::look(spec).unwrap_err();
-            let causes = core::iter::successors(Some(error), |it| it.source());
-            causes
-                .map(ToString::to_string)
-                .collect::<Vec<_>>()
-                .join(": ")
-        };
+        let refused = |spec: &SourceSpec| causes::in_one_line(&Feed::look(spec).unwrap_err());
         let path = |path: &str| SourceSpec::new(path);
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));

@@ -319,12 +319,9 @@ impl Supply {
     fn lose(&mut self, error: &FootageError, now: u64) {
         let cause = cause_of(error);
         if self.feed.is_some() || self.cause != cause {
-            let causes =
-                core::iter::successors(Some(error as &dyn core::error::Error), |it| it.source());
-            let text: Vec<String> = causes.map(ToString::to_string).collect();
             tracing::error!(
                 frame = self.index(),
-                error = text.join(": "),
+                error = causes::in_one_line(error),
                 "no picture from this camera"
             );
         }

@@ -386,20 +386,3 @@ pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
         prepared.model.n_parts()
     ))
 }
-
-/// FNV-1a, 64 bits: to tell files apart, not to keep anybody out.
-pub(crate) fn fingerprint(bytes: &[u8]) -> u64 {
-    let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_fingerprint_is_that_of_the_published_function() {
-        assert_eq!(fingerprint(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(fingerprint(b"a"), 0xaf63_dc4c_8601_ec8c);
-    }
-}

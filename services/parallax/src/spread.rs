@@ -1,6 +1,7 @@
 //! How a quantity spreads: percentiles.
 
 use serde::{Deserialize, Serialize};
+use statistics::Sorted;
 
 /// Percentiles of measured values, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -19,19 +20,14 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// Of some values, by nearest rank; none of nothing.
-    pub(crate) fn of(mut values: Vec<f64>) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        let n = values.len();
-        let at = |share: f64| {
-            let rank = (share * n as f64).ceil() as usize;
-            values[rank.clamp(1, n) - 1]
-        };
-        (n > 0).then(|| Self {
-            n,
-            p50: at(0.5),
-            p99: at(0.99),
-            p99_9: at(0.999),
-            max: at(1.0),
+    pub(crate) fn of(values: Vec<f64>) -> Option<Self> {
+        let sorted = Sorted::new(values);
+        Some(Self {
+            n: sorted.values().len(),
+            p50: sorted.nearest_rank(0.5)?,
+            p99: sorted.nearest_rank(0.99)?,
+            p99_9: sorted.nearest_rank(0.999)?,
+            max: sorted.nearest_rank(1.0)?,
         })
     }
 

@@ -59,7 +59,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         .flatten()
     {
         let bytes = std::fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
-        files.insert(file.clone(), inputs::fingerprint(&bytes));
+        files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
     for (kind, file) in [
         (Shipped::Model, &deployment.model),
@@ -73,7 +73,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         } else {
             file.clone()
         };
-        files.insert(name, inputs::fingerprint(&kind.read(file)?));
+        files.insert(name, checksum::fnv1a(&kind.read(file)?));
     }
     Ok(files)
 }

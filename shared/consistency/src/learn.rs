@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use skeleton::{JointSet, N_PARTS, PARENT};
+use statistics::Sorted;
 
 use crate::counts::{Counts, Shape};
 use crate::joints::{JointFit, JointSample};
@@ -254,11 +255,7 @@ impl Learner {
 
 /// The middle one; of an even number the lower.
 fn median(values: &[f32]) -> f32 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f32::total_cmp);
-    let middle = sorted.len().saturating_sub(1) / 2;
+    let median = Sorted::new(values).lower_median();
     // Four digits are more than pictures tell.
-    sorted
-        .get(middle)
-        .map_or(0.0, |it| (it * 1e4).round() / 1e4)
+    median.map_or(0.0, |it| (it * 1e4).round() / 1e4)
 }

@@ -2,6 +2,8 @@
 
 use core::str::FromStr;
 
+use statistics::Sorted;
+
 use crate::Person;
 
 /// The convention of left and right for the joints of a data set.
@@ -70,14 +72,12 @@ impl Sides {
 /// Of two joints that mirror each other the first one is the right one, as in PARSE and LSP.
 fn is_from_behind(joints: &[[f64; 2]], joint_mirror: &[usize]) -> bool {
     let pairs = joint_mirror.iter().enumerate();
-    let mut differences: Vec<f64> = pairs
+    let ahead: Vec<f64> = pairs
         .filter(|(right, left)| right < *left)
         .map(|(right, &left)| joints[right][0] - joints[left][0])
         .filter(|it| it.is_finite())
         .collect();
-    differences.sort_unstable_by(f64::total_cmp);
-    let n = differences.len();
-    n > 0 && differences[n / 2] + differences[(n - 1) / 2] > 0.0
+    Sorted::new(ahead).median().is_some_and(|it| it > 0.0)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Confidence intervals by drawing frames again.
 
+use statistics::Sorted;
+
 /// What one frame adds to a mean: the sum of its values, and how many they are.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Share {
@@ -80,8 +82,9 @@ impl Bootstrap {
             }
         }
         let outside = (1.0 - self.confidence.clamp(0.0, 1.0)) / 2.0;
-        let low = crate::percentile(&means, outside)?;
-        let high = crate::percentile(&means, 1.0 - outside)?;
+        let means = Sorted::new(means);
+        let low = means.interpolated(outside)?;
+        let high = means.interpolated(1.0 - outside)?;
         Some([low, high])
     }
 }

@@ -1,4 +1,4 @@
-//! Errors against a reference: PCP, PCK, distances, percentiles, and the TRC files references come in.
+//! Errors against a reference: PCP, PCK, distances, and the TRC files references come in.
 //!
 //! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
 //! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
@@ -14,7 +14,6 @@ mod pcp3d;
 
 mod bootstrap;
 mod changes;
-mod percentile;
 mod ranks;
 
 mod trc;
@@ -25,7 +24,6 @@ pub use joints3d::{aligned, joint_errors};
 pub use pck::{PCK_GROUPS, best_covering, joints_found};
 pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
 pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
-pub use percentile::percentile;
 pub use ranks::{area_under_roc, rank_correlation};
 pub use report::{PCK_SHARES, Report, evaluate};
 pub use trc::{Trc, TrcError};

@@ -8,6 +8,7 @@ mod tests;
 use std::collections::VecDeque;
 
 use nalgebra::{Point2, Point3};
+use statistics::Sorted;
 
 use crate::{Camera, Ray};
 
@@ -288,8 +289,7 @@ fn median_offset(all: &[[f64; 2]]) -> Option<[f64; 2]> {
     Some([along(0)?, along(1)?])
 }
 
-/// The lower of the two in the middle; `None` of an empty list.
-fn median(mut all: Vec<f64>) -> Option<f64> {
-    all.sort_by(f64::total_cmp);
-    all.get(all.len().saturating_sub(1) / 2).copied()
+/// The lower of the two in the middle; none of nothing.
+fn median(all: Vec<f64>) -> Option<f64> {
+    Sorted::new(all).lower_median()
 }

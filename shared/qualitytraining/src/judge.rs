@@ -1,9 +1,10 @@
 //! Predicted errors against true ones, part by part.
 
 use skeleton::N_PARTS;
+use statistics::Sorted;
 
 use crate::sample::Sample;
-use crate::score::{area, median, rank_correlation};
+use crate::score::{area, rank_correlation};
 
 /// How good predictions are.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -22,12 +23,12 @@ pub struct Judgement {
 
 /// The errors of samples, shares of the height that their tiles show: the median of every part is its tau.
 pub fn tau(samples: &[&Sample]) -> Vec<f32> {
-    let of_part = |part: usize| {
+    let of_part = |part: usize| -> Vec<f32> {
         let share = |it: &&Sample| it.errors_px[part] / it.height_px;
         samples.iter().map(share).collect()
     };
     (0..N_PARTS)
-        .map(|part| median(of_part(part)).unwrap_or(0.0))
+        .map(|part| Sorted::new(of_part(part)).median().unwrap_or(0.0))
         .collect()
 }
 

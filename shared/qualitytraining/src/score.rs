@@ -1,16 +1,5 @@
 //! How good predicted errors are, as they are used: is a part further off than its threshold or not.
 
-/// The middle of some numbers, the mean of the two middle ones of an even number of them.
-///
-/// * Returns `None` of no numbers.
-pub fn median(mut of: Vec<f32>) -> Option<f32> {
-    of.sort_unstable_by(f32::total_cmp);
-    let n = of.len();
-    let high = *of.get(n / 2)?;
-    let low = of[(n - 1) / 2];
-    Some(f32::midpoint(low, high))
-}
-
 /// Area under the ROC: the probability that a sample that is positive scores higher than one that is not; ties
 /// count half.
 ///
@@ -61,13 +50,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-
-    #[test]
-    fn the_median_is_the_middle() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
-        assert_eq!(median(Vec::new()), None);
-    }
 
     #[test]
     fn ranks_of_ties_are_shared() {

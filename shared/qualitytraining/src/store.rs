@@ -9,6 +9,7 @@
 //! | 28.. | payload: bincode 2, standard configuration |
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
+use checksum::{Envelope, EnvelopeError};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use viewquality::{EVIDENCE_VERSION, TileShape, n_evidence};
 
@@ -16,42 +17,15 @@ use crate::sample::{Sample, picture_size};
 use skeleton::N_PARTS;
 
 const SAMPLES: [u8; 8] = *b"PLXTILES";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 28;
 /// Most bytes of a payload.
 const MAX_BYTES: usize = 16 << 30;
 
 /// Why bytes are not what they should be, or cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// Another kind of file.
-    #[error("it does not begin with `{}`", String::from_utf8_lossy(.expected))]
-    Magic {
-        /// How it should.
-        expected: [u8; 8],
-    },
-    /// Another Parallax made it.
-    #[error("it has version {got}, this Parallax reads version {VERSION}")]
-    Version {
-        /// Its version.
-        got: u32,
-    },
-    /// Truncated, or something was appended.
-    #[error("it has {got} bytes, its header says {expected}")]
-    Length {
-        /// Bytes there are.
-        got: u64,
-        /// Bytes that there should be.
-        expected: u64,
-    },
-    /// Damaged.
-    #[error("it is damaged: its checksum is {got:016x}, its header says {expected:016x}")]
-    Checksum {
-        /// Checksum of what is there.
-        got: u64,
-        /// Checksum that the header holds.
-        expected: u64,
-    },
+    /// Another kind or version of file, or a damaged one.
+    #[error(transparent)]
+    Envelope(#[from] EnvelopeError),
     /// The checksum is right, but what it is of is not what the header says.
     #[error("the payload is not what it should be")]
     Payload(#[source] Box<bincode::error::DecodeError>),
@@ -153,54 +127,20 @@ const fn configuration() -> Configuration<LittleEndian, Varint, Limit<MAX_BYTES>
     config::standard().with_limit::<MAX_BYTES>()
 }
 
-/// FNV-1a of 64 bits.
-pub fn fnv1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
-    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+const fn envelope(magic: [u8; 8]) -> Envelope {
+    Envelope { magic, version: 1 }
 }
 
 /// A payload with its header.
 pub(crate) fn wrap<T: Serialize>(magic: [u8; 8], payload: &T) -> Result<Vec<u8>, StoreError> {
     let payload = bincode::serde::encode_to_vec(payload, configuration());
     let payload = payload.map_err(|it| StoreError::Encode(Box::new(it)))?;
-    let mut bytes = Vec::with_capacity(HEADER_BYTES + payload.len());
-    bytes.extend(magic);
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend((payload.len() as u64).to_le_bytes());
-    bytes.extend(fnv1a(payload.iter().copied()).to_le_bytes());
-    bytes.extend(payload);
-    Ok(bytes)
+    Ok(envelope(magic).seal(&payload))
 }
 
 /// The payload behind a header that fits it.
 pub(crate) fn unwrap<T: DeserializeOwned>(magic: [u8; 8], bytes: &[u8]) -> Result<T, StoreError> {
-    let rest = bytes
-        .strip_prefix(&magic)
-        .ok_or(StoreError::Magic { expected: magic })?;
-    let too_short = || StoreError::Length {
-        got: bytes.len() as u64,
-        expected: HEADER_BYTES as u64,
-    };
-    let (&version, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let (&length, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let (&checksum, payload) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let version = u32::from_le_bytes(version);
-    if version != VERSION {
-        return Err(StoreError::Version { got: version });
-    }
-    let length = u64::from_le_bytes(length);
-    if length != payload.len() as u64 {
-        return Err(StoreError::Length {
-            got: bytes.len() as u64,
-            expected: length.saturating_add(HEADER_BYTES as u64),
-        });
-    }
-    let expected = u64::from_le_bytes(checksum);
-    let got = fnv1a(payload.iter().copied());
-    if got != expected {
-        return Err(StoreError::Checksum { got, expected });
-    }
+    let payload = envelope(magic).open(bytes)?;
     let decoded = bincode::serde::decode_from_slice(payload, configuration());
     let (decoded, n_read): (T, usize) = decoded.map_err(|it| StoreError::Payload(Box::new(it)))?;
     match payload.len() - n_read {

@@ -13,7 +13,7 @@ use crate::onnx;
 use crate::parameters::{self, Inputs, Parameter};
 use crate::sample::Sample;
 use crate::settings::Settings;
-use crate::store::{Samples, StoreError, fnv1a, unwrap, wrap};
+use crate::store::{Samples, StoreError, unwrap, wrap};
 use crate::vary::{Seen, plain, varied};
 
 const CHECKPOINT: [u8; 8] = *b"PLXQUALI";
@@ -363,7 +363,7 @@ impl<'a> Trainer<'a> {
 /// Whether a sample is validated on: by its group alone.
 fn is_validated(sample: &Sample, settings: &Settings) -> bool {
     let seed = settings.seed.to_le_bytes();
-    let hash = fnv1a(sample.group.bytes().chain(seed));
+    let hash = checksum::fnv1a_of(sample.group.bytes().chain(seed));
     // The lowest bits of the hash are the worst.
     (hash >> 40) as f32 / (1_u32 << 24) as f32 <= settings.validation
 }
@@ -392,9 +392,9 @@ fn stamp(settings: &Settings, samples: &Samples) -> u64 {
     let of_sample = |it: &Sample| {
         let picture = it.picture.iter().step_by(97).copied();
         let errors = it.errors_px.iter().flat_map(|it| it.to_le_bytes());
-        fnv1a(it.source.bytes().chain(picture).chain(errors)).to_le_bytes()
+        checksum::fnv1a_of(it.source.bytes().chain(picture).chain(errors)).to_le_bytes()
     };
-    fnv1a(
+    checksum::fnv1a_of(
         settings
             .into_iter()
             .chain(samples.all.iter().flat_map(of_sample)),

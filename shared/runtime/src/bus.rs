@@ -310,10 +310,8 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         std::fs::create_dir_all(parent).map_err(directory)?;
     }
     if !path.exists() {
-        // Written beside and renamed, so that no process ever reads half of it.
-        let draft = path.with_extension(format!("{}.draft", std::process::id()));
-        std::fs::write(&draft, namespace.config_text()).map_err(directory)?;
-        std::fs::rename(&draft, &path).map_err(directory)?;
+        // In one step, so that no process ever reads half of it.
+        files::replace(&path, namespace.config_text().as_bytes()).map_err(directory)?;
     }
     // The clean-up of dead nodes falls back to the process's global configuration where a node died
     // before it had written its own (iceoryx2 0.10, node/mod.rs), so that must say the same.

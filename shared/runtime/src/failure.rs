@@ -140,15 +140,9 @@ impl Failure {
     ///
     /// Those of `out`.
     pub fn report(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(
-            out,
-            "error: {}",
-            in_words(&self.source.to_string()).trim_end()
-        )?;
-        let mut cause = self.source.source();
-        while let Some(error) = cause {
-            writeln!(out, "  cause: {}", in_words(&error.to_string()).trim_end())?;
-            cause = error.source();
+        for (depth, error) in causes::chain(self.source()).enumerate() {
+            let label = if depth == 0 { "error" } else { "  cause" };
+            writeln!(out, "{label}: {}", in_words(&error.to_string()).trim_end())?;
         }
         if let Some(hint) = &self.hint {
             writeln!(out, "  hint: {hint}")?;

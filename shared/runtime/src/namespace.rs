@@ -183,10 +183,7 @@ impl Namespace {
 
 /// FNV-1a over the user and the root, folded to 32 bits.
 fn fingerprint(user: u32, root: &str) -> u32 {
-    let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
-    for byte in user.to_le_bytes().into_iter().chain(root.bytes()) {
-        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    }
+    let hash = checksum::fnv1a_of(user.to_le_bytes().into_iter().chain(root.bytes()));
     (hash ^ (hash >> 32)) as u32
 }
 

@@ -21,11 +21,7 @@ impl Random {
 
     /// Another generator for a purpose of its own, so that one more throw here changes nothing there.
     pub(crate) fn fork(self, purpose: &str) -> Self {
-        // FNV-1a.
-        let hash = purpose.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, it| {
-            (hash ^ u64::from(it)).wrapping_mul(0x100_0000_01b3)
-        });
-        Self(mix(self.0 ^ hash))
+        Self(mix(self.0 ^ checksum::fnv1a(purpose.as_bytes())))
     }
 
     /// Another generator, for the n-th of many.

@@ -1,6 +1,7 @@
 //! Recorded motion, put on the skeleton of a subject.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use statistics::Sorted;
 
 use crate::body::{
     ABDOMEN, Bones, CHEST, COLLAR, FOOT, FOREARM, HAND, HEAD, LEFT, N_BONES, NECK, PARENT, PELVIS,
@@ -139,11 +140,12 @@ fn recorded_leg(recording: &Recording) -> f64 {
         (knee - hip).norm() + (ankle - knee).norm()
     };
     let all = recording.postures.iter();
-    let mut all: Vec<f64> = all
+    let all: Vec<f64> = all
         .flat_map(|it| [0, 1].map(|side| length(it, side)))
         .collect();
-    all.sort_by(f64::total_cmp);
-    all[all.len() / 2].max(1e-3)
+    Sorted::new(all)
+        .upper_median()
+        .map_or(1e-3, |it| it.max(1e-3))
 }
 
 /// The rotations of all bones, in the frame of the recording.

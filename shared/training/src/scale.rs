@@ -1,5 +1,7 @@
 //! How large a person is: one square box for all parts.
 
+use statistics::Sorted;
+
 /// Sizes of the part boxes of all people, in pixels of their images.
 ///
 /// The length of every edge of the tree is divided by its usual length, which is counted in lengths
@@ -45,14 +47,8 @@ pub(crate) fn filter_side(sides: &[f64], cell_px: usize) -> (usize, f64) {
 }
 
 /// The quantile at `share`, linear between neighbours; 0 of nothing.
-pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let at = share * values.len().saturating_sub(1) as f64;
-    let (low, high) = (at.floor() as usize, at.ceil() as usize);
-    match (values.get(low), values.get(high)) {
-        (Some(low), Some(high)) => low + (high - low) * at.fract(),
-        _ => 0.0,
-    }
+pub(crate) fn quantile(values: Vec<f64>, share: f64) -> f64 {
+    Sorted::new(values).interpolated(share).unwrap_or(0.0)
 }
 
 #[cfg(test)]

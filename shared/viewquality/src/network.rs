@@ -88,7 +88,7 @@ impl Network {
     ///
     /// [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
-        let fingerprint = fnv1a(&file);
+        let fingerprint = checksum::fnv1a_32(&file);
         frame::check(&file).map_err(|it| NetworkError::Load(Box::new(it)))?;
         let (engine, description) = Rten::load(file)?;
         Self::new(Box::new(engine), &description, fingerprint, n_parts)
@@ -107,7 +107,12 @@ impl Network {
     ) -> Result<Self, NetworkError> {
         frame::check(file).map_err(|it| NetworkError::Load(Box::new(it)))?;
         let (engine, description) = runtime.load_network(file)?;
-        Self::new(Box::new(engine), &description, fnv1a(file), n_parts)
+        Self::new(
+            Box::new(engine),
+            &description,
+            checksum::fnv1a_32(file),
+            n_parts,
+        )
     }
 
     fn new(
@@ -226,12 +231,6 @@ impl Network {
         }
         Ok(sigma)
     }
-}
-
-/// The published hash; its letters are checked in the tests.
-fn fnv1a(bytes: &[u8]) -> u32 {
-    let step = |hash: u32, byte: &u8| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193);
-    bytes.iter().fold(0x811c_9dc5, step)
 }
 
 fn names(what: &'static str, found: &[&str]) -> NetworkError {

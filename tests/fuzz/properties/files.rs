@@ -13,14 +13,9 @@ use scene::truth::{Frame, Header};
 use training::Checkpoint;
 use viewquality::{Card, Network, Table, Tau};
 
-/// A payload behind our own header: magic, version 1, length and FNV-1a.
+/// A payload behind our own header, of version 1.
 fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
-    let hash = payload.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    });
-    let length = payload.len() as u64;
-    let header = [&magic[..], &[1, 0, 0, 0], &length.to_le_bytes()].concat();
-    [&header[..], &u64::to_le_bytes(hash), payload].concat()
+    checksum::Envelope { magic, version: 1 }.seal(payload)
 }
 /// The authors' text models.
 pub fn model_text(input: &[u8]) {

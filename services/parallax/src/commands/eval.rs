@@ -355,11 +355,10 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
 fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
         let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
-        Ok::<_, Failure>(inputs::fingerprint(&bytes))
+        Ok::<_, Failure>(checksum::fnv1a(&bytes))
     };
-    let of =
-        |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(inputs::fingerprint(&kind.read(file)?));
-    let model = inputs::fingerprint(&inputs::model_bytes(arguments.model.as_deref())?);
+    let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));
+    let model = checksum::fnv1a(&inputs::model_bytes(arguments.model.as_deref())?);
     let sigma = arguments.sigma.as_ref().map(digest).transpose()?;
     let network = arguments
         .network

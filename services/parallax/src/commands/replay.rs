@@ -159,10 +159,10 @@ fn refused(key: &str, from: Stage) -> Option<String> {
 fn warn_of_other_files(settings: &Settings) {
     for (file, recorded) in &settings.files {
         let now = match Shipped::of_name(file) {
-            Some(it) => Some(inputs::fingerprint(it.bytes())),
+            Some(it) => Some(checksum::fnv1a(it.bytes())),
             None => std::fs::read(file)
                 .ok()
-                .map(|bytes| inputs::fingerprint(&bytes)),
+                .map(|bytes| checksum::fnv1a(&bytes)),
         };
         if now != Some(*recorded) {
             let file = file.display();

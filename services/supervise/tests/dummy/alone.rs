@@ -1,6 +1,5 @@
 //! Dummies that are no services: a supervisor to be killed, and a process that fills shared memory.
 
-use std::error::Error;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
@@ -68,7 +67,10 @@ pub(crate) fn fill(base: &Path) -> ExitCode {
         7_000_000,
     );
     let preflight = preflight(core::slice::from_ref(&plan));
-    say(&preflight.map_or_else(|error| chain(&error), |()| "it fits".to_owned()));
+    say(&preflight.map_or_else(
+        |error| causes::in_one_line(&error),
+        |()| "it fits".to_owned(),
+    ));
     match force(base, &plan) {
         Ok(text) => {
             say(&text);
@@ -84,17 +86,10 @@ fn force(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
     let topics = bus.create_topics(core::slice::from_ref(plan))?;
     let said = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
         Ok(_) => "it fits".to_owned(),
-        Err(error) => chain(&error),
+        Err(error) => causes::in_one_line(&error),
     };
     drop(topics);
     Ok(said)
-}
-
-fn chain(error: &dyn Error) -> String {
-    match error.source() {
-        Some(cause) => format!("{error}: {}", chain(cause)),
-        None => error.to_string(),
-    }
 }
 
 #[expect(clippy::expect_used, reason = "a test fails by panicking")]

@@ -11,11 +11,9 @@ mod released;
 mod summary;
 mod tokens;
 
-use std::ffi::OsString;
-use std::fs::{self, File};
-use std::io::{self, Write as _};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process;
 
 pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
 pub use tokens::Place;
@@ -135,26 +133,11 @@ pub fn write(path: &Path, model: &Model) -> Result<(), ModelFileError> {
         path: path.to_owned(),
         source,
     })?;
-    let mut name = OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", process::id()));
-    let beside = path.with_file_name(name);
-    let written = write_and_sync(&beside, &bytes).and_then(|()| fs::rename(&beside, path));
-    written.map_err(|source| {
-        // The error that is reported came first; one of the removal could add nothing to it.
-        drop(fs::remove_file(&beside));
-        ModelFileError::Io {
-            path: path.to_owned(),
-            doing: "write",
-            source,
-        }
+    files::replace(path, &bytes).map_err(|source| ModelFileError::Io {
+        path: path.to_owned(),
+        doing: "write",
+        source,
     })
-}
-
-fn write_and_sync(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<ModelSpec, ModelFileError> {

@@ -8,43 +8,25 @@
 //! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it tells every change within one byte |
 //! | 28.. | payload: bincode 2, standard configuration (little-endian, variable-length integers) |
 
+use checksum::{Envelope, EnvelopeError};
+
 use super::payload;
 use crate::{Model, ModelSpec};
 
 /// How Parallax's own model file begins.
 pub const MAGIC: [u8; 8] = *b"PLXMODEL";
 
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 28;
+const ENVELOPE: Envelope = Envelope {
+    magic: MAGIC,
+    version: 1,
+};
 
 /// Why bytes are not a model file of Parallax, or none could be made.
 #[derive(Debug, thiserror::Error)]
 pub enum OwnError {
-    /// Another kind of file.
-    #[error("the file does not begin with `PLXMODEL`")]
-    Magic,
-    /// The file was made by another Parallax.
-    #[error("the file has version {got}, this Parallax reads version {VERSION}")]
-    Version {
-        /// The file's version.
-        got: u32,
-    },
-    /// The file is truncated, or something was appended.
-    #[error("the file has {got} bytes, its header says {expected}")]
-    Length {
-        /// Bytes there are.
-        got: u64,
-        /// Bytes that there should be.
-        expected: u64,
-    },
-    /// The file is damaged.
-    #[error("the file is damaged: its checksum is {got:016x}, its header says {expected:016x}")]
-    Checksum {
-        /// Checksum of what is there.
-        got: u64,
-        /// Checksum that the header holds.
-        expected: u64,
-    },
+    /// Another kind or version of file, or a damaged one.
+    #[error(transparent)]
+    Envelope(#[from] EnvelopeError),
     /// The payload is no model, though its checksum is right.
     #[error("the payload is not a model")]
     Payload(#[source] Box<bincode::error::DecodeError>),
@@ -66,13 +48,7 @@ pub enum OwnError {
 /// [`OwnError::Encode`], for a model beyond the format's limit of 192 MiB.
 pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
     let payload = payload::write(model.spec()).map_err(|it| OwnError::Encode(Box::new(it)))?;
-    let mut bytes = Vec::with_capacity(HEADER_BYTES + payload.len());
-    bytes.extend(MAGIC);
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend((payload.len() as u64).to_le_bytes());
-    bytes.extend(fnv1a(&payload).to_le_bytes());
-    bytes.extend(payload);
-    Ok(bytes)
+    Ok(ENVELOPE.seal(&payload))
 }
 
 /// Reads the bytes of a model file. What the model says is judged by [`Model::new`].
@@ -81,30 +57,7 @@ pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
 ///
 /// [`OwnError`]; truncated bytes and bytes with a changed one are always refused.
 pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
-    let rest = bytes.strip_prefix(&MAGIC).ok_or(OwnError::Magic)?;
-    let too_short = || OwnError::Length {
-        got: bytes.len() as u64,
-        expected: HEADER_BYTES as u64,
-    };
-    let (&version, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let (&length, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let (&checksum, payload) = rest.split_first_chunk().ok_or_else(too_short)?;
-    let version = u32::from_le_bytes(version);
-    if version != VERSION {
-        return Err(OwnError::Version { got: version });
-    }
-    let length = u64::from_le_bytes(length);
-    if length != payload.len() as u64 {
-        return Err(OwnError::Length {
-            got: bytes.len() as u64,
-            expected: length.saturating_add(HEADER_BYTES as u64),
-        });
-    }
-    let expected = u64::from_le_bytes(checksum);
-    let got = fnv1a(payload);
-    if got != expected {
-        return Err(OwnError::Checksum { got, expected });
-    }
+    let payload = ENVELOPE.open(bytes)?;
     let (spec, n_read) = payload::read(payload).map_err(|it| OwnError::Payload(Box::new(it)))?;
     match payload.len() - n_read {
         0 => Ok(spec),
@@ -112,17 +65,9 @@ pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
     }
 }
 
-/// Fowler, Noll and Vo's hash 1a, 64 bit.
-///
-/// Every step is a bijection of the state, so two inputs that differ in one byte only never agree.
-fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    use checksum::HEADER_BYTES;
     use proptest::prelude::*;
 
     use super::*;
@@ -185,12 +130,6 @@ mod tests {
     }
 
     #[test]
-    fn the_hash_is_the_published_one() {
-        assert_eq!(fnv1a(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(fnv1a(b"foobar"), 0x8594_4171_f739_67e8);
-    }
-
-    #[test]
     fn says_what_is_wrong_with_the_header() {
         let mut bytes = bytes();
         let n = bytes.len();
@@ -214,22 +153,12 @@ mod tests {
         assert_eq!(said_of(&bytes), expected);
     }
 
-    /// Puts a right header before any payload.
-    fn sealed(payload: &[u8]) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend(VERSION.to_le_bytes());
-        bytes.extend((payload.len() as u64).to_le_bytes());
-        bytes.extend(fnv1a(payload).to_le_bytes());
-        bytes.extend(payload);
-        bytes
-    }
-
     #[test]
     fn refuses_what_follows_the_model() {
         let mut payload = bytes()[HEADER_BYTES..].to_vec();
         payload.push(0);
         let expected = "the model ends 1 bytes before its payload";
-        assert_eq!(said_of(&sealed(&payload)), expected);
+        assert_eq!(said_of(&ENVELOPE.seal(&payload)), expected);
     }
 
     #[test]
@@ -237,7 +166,10 @@ mod tests {
         // An empty name, then 2^62 parts.
         let mut payload = vec![0, 253];
         payload.extend((1_u64 << 62).to_le_bytes());
-        assert_eq!(said_of(&sealed(&payload)), "the payload is not a model");
+        assert_eq!(
+            said_of(&ENVELOPE.seal(&payload)),
+            "the payload is not a model"
+        );
     }
 
     proptest! {
@@ -261,7 +193,7 @@ mod tests {
             let mut payload = bytes()[HEADER_BYTES..].to_vec();
             let at = (payload.len() as f64 * part) as usize;
             payload[at] = byte;
-            if let Ok(spec) = decode(&sealed(&payload)) {
+            if let Ok(spec) = decode(&ENVELOPE.seal(&payload)) {
                 let _model = Model::new(spec);
             }
         }

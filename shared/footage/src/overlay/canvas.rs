@@ -1,6 +1,5 @@
 //! A picture, and the shapes that can be drawn on it.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -184,8 +183,7 @@ impl Canvas {
         Ok(png)
     }
 
-    /// Writes a PNG. A reader of `path` sees the old file or the new one, never a part: it is written
-    /// beside it (`.part`) and renamed.
+    /// Writes a PNG. A reader of `path` sees the old file or the new one, never a part.
     ///
     /// # Errors
     ///
@@ -195,15 +193,9 @@ impl Canvas {
             path: path.to_path_buf(),
             source,
         })?;
-        let part = path.with_extension("png.part");
-        let written = fs::write(&part, png).and_then(|()| fs::rename(&part, path));
-        written.map_err(|source| {
-            // Whether there is something to remove or not, the error is the one above.
-            fs::remove_file(&part).ok();
-            OverlayError::Io {
-                path: path.to_path_buf(),
-                source,
-            }
+        files::replace_unsynced(path, &png).map_err(|source| OverlayError::Io {
+            path: path.to_path_buf(),
+            source,
         })
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use statistics::Sorted;
 
 use super::{Motion, MotionError};
 
@@ -65,7 +66,6 @@ fn fold(frame: &[[f64; 3]; 14]) -> f64 {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    let values: Vec<f64> = values.collect();
+    Sorted::new(values).upper_median().unwrap_or(f64::NAN)
 }

@@ -132,13 +132,6 @@ impl<'a> Trainer<'a> {
     fn fingerprint(&self) -> u64 {
         let n_images = self.album.n_backgrounds();
         let text = format!("{:?} {:?} {n_images}", self.settings, self.plan);
-        fnv1a(text.bytes())
+        checksum::fnv1a(text.as_bytes())
     }
-}
-
-/// Fowler, Noll and Vo's hash 1a, 64 bit.
-fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Scene, View};
 use serde_json::{Value, json};
+use statistics::Sorted;
 
 use crate::plan::Resolved;
 use crate::prepare::Prepared;
@@ -70,7 +71,9 @@ impl Gauge {
             self.frame(spans.len() as u64)?;
             spans.push(nth.elapsed().as_secs_f64());
         }
-        let frame_s = evaluation::percentile(&spans[1..], 0.5).unwrap_or(f64::INFINITY);
+        let frame_s = Sorted::new(&spans[1..])
+            .interpolated(0.5)
+            .unwrap_or(f64::INFINITY);
         Ok(Machine {
             load,
             n_cores: std::thread::available_parallelism().map_or(1, usize::from),

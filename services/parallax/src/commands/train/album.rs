@@ -130,16 +130,10 @@ fn turned(plain: &Sample, degrees: f64) -> Result<Sample, AlbumError> {
 
 /// FNV-1a of the names and lengths of files.
 fn stamp(files: &[&Path]) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut add = |bytes: &[u8]| {
-        for &byte in bytes {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    };
-    for file in files {
+    let named = files.iter().flat_map(|file| {
         let length = std::fs::metadata(file).map_or(0, |it| it.len());
-        add(file.file_name().unwrap_or_default().as_encoded_bytes());
-        add(&length.to_le_bytes());
-    }
-    hash
+        let name = file.file_name().unwrap_or_default().as_encoded_bytes();
+        name.iter().copied().chain(length.to_le_bytes())
+    });
+    checksum::fnv1a_of(named)
 }

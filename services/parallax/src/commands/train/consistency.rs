@@ -100,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .build()
         .or_fail(ExitKind::Run)?;
     let work = Work::new(arguments, globals, model, stop);
-    let fingerprint = format!("{:016x}", inputs::fingerprint(&bytes));
+    let fingerprint = format!("{:016x}", checksum::fnv1a(&bytes));
     let keep = |learned: &Learned| {
         let text = learned.write().or_fail(ExitKind::Run)?;
         let wrong = |error: std::io::Error| inputs::in_file(&arguments.out, &error);

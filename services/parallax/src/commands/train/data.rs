@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::per_dataset::deal;
-use super::progress::{Progress, chain};
+use super::progress::Progress;
 use crate::inputs;
 
 /// Which people, which images without people, and what is made of them.
@@ -75,7 +75,7 @@ impl Chosen {
     pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
         match &self.skeleton {
             Some(file) => SkeletonTable::parse(&inputs::text(file)?).map_err(|error| {
-                let message = format!("{}: {}", file.display(), chain(&error));
+                let message = format!("{}: {}", file.display(), causes::in_one_line(&error));
                 Failure::new(ExitKind::Input, message)
             }),
             None => Ok(SkeletonTable::published()),

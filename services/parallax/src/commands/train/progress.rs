@@ -76,22 +76,27 @@ impl Progress {
 
     /// Tells of a person who was left out.
     pub(super) fn left_out(&self, problem: &Problem) -> Result<(), Failure> {
-        self.say(&format!("left out: {}", chain(problem)));
+        self.say(&format!("left out: {}", causes::in_one_line(problem)));
         self.event(|| {
             json!({
                 "event": "left-out",
                 "file": problem.file,
                 "row": problem.row,
                 "kind": problem.fault.kind().name(),
-                "message": chain(&problem.fault),
+                "message": causes::in_one_line(&problem.fault),
             })
         })
     }
 
     /// Tells of an image without people that cannot be read.
-    pub(super) fn unreadable(&self, image: &Path, error: &dyn Error) -> Result<(), Failure> {
-        self.say(&format!("left out: {}", chain(error)));
-        self.event(|| json!({ "event": "unreadable", "file": image, "message": chain(error) }))
+    pub(super) fn unreadable(
+        &self,
+        image: &Path,
+        error: &(dyn Error + 'static),
+    ) -> Result<(), Failure> {
+        let message = causes::in_one_line(error);
+        self.say(&format!("left out: {message}"));
+        self.event(|| json!({ "event": "unreadable", "file": image, "message": message }))
     }
 
     /// Tells what is trained on.
@@ -334,15 +339,6 @@ fn kind(step: Step) -> &'static str {
 
 fn mib(bytes: usize) -> f64 {
     bytes as f64 / f64::from(1 << 20)
-}
-
-/// An error with its causes, in one line.
-pub(super) fn chain(error: &dyn Error) -> String {
-    let causes = core::iter::successors(Some(error), |&it| it.source());
-    causes
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join(": ")
 }
 
 #[cfg(test)]

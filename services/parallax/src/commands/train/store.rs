@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -152,7 +152,7 @@ impl Store {
         let bytes = checkpoint.to_bytes(stamp).or_fail(ExitKind::Run)?;
         let path = self.checkpoint();
         let mut state = self.lock();
-        replace(&path, &bytes).map_err(|error| {
+        files::replace(&path, &bytes).map_err(|error| {
             let message = format!("cannot write the checkpoint {}: {error}", path.display());
             Failure::new(ExitKind::Run, message)
         })?;
@@ -253,25 +253,6 @@ fn claim(out: &Path) -> Result<File, Failure> {
                 .with_hint("wait for it, or write to another --out"))
         }
     }
-}
-
-/// Puts a whole file into its place in one step.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut name = OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(".part");
-    let beside = path.with_file_name(name);
-    let written = File::create(&beside)
-        .and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        })
-        .and_then(|()| fs::rename(&beside, path));
-    if written.is_err() {
-        // The error that is reported came first; one of the removal could add nothing to it.
-        drop(fs::remove_file(&beside));
-    }
-    written
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The epipolar errors of a rig on points seen by several cameras.
 
 use nalgebra::Point2;
+use statistics::Sorted;
 
 use crate::{Camera, Rig, epipolar};
 
@@ -51,7 +52,7 @@ pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> Epipola
             of_camera[a].extend_from_slice(&errors);
             of_camera[b].extend_from_slice(&errors);
             let n_points = errors.len();
-            pairs.extend(median(errors).map(|median_px| PairError {
+            pairs.extend(Sorted::new(errors).median().map(|median_px| PairError {
                 cameras: [a, b],
                 n_points,
                 median_px,
@@ -63,7 +64,7 @@ pub fn epipolar_check(rig: &Rig, points: &[Vec<Option<Point2<f64>>>]) -> Epipola
         .enumerate()
         .filter_map(|(camera, errors)| {
             let n_points = errors.len();
-            median(errors).map(|median_px| CameraError {
+            Sorted::new(errors).median().map(|median_px| CameraError {
                 camera,
                 n_points,
                 median_px,
@@ -89,13 +90,4 @@ fn pair_errors(
         Some(0.5 * (at_a + at_b))
     };
     points.iter().filter_map(error).collect()
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let (low, high) = (
-        values.get(values.len().checked_sub(1)? / 2)?,
-        values.get(values.len() / 2)?,
-    );
-    Some(0.5 * (low + high))
 }

@@ -4,22 +4,11 @@ use std::error::Error as _;
 
 use super::*;
 
-/// An error and its causes on one line, as a program would print them.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        text = format!("{text}: {error}");
-        cause = error.source();
-    }
-    text
-}
-
-/// Asserts that the error contains all of `parts`.
-fn refused(result: Result<Rig, ParseError>, parts: &[&str]) {
-    let text = chain(&result.expect_err("must be refused"));
-    for part in parts {
-        assert!(text.contains(part), "{part:?} is not in {text:?}");
+/// Asserts that a text is refused with an error that holds all of `words`.
+fn refused(result: Result<Rig, ParseError>, words: &[&str]) {
+    let text = causes::in_one_line(&result.expect_err("must be refused"));
+    for word in words {
+        assert!(text.contains(word), "{word:?} is not in {text:?}");
     }
 }
 
@@ -292,12 +281,14 @@ fn errors_name_the_file() {
     let path = folder.path().join("broken.cal");
     std::fs::write(&path, "1 2 3").expect("writable");
     let options = ReadOptions::default();
-    let text = chain(&read(&path, &options).expect_err("3 numbers"));
+    let text = causes::in_one_line(&read(&path, &options).expect_err("3 numbers"));
     assert!(
         text.contains("broken.cal") && text.contains("3 numbers"),
         "{text}"
     );
-    let text = chain(&read(&folder.path().join("absent.toml"), &options).expect_err("absent"));
+    let text = causes::in_one_line(
+        &read(&folder.path().join("absent.toml"), &options).expect_err("absent"),
+    );
     assert!(text.contains("absent.toml"), "{text}");
     let other = folder.path().join("notes.txt");
     std::fs::write(&other, "hello").expect("writable");
@@ -316,7 +307,10 @@ fn errors_name_the_file() {
         Err(RigFileError::NoFiles)
     ));
     let twice = read_many(&[&own, &own], &options).expect_err("two of a name");
-    assert!(chain(&twice).contains("two cameras are named"), "{twice}");
+    assert!(
+        causes::in_one_line(&twice).contains("two cameras are named"),
+        "{twice}"
+    );
     let large = folder.path().join("large.toml");
     std::fs::File::create(&large)
         .and_then(|file| file.set_len(LARGEST_FILE + 1))

@@ -9,12 +9,14 @@
 //! | 28.. | payload: the stamp and the checkpoint, bincode 2, standard configuration |
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
+use checksum::{Envelope, EnvelopeError};
 
-use super::{Checkpoint, fnv1a};
+use super::Checkpoint;
 
-const MAGIC: [u8; 8] = *b"PLXTRAIN";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 28;
+const ENVELOPE: Envelope = Envelope {
+    magic: *b"PLXTRAIN",
+    version: 1,
+};
 
 /// Most bytes of a payload: ten million examples are far from it.
 const MAX_BYTES: usize = 4 << 30;
@@ -22,31 +24,9 @@ const MAX_BYTES: usize = 4 << 30;
 /// Why bytes are no checkpoint, or none could be made.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointBytesError {
-    /// Another kind of file.
-    #[error("it does not begin with `PLXTRAIN`")]
-    Magic,
-    /// Another Parallax made it.
-    #[error("it has version {got}, this Parallax reads version {VERSION}")]
-    Version {
-        /// Its version.
-        got: u32,
-    },
-    /// Truncated, or something was appended.
-    #[error("it has {got} bytes, its header says {expected}")]
-    Length {
-        /// Bytes there are.
-        got: u64,
-        /// Bytes that there should be.
-        expected: u64,
-    },
-    /// Damaged.
-    #[error("it is damaged: its checksum is {got:016x}, its header says {expected:016x}")]
-    Checksum {
-        /// Checksum of what is there.
-        got: u64,
-        /// Checksum that the header holds.
-        expected: u64,
-    },
+    /// Another kind or version of file, or a damaged one.
+    #[error(transparent)]
+    Envelope(#[from] EnvelopeError),
     /// The checksum is right, but what it is of is no checkpoint.
     #[error("the payload is no checkpoint")]
     Payload(#[source] Box<bincode::error::DecodeError>),
@@ -77,13 +57,7 @@ impl Checkpoint {
     pub fn to_bytes(&self, stamp: u64) -> Result<Vec<u8>, CheckpointBytesError> {
         let payload = bincode::serde::encode_to_vec((stamp, self), configuration());
         let payload = payload.map_err(|it| CheckpointBytesError::Encode(Box::new(it)))?;
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + payload.len());
-        bytes.extend(MAGIC);
-        bytes.extend(VERSION.to_le_bytes());
-        bytes.extend((payload.len() as u64).to_le_bytes());
-        bytes.extend(fnv1a(payload.iter().copied()).to_le_bytes());
-        bytes.extend(payload);
-        Ok(bytes)
+        Ok(ENVELOPE.seal(&payload))
     }
 
     /// Reads the bytes of a file: the checkpoint and the stamp. Whether they fit a training is judged
@@ -93,32 +67,7 @@ impl Checkpoint {
     ///
     /// [`CheckpointBytesError`]; truncated bytes and bytes with a changed one are always refused.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, u64), CheckpointBytesError> {
-        let rest = bytes
-            .strip_prefix(&MAGIC)
-            .ok_or(CheckpointBytesError::Magic)?;
-        let too_short = || CheckpointBytesError::Length {
-            got: bytes.len() as u64,
-            expected: HEADER_BYTES as u64,
-        };
-        let (&version, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-        let (&length, rest) = rest.split_first_chunk().ok_or_else(too_short)?;
-        let (&checksum, payload) = rest.split_first_chunk().ok_or_else(too_short)?;
-        let version = u32::from_le_bytes(version);
-        if version != VERSION {
-            return Err(CheckpointBytesError::Version { got: version });
-        }
-        let length = u64::from_le_bytes(length);
-        if length != payload.len() as u64 {
-            return Err(CheckpointBytesError::Length {
-                got: bytes.len() as u64,
-                expected: length.saturating_add(HEADER_BYTES as u64),
-            });
-        }
-        let expected = u64::from_le_bytes(checksum);
-        let got = fnv1a(payload.iter().copied());
-        if got != expected {
-            return Err(CheckpointBytesError::Checksum { got, expected });
-        }
+        let payload = ENVELOPE.open(bytes)?;
         let decoded = bincode::serde::decode_from_slice(payload, configuration());
         let ((stamp, checkpoint), n_read): ((u64, Self), usize) =
             decoded.map_err(|it| CheckpointBytesError::Payload(Box::new(it)))?;
