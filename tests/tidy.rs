@@ -16,10 +16,11 @@ const LAYERS: &[&[&str]] = &[
         "causes",
         "checksum",
         "files",
+        "onnx",
         "statistics",
     ],
     &[
-        "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles",
+        "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles", "trc",
     ],
     &["metrics", "recording", "fmp", "scene"],
     &["runtime"],

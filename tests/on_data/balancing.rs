@@ -6,13 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ::footage::{Fill, Size, Source, SourceSpec, Warp};
-use evaluation::Trc;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
 use pipeline::{Combine, Estimator, EstimatorSettings};
 use skeleton::PARSE14;
 use statistics::Sorted;
+use trc::Trc;
 
 use crate::shared_dir;
 

@@ -261,10 +261,6 @@ fn by_onnx_runtime(
     file: &Path,
     n_parts: usize,
 ) -> Result<Network, Failure> {
-    let device = match device {
-        quality::Device::Cpu => viewquality::Device::Cpu,
-        quality::Device::Cuda => viewquality::Device::Cuda,
-    };
     let runtime = viewquality::OnnxRuntime::load(library, device);
     let runtime = runtime.map_err(|error| refused(library, &error))?;
     let bytes = Shipped::Network.read(file)?;

@@ -11,9 +11,9 @@ use fmp::{Layout, Scope};
 use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
+use onnx::{Network, Side};
 use pipeline::{Answer, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep};
 use serde_json::{Value, json};
-use testkit::onnx::{Network, Side};
 use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
@@ -35,11 +35,11 @@ fn network(tau: f32) -> Network {
     let sigma = vec![Side::Named("n"), Side::Fixed(N_PARTS)];
     net.outputs.push(("sigma".to_owned(), sigma));
     let red = |it: usize| if it < N_PARTS { 0.05 } else { 0.0 };
-    net.weigh("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
+    net.floats("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
     let bias = (0..N_PARTS).map(|it| it as f32 / 800.0);
-    net.weigh("b", &[N_PARTS], bias.collect());
+    net.floats("b", &[N_PARTS], bias.collect());
     let first = |it: usize| if it < N_PARTS { 0.01 } else { 0.0 };
-    net.weigh("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
+    net.floats("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
     net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
     net.node("Flatten", &["mean"], "flat", vec![]);
     net.node("Gemm", &["flat", "w", "b"], "seen", vec![]);

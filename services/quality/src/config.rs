@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use viewquality::Selection;
+use viewquality::{Device, Selection};
 
 /// Where the expected errors of the parts come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,17 +34,6 @@ pub struct Config {
     pub frame_offset: i64,
     /// Frames of the table per frame of the footage, at least 1.
     pub frame_step: u32,
-}
-
-/// What a network runs on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Device {
-    /// One thread of the processor.
-    #[default]
-    Cpu,
-    /// The first GPU of NVIDIA's.
-    Cuda,
 }
 
 impl Default for Config {

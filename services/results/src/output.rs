@@ -323,7 +323,7 @@ mod tests {
         assert_eq!(text(&dir, "pose3d.jsonl").lines().count(), 2);
         assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 2 * 14);
         assert_eq!(text(&dir, "pose2d.jsonl").lines().count(), 4);
-        let trc = evaluation::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+        let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
         assert_eq!(trc.frames.len(), 2);
     }
 
@@ -435,7 +435,7 @@ mod tests {
             json!({ "left": "dropped", "right": "dropped" })
         );
         assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
-        let trc = evaluation::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
+        let trc = ::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
         assert_eq!(trc.frames.len(), 6);
     }
 

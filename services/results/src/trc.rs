@@ -1,7 +1,5 @@
 //! `pose3d.trc` for `OpenSim`: tab separated, metres, y up.
 
-use core::fmt::Write as _;
-
 use messages::Pose3d;
 use nalgebra::Vector3;
 
@@ -14,18 +12,9 @@ use crate::pose3d::{is_placed, joints};
 pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
     let axes = scene.opensim_from_world();
     let time = scene.time_s(pose.stamp.frame).unwrap_or(0.0);
-    let mut text = format!("{row}\t{time:.6}");
-    for (_, joint) in joints(scene, pose) {
-        if is_placed(joint) {
-            let [x, y, z]: [f64; 3] = (axes * Vector3::from(joint.in_world)).into();
-            // Writing to a string cannot fail.
-            let _infallible = write!(text, "\t{x:.6}\t{y:.6}\t{z:.6}");
-        } else {
-            text.push_str("\t\t\t");
-        }
-    }
-    text.push('\n');
-    text
+    let points = joints(scene, pose)
+        .map(|(_, joint)| is_placed(joint).then(|| (axes * Vector3::from(joint.in_world)).into()));
+    ::trc::row(row, time, points)
 }
 
 /// The five lines before the rows.
@@ -33,28 +22,21 @@ pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
 /// * `n_rows`: rows that follow.
 pub(crate) fn header(scene: &Scene, n_rows: u64) -> String {
     let rate = scene.frame_rate_hz.unwrap_or(1.0) / scene.frame_step.max(1) as f64;
-    let names: Vec<String> = scene
-        .joints
-        .joints
-        .iter()
-        .map(|it| it.name.replace(' ', "_"))
-        .collect();
-    let n = names.len();
-    let markers = names.join("\t\t\t");
-    let axes: Vec<String> = (1..=n).map(|it| format!("X{it}\tY{it}\tZ{it}")).collect();
-    let axes = axes.join("\t");
-    format!(
-        "PathFileType\t4\t(X/Y/Z)\tpose3d.trc\n\
-         DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n\
-         {rate}\t{rate}\t{n_rows}\t{n}\tm\t{rate}\t1\t{n_rows}\n\
-         Frame#\tTime\t{markers}\t\t\n\
-         \t\t{axes}\n"
-    )
+    let joints = scene.joints.joints.iter();
+    let names: Vec<String> = joints.map(|it| it.name.replace(' ', "_")).collect();
+    let heading = ::trc::Heading {
+        file_name: "pose3d.trc",
+        rate_hz: rate,
+        units: "m",
+        markers: &names.iter().map(String::as_str).collect::<Vec<_>>(),
+        n_rows,
+    };
+    heading.to_string()
 }
 
 #[cfg(test)]
 mod tests {
-    use evaluation::Trc;
+    use ::trc::Trc;
     use messages::Status;
 
     use super::*;

@@ -1,4 +1,4 @@
-//! Errors against a reference: PCP, PCK, distances, and the TRC files references come in.
+//! Errors against a reference: PCP, PCK, and distances.
 //!
 //! In three dimensions: [`segment_errors`] (PCP3D, the paper's eq. 13), [`joint_errors`] and [`aligned`]
 //! (MPJPE and its Procrustes form, 3D PCK), [`Changes`] against a baseline, and [`Bootstrap`] intervals of
@@ -16,8 +16,6 @@ mod bootstrap;
 mod changes;
 mod ranks;
 
-mod trc;
-
 pub use bootstrap::{Bootstrap, Share};
 pub use changes::Changes;
 pub use joints3d::{aligned, joint_errors};
@@ -26,7 +24,6 @@ pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
 pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
 pub use ranks::{area_under_roc, rank_correlation};
 pub use report::{PCK_SHARES, Report, evaluate};
-pub use trc::{Trc, TrcError};
 
 /// A place in space.
 pub type Point = [f64; 3];

@@ -1,9 +1,7 @@
 //! A trained network as an ONNX file.
 
-mod graph;
-mod wire;
+use onnx::{Attribute, Network, Side};
 
-use self::graph::{Attribute, Graph};
 use crate::network::{self, Conv, Kind, Ops, Places, Shape};
 use crate::parameters::{Dims, Inputs, Parameter, convolved};
 
@@ -32,23 +30,41 @@ pub fn write(
     metadata: &[(String, String)],
 ) -> Vec<u8> {
     let mut writer = Writer {
-        graph: Graph::default(),
+        graph: Network {
+            name: Kind::name(shape.kind).to_owned(),
+            producer: Some(("parallax".to_owned(), env!("CARGO_PKG_VERSION").to_owned())),
+            metadata: metadata.to_vec(),
+            ..Network::default()
+        },
         inputs,
         parameters: parameters.iter(),
         n: 0,
     };
     let found = network::run(&mut writer, shape);
-    writer.graph.node("Identity", SIGMA, &[&found.name], &[]);
-    writer.graph.output(SIGMA, &found.dims);
+    let mut graph = writer.graph;
+    graph.node("Identity", &[&found.name], SIGMA, vec![]);
+    graph.outputs.push(batched(SIGMA, &found.dims));
     if let Some(tile) = shape.kind.tile() {
         debug_assert_eq!(tile.len(), 2, "height and width");
         let dims = [3, inputs.tile[0], inputs.tile[1]];
-        writer.graph.input(TILE, &dims);
+        graph.inputs.push(batched(TILE, &dims));
     }
     if shape.kind.sees_evidence() {
-        writer.graph.input(EVIDENCE, &[inputs.evidence_mean.len()]);
+        let dims = [inputs.evidence_mean.len()];
+        graph.inputs.push(batched(EVIDENCE, &dims));
     }
-    writer.graph.finish(Kind::name(shape.kind), metadata)
+    graph.file()
+}
+
+/// An input or output `[n, dims...]`, where `n` is the batch.
+fn batched(name: &str, dims: &[usize]) -> (String, Vec<Side>) {
+    let dims = dims.iter().map(|&dim| Side::Fixed(dim));
+    let shape = core::iter::once(Side::Named("n")).chain(dims);
+    (name.to_owned(), shape.collect())
+}
+
+fn ints(all: &[usize]) -> Attribute {
+    Attribute::Ints(all.iter().map(|&value| value as i64).collect())
 }
 
 /// A value of the graph.
@@ -60,7 +76,7 @@ struct Value {
 }
 
 struct Writer<'a> {
-    graph: Graph,
+    graph: Network,
     inputs: &'a Inputs,
     parameters: core::slice::Iter<'a, Parameter>,
     n: usize,
@@ -80,7 +96,7 @@ impl<'a> Writer<'a> {
     /// Writes a parameter as it is.
     fn constant(&mut self, name: &str) -> &'a Parameter {
         let found = self.parameter(name);
-        self.graph.floats(name, &found.dims, &found.values);
+        self.graph.floats(name, &found.dims, found.values.clone());
         found
     }
 
@@ -88,12 +104,12 @@ impl<'a> Writer<'a> {
         &mut self,
         operator: &str,
         inputs: &[&str],
-        attributes: &[(&str, Attribute<'_>)],
+        attributes: Vec<(&'static str, Attribute)>,
         dims: Dims,
     ) -> Value {
         self.n += 1;
         let name = format!("{}_{}", operator.to_lowercase(), self.n);
-        self.graph.node(operator, &name, inputs, attributes);
+        self.graph.node(operator, inputs, &name, attributes);
         Value { name, dims }
     }
 
@@ -101,28 +117,28 @@ impl<'a> Writer<'a> {
     fn reshaped(&mut self, of: &Value, dims: &[usize]) -> Value {
         let shape = format!("shape_{}", self.n);
         let sizes = core::iter::once(-1).chain(dims.iter().map(|it| *it as i64));
-        self.graph.ints(&shape, &sizes.collect::<Vec<_>>());
-        self.node("Reshape", &[&of.name, &shape], &[], dims.to_vec())
+        self.graph.ints(&shape, sizes.collect());
+        self.node("Reshape", &[&of.name, &shape], vec![], dims.to_vec())
     }
 
     /// Weights about every part along one side of a map, `[n, parts, cells]`.
     fn weights(&mut self, columns: &[usize], (cells, side): (usize, f32), deviation: f32) -> Value {
         let id = self.n;
         let [index, centre, scale] = ["index", "centre", "scale"].map(|it| format!("{it}_{id}"));
-        let columns: Vec<i64> = columns.iter().map(|it| *it as i64).collect();
-        self.graph.ints(&index, &columns);
-        let (centres, factor) = cells_along(cells, side, deviation);
-        self.graph.floats(&centre, &[1, 1, cells], &centres);
-        self.graph.floats(&scale, &[1], &[factor]);
-        let axis = [("axis", Attribute::Int(1))];
         let n = columns.len();
-        let places = self.node("Gather", &[EVIDENCE, &index], &axis, vec![n]);
+        self.graph
+            .ints(&index, columns.iter().map(|it| *it as i64).collect());
+        let (centres, factor) = cells_along(cells, side, deviation);
+        self.graph.floats(&centre, &[1, 1, cells], centres);
+        self.graph.floats(&scale, &[1], vec![factor]);
+        let axis = vec![("axis", Attribute::Int(1))];
+        let places = self.node("Gather", &[EVIDENCE, &index], axis, vec![n]);
         let places = self.reshaped(&places, &[n, 1]);
         let dims = vec![n, cells];
-        let off = self.node("Sub", &[&places.name, &centre], &[], dims.clone());
-        let squared = self.node("Mul", &[&off.name, &off.name], &[], dims.clone());
-        let scaled = self.node("Mul", &[&squared.name, &scale], &[], dims.clone());
-        self.node("Exp", &[&scaled.name], &[], dims)
+        let off = self.node("Sub", &[&places.name, &centre], vec![], dims.clone());
+        let squared = self.node("Mul", &[&off.name, &off.name], vec![], dims.clone());
+        let scaled = self.node("Mul", &[&squared.name, &scale], vec![], dims.clone());
+        self.node("Exp", &[&scaled.name], vec![], dims)
     }
 }
 
@@ -155,8 +171,8 @@ impl Ops for Writer<'_> {
     fn evidence(&mut self) -> Value {
         let dims = self.constant("evidence.mean").dims.clone();
         self.constant("evidence.factor");
-        let off = self.node("Sub", &[EVIDENCE, "evidence.mean"], &[], dims.clone());
-        self.node("Mul", &[&off.name, "evidence.factor"], &[], dims)
+        let off = self.node("Sub", &[EVIDENCE, "evidence.mean"], vec![], dims.clone());
+        self.node("Mul", &[&off.name, "evidence.factor"], vec![], dims)
     }
 
     fn conv(&mut self, of: &Value, name: &str, conv: Conv) -> Value {
@@ -183,38 +199,43 @@ impl Ops for Writer<'_> {
             self.parameter(&format!("{name}.bias")).values.clone()
         };
         let [of_weight, of_bias] = ["weight", "bias"].map(|it| format!("{name}.{it}"));
-        self.graph.floats(&of_weight, &weight.dims, &weights);
-        self.graph.floats(&of_bias, &[conv.channels], &bias);
+        self.graph.floats(&of_weight, &weight.dims, weights);
+        self.graph.floats(&of_bias, &[conv.channels], bias);
         let group = if conv.by_channel { conv.channels } else { 1 };
         let half = conv.kernel / 2;
-        let attributes = [
-            ("kernel_shape", Attribute::Ints(&[conv.kernel; 2])),
-            ("strides", Attribute::Ints(&[conv.stride; 2])),
-            ("pads", Attribute::Ints(&[half; 4])),
+        let attributes = vec![
+            ("kernel_shape", ints(&[conv.kernel; 2])),
+            ("strides", ints(&[conv.stride; 2])),
+            ("pads", ints(&[half; 4])),
             ("group", Attribute::Int(group as i64)),
         ];
         let dims = convolved(&of.dims, conv);
         let inputs = [of.name.as_str(), &of_weight, &of_bias];
-        let sum = self.node("Conv", &inputs, &attributes, dims.clone());
-        self.node("Relu", &[&sum.name], &[], dims)
+        let sum = self.node("Conv", &inputs, attributes, dims.clone());
+        self.node("Relu", &[&sum.name], vec![], dims)
     }
 
     fn pool(&mut self, of: &Value) -> Value {
-        let two = Attribute::Ints(&[2, 2]);
-        let attributes = [("kernel_shape", two), ("strides", two)];
+        let two = ints(&[2, 2]);
+        let attributes = vec![("kernel_shape", two.clone()), ("strides", two)];
         let dims = vec![of.dims[0], of.dims[1] / 2, of.dims[2] / 2];
-        self.node("MaxPool", &[&of.name], &attributes, dims)
+        self.node("MaxPool", &[&of.name], attributes, dims)
     }
 
     fn mean(&mut self, of: &Value) -> Value {
         let n = of.dims[0];
-        let mean = self.node("GlobalAveragePool", &[&of.name], &[], vec![n, 1, 1]);
+        let mean = self.node("GlobalAveragePool", &[&of.name], vec![], vec![n, 1, 1]);
         self.flat(&mean)
     }
 
     fn flat(&mut self, of: &Value) -> Value {
         let dims = vec![of.dims.iter().product()];
-        self.node("Flatten", &[&of.name], &[("axis", Attribute::Int(1))], dims)
+        self.node(
+            "Flatten",
+            &[&of.name],
+            vec![("axis", Attribute::Int(1))],
+            dims,
+        )
     }
 
     fn look(&mut self, of: &Value, places: &Places, deviation: f32) -> Value {
@@ -226,42 +247,42 @@ impl Ops for Writer<'_> {
         let y = self.weights(&places.y, (rows, 1.0), deviation);
         let x = self.reshaped(&x, &[n, 1, cols]);
         let y = self.reshaped(&y, &[n, rows, 1]);
-        let both = self.node("Mul", &[&y.name, &x.name], &[], vec![n, rows, cols]);
+        let both = self.node("Mul", &[&y.name, &x.name], vec![], vec![n, rows, cols]);
         let both = self.reshaped(&both, &[n, rows * cols]);
         let map = self.reshaped(of, &[channels, rows * cols]);
-        let turn = [("perm", Attribute::Ints(&[0, 2, 1]))];
-        let map = self.node(
-            "Transpose",
-            &[&map.name],
-            &turn,
-            vec![rows * cols, channels],
+        let turn = vec![("perm", ints(&[0, 2, 1]))];
+        let map = self.node("Transpose", &[&map.name], turn, vec![rows * cols, channels]);
+        let looked = self.node(
+            "MatMul",
+            &[&both.name, &map.name],
+            vec![],
+            vec![n, channels],
         );
-        let looked = self.node("MatMul", &[&both.name, &map.name], &[], vec![n, channels]);
         self.reshaped(&looked, &[n * channels])
     }
 
     fn join(&mut self, of: &[&Value]) -> Value {
         let names: Vec<&str> = of.iter().map(|it| it.name.as_str()).collect();
         let dims = vec![of.iter().map(|it| it.dims[0]).sum()];
-        self.node("Concat", &names, &[("axis", Attribute::Int(1))], dims)
+        self.node("Concat", &names, vec![("axis", Attribute::Int(1))], dims)
     }
 
     fn dense(&mut self, of: &Value, name: &str, values: usize) -> Value {
         let [weight, bias] = ["weight", "bias"].map(|it| format!("{name}.{it}"));
         self.constant(&weight);
         self.constant(&bias);
-        let attributes = [("transB", Attribute::Int(1))];
+        let attributes = vec![("transB", Attribute::Int(1))];
         self.node(
             "Gemm",
             &[&of.name, &weight, &bias],
-            &attributes,
+            attributes,
             vec![values],
         )
     }
 
     fn prelu(&mut self, of: &Value, name: &str) -> Value {
         self.constant(name);
-        self.node("PRelu", &[&of.name, name], &[], of.dims.clone())
+        self.node("PRelu", &[&of.name, name], vec![], of.dims.clone())
     }
 
     fn dropout(&mut self, of: &Value, _: f32) -> Value {

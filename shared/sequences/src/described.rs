@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use evaluation::{Point, Trc};
+use evaluation::Point;
 use geometry::Rig;
 use geometry::files::ReadOptions;
 use serde::Deserialize;
 use skeleton::JointSet;
+use trc::Trc;
 
 use crate::error::{invalid, text};
 use crate::{Frame, Options, Sequence, SequenceError, View};

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use c3d::C3dError;
-use evaluation::TrcError;
 use geometry::RigError;
 use geometry::files::RigFileError;
+use trc::TrcError;
 
 /// Why a sequence could not be read.
 #[derive(Debug, thiserror::Error)]

@@ -4,5 +4,5 @@
 pub mod browser;
 pub mod c3d;
 pub mod mat;
+pub mod networks;
 pub mod npy;
-pub mod onnx;

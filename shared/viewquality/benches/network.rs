@@ -6,8 +6,8 @@
 use std::hint::black_box;
 
 use kernels::Rgb8View;
+use onnx::{Attribute, Side};
 use rustix::time::{ClockId, clock_gettime};
-use testkit::onnx::{self, Attribute, Side};
 use viewquality::{Network, Normalisation, Sampler, Tile, TileShape};
 
 const SIZE: [usize; 2] = [1280, 720];
@@ -89,7 +89,7 @@ fn file() -> Vec<u8> {
     let mut net = layers.net;
     net.node("GlobalAveragePool", &[&layers.last], "mean", vec![]);
     net.node("Flatten", &["mean"], "flat", vec![]);
-    net.weigh("top", &[512, N_PARTS], vec![0.01; 512 * N_PARTS]);
+    net.floats("top", &[512, N_PARTS], vec![0.01; 512 * N_PARTS]);
     net.node("MatMul", &["flat", "top"], "sigma", vec![]);
     net.file()
 }
@@ -109,8 +109,8 @@ impl Layers {
         let shape = [channels, self.channels / groups, side, side];
         let n = shape.iter().product();
         let values = (0..n).map(|_| self.random(n / channels)).collect();
-        self.net.weigh(&weights, &shape, values);
-        self.net.weigh(&bias, &[channels], vec![0.05; channels]);
+        self.net.floats(&weights, &shape, values);
+        self.net.floats(&bias, &[channels], vec![0.05; channels]);
         let (side, pad) = (side as i64, side as i64 / 2);
         let attributes = vec![
             ("kernel_shape", Attribute::Ints(vec![side; 2])),

@@ -127,7 +127,7 @@ impl Forecaster {
 #[cfg(test)]
 mod tests {
     use fmp::{Filter, ModelSpec, N_CHANNELS, PartSpec, Placement};
-    use testkit::onnx::{self, Side};
+    use onnx::Side;
 
     use super::*;
     use crate::{Card, Unit};
@@ -162,8 +162,8 @@ mod tests {
         net.inputs.push(("tile".to_owned(), sides.to_vec()));
         let one = vec![Side::Fixed(1), Side::Fixed(1)];
         net.outputs.push(("sigma".to_owned(), one));
-        net.weigh("w", &[3, 1], vec![0.0; 3]);
-        net.weigh("b", &[1], vec![sigma]);
+        net.floats("w", &[3, 1], vec![0.0; 3]);
+        net.floats("b", &[1], vec![sigma]);
         net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
         net.node("Flatten", &["mean"], "flat", vec![]);
         net.node("Gemm", &["flat", "w", "b"], "sigma", vec![]);

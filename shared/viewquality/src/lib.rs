@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod card;
+mod device;
 mod evidence;
 mod forecast;
 mod network;
@@ -16,13 +17,14 @@ mod tau;
 mod tile;
 
 pub use card::{Card, CardError, Unit, key};
+pub use device::Device;
 pub use evidence::{
     EVIDENCE_VERSION, EvidenceError, FAR, N_TYPES, PART_NUMBERS, POSE_NUMBERS, evidence,
     evidence_name, n_evidence,
 };
 pub use forecast::{Forecast, ForecastError, Forecaster, Seen};
 #[cfg(feature = "ort")]
-pub use network::{Device, OnnxRuntime};
+pub use network::OnnxRuntime;
 pub use network::{Network, NetworkError};
 pub use predictor::{NoPredictions, Predictor, Selection};
 pub use table::{Table, TableError};

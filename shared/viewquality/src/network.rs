@@ -9,7 +9,7 @@ mod rten_engine;
 
 use self::engine::{Description, Engine, Input, Side};
 #[cfg(feature = "ort")]
-pub use self::onnx_runtime::{Device, OnnxRuntime};
+pub use self::onnx_runtime::OnnxRuntime;
 use self::rten_engine::Rten;
 use crate::{Card, CardError, TileShape, n_evidence};
 

@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use testkit::onnx::{self, of_colours};
+use testkit::networks::of_colours;
 use viewquality::{Device, Network, NetworkError, OnnxRuntime, TileShape, n_evidence};
 
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.quality.onnx");

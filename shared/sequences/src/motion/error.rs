@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use c3d::C3dError;
-use evaluation::TrcError;
+use trc::TrcError;
 
 /// Why a motion could not be read.
 #[derive(Debug, thiserror::Error)]

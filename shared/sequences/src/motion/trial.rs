@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use c3d::C3d;
-use evaluation::Trc;
+use trc::Trc;
 
 use super::{MotionError, MotionOptions};
 

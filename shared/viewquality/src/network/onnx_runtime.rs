@@ -9,16 +9,7 @@ use ort::value::{TensorRef, ValueType};
 
 use super::NetworkError;
 use super::engine::{Description, Engine, Input, Output, Port, Side, Wrong};
-
-/// What a network runs on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Device {
-    /// One thread of the processor.
-    #[default]
-    Cpu,
-    /// The first GPU of NVIDIA's, which the library must have been built for.
-    Cuda,
-}
+use crate::Device;
 
 /// The library that this process has loaded: there can be one, and it stays.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);

@@ -1,7 +1,8 @@
 //! Networks whose answers are known by hand give them, and what is no such network is refused.
 
+use onnx::Side;
 use proptest::prelude::*;
-use testkit::onnx::{self, Side, of_colours};
+use testkit::networks::of_colours;
 
 use super::*;
 use crate::Unit;
@@ -22,7 +23,7 @@ fn of_evidence() -> onnx::Network {
         .push(("sigma".to_owned(), vec![Side::Fixed(1), Side::Fixed(2)]));
     let mut weights = vec![0.0; 2 * k];
     (weights[0], weights[3]) = (1.0, 1.0);
-    net.weigh("w", &[k, 2], weights);
+    net.floats("w", &[k, 2], weights);
     net.node("MatMul", &["evidence", "w"], "sigma", vec![]);
     net.metadata
         .push(("parallax.evidence".to_owned(), "1".to_owned()));
@@ -70,7 +71,7 @@ fn a_network_may_take_both() {
     net.metadata
         .push(("parallax.evidence".to_owned(), "1".to_owned()));
     net.nodes.last_mut().unwrap().output = "seen".to_owned();
-    net.weigh("v", &[k, 2], vec![1.0; 2 * k]);
+    net.floats("v", &[k, 2], vec![1.0; 2 * k]);
     net.node("MatMul", &["evidence", "v"], "known", vec![]);
     net.node("Add", &["seen", "known"], "sigma", vec![]);
     let sigma = read(&net).unwrap().run(&[0.0; 36], &vec![0.5; k]).unwrap();

@@ -2,7 +2,7 @@
 
 /// A message that is being written.
 #[derive(Debug, Default, Clone)]
-pub(super) struct Message(Vec<u8>);
+pub(crate) struct Message(Vec<u8>);
 
 /// Wire types.
 const VARINT: u64 = 0;
@@ -10,14 +10,14 @@ const BYTES: u64 = 2;
 
 impl Message {
     /// A whole number.
-    pub(super) fn number(mut self, field: u64, value: i64) -> Self {
+    pub(crate) fn number(mut self, field: u64, value: i64) -> Self {
         self.key(field, VARINT);
         self.varint(value as u64);
         self
     }
 
     /// Bytes.
-    pub(super) fn bytes(mut self, field: u64, value: &[u8]) -> Self {
+    pub(crate) fn bytes(mut self, field: u64, value: &[u8]) -> Self {
         self.key(field, BYTES);
         self.varint(value.len() as u64);
         self.0.extend(value);
@@ -25,17 +25,17 @@ impl Message {
     }
 
     /// A text.
-    pub(super) fn text(self, field: u64, value: &str) -> Self {
+    pub(crate) fn text(self, field: u64, value: &str) -> Self {
         self.bytes(field, value.as_bytes())
     }
 
     /// Another message.
-    pub(super) fn message(self, field: u64, value: &Self) -> Self {
+    pub(crate) fn message(self, field: u64, value: &Self) -> Self {
         self.bytes(field, &value.0)
     }
 
     /// One field for every item.
-    pub(super) fn each<T>(
+    pub(crate) fn each<T>(
         self,
         items: impl IntoIterator<Item = T>,
         put: impl Fn(Self, T) -> Self,
@@ -44,7 +44,7 @@ impl Message {
     }
 
     /// The bytes of the message.
-    pub(super) fn finish(self) -> Vec<u8> {
+    pub(crate) fn finish(self) -> Vec<u8> {
         self.0
     }
 

@@ -1,4 +1,4 @@
-//! TRC files (OpenSim markers): five header lines, then a row a frame, tab separated.
+//! The text of a file to markers over time.
 
 /// Markers over time.
 #[derive(Debug, Clone, PartialEq)]
