@@ -8,6 +8,7 @@ use kernels::{
 };
 
 use crate::features::{Features, Source};
+use crate::pool::Pool;
 use crate::{Layout, Model, Precision, Scope};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
@@ -17,8 +18,8 @@ pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
     bank: Bank,
-    workspaces: Mutex<Vec<Features>>,
-    /// One for each thread.
+    workspaces: Pool<Features>,
+    /// One for each thread. A stack and no [`Pool`]: the last one put back is the first one taken, and still in the cache.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 
@@ -83,7 +84,7 @@ impl Extractor {
             model,
             isa,
             bank,
-            workspaces: Mutex::default(),
+            workspaces: Pool::default(),
             buffers: Mutex::default(),
         }
     }
@@ -147,7 +148,7 @@ impl Extractor {
             cell_px: spec.cell_px,
             rounded: matches!(self.bank, Bank::Bf16(_)),
         };
-        let mut features = lock(&self.workspaces).pop().unwrap_or_default();
+        let mut features = self.workspaces.take();
         let n_threads = if in_pool() {
             rayon::current_num_threads()
         } else {
@@ -166,7 +167,7 @@ impl Extractor {
         };
         let out = &mut out[..n_values];
         self.correlate((&source, &features), everything, share, out);
-        lock(&self.workspaces).push(features);
+        self.workspaces.put_back(features);
     }
 
     /// Makes room for every thread.

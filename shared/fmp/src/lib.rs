@@ -17,6 +17,7 @@ mod features;
 mod layout;
 mod local;
 mod model;
+mod pool;
 mod pose;
 mod precision;
 mod pyramid;

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use self::effort::Tally;
 use self::sweep::{Problem, Sweep, Workspace};
 use crate::extract::{in_pool, lock};
+use crate::pool::Pool;
 use crate::{Edge, Model, Pose, Responses, Spring, Springs};
 pub use again::Again;
 pub use bounds::{Bound, Bounds};
@@ -78,9 +79,10 @@ pub struct Solver {
     rules: Vec<Option<VoteRule>>,
     /// Number of score planes before those of every part, and of all.
     first_planes: Vec<usize>,
+    /// A list and no [`Pool`]: the one that fits a level best is taken, which a queue cannot look for.
     workspaces: Mutex<Vec<Workspace>>,
     /// One list of part scores for every caller of [`Self::score`].
-    scores: Mutex<Vec<Vec<f32>>>,
+    scores: Pool<Vec<f32>>,
     tally: Tally,
     n_sweeps: AtomicU64,
 }
@@ -117,7 +119,7 @@ impl Solver {
             isa,
             model,
             workspaces: Mutex::default(),
-            scores: Mutex::default(),
+            scores: Pool::default(),
             tally: Tally::default(),
             n_sweeps: AtomicU64::new(0),
         }
@@ -205,9 +207,9 @@ impl Solver {
     pub fn score(&self, evidence: &Responses<'_>, pose: &Pose, extra: Option<&dyn Extra>) -> f32 {
         self.check(evidence);
         let problem = Problem::new(self, evidence, extra, pose.level);
-        let mut scores = lock(&self.scores).pop().unwrap_or_default();
+        let mut scores = self.scores.take();
         let score = sweep::score(&problem, pose, &mut scores);
-        lock(&self.scores).push(scores);
+        self.scores.put_back(scores);
         score
     }
 

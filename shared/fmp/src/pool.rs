@@ -1,0 +1,64 @@
+//! Workspaces that are used again from frame to frame.
+
+use crossbeam_queue::ArrayQueue;
+
+/// Most workspaces that are kept: more callers at a time than any machine of ours has threads, and those beyond
+/// only make theirs anew.
+const MOST: usize = 256;
+
+/// Workspaces of one kind: whoever begins takes one, and puts it back at the end.
+///
+/// A queue without locks, so that threads that begin and end at one time do not wait for each other. First in,
+/// first out: for workspaces of which there is one per caller, not for those that are taken many times a frame and
+/// should be warm in the cache.
+#[derive(Debug)]
+pub(crate) struct Pool<T> {
+    free: ArrayQueue<T>,
+}
+
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Self {
+            free: ArrayQueue::new(MOST),
+        }
+    }
+}
+
+impl<T: Default> Pool<T> {
+    /// A workspace that nobody uses, or a new one.
+    pub(crate) fn take(&self) -> T {
+        self.free.pop().unwrap_or_default()
+    }
+
+    /// Takes a workspace back.
+    pub(crate) fn put_back(&self, workspace: T) {
+        // Beyond the limit it is dropped.
+        drop(self.free.push(workspace));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_put_back_first_is_taken_first_and_then_new_ones_are_made() {
+        let pool = Pool::<Vec<u8>>::default();
+        pool.put_back(vec![7]);
+        pool.put_back(vec![8]);
+        assert_eq!(
+            [pool.take(), pool.take(), pool.take()],
+            [vec![7], vec![8], vec![]]
+        );
+    }
+
+    #[test]
+    fn beyond_the_limit_nothing_is_kept() {
+        let pool = Pool::<u32>::default();
+        for number in 1..=MOST as u32 + 1 {
+            pool.put_back(number);
+        }
+        let kept = core::iter::from_fn(|| Some(pool.take()).filter(|&number| number > 0));
+        assert_eq!(kept.count(), MOST);
+    }
+}
