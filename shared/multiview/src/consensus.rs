@@ -63,34 +63,73 @@ struct Choice {
 ///
 /// * Returns one position per view, pixels; `None` for a view without sightings.
 pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
-    let choices: Vec<Vec<Choice>> = views.iter().map(|it| distinct(settings, it)).collect();
-    if choices.iter().all(|it| it.len() <= 1) {
-        return choices
-            .iter()
-            .map(|it| it.first().map(|it| it.at.into()))
-            .collect();
-    }
-    let means: Vec<Vec<Choice>> = views.iter().map(of_means).collect();
-    let most = views.iter().map(|it| it.points_px.len()).max();
-    let price = vote_cost(settings, 1, most.unwrap_or(1));
-    let chosen = best(settings, views, &choices);
-    let average = best(settings, views, &means);
-    let picked = match (chosen, average) {
-        (Some((cost, picked)), Some((cost_of_means, _))) if cost <= cost_of_means + price => {
-            return pick(&choices, &picked);
-        }
-        (Some((_, picked)), None) => return pick(&choices, &picked),
-        _ => vec![0; views.len()],
-    };
-    pick(&means, &picked)
+    let mut workspace = ConsensusWorkspace::default();
+    workspace.agree(settings, views).collect()
 }
 
-fn pick(choices: &[Vec<Choice>], picked: &[usize]) -> Vec<Option<[f64; 2]>> {
-    choices
-        .iter()
-        .zip(picked)
-        .map(|(choices, &it)| choices.get(it).map(|it| it.at.into()))
-        .collect()
+/// What [`consensus()`] is computed in: lists that are used again from part to part.
+#[derive(Debug, Clone, Default)]
+pub struct ConsensusWorkspace {
+    /// By view.
+    choices: Vec<Vec<Choice>>,
+    /// By view: the mean, if there are sightings.
+    means: Vec<Vec<Choice>>,
+    kinds: Vec<Kind>,
+}
+
+impl ConsensusWorkspace {
+    /// [`consensus()`], one view after the other.
+    pub fn agree<'a>(
+        &'a mut self,
+        settings: &'a ConsensusSettings,
+        views: &'a [Sightings<'_>],
+    ) -> impl Iterator<Item = Option<[f64; 2]>> + 'a {
+        self.choices.resize_with(views.len(), Vec::new);
+        self.means.resize_with(views.len(), Vec::new);
+        for (choices, view) in self.choices.iter_mut().zip(views) {
+            distinct(settings, view, &mut self.kinds, choices);
+        }
+        let is_settled = self.choices.iter().all(|choices| choices.len() <= 1);
+        for (mean, view) in self.means.iter_mut().zip(views) {
+            mean.clear();
+            mean.extend(of_mean(view).filter(|_| !is_settled));
+        }
+        let (choices, means) = (&self.choices[..], &self.means[..]);
+        let point = if is_settled {
+            None
+        } else {
+            meeting(settings, views, choices, means)
+        };
+        (0..views.len()).map(move |view| {
+            let own = &choices[view];
+            let chosen = match &point {
+                Some(point) => own.get(nearest(settings, &views[view], own, point).0),
+                None if is_settled => own.first(),
+                None => means[view].first(),
+            };
+            chosen.map(|choice| choice.at.into())
+        })
+    }
+}
+
+/// The point of the world that the choices mean, unless the means fit together better.
+fn meeting(
+    settings: &ConsensusSettings,
+    views: &[Sightings<'_>],
+    choices: &[Vec<Choice>],
+    means: &[Vec<Choice>],
+) -> Option<Point3<f64>> {
+    let most = views.iter().map(|it| it.points_px.len()).max();
+    let price = vote_cost(settings, 1, most.unwrap_or(1));
+    let chosen = best(settings, views, choices);
+    let average = best(settings, views, means);
+    match (chosen, average) {
+        (Some((cost, point)), Some((cost_of_means, _))) if cost <= cost_of_means + price => {
+            Some(point)
+        }
+        (Some((_, point)), None) => Some(point),
+        _ => None,
+    }
 }
 
 fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f64 {
@@ -101,35 +140,66 @@ fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f6
 /// The different answers of a view, in the order in which they were first given.
 ///
 /// Answers close to the first one of their kind are one answer, at their mean.
-fn distinct(settings: &ConsensusSettings, view: &Sightings<'_>) -> Vec<Choice> {
-    let mut kinds: Vec<Vec<[f64; 2]>> = Vec::new();
+fn distinct(
+    settings: &ConsensusSettings,
+    view: &Sightings<'_>,
+    kinds: &mut Vec<Kind>,
+    choices: &mut Vec<Choice>,
+) {
+    kinds.clear();
     let reach = settings.same_sigmas * view.sigma_px;
     for &point in &view.points_px {
         let is_near =
-            |it: &&mut Vec<[f64; 2]>| (it[0][0] - point[0]).hypot(it[0][1] - point[1]) <= reach;
+            |it: &&mut Kind| (it.first[0] - point[0]).hypot(it.first[1] - point[1]) <= reach;
         match kinds.iter_mut().find(is_near) {
-            Some(kind) => kind.push(point),
-            None => kinds.push(vec![point]),
+            Some(kind) => kind.add(point),
+            None => kinds.push(Kind::of(point)),
         }
     }
-    let choice = |kind: &Vec<[f64; 2]>| {
-        let at = mean(kind);
+    let choice = |kind: &Kind| {
+        let at = Point2::from(kind.sum.map(|it| it / kind.n as f64));
         Choice {
             at,
             ray: view.camera.ray(&at),
-            cost: vote_cost(settings, kind.len(), view.points_px.len()),
+            cost: vote_cost(settings, kind.n, view.points_px.len()),
         }
     };
-    kinds.iter().map(choice).collect()
+    choices.clear();
+    choices.extend(kinds.iter().map(choice));
 }
 
-fn of_means(view: &Sightings<'_>) -> Vec<Choice> {
+/// Answers that are close to the first of them.
+#[derive(Debug, Clone)]
+struct Kind {
+    first: [f64; 2],
+    sum: [f64; 2],
+    n: usize,
+}
+
+impl Kind {
+    fn of(first: [f64; 2]) -> Self {
+        let mut kind = Self {
+            first,
+            sum: [0.0; 2],
+            n: 0,
+        };
+        kind.add(first);
+        kind
+    }
+
+    fn add(&mut self, point: [f64; 2]) {
+        self.sum = [self.sum[0] + point[0], self.sum[1] + point[1]];
+        self.n += 1;
+    }
+}
+
+fn of_mean(view: &Sightings<'_>) -> Option<Choice> {
     if view.points_px.is_empty() {
-        return Vec::new();
+        return None;
     }
     let at = mean(&view.points_px);
     let ray = view.camera.ray(&at);
-    vec![Choice { at, ray, cost: 0.0 }]
+    Some(Choice { at, ray, cost: 0.0 })
 }
 
 fn mean(points: &[[f64; 2]]) -> Point2<f64> {
@@ -139,13 +209,13 @@ fn mean(points: &[[f64; 2]]) -> Point2<f64> {
     Point2::from(sum.map(|it| it / points.len() as f64))
 }
 
-/// The cheapest point in which two rays meet, as its cost and the choice of every view.
+/// The cheapest point in which two rays meet, behind its cost.
 fn best(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
     choices: &[Vec<Choice>],
-) -> Option<(f64, Vec<usize>)> {
-    let mut best: Option<(f64, Vec<usize>)> = None;
+) -> Option<(f64, Point3<f64>)> {
+    let mut best: Option<(f64, Point3<f64>)> = None;
     for (first, of_first) in choices.iter().enumerate() {
         for of_second in &choices[first + 1..] {
             for (a, b) in of_first
@@ -158,9 +228,9 @@ fn best(
                 let Some(point) = meeting_point(a, b) else {
                     continue;
                 };
-                let found = judge(settings, views, choices, &point);
-                if best.as_ref().is_none_or(|it| found.0 < it.0) {
-                    best = Some(found);
+                let cost = judge(settings, views, choices, &point);
+                if best.as_ref().is_none_or(|it| cost < it.0) {
+                    best = Some((cost, point));
                 }
             }
         }
@@ -168,35 +238,36 @@ fn best(
     best
 }
 
-/// What a point of the world costs in all views, and the answer of each that it is nearest to.
+/// What a point of the world costs in all views.
 fn judge(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
     choices: &[Vec<Choice>],
     point: &Point3<f64>,
-) -> (f64, Vec<usize>) {
+) -> f64 {
+    let each = views.iter().zip(choices);
+    let answered = each.filter(|(_, choices)| !choices.is_empty());
+    answered.fold(0.0, |total, (view, choices)| {
+        total + nearest(settings, view, choices, point).1
+    })
+}
+
+/// The answer of a view that is nearest to a point of the world, and what it costs.
+fn nearest(
+    settings: &ConsensusSettings,
+    view: &Sightings<'_>,
+    choices: &[Choice],
+    point: &Point3<f64>,
+) -> (usize, f64) {
     let c2 = settings.loss_sigmas.powi(2);
-    let mut total = 0.0;
-    let mut picked = Vec::with_capacity(views.len());
-    for (view, choices) in views.iter().zip(choices) {
-        let seen = view.camera.project(point);
-        let cost = |it: &Choice| {
-            let r = seen.map_or(UNSEEN, |seen| (seen - it.at).norm() / view.sigma_px);
-            it.cost + c2 * (r * r / c2).ln_1p()
-        };
-        let costs = choices.iter().map(cost).enumerate();
-        let least = costs.fold(
-            (0, f64::INFINITY),
-            |least, it| {
-                if it.1 < least.1 { it } else { least }
-            },
-        );
-        picked.push(least.0);
-        if !choices.is_empty() {
-            total += least.1;
-        }
-    }
-    (total, picked)
+    let seen = view.camera.project(point);
+    let cost = |it: &Choice| {
+        let r = seen.map_or(UNSEEN, |seen| (seen - it.at).norm() / view.sigma_px);
+        it.cost + c2 * (r * r / c2).ln_1p()
+    };
+    let costs = choices.iter().map(cost).enumerate();
+    let dearest = (0, f64::INFINITY);
+    costs.fold(dearest, |least, it| if it.1 < least.1 { it } else { least })
 }
 
 /// The point nearest to both rays; `None` if they are parallel or it lies behind one of them.

@@ -63,16 +63,56 @@ impl<'a> PairTerms<'a> {
     /// The same, with the terms that are on while `target` is solved.
     pub(crate) fn for_target(&self, target: usize, first: &Pose, second: &Pose) -> f64 {
         let plan = self.pair.views[0].plan;
-        let fixed = Consistency::switched(self, [0, target], second);
         let scale2 = plan.scale(usize::from(first.level)).powi(2);
         (0..self.counterpart.len())
             .map(|part| {
                 let at = plan.ideal_centre(first, part);
-                let distance2 = fixed.terms[part].map_or(0.0, |it| it.distance2(at, scale2));
+                let term = self.term([0, target], part, second);
+                let distance2 = term.map_or(0.0, |it| it.distance2(at, scale2));
                 let mixture = usize::from(first.parts[part].mixture);
-                f64::from(fixed.of_type(part, mixture)) - self.settings.alpha * distance2
+                let of_type = self.of_type([0, target], [part, mixture], second);
+                f64::from(of_type) - self.settings.alpha * distance2
             })
             .sum()
+    }
+
+    /// The geometric term of a part of view `view`, as it is switched while view `target` is solved.
+    ///
+    /// * `support`: the pose of the other view.
+    fn term(&self, [view, target]: [usize; 2], part: usize, support: &Pose) -> Option<Term> {
+        if !self.is_active([view, target], part) {
+            return None;
+        }
+        let plan = self.pair.views[1 - view].plan;
+        let support_from_target = self.pair.epipolar.support_from_target(view == 0);
+        let scale = plan.scale(usize::from(support.level));
+        let at = plan.ideal_centre(support, self.partner(part));
+        let cap = self.settings.max_distance_cells;
+        Term::new(support_from_target, at, scale, cap)
+    }
+
+    /// The appearance term of a type of a part, as [`Self::term`].
+    fn of_type(
+        &self,
+        [view, target]: [usize; 2],
+        [part, mixture]: [usize; 2],
+        support: &Pose,
+    ) -> f32 {
+        let Some(table) = self.table else {
+            return 0.0;
+        };
+        if !self.is_active([view, target], part) {
+            return 0.0;
+        }
+        let partner = self.partner(part);
+        let other = usize::from(support.parts[partner].mixture);
+        // The table goes by the parts of the first view.
+        let joint = if view == 0 {
+            table.value(part, mixture, other)
+        } else {
+            table.value(partner, other, mixture)
+        };
+        (self.settings.beta * joint) as f32
     }
 
     /// The part of the other view that goes with `part` of view `target`.
@@ -96,49 +136,25 @@ impl<'a> PairTerms<'a> {
 pub(crate) struct Consistency<'a> {
     pair_terms: &'a PairTerms<'a>,
     target: usize,
-    /// The view whose switches count: the target, but where two poses are only judged.
-    switches: usize,
     support: &'a Pose,
     terms: Vec<Option<Term>>,
 }
 
 impl<'a> Consistency<'a> {
     pub(crate) fn new(pair_terms: &'a PairTerms<'a>, target: usize, support: &'a Pose) -> Self {
-        Self::switched(pair_terms, [target; 2], support)
-    }
-
-    fn switched(
-        pair_terms: &'a PairTerms<'a>,
-        [target, switches]: [usize; 2],
-        support: &'a Pose,
-    ) -> Self {
-        let settings = pair_terms.settings;
-        let plan = pair_terms.pair.views[1 - target].plan;
-        let support_from_target = pair_terms.pair.epipolar.support_from_target(target == 0);
-        let scale = plan.scale(usize::from(support.level));
-        let terms = (0..support.parts.len())
-            .map(|part| {
-                pair_terms
-                    .is_active([target, switches], part)
-                    .then_some(())?;
-                let at = plan.ideal_centre(support, pair_terms.partner(part));
-                Term::new(support_from_target, at, scale, settings.max_distance_cells)
-            })
-            .collect();
+        let term = |part| pair_terms.term([target; 2], part, support);
         Self {
+            terms: (0..support.parts.len()).map(term).collect(),
             pair_terms,
             target,
-            switches,
             support,
-            terms,
         }
     }
 }
 
 impl Consistency<'_> {
     fn is_active(&self, part: usize) -> bool {
-        self.pair_terms
-            .is_active([self.target, self.switches], part)
+        self.pair_terms.is_active([self.target; 2], part)
     }
 }
 
@@ -158,21 +174,8 @@ impl Extra for Consistency<'_> {
     }
 
     fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        let Some(table) = self.pair_terms.table else {
-            return 0.0;
-        };
-        if !self.is_active(part) {
-            return 0.0;
-        }
-        let partner = self.pair_terms.partner(part);
-        let other = usize::from(self.support.parts[partner].mixture);
-        // The table goes by the parts of the first view.
-        let joint = if self.target == 0 {
-            table.value(part, mixture, other)
-        } else {
-            table.value(partner, other, mixture)
-        };
-        (self.pair_terms.settings.beta * joint) as f32
+        self.pair_terms
+            .of_type([self.target; 2], [part, mixture], self.support)
     }
 
     fn max_gain(&self, part: usize) -> f32 {

@@ -108,7 +108,7 @@ pub use anatomy::anatomical_evidence;
 pub use angle::{AngleTables, angle_between};
 pub use average::{FusedPose, anatomical, average};
 pub use compatibility::{Compatibility, CompatibilityError};
-pub use consensus::{ConsensusSettings, Sightings, consensus};
+pub use consensus::{ConsensusSettings, ConsensusWorkspace, Sightings, consensus};
 pub use facing::{
     Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
     rank_facing,

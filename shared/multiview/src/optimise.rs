@@ -232,11 +232,10 @@ pub(crate) fn types(pose: &Pose) -> impl Iterator<Item = u8> {
 
 /// Mean distance between the part centres of two poses, pixels.
 pub(crate) fn mean_movement(plan: &ViewPlan, from: &Pose, to: &Pose) -> f64 {
-    let (from, to) = (plan.centres(from), plan.centres(to));
-    let sum: f64 = from
-        .iter()
-        .zip(&to)
-        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
-        .sum();
-    sum / from.len().max(1) as f64
+    let movement = |part: usize| {
+        let [a, b] = [from, to].map(|pose| plan.centre(pose, part));
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    let n = from.parts.len().min(to.parts.len());
+    (0..n).map(movement).sum::<f64>() / n.max(1) as f64
 }

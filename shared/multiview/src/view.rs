@@ -91,15 +91,20 @@ impl ViewPlan {
     /// How large the person of a pose is: the longer side of the rectangle around the centres of its parts, pixels
     /// of the frame.
     pub fn size(&self, pose: &Pose) -> f64 {
-        let centres = self.centres(pose);
+        let parts = 0..pose.parts.len();
         let side = |axis: usize| {
-            let values = centres.iter().map(|it| it[axis]);
+            let values = parts.clone().map(|part| self.centre(pose, part)[axis]);
             let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
                 [low.min(it), high.max(it)]
             });
             high - low
         };
         side(0).max(side(1)).max(0.0)
+    }
+
+    /// Centre of a part of a pose, pixels of the frame.
+    pub fn centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
+        pose.centre(&self.model, &self.layout, part)
     }
 
     /// Centres of all parts of a pose, pixels of the frame.

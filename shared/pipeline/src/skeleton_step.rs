@@ -5,8 +5,9 @@ use std::sync::Arc;
 use fmp::Pose;
 use geometry::{Observation, TriangulateError, Triangulated};
 use multiview::{
-    ConsensusSettings, Exchanges, FacingFilter, FacingHypothesis, FacingSettings, FusedPose,
-    Sightings, ViewPlan, anatomical, anatomical_evidence, average, consensus, is_exchanged,
+    ConsensusSettings, ConsensusWorkspace, Exchanges, FacingFilter, FacingHypothesis,
+    FacingSettings, FusedPose, Sightings, ViewPlan, anatomical, anatomical_evidence, average,
+    is_exchanged,
 };
 use nalgebra::{Point2, Point3, UnitVector3};
 use skeleton::{JointMap, JointSet, PARSE14};
@@ -276,7 +277,9 @@ impl SkeletonStep {
             let candidate = |energy: f64, pose: &Pose| Candidate {
                 energy,
                 cell_px: plan.scale(usize::from(pose.level)),
-                centres_px: anatomical(&plan.centres(pose), mirror),
+                centres_px: (0..pose.parts.len())
+                    .map(|part| plan.centre(pose, mirror.map_or(part, |mirror| mirror[part])))
+                    .collect(),
             };
             let found = found.poses(view, exchanged).into_iter();
             Some(Candidates {
@@ -297,14 +300,22 @@ impl SkeletonStep {
     ) -> Vec<Option<FusedView>> {
         let mut views = fuse(candidates, exchanged);
         let n_parts = self.plans.first().map_or(0, |it| it.model().n_parts());
+        let mut sightings: Vec<Sightings<'_>> = views
+            .iter()
+            .zip(&self.plans)
+            .map(|(view, plan)| self.sightings(view.as_ref(), plan))
+            .collect();
+        let mut workspace = ConsensusWorkspace::default();
         for part in 0..n_parts {
-            let sightings: Vec<Sightings<'_>> = (0..views.len())
-                .map(|view| self.sightings(view, part, candidates, &views))
-                .collect();
-            for (view, agreed) in views
-                .iter_mut()
-                .zip(consensus(&self.settings.consensus, &sightings))
-            {
+            for (sightings, candidates) in sightings.iter_mut().zip(candidates) {
+                let all = candidates.iter().flat_map(Candidates::all);
+                sightings.points_px.clear();
+                sightings
+                    .points_px
+                    .extend(all.map(|it| it.centres_px[part]));
+            }
+            let agreed = workspace.agree(&self.settings.consensus, &sightings);
+            for (view, agreed) in views.iter_mut().zip(agreed) {
                 if let (Some(view), Some(agreed)) = (view, agreed) {
                     view.pose.centres_px[part] = agreed;
                 }
@@ -313,20 +324,13 @@ impl SkeletonStep {
         views
     }
 
-    /// Where the pairs of a view saw a part; nowhere, if the view is missing.
-    fn sightings(
-        &self,
-        view: usize,
-        part: usize,
-        candidates: &[Option<Candidates>],
-        views: &[Option<FusedView>],
-    ) -> Sightings<'_> {
-        let cell_px = views[view].as_ref().map_or(1.0, |it| it.cell_px);
-        let all = candidates[view].iter().flat_map(Candidates::all);
+    /// What the pairs of a view saw, yet without points.
+    fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
+        let cell_px = view.map_or(1.0, |it| it.cell_px);
         Sightings {
-            camera: self.plans[view].camera(),
+            camera: plan.camera(),
             sigma_px: cell_px * self.settings.sigma_cells,
-            points_px: all.map(|it| it.centres_px[part]).collect(),
+            points_px: Vec::new(),
         }
     }
 
@@ -352,16 +356,18 @@ impl SkeletonStep {
             let of_view = expected_px.get(view)?;
             of_view.get(point).copied()
         };
+        let mut observations: Vec<Observation<'_>> = Vec::with_capacity(seen.len());
         let triangulate = |point: usize| {
-            let observations: Vec<Observation<'_>> = seen
-                .iter()
-                .map(|(view, fused, points)| Observation {
+            observations.clear();
+            let observed = seen.iter();
+            observations.extend(observed.map(|(view, fused, points)| {
+                Observation {
                     camera: self.plans[*view].camera(),
                     point_px: Point2::from(points[point]),
                     sigma_px: (fused.cell_px * self.settings.sigma_cells)
                         .hypot(expected_px(*view, point).unwrap_or(0.0)),
-                })
-                .collect();
+                }
+            }));
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
             Ok(by_view(found, seen.iter().map(|it| it.0)))
         };

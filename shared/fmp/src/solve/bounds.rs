@@ -2,7 +2,7 @@
 
 use super::sweep::Sweep;
 use super::{Extra, Solver};
-use crate::{Responses, Springs};
+use crate::{Responses, Spring, Springs};
 
 /// For every level of a layout the score of its best pose without the terms of other views.
 ///
@@ -136,16 +136,16 @@ impl Solver {
     pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
         let of_edge = parts.filter_map(|it| it.edge.as_ref()).map(|edge| {
-            let springs: Vec<_> = match &edge.springs {
-                Springs::PerChildType(all) => all.iter().collect(),
-                Springs::PerTypePair(all) => all.iter().flatten().flatten().collect(),
+            let most = |most: f64, spring: &Spring| {
+                let [xx, x, yy, y] = spring.w;
+                most.max(x * x / (4.0 * xx) + y * y / (4.0 * yy))
             };
-            let spring = springs.into_iter().map(|it| {
-                let [xx, x, yy, y] = it.w;
-                x * x / (4.0 * xx) + y * y / (4.0 * yy)
-            });
+            let spring = match &edge.springs {
+                Springs::PerChildType(all) => all.iter().fold(0.0, most),
+                Springs::PerTypePair(all) => all.iter().flatten().flatten().fold(0.0, most),
+            };
             let bias = edge.bias.iter().flatten().copied().fold(0.0, f64::max);
-            bias + spring.fold(0.0, f64::max)
+            bias + spring
         });
         of_edge.sum::<f64>() + self.model.spec().root_bias.abs()
     }

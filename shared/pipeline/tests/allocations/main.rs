@@ -1,0 +1,124 @@
+//! What the steps of `fuse` and `triangulate` allocate for a frame, once their buffers are there.
+//!
+//! The goal is nothing; it is not reached. Nothing as large as a response map is allocated: a frame of four times the
+//! cells takes no more than a small one. What is left are the answers themselves (the poses of every solution, the
+//! joints) and short lists of a frame, one entry per view, part, candidate or level; in `triangulate` once for each of
+//! the eight assumptions about facing of four views. The limits are what was counted, rounded up; they fall when a
+//! list goes, and hold with the checks that a build for tests has.
+//!
+//! A program without the harness, whose own threads allocate too; everything runs on one thread.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod scene;
+
+use std::alloc::System;
+use std::sync::Arc;
+
+use pipeline::{Combine, FuseStep, PairTables, SkeletonSettings, SkeletonStep};
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+use scene::Scene;
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Views of the rig; pairs are the six of them.
+const N_VIEWS: usize = 4;
+
+/// Of `fuse`, for each single-view solution.
+const MOST_OF_SOLUTION: Count = Count {
+    allocations: 13,
+    bytes: 5_500,
+};
+
+/// Of `triangulate`.
+const MOST_OF_SKELETON: Count = Count {
+    allocations: 580,
+    bytes: 250_000,
+};
+
+/// What a call allocates and reallocates, and how many bytes that are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Count {
+    allocations: usize,
+    bytes: usize,
+}
+
+impl Count {
+    fn is_within(self, most: Self, what: &str) {
+        assert!(
+            self.allocations <= most.allocations && self.bytes <= most.bytes,
+            "{what}: {self:?}, at most {most:?}"
+        );
+    }
+}
+
+fn count<T>(call: impl FnOnce() -> T) -> (T, Count) {
+    let region = Region::new(ALLOCATOR);
+    let answer = call();
+    let change = region.change();
+    let count = Count {
+        allocations: change.allocations + change.reallocations,
+        bytes: change.bytes_allocated,
+    };
+    (answer, count)
+}
+
+/// What a frame of pairs takes in `fuse` for each of its single-view solutions, and in `triangulate`.
+fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
+    let scene = Scene::new(rows, N_VIEWS);
+    let settings = multiview::Settings::default();
+    let tables = PairTables::default();
+    let fuse = FuseStep::new(
+        Arc::clone(&scene.model),
+        settings,
+        scene.plans.clone(),
+        tables,
+    );
+    let settings = SkeletonSettings {
+        combine,
+        ..SkeletonSettings::default()
+    };
+    let mut skeleton = SkeletonStep::new(scene.plans.clone(), None, settings);
+    let evidence = scene.evidence();
+    let mut last = None;
+    // The first frames make the buffers.
+    for _ in 0..3 {
+        let start = fuse.start(&scene.answers);
+        let (pairs, of_pairs) = count(|| {
+            let pairs = pipeline::all_pairs(N_VIEWS).into_iter();
+            let solved = pairs.map(|views| {
+                let evidence = views.map(|view| &evidence[view]);
+                fuse.pair(views, &scene.answers, evidence, &start).unwrap()
+            });
+            solved.collect::<Vec<_>>()
+        });
+        let hypotheses = pairs.iter().flat_map(|pair| &pair.hypotheses);
+        let n_solutions: usize = hypotheses.map(|it| it.iterations.len()).sum();
+        let (_, of_skeleton) = count(|| skeleton.run(&scene.answers, &pairs));
+        last = Some((of_pairs, n_solutions, of_skeleton));
+    }
+    let (of_pairs, n_solutions, of_skeleton) = last.unwrap();
+    let of_solution = Count {
+        allocations: of_pairs.allocations.div_ceil(n_solutions),
+        bytes: of_pairs.bytes.div_ceil(n_solutions),
+    };
+    [of_solution, of_skeleton]
+}
+
+fn main() {
+    let (kept, counted) = count(|| std::hint::black_box(vec![1_u8; 100]));
+    let expected = Count {
+        allocations: 1,
+        bytes: kept.len(),
+    };
+    assert_eq!(counted, expected, "the counter counts");
+    for combine in [Combine::Mean, Combine::Consensus] {
+        for rows in [24, 48] {
+            let [of_solution, of_skeleton] = of_frame(rows, combine);
+            let what = format!("{combine:?}, {rows} rows");
+            of_solution.is_within(MOST_OF_SOLUTION, &what);
+            of_skeleton.is_within(MOST_OF_SKELETON, &what);
+        }
+    }
+}
