@@ -5,12 +5,16 @@
 //! samples are skipped. Memory is allocated only for data that is in the file, never for a declared
 //! count. The format is described in *The C3D File Format* (c3d.org).
 //!
-//! ```no_run
-//! let trial = c3d::C3d::parse(&std::fs::read("Walking_1.c3d")?)?;
-//! if let Some(head) = trial.point("HEDO") {
-//!     println!("{:?} {}", trial.frame(0)[head], trial.units());
-//! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//! let file = include_bytes!("../examples/walk.c3d");
+//! let trial = c3d::C3d::parse(file)?;
+//! assert_eq!((trial.n_frames(), trial.rate_hz(), trial.units()), (2, 100.0, "mm"));
+//! assert_eq!(trial.labels(), ["HEAD", "HIPS"]);
+//! let head = trial.point("HEAD").unwrap();
+//! assert_eq!(trial.frame(0)[head], Some([0.0, 0.0, 1700.0]));
+//! // In the second frame nobody saw the hips.
+//! assert_eq!(trial.frame(1)[1], None);
+//! # Ok::<(), c3d::C3dError>(())
 //! ```
 #![forbid(unsafe_code)]
 

@@ -3,15 +3,17 @@
 //! A reader of its own because published ones panic on damaged files. Memory is never allocated for a
 //! declared count: every array is a view of bytes of the file.
 //!
-//! ```no_run
-//! let file = std::fs::read("labels.mat")?;
-//! for bytes in &mat5::variables(&file)? {
-//!     let (name, value) = mat5::variable(bytes)?;
-//!     if let mat5::Value::Numbers(numbers) = value {
-//!         println!("{name}: {:?}", numbers.sizes());
-//!     }
+//! ```
+//! let file = include_bytes!("../examples/points.mat");
+//! let variables = mat5::variables(file)?;
+//! let (name, value) = mat5::variable(&variables[0])?;
+//! assert_eq!(name, "points");
+//! if let mat5::Value::Numbers(numbers) = value {
+//!     assert_eq!(numbers.sizes(), [2, 3]);
+//!     // Column by column.
+//!     assert_eq!(numbers.values(), [1.0, 2.0, 3.0, 4.5, 5.5, 6.5]);
 //! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! # Ok::<(), mat5::ContainerError>(())
 //! ```
 #![forbid(unsafe_code)]
 

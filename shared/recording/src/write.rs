@@ -1,4 +1,9 @@
 //! Writing a recording: append only, so that what has been written stays whatever comes after.
+//!
+//! Not by the crate `mcap` (0.26), which the tests read our files with: in front of every chunk stands our own record with
+//! the places and checksums of its messages, and with the lengths of the chunk and of its indexes. Its writer takes such a
+//! record, but lays out the chunk and the indexes itself and later, so that both would have to be laid out here as well
+//! to know those lengths.
 
 use core::fmt;
 use core::mem::take;
