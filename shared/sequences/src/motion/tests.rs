@@ -222,7 +222,7 @@ fn short_gaps_are_interpolated_and_long_ones_are_refused_with_their_frames() {
         trc(60, false, gap(10, 22)),
         &MotionOptions::default(),
     );
-    let expected = "trc: marker \"right_knee\" is missing in frames 11-23 (0.26 s); gaps are interpolated up to 0.25 s";
+    let expected = "trc: marker \"right_knee\" is missing in frames 11-23 (0.26 s); gaps are bridged up to 0.25 s";
     assert_eq!(refused(got), expected);
     let got = read(
         "a.trc",
