@@ -1,6 +1,6 @@
 //! Workspaces that are used again from frame to frame.
 
-use crossbeam_queue::ArrayQueue;
+use crossbeam::queue::ArrayQueue;
 
 /// Most workspaces that are kept: more callers at a time than any machine of ours has threads, and those beyond
 /// only make theirs anew.
