@@ -13,7 +13,7 @@ use fmp::{Bounds, Effort, Extractor, Layout, Model, Pose, Responses, Solver};
 use geometry::{Camera, Framing, OutSize, Rig};
 use kernels::Rgb8View;
 use multiview::{
-    Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewAnswer, ViewPlan,
+    Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewInput, ViewPlan,
     choose_start, estimate_pair,
 };
 use rayon::ThreadPool;
@@ -67,8 +67,8 @@ impl Shot {
         Responses::new(self.plan.layout(), &self.responses, &self.levels)
     }
 
-    fn answer(&self) -> ViewAnswer<'_> {
-        ViewAnswer {
+    fn answer(&self) -> ViewInput<'_> {
+        ViewInput {
             plan: &self.plan,
             candidates: &self.candidates,
             sigma_px: None,

@@ -12,7 +12,7 @@ use fmp::{Extractor, Pose, Solver};
 use geometry::epipolar::{epipolar_line, point_line_distance};
 use geometry::{Camera, Intrinsics, Lens, LensModel};
 use multiview::{
-    Compatibility, Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewAnswer,
+    Compatibility, Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewInput,
     ViewPlan, estimate_pair, heat_map,
 };
 use nalgebra::{Isometry3, Matrix3, Point2, Translation3, Vector3};
@@ -204,7 +204,7 @@ impl Pair {
         sigma_px: [Option<&[f32]>; 2],
     ) -> PairEstimate {
         let input = PairInput {
-            views: order.map(|view| ViewAnswer {
+            views: order.map(|view| ViewInput {
                 plan: &self.plans[view],
                 candidates: std::slice::from_ref(&self.solo[view]),
                 sigma_px: sigma_px[view],

@@ -4,7 +4,7 @@ use std::cell::Ref;
 
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
-use pipeline::{Answer, Support, Views};
+use pipeline::{ViewResult, Support, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
@@ -15,7 +15,7 @@ use crate::job::Job;
 /// What is known of a frame.
 struct FrameViews<'a> {
     turn: &'a Turn,
-    answers: Vec<Option<Answer>>,
+    answers: Vec<Option<ViewResult>>,
     /// How many frames old the expected errors of every view are.
     sigma_ages: Vec<u64>,
     evidence: Vec<Option<EvidenceView<'a>>>,
@@ -63,7 +63,7 @@ impl Worker<'_> {
     }
 
     /// The poses of every view with their expected errors, and how many frames old these are.
-    fn answers(&self, frame: &mut Frame<'_, Input>) -> (Vec<Option<Answer>>, Vec<u64>) {
+    fn answers(&self, frame: &mut Frame<'_, Input>) -> (Vec<Option<ViewResult>>, Vec<u64>) {
         let n_views = self.job.plans.len();
         let mut ages = vec![0; n_views];
         let mut answers = Vec::with_capacity(n_views);
@@ -83,7 +83,7 @@ impl Worker<'_> {
                     continue;
                 }
             };
-            let mut answer = Answer {
+            let mut answer = ViewResult {
                 candidates,
                 sigma_px: None,
                 tau_px: None,
@@ -105,7 +105,7 @@ impl Worker<'_> {
         &'a self,
         view: usize,
         sample: &'a Sample<f32, EvidenceHeader>,
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
     ) -> Option<EvidenceView<'a>> {
         let layout = self.job.plans[view].layout();
         let read = wire::evidence_from_message(sample.header(), sample.payload(), layout);

@@ -12,7 +12,7 @@ use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
 use onnx::{Network, Side};
-use pipeline::{Answer, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep};
+use pipeline::{SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
 use serde_json::{Value, json};
 use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
 
@@ -109,7 +109,7 @@ fn the_service_says_what_the_library_says() {
 }
 
 /// What every view of a planted rig says of a frame of its own.
-fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
+fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>> {
     let [width, height] = planted::SIZE.map(|it| it as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
         let (step, layout) = step_of(plan);
@@ -117,7 +117,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
         let picture = planted::picture(plan.camera(), *frame);
         let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
         let found = step.run(image, Scope::whole(&layout), &mut responses);
-        Some(Answer {
+        Some(ViewResult {
             candidates: found.candidates,
             sigma_px: None,
             tau_px: None,
@@ -131,7 +131,7 @@ fn a_joint_is_where_the_views_see_it_that_are_expected_to_be_right() {
     let (rig, model) = (planted::rig(4), planted::model());
     let plans = rig.cameras().iter().map(|it| pipeline::plan(&model, it));
     let plans: Vec<_> = plans.collect::<Result<_, _>>().unwrap();
-    let joints = |answers: &[Option<Answer>], error_weight: f64| -> Vec<Point3<f64>> {
+    let joints = |answers: &[Option<ViewResult>], error_weight: f64| -> Vec<Point3<f64>> {
         let settings = SkeletonSettings {
             error_weight,
             facing: false,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::ViewPlan;
-use pipeline::{Answer, PairAnswer, Skeleton, SkeletonStep, Views};
+use pipeline::{ViewResult, PairResult, Skeleton, SkeletonStep, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use stage::{Frame, Item, Stage};
 use wire::WireError;
@@ -76,7 +76,7 @@ enum Input {
 #[derive(Debug)]
 struct PairInput {
     views: [usize; 2],
-    answer: Option<PairAnswer>,
+    answer: Option<PairResult>,
     /// With their age in frames.
     sigma_px: [Option<(u16, Vec<f32>)>; 2],
 }
@@ -100,7 +100,7 @@ fn view_answers(
     frame: &mut Frame<'_, Input>,
     n_views: usize,
     pairs: &[PairInput],
-) -> Vec<Option<Answer>> {
+) -> Vec<Option<ViewResult>> {
     let answer = |view: usize| {
         let Some(Item {
             value: Input::Candidates(candidates),
@@ -114,7 +114,7 @@ fn view_answers(
             pair.sigma_px[side].as_ref()
         });
         let latest = of_view.min_by_key(|(age, _)| *age);
-        (!candidates.is_empty()).then(|| Answer {
+        (!candidates.is_empty()).then(|| ViewResult {
             candidates,
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
@@ -127,12 +127,12 @@ fn view_answers(
 /// have been used whose own poses are missing here.
 fn skeleton(
     solved: Views,
-    views: &[Option<Answer>],
+    views: &[Option<ViewResult>],
     pairs: Vec<PairInput>,
     step: &mut SkeletonStep,
 ) -> Skeleton {
     let is_here = |view: usize| views[view].is_some();
-    let mut pairs: Vec<PairAnswer> = pairs.into_iter().filter_map(|pair| pair.answer).collect();
+    let mut pairs: Vec<PairResult> = pairs.into_iter().filter_map(|pair| pair.answer).collect();
     if solved == Views::Pairs {
         pairs.retain(|pair| pair.views.iter().all(|&view| is_here(view)));
         return step.run(views, &pairs);

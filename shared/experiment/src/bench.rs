@@ -10,8 +10,9 @@ use kernels::Rgb8View;
 use multiview::{PairEstimate, ViewPlan};
 use nalgebra::UnitVector3;
 use pipeline::{
-    AllViewsAnswer, Answer, Combine, EstimatorError, FuseStep, PairAnswer, PairTables, Skeleton,
-    SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewSettings, ViewStep, all_pairs, plan,
+    AllViewsResult, Combine, EstimatorError, FuseStep, PairResult, PairTables, Skeleton,
+    SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings, ViewStep,
+    all_pairs, plan,
 };
 use rayon::prelude::*;
 use skeleton::{JointMap, PARSE14};
@@ -97,7 +98,7 @@ pub struct Bench {
 
 /// What the views say about a frame.
 struct Seen<'a> {
-    answers: Vec<Option<Answer>>,
+    answers: Vec<Option<ViewResult>>,
     evidence: Vec<Option<Responses<'a>>>,
 }
 
@@ -206,7 +207,7 @@ impl Bench {
                 centres: &centres,
             };
             let expected = expected(&look);
-            Some(Answer {
+            Some(ViewResult {
                 candidates: it.candidates.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
                 sigma_px: expected.map(|it| it.sigma),
@@ -226,7 +227,7 @@ impl Bench {
 
     fn version(&self, nth: usize, version: Version, seen: &Seen<'_>) -> Found {
         let step = &self.fuse[nth];
-        let answers: Vec<Option<Answer>> = seen
+        let answers: Vec<Option<ViewResult>> = seen
             .answers
             .iter()
             .map(|it| {
@@ -274,9 +275,9 @@ impl Bench {
     fn pairs(
         &self,
         step: &FuseStep,
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
         seen: &Seen<'_>,
-    ) -> Vec<PairAnswer> {
+    ) -> Vec<PairResult> {
         let start = step.start(answers);
         let solve = |pair: [usize; 2]| {
             let [first, second] = pair.map(|it| seen.evidence[it].as_ref());
@@ -321,7 +322,7 @@ struct Effort {
 
 impl Effort {
     /// Counts the iterations of the highest energy, and the solutions of all that was tried.
-    fn of_all_views(&mut self, all: &AllViewsAnswer) {
+    fn of_all_views(&mut self, all: &AllViewsResult) {
         let estimates = all.hypotheses.iter().map(|it| &it.estimate);
         self.solutions = estimates.clone().map(|it| it.iterations.len() as u32).sum();
         if let Some(it) = estimates.max_by(|a, b| a.energy.total_cmp(&b.energy)) {
@@ -336,7 +337,7 @@ impl Effort {
     }
 
     /// Counts the iterations of what was taken, and the solutions of all that was tried.
-    fn of_pairs(&mut self, pairs: &[PairAnswer], skeleton: &Skeleton) {
+    fn of_pairs(&mut self, pairs: &[PairResult], skeleton: &Skeleton) {
         let (mut on, mut n_terms) = (0, 0);
         for pair in pairs {
             let [first, second] = pair.views.map(|view| {

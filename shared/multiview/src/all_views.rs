@@ -6,13 +6,13 @@ use fmp::{Again, Extra, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::optimise::{is_best, mean_movement, types};
-use crate::{Epipolar, Iteration, PairInput, Settings, TypeTables, ViewAnswer};
+use crate::{Epipolar, Iteration, PairInput, Settings, TypeTables, ViewInput};
 
 /// All views of one frame that answered.
 #[derive(Clone, Copy)]
 pub struct AllViewsInput<'a> {
     /// The views.
-    pub views: &'a [ViewAnswer<'a>],
+    pub views: &'a [ViewInput<'a>],
     /// Part-type tables of a pair `(first, second)` of indices into `views`, `first < second`.
     pub tables: &'a dyn Fn(usize, usize) -> Option<&'a TypeTables>,
     /// Weight of the terms of a pair. 1 adds those of all pairs as they are; `1 / (n - 1)` gives the
@@ -86,7 +86,7 @@ pub fn estimate_all_views(
     };
     let inputs = inputs(input);
     let pairs = Pairs::new(&of_pair, &inputs, start.exchanged);
-    let candidate = |(view, it): (&ViewAnswer<'_>, &usize)| view.candidates[*it].clone();
+    let candidate = |(view, it): (&ViewInput<'_>, &usize)| view.candidates[*it].clone();
     let poses: Vec<Pose> = input
         .views
         .iter()

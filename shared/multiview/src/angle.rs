@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point2, Vector3};
 
-use crate::{TypeTables, ViewAnswer};
+use crate::{TypeTables, ViewInput};
 
 /// Part-type tables by the angle under which two views see the person.
 ///
@@ -43,10 +43,10 @@ impl AngleTables {
 /// The person is where the rays through the middles of the views' best poses meet, so the angle at the person
 /// is that between the rays, and where exactly they meet does not matter. Up is what the pictures show as
 /// up. `None` where the lens model has no answer, or a view looks straight up or down.
-pub fn angle_between(first: &ViewAnswer<'_>, second: &ViewAnswer<'_>) -> Option<f64> {
+pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f64> {
     let ups = [first, second].map(up);
     let up = (ups[0] + ups[1]).try_normalize(1e-6)?;
-    let level = |answer: &ViewAnswer<'_>| {
+    let level = |answer: &ViewInput<'_>| {
         let ray = ray(answer)?;
         (ray - up * ray.dot(&up)).try_normalize(1e-3)
     };
@@ -55,13 +55,13 @@ pub fn angle_between(first: &ViewAnswer<'_>, second: &ViewAnswer<'_>) -> Option<
 }
 
 /// Against gravity, as the view's picture shows it, in the world.
-fn up(answer: &ViewAnswer<'_>) -> Vector3<f64> {
+fn up(answer: &ViewInput<'_>) -> Vector3<f64> {
     let turn = answer.plan.camera().camera_from_world.rotation.inverse();
     turn * -Vector3::y()
 }
 
 /// Direction from the camera to the person, in the world.
-fn ray(answer: &ViewAnswer<'_>) -> Option<Vector3<f64>> {
+fn ray(answer: &ViewInput<'_>) -> Option<Vector3<f64>> {
     let centres = answer.plan.centres(answer.candidates.first()?);
     let n = centres.len().max(1) as f64;
     let mean = [0, 1].map(|axis| centres.iter().map(|it| it[axis]).sum::<f64>() / n);

@@ -1,6 +1,6 @@
 //! One energy over several views, maximised by alternating exact single-view solutions.
 //!
-//! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewAnswer`], what a
+//! The paper's sections 4 to 6. Reading order: [`Settings`]; [`ViewPlan`] and [`ViewInput`], what a
 //! view brings; [`choose_start`], which candidate of every view is the person; [`estimate_pair`], the
 //! optimiser of a pair, [`estimate_all_views`], that of all views at once; [`rank_facing`], [`FacingFilter`], [`average`] and [`consensus()`], from the pairs back to one pose per view.
 //!
@@ -118,4 +118,4 @@ pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair}
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;
-pub use view::{ViewAnswer, ViewPlan};
+pub use view::{ViewInput, ViewPlan};

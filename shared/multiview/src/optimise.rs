@@ -4,13 +4,13 @@ use fmp::{Bounds, Extra, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::released::{ReleasedPair, ReleasedTerms};
-use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewAnswer, ViewPlan};
+use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewInput, ViewPlan};
 
 /// A pair of views of one frame.
 #[derive(Debug, Clone, Copy)]
 pub struct PairInput<'a> {
     /// The two views.
-    pub views: [ViewAnswer<'a>; 2],
+    pub views: [ViewInput<'a>; 2],
     /// Their geometry, from the first to the second.
     pub epipolar: Epipolar,
     /// Part-type tables of the pair, if any were learned.

@@ -1,7 +1,7 @@
 //! The start of a frame: which candidate of every view is the person, and which way each view sees it.
 
 use crate::consistency::PairTerms;
-use crate::{Epipolar, PairInput, Settings, TypeTables, ViewAnswer};
+use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
 
 /// Exhaustive search is used up to this many joint states.
 const MAX_STATES: usize = 200_000;
@@ -31,7 +31,7 @@ pub struct Start {
 /// * `tables`: part-type tables of a pair of indices into `views`.
 pub fn choose_start<'a>(
     settings: &Settings,
-    views: &[ViewAnswer<'a>],
+    views: &[ViewInput<'a>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Start {
     let all = views.iter().enumerate();
@@ -45,10 +45,10 @@ pub fn choose_start<'a>(
 /// of the binary numbers that the views from the second on make.
 pub fn rank_starts<'a>(
     settings: &Settings,
-    views: &[ViewAnswer<'a>],
+    views: &[ViewInput<'a>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Vec<Start> {
-    let can_exchange = |it: &ViewAnswer<'_>| it.plan.model().spec().mirror.is_some();
+    let can_exchange = |it: &ViewInput<'_>| it.plan.model().spec().mirror.is_some();
     let n_free = if settings.facing && views.iter().all(can_exchange) {
         views.len().saturating_sub(1)
     } else {
@@ -74,7 +74,7 @@ pub fn rank_starts<'a>(
 /// The joint state that the energies of all pairs like best.
 fn best_of<'a>(
     settings: &Settings,
-    views: &[ViewAnswer<'a>],
+    views: &[ViewInput<'a>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
     states: &[Vec<State>],
 ) -> Start {
@@ -106,7 +106,7 @@ struct State {
     exchanged: bool,
 }
 
-fn states(settings: &Settings, answer: &ViewAnswer<'_>, view: usize) -> Vec<State> {
+fn states(settings: &Settings, answer: &ViewInput<'_>, view: usize) -> Vec<State> {
     let can_exchange = settings.facing && answer.plan.model().spec().mirror.is_some() && view > 0;
     let n = answer.candidates.len().min(settings.n_candidates.max(1));
     [false, true]
@@ -126,7 +126,7 @@ type Between = Vec<Vec<Vec<Vec<f64>>>>;
 
 fn between<'a>(
     settings: &Settings,
-    views: &[ViewAnswer<'a>],
+    views: &[ViewInput<'a>],
     states: &[Vec<State>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Between {

@@ -137,7 +137,7 @@ fn undistorted_cells(
 
 /// What one view says about one frame, besides its evidence.
 #[derive(Debug, Clone, Copy)]
-pub struct ViewAnswer<'a> {
+pub struct ViewInput<'a> {
     /// The prepared view.
     pub plan: &'a ViewPlan,
     /// Its distinct candidates, best first; never empty.
@@ -149,7 +149,7 @@ pub struct ViewAnswer<'a> {
     pub tau_px: Option<&'a [f32]>,
 }
 
-impl ViewAnswer<'_> {
+impl ViewInput<'_> {
     /// Expected error and threshold of a part, where there are both.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;

@@ -10,8 +10,8 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    AllViewsAnswer, Answer, FuseStep, PairAnswer, PairTables, Skeleton, SkeletonSettings,
-    SkeletonStep, Support, ViewEstimate, ViewSettings, ViewStep, Views, all_pairs,
+    AllViewsResult, FuseStep, PairResult, PairTables, Skeleton, SkeletonSettings, SkeletonStep,
+    Support, ViewEstimate, ViewResult, ViewSettings, ViewStep, Views, all_pairs,
 };
 
 /// Why an estimator could not be made.
@@ -34,15 +34,15 @@ pub enum EstimatorError {
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// What every view answered alone.
-    pub answers: Vec<Option<Answer>>,
+    pub answers: Vec<Option<ViewResult>>,
     /// The joint start: candidate and exchange of every view.
     pub start: Vec<Option<(usize, bool)>>,
     /// What was searched of every view's image.
     pub scopes: Vec<Option<Scope>>,
     /// What every pair found; empty where all views are solved at once.
-    pub pairs: Vec<PairAnswer>,
+    pub pairs: Vec<PairResult>,
     /// What all views found at once, where they are solved so.
-    pub all_views: Option<AllViewsAnswer>,
+    pub all_views: Option<AllViewsResult>,
     /// The result.
     pub skeleton: Skeleton,
 }
@@ -128,7 +128,7 @@ impl Estimator {
         assert_eq!(images.len(), self.views.len(), "one image per view");
         let frame = self.n_frames;
         self.n_frames += 1;
-        let viewed: Vec<(Option<Answer>, Option<ViewEstimate>)> = self
+        let viewed: Vec<(Option<ViewResult>, Option<ViewEstimate>)> = self
             .views
             .par_iter()
             .zip(&mut self.responses)
@@ -144,7 +144,7 @@ impl Estimator {
                     found = step.run(image, Scope::whole(step.layout()), responses);
                 }
                 step.follow(tracker, frame, &found);
-                let answer = (!found.candidates.is_empty()).then(|| Answer {
+                let answer = (!found.candidates.is_empty()).then(|| ViewResult {
                     candidates: found.candidates.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                     tau_px: None,
@@ -189,10 +189,10 @@ impl Estimator {
     /// What every pair of the views that answered found.
     fn pairs(
         &self,
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
         start: &[Option<(usize, bool)>],
-    ) -> Vec<PairAnswer> {
+    ) -> Vec<PairResult> {
         let solve = |pair: [usize; 2]| {
             let [first, second] = pair.map(|view| evidence[view].as_ref());
             self.fuse.pair(pair, answers, [first?, second?], start)

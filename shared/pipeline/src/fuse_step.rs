@@ -5,13 +5,13 @@ use std::sync::Arc;
 use fmp::{Model, Pose, Responses, Solver};
 use multiview::{
     AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, PairEstimate, PairInput,
-    PairStart, Settings, Start, TypeTables, ViewAnswer, ViewPlan, angle_between, choose_start,
+    PairStart, Settings, Start, TypeTables, ViewInput, ViewPlan, angle_between, choose_start,
     estimate_all_views, estimate_pair, rank_starts,
 };
 
 /// What a view answered for one frame, besides its evidence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answer {
+pub struct ViewResult {
     /// Distinct poses, best first; never empty.
     pub candidates: Vec<Pose>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
@@ -20,7 +20,7 @@ pub struct Answer {
     pub tau_px: Option<Vec<f32>>,
 }
 
-impl Answer {
+impl ViewResult {
     /// Whether all its poses lie where there is evidence. Those of one frame may not: a process that was restarted
     /// answers it again, and searches elsewhere than the life whose evidence came before.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
@@ -48,7 +48,7 @@ pub struct FuseStep {
 
 /// What a pair found: one estimate per assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PairAnswer {
+pub struct PairResult {
     /// The two views, ascending.
     pub views: [usize; 2],
     /// Same facing, then opposite facing; the latter only where facing is to be decided.
@@ -79,7 +79,7 @@ pub enum Support {
 
 /// What all views found at once.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AllViewsAnswer {
+pub struct AllViewsResult {
     /// The views that answered, ascending.
     pub views: Vec<usize>,
     /// One estimate per assumption about facing; never empty.
@@ -95,7 +95,7 @@ pub struct AllViewsHypothesis {
     pub estimate: AllViewsEstimate,
 }
 
-impl AllViewsAnswer {
+impl AllViewsResult {
     /// What is left without the views that `keep` does not want; `None` if fewer than two are.
     pub fn only(mut self, keep: impl Fn(usize) -> bool) -> Option<Self> {
         let kept: Vec<usize> = (0..self.views.len())
@@ -141,14 +141,14 @@ impl FuseStep {
     ///
     /// Every fusion worker computes it for all views, from their (small) answers alone, so that all
     /// pairs start from the same person.
-    pub fn start(&self, answers: &[Option<Answer>]) -> Vec<Option<(usize, bool)>> {
+    pub fn start(&self, answers: &[Option<ViewResult>]) -> Vec<Option<(usize, bool)>> {
         let present: Vec<usize> = (0..answers.len())
             .filter(|it| answers[*it].is_some())
             .collect();
         if present.is_empty() {
             return vec![None; answers.len()];
         }
-        let views: Vec<ViewAnswer<'_>> = present
+        let views: Vec<ViewInput<'_>> = present
             .iter()
             .filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)))
             .collect();
@@ -175,10 +175,10 @@ impl FuseStep {
     pub fn pair(
         &self,
         views: [usize; 2],
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
         evidence: [&Responses<'_>; 2],
         start: &[Option<(usize, bool)>],
-    ) -> Option<PairAnswer> {
+    ) -> Option<PairResult> {
         let [first, second] = views;
         for (view, evidence) in views.into_iter().zip(evidence) {
             if !answers[view].as_ref()?.is_within(evidence) {
@@ -223,7 +223,7 @@ impl FuseStep {
         } else {
             vec![hypothesis(exchanged_a != exchanged_b)]
         };
-        Some(PairAnswer { views, hypotheses })
+        Some(PairResult { views, hypotheses })
     }
 
     /// Solves all views at once, from the best starts under different assumptions about who sees the
@@ -233,10 +233,10 @@ impl FuseStep {
     /// * Returns `None` if fewer than two views have an answer, and evidence that [covers](Responses::covers) its poses.
     pub fn all_views(
         &self,
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
         support: Support,
-    ) -> Option<AllViewsAnswer> {
+    ) -> Option<AllViewsResult> {
         let present = |it: &usize| {
             let both = answers[*it].as_ref().zip(evidence[*it].as_ref());
             both.is_some_and(|(answer, evidence)| answer.is_within(evidence))
@@ -247,7 +247,7 @@ impl FuseStep {
         }
         let views = present.iter();
         let views = views.filter_map(|&it| Some(self.view_answer(it, answers[it].as_ref()?)));
-        let views: Vec<ViewAnswer<'_>> = views.collect();
+        let views: Vec<ViewInput<'_>> = views.collect();
         let evidence = present.iter().filter_map(|&it| evidence[it].as_ref());
         let evidence: Vec<&Responses<'_>> = evidence.collect();
         let input = AllViewsInput {
@@ -273,14 +273,14 @@ impl FuseStep {
                 exchanged: start.exchanged,
             }
         };
-        Some(AllViewsAnswer {
+        Some(AllViewsResult {
             hypotheses: starts.into_iter().map(solve).collect(),
             views: present,
         })
     }
 
-    fn view_answer<'a>(&'a self, view: usize, answer: &'a Answer) -> ViewAnswer<'a> {
-        ViewAnswer {
+    fn view_answer<'a>(&'a self, view: usize, answer: &'a ViewResult) -> ViewInput<'a> {
+        ViewInput {
             plan: &self.plans[view],
             candidates: &answer.candidates,
             sigma_px: answer.sigma_px.as_deref(),
@@ -289,7 +289,7 @@ impl FuseStep {
     }
 
     /// The tables of a pair: its own, or those of the angle under which its views see the person.
-    fn tables(&self, pair: [usize; 2], views: [&ViewAnswer<'_>; 2]) -> Option<&TypeTables> {
+    fn tables(&self, pair: [usize; 2], views: [&ViewInput<'_>; 2]) -> Option<&TypeTables> {
         let mut own = self.tables.of_pairs.iter();
         if let Some(own) = own.find(|it| [it.0, it.1] == pair) {
             return Some(&own.2);

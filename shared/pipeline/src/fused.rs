@@ -3,7 +3,7 @@
 use fmp::Pose;
 use multiview::{Exchanges, PairEnergies, PairEstimate, is_exchanged, rank_facing};
 
-use crate::{AllViewsAnswer, AllViewsHypothesis, PairAnswer};
+use crate::{AllViewsHypothesis, AllViewsResult, PairResult};
 
 /// Assignments of facing that are compared with all views at once.
 const N_HYPOTHESES: usize = 16;
@@ -11,8 +11,8 @@ const N_HYPOTHESES: usize = 16;
 /// What fusion found, either way.
 pub(crate) enum Fused<'a> {
     /// In ascending order of their views.
-    Pairs(Vec<&'a PairAnswer>),
-    AllViews(&'a AllViewsAnswer),
+    Pairs(Vec<&'a PairResult>),
+    AllViews(&'a AllViewsResult),
 }
 
 impl<'a> Fused<'a> {
@@ -49,7 +49,7 @@ impl<'a> Fused<'a> {
     pub(crate) fn poses(&self, view: usize, exchanged: Exchanges) -> Vec<(f64, &'a Pose)> {
         match self {
             Self::Pairs(pairs) => {
-                let of_pair = |pair: &&'a PairAnswer| {
+                let of_pair = |pair: &&'a PairResult| {
                     let side = pair.views.iter().position(|it| *it == view)?;
                     let estimate = chosen(pair, exchanged)?;
                     Some((estimate.energy, &estimate.poses[side]))
@@ -74,13 +74,13 @@ impl<'a> Fused<'a> {
 }
 
 /// The views that a hypothesis takes to be exchanged with respect to the first.
-fn exchanges(found: &AllViewsAnswer, hypothesis: &AllViewsHypothesis) -> Exchanges {
+fn exchanges(found: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
     let each = found.views.iter().zip(&hypothesis.exchanged);
     each.fold(0, |mask, (view, it)| mask | Exchanges::from(*it) << view)
 }
 
 /// The hypothesis of a pair that agrees with the joint decision.
-fn chosen(pair: &PairAnswer, exchanged: Exchanges) -> Option<&PairEstimate> {
+fn chosen(pair: &PairResult, exchanged: Exchanges) -> Option<&PairEstimate> {
     let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
     let opposite = first != second;
     pair.hypotheses
@@ -111,7 +111,7 @@ mod tests {
     }
 
     /// Views 1, 2 and 4 of a rig, under two assumptions.
-    fn answer() -> AllViewsAnswer {
+    fn answer() -> AllViewsResult {
         let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
             exchanged: exchanged.to_vec(),
             estimate: AllViewsEstimate {
@@ -122,7 +122,7 @@ mod tests {
                 poses: (0..3).map(|view| pose(x + view)).collect(),
             },
         };
-        AllViewsAnswer {
+        AllViewsResult {
             views: vec![1, 2, 4],
             hypotheses: vec![
                 hypothesis([false, true, false], 5.0, 10),

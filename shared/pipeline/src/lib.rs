@@ -13,8 +13,8 @@ mod estimate;
 
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use fuse_step::{
-    AllViewsAnswer, AllViewsHypothesis, Answer, FuseStep, PairAnswer, PairTables, Support, Views,
-    all_pairs,
+    AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, ViewResult,
+    Views, all_pairs,
 };
 pub use skeleton_step::{Combine, FusedView, Skeleton, SkeletonSettings, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

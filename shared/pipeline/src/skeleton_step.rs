@@ -13,7 +13,7 @@ use nalgebra::{Point2, Point3, UnitVector3};
 use skeleton::{JointMap, JointSet, PARSE14};
 
 use crate::fused::Fused;
-use crate::{AllViewsAnswer, Answer, PairAnswer};
+use crate::{AllViewsResult, PairResult, ViewResult};
 
 /// How a view's pose is made of those of its pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -127,8 +127,8 @@ impl SkeletonStep {
     ///
     /// * `answers`: the single-view answers; a view without a pair keeps its own.
     /// * `pairs`: in any order; their number and views may differ from frame to frame.
-    pub fn run(&mut self, answers: &[Option<Answer>], pairs: &[PairAnswer]) -> Skeleton {
-        let mut pairs: Vec<&PairAnswer> = pairs.iter().collect();
+    pub fn run(&mut self, answers: &[Option<ViewResult>], pairs: &[PairResult]) -> Skeleton {
+        let mut pairs: Vec<&PairResult> = pairs.iter().collect();
         pairs.sort_by_key(|it| it.views);
         self.settle(answers, &Fused::Pairs(pairs))
     }
@@ -138,13 +138,13 @@ impl SkeletonStep {
     /// * `answers`: the single-view answers; a view that was not solved keeps its own.
     pub fn run_all_views(
         &mut self,
-        answers: &[Option<Answer>],
-        found: &AllViewsAnswer,
+        answers: &[Option<ViewResult>],
+        found: &AllViewsResult,
     ) -> Skeleton {
         self.settle(answers, &Fused::AllViews(found))
     }
 
-    fn settle(&mut self, answers: &[Option<Answer>], found: &Fused<'_>) -> Skeleton {
+    fn settle(&mut self, answers: &[Option<ViewResult>], found: &Fused<'_>) -> Skeleton {
         let (exchanged, facing_margin) = if self.settings.facing && self.can_exchange() {
             self.decide_facing(answers, found)
         } else {
@@ -173,8 +173,12 @@ impl SkeletonStep {
     /// Of every view: the expected errors of its joints, pixels of the frame, weighed; none where nothing was
     /// predicted. That of a joint is the mean of those of its parts, of which none is further off than the
     /// frame is large.
-    fn expected_errors(&self, answers: &[Option<Answer>], exchanged: Exchanges) -> Vec<Vec<f64>> {
-        let of_view = |(view, answer): (usize, &Option<Answer>)| {
+    fn expected_errors(
+        &self,
+        answers: &[Option<ViewResult>],
+        exchanged: Exchanges,
+    ) -> Vec<Vec<f64>> {
+        let of_view = |(view, answer): (usize, &Option<ViewResult>)| {
             let of_parts = answer.as_ref()?.sigma_px.as_ref()?.iter();
             let [width, height] = self.plans[view].camera().intrinsics.size.map(f64::from);
             let weighed = |it: &f32| {
@@ -206,7 +210,11 @@ impl SkeletonStep {
     }
 
     /// Which views see the person from behind, and by what margin.
-    fn decide_facing(&mut self, answers: &[Option<Answer>], found: &Fused<'_>) -> (Exchanges, f64) {
+    fn decide_facing(
+        &mut self,
+        answers: &[Option<ViewResult>],
+        found: &Fused<'_>,
+    ) -> (Exchanges, f64) {
         let present = answers.iter().enumerate().fold(0, |mask, (view, it)| {
             mask | Exchanges::from(it.is_some()) << view
         });
@@ -266,7 +274,7 @@ impl SkeletonStep {
     /// What every view was found to be, by each of its pairs or by all views, under an assignment of facing.
     fn candidates(
         &self,
-        answers: &[Option<Answer>],
+        answers: &[Option<ViewResult>],
         found: &Fused<'_>,
         exchanged: Exchanges,
     ) -> Vec<Option<Candidates>> {

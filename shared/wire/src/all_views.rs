@@ -2,7 +2,7 @@
 
 use messages::PairPose;
 use multiview::{AllViewsEstimate, PairEstimate, PairStart};
-use pipeline::{AllViewsAnswer, AllViewsHypothesis, PairAnswer};
+use pipeline::{AllViewsHypothesis, AllViewsResult, PairResult};
 
 use crate::error::{equal, index};
 use crate::{WireError, pair_to_message};
@@ -21,11 +21,11 @@ use crate::{WireError, pair_to_message};
 /// [`WireError`] if something does not fit into a message.
 pub fn all_views_to_messages(
     n_views: usize,
-    answer: Option<&AllViewsAnswer>,
+    answer: Option<&AllViewsResult>,
     views_present: u32,
 ) -> Result<Vec<PairPose>, WireError> {
     let message = |view: usize| {
-        let place = |it: &AllViewsAnswer| it.views.iter().position(|it| *it == view);
+        let place = |it: &AllViewsResult| it.views.iter().position(|it| *it == view);
         let found = answer.and_then(|it| Some((it, place(it).filter(|place| *place > 0)?)));
         let Some((answer, place)) = found else {
             return pair_to_message([view - 1, view], None, views_present);
@@ -72,7 +72,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
 }
 
 /// The first view of an answer, and the one at a place.
-fn beside_the_first(answer: &AllViewsAnswer, place: usize) -> PairAnswer {
+fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     let hypothesis = |it: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
             candidates: [0; 2],
@@ -84,7 +84,7 @@ fn beside_the_first(answer: &AllViewsAnswer, place: usize) -> PairAnswer {
         active: Vec::new(),
         poses: [0, place].map(|it_is| it.estimate.poses[it_is].clone()),
     };
-    PairAnswer {
+    PairResult {
         views: [answer.views[0], answer.views[place]],
         hypotheses: answer.hypotheses.iter().map(hypothesis).collect(),
     }
@@ -101,11 +101,11 @@ fn beside_the_first(answer: &AllViewsAnswer, place: usize) -> PairAnswer {
 ///
 /// [`WireError`] if they are not of one answer: another first view, order or number of hypotheses, or another
 /// energy.
-pub fn all_views_from_pairs(pairs: &[PairAnswer]) -> Result<Option<AllViewsAnswer>, WireError> {
+pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResult>, WireError> {
     let Some(first) = pairs.first() else {
         return Ok(None);
     };
-    let mut answer = AllViewsAnswer {
+    let mut answer = AllViewsResult {
         views: vec![first.views[0]],
         hypotheses: first.hypotheses.iter().map(alone).collect(),
     };
@@ -162,7 +162,7 @@ mod tests {
     const N_VIEWS: usize = 5;
 
     /// Answers of views 0 to 4, of which some are missing.
-    fn any_answer() -> impl Strategy<Value = AllViewsAnswer> {
+    fn any_answer() -> impl Strategy<Value = AllViewsResult> {
         let views = prop::sample::subsequence((0..N_VIEWS).collect::<Vec<_>>(), 2..=N_VIEWS);
         views.prop_flat_map(|views| {
             let n = views.len();
@@ -173,7 +173,7 @@ mod tests {
                 any::<bool>(),
             );
             let hypotheses = prop::collection::vec(hypothesis.prop_map(any_hypothesis), 1..=2);
-            hypotheses.prop_map(move |hypotheses| AllViewsAnswer {
+            hypotheses.prop_map(move |hypotheses| AllViewsResult {
                 views: views.clone(),
                 hypotheses,
             })
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    fn read(messages: &[PairPose]) -> Vec<PairAnswer> {
+    fn read(messages: &[PairPose]) -> Vec<PairResult> {
         let plans = plans_of(N_VIEWS);
         let read = messages.iter().map(|it| pair_from_message(it, &plans));
         read.filter_map(|it| it.unwrap()).collect()
@@ -229,14 +229,14 @@ mod tests {
     }
 
     /// Views 0, 1 and 2 as they are sent.
-    fn pairs() -> [PairAnswer; 2] {
+    fn pairs() -> [PairResult; 2] {
         let pose = || Pose {
             parts: vec![fmp::Placement::default(); 3],
             ..Pose::default()
         };
         let poses = [pose(), pose(), pose()].to_vec();
         let hypothesis = any_hypothesis((poses, vec![false; 3], 2.0, true));
-        let answer = AllViewsAnswer {
+        let answer = AllViewsResult {
             views: vec![0, 1, 2],
             hypotheses: vec![hypothesis],
         };
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn refuses_messages_that_are_not_of_one_answer() {
-        let change = |change: fn(&mut [PairAnswer; 2])| {
+        let change = |change: fn(&mut [PairResult; 2])| {
             let mut pairs = pairs();
             change(&mut pairs);
             all_views_from_pairs(&pairs).unwrap_err().to_string()

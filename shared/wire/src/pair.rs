@@ -3,7 +3,7 @@
 use fmp::Pose;
 use messages::{PairHypothesis, PairPose, Status};
 use multiview::{PairEstimate, PairStart, ViewPlan};
-use pipeline::PairAnswer;
+use pipeline::PairResult;
 
 use crate::error::{count, equal, finite, index};
 use crate::{WireError, pose_from_message, pose_to_message};
@@ -19,7 +19,7 @@ use crate::{WireError, pose_from_message, pose_to_message};
 /// [`WireError`] if something does not fit into the message.
 pub fn pair_to_message(
     views: [usize; 2],
-    answer: Option<&PairAnswer>,
+    answer: Option<&PairResult>,
     views_present: u32,
 ) -> Result<PairPose, WireError> {
     let mut message = PairPose {
@@ -71,7 +71,7 @@ fn hypothesis(estimate: &PairEstimate) -> Result<PairHypothesis, WireError> {
 pub fn pair_from_message(
     message: &PairPose,
     plans: &[impl AsRef<ViewPlan>],
-) -> Result<Option<PairAnswer>, WireError> {
+) -> Result<Option<PairResult>, WireError> {
     if message.status != Status::OK {
         return Ok(None);
     }
@@ -85,7 +85,7 @@ pub fn pair_from_message(
         .iter()
         .map(|it| estimate(it, plans))
         .collect::<Result<_, _>>()?;
-    Ok(Some(PairAnswer {
+    Ok(Some(PairResult {
         views: [first, second],
         hypotheses,
     }))
@@ -171,7 +171,7 @@ mod tests {
         fn an_answer_comes_back_as_it_was_sent(
             hypotheses in prop::collection::vec(any_estimate(), 1..=2),
         ) {
-            let answer = PairAnswer { views: [0, 1], hypotheses };
+            let answer = PairResult { views: [0, 1], hypotheses };
             let message = pair_to_message(answer.views, Some(&answer), 0b11).unwrap();
             prop_assert_eq!(pair_from_message(&message, &plans()).unwrap(), Some(answer));
         }

@@ -15,7 +15,7 @@ use messages::{
 };
 use multiview::{Settings, ViewPlan};
 use nalgebra::Isometry3;
-use pipeline::{Answer, FuseStep, PairTables, SkeletonSettings, SkeletonStep};
+use pipeline::{FuseStep, PairTables, SkeletonSettings, SkeletonStep, ViewResult};
 use wire::Expected;
 
 const SIZE: [usize; 2] = [80, 60];
@@ -383,13 +383,13 @@ pub fn wire_fusion(input: &[u8]) {
     }
     let quality = view_quality(input);
     let sigma = wire::sigma_from_message(&quality, model.n_parts());
-    let changed = Answer {
+    let changed = ViewResult {
         candidates,
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
     };
     let expected = wire::sigma_from_pair(&pair_pose(pairs), 1, model.n_parts());
-    let whole = Answer {
+    let whole = ViewResult {
         candidates: vec![pose()],
         sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,

@@ -425,7 +425,7 @@ impl Report<'_> {
         })
     }
 
-    fn pair(&self, pair: &pipeline::PairAnswer) -> Value {
+    fn pair(&self, pair: &pipeline::PairResult) -> Value {
         let hypotheses: Vec<Value> = pair
             .hypotheses
             .iter()

@@ -3,7 +3,7 @@
 use consistency::{Learner, Pair, Sighting};
 use evaluation::Point;
 use kernels::Rgb8View;
-use multiview::{ViewAnswer, angle_between};
+use multiview::{ViewInput, angle_between};
 use nalgebra::Point3;
 use sequences::Sequence;
 
@@ -32,7 +32,7 @@ impl Bench {
         self.responses = responses;
         let answer = |view: usize| {
             let found = found[view].as_ref()?;
-            (!found.candidates.is_empty()).then_some(ViewAnswer {
+            (!found.candidates.is_empty()).then_some(ViewInput {
                 plan: &self.plans[view],
                 candidates: &found.candidates,
                 sigma_px: None,
@@ -43,7 +43,7 @@ impl Bench {
             let answer = answer(view)?;
             Some((answer, sighting(&answer, sequence, joints)?))
         };
-        let views: Vec<Option<(ViewAnswer<'_>, Sighting)>> = (0..found.len()).map(sight).collect();
+        let views: Vec<Option<(ViewInput<'_>, Sighting)>> = (0..found.len()).map(sight).collect();
         for learner in &mut *learners {
             let sightings = views.iter().flatten();
             sightings.for_each(|it| learner.see(&it.1, sequence.joints));
@@ -66,7 +66,7 @@ impl Bench {
 }
 
 fn sighting(
-    answer: &ViewAnswer<'_>,
+    answer: &ViewInput<'_>,
     sequence: &Sequence,
     joints: &[Option<Point>],
 ) -> Option<Sighting> {

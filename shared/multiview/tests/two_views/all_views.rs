@@ -2,7 +2,7 @@
 
 use fmp::{Pose, Responses};
 use multiview::{
-    AllViewsEstimate, AllViewsInput, AllViewsStart, PairStart, Settings, ViewAnswer,
+    AllViewsEstimate, AllViewsInput, AllViewsStart, PairStart, Settings, ViewInput,
     estimate_all_views,
 };
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ fn starts(n_views: usize) -> impl Strategy<Value = Start> {
 }
 
 fn fuse(scene: &Scene, settings: &Settings, start: &Start) -> AllViewsEstimate {
-    let views: Vec<ViewAnswer<'_>> = scene.views.iter().map(|it| it.answer()).collect();
+    let views: Vec<ViewInput<'_>> = scene.views.iter().map(|it| it.answer()).collect();
     let evidence: Vec<Responses<'_>> = scene.views.iter().map(|it| it.evidence()).collect();
     let evidence: Vec<&Responses<'_>> = evidence.iter().collect();
     let input = AllViewsInput {

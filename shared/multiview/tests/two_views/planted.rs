@@ -8,7 +8,7 @@ use fmp::{
 };
 use geometry::{Camera, Intrinsics, Lens, LensModel};
 use multiview::{
-    Compatibility, Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewAnswer,
+    Compatibility, Epipolar, PairEstimate, PairInput, PairStart, Settings, TypeTables, ViewInput,
     ViewPlan, estimate_pair,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -157,8 +157,8 @@ impl View {
         Responses::new(self.plan.layout(), &self.values, &self.levels)
     }
 
-    pub(crate) fn answer(&self) -> ViewAnswer<'_> {
-        ViewAnswer {
+    pub(crate) fn answer(&self) -> ViewInput<'_> {
+        ViewInput {
             plan: &self.plan,
             candidates: &self.candidates,
             sigma_px: self.sigma_px.as_deref(),

@@ -1,6 +1,6 @@
 //! The choice of candidates and exchanges, against every combination there is.
 
-use multiview::{Settings, TypeTables, ViewAnswer, choose_start, rank_starts};
+use multiview::{Settings, TypeTables, ViewInput, choose_start, rank_starts};
 use proptest::prelude::*;
 
 use crate::oracle;
@@ -9,14 +9,14 @@ use crate::planted::{Scene, View, settings};
 const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
 
 fn chosen(scene: &Scene, settings: &Settings) -> multiview::Start {
-    let answers: Vec<ViewAnswer<'_>> = scene.views.iter().map(View::answer).collect();
+    let answers: Vec<ViewInput<'_>> = scene.views.iter().map(View::answer).collect();
     let tables =
         |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
     choose_start(settings, &answers, &tables)
 }
 
 fn ranked(scene: &Scene, settings: &Settings) -> Vec<multiview::Start> {
-    let answers: Vec<ViewAnswer<'_>> = scene.views.iter().map(View::answer).collect();
+    let answers: Vec<ViewInput<'_>> = scene.views.iter().map(View::answer).collect();
     let tables =
         |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
     rank_starts(settings, &answers, &tables)
