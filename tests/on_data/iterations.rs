@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use ::footage::{Fill, Size, Warp};
-use fmp::{Bounds, Effort, Extractor, Layout, Model, Pose, Responses, Solver};
+use fmp::{Bounds, Extractor, Layout, Model, Pose, Responses, SolveStatistics, Solver};
 use geometry::{Camera, Framing, OutSize, Rig};
 use kernels::Rgb8View;
 use multiview::{
@@ -118,9 +118,9 @@ impl Case<'_> {
     /// Checks the solution, prints a row, and returns the number of iterations and their milliseconds on one and
     /// two threads.
     fn measure(&self, name: &str, pools: &[ThreadPool; 2]) -> [f64; 3] {
-        let before = self.solver.effort();
+        let before = self.solver.statistics();
         let estimate = pools[0].install(|| self.solve(12));
-        let effort = self.solver.effort().since(&before);
+        let effort = self.solver.statistics().since(&before);
         let on_two_threads = pools[1].install(|| self.solve(12));
         assert_eq!(estimate, on_two_threads, "{name}: one and two threads");
         let evidence = self.shots.map(Shot::evidence_without_bounds);
@@ -149,7 +149,7 @@ impl Case<'_> {
     }
 }
 
-fn describe(effort: &Effort) -> String {
+fn describe(effort: &SolveStatistics) -> String {
     let n = effort.solutions as f64;
     let [solved, offered] =
         [effort.levels_solved, effort.levels_offered].map(|levels| levels as f64 / n);
@@ -179,7 +179,7 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
         (0..RUNS).map(run).fold(f64::INFINITY, f64::min)
     });
     println!("| {name}: the first view alone | | | | {alone:.2} / {alone_two:.2} | | |");
-    let before = solver.effort();
+    let before = solver.statistics();
     let mut sums = [0.0; 3];
     for [a, b] in pipeline::all_pairs(shots.len()) {
         for exchanged in [false, true] {
@@ -196,7 +196,7 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
             sums = [0, 1, 2].map(|it| sums[it] + of_case[it]);
         }
     }
-    let effort = solver.effort().since(&before);
+    let effort = solver.statistics().since(&before);
     assert!(
         effort.votes_cast < effort.votes_solved,
         "{name}: messages are reused: {effort:?}"

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use fmp::{Model, Pose, Scope, Track};
+use fmp::{Model, Pose, Scope, TrackSettings};
 use kernels::Rgb8View;
 use nalgebra::Point3;
 use pipeline::{Combine, Estimator, EstimatorSettings, ViewSettings, ViewStep};
@@ -37,8 +37,8 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
     println!("| search | full searches | same pose | px median / p90 |");
     let [median, p90] = errors(&model, &clip, &truth, &full);
     println!("| full | 100 % | 100 % | {median:.1} / {p90:.1} |");
-    let default = Track::default();
-    let row = |levels, margin, full_every, max_drop| Track {
+    let default = TrackSettings::default();
+    let row = |levels, margin, full_every, max_drop| TrackSettings {
         levels,
         margin,
         full_every,
@@ -55,7 +55,7 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
         let got = search(&model, &clip, Some(track));
         let same = same(&full, &got);
         let errors = errors(&model, &clip, &truth, &got);
-        let Track {
+        let TrackSettings {
             levels,
             margin,
             full_every,
@@ -88,7 +88,7 @@ fn image(clip: &Clip, view: usize, frame: usize) -> Rgb8View<'_> {
 }
 
 /// The best pose of every frame of every view, each view independently.
-fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
+fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Searched {
     let settings = ViewSettings {
         track,
         n_candidates: 1,
@@ -105,7 +105,7 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
             let scope = tracker.scope(&layout, frame as u64);
             n_full += usize::from(scope == Scope::whole(&layout));
             let mut found = step.run(image(clip, view, frame), scope, &mut responses);
-            if step.gives_up(&tracker, &found) {
+            if step.needs_full_search(&tracker, &found) {
                 n_full += 1;
                 found = step.run(
                     image(clip, view, frame),
@@ -113,7 +113,7 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<Track>) -> Searched {
                     &mut responses,
                 );
             }
-            step.follow(&mut tracker, frame as u64, &found);
+            step.update(&mut tracker, frame as u64, &found);
             found.candidates[0].clone()
         });
         frames.collect()
@@ -156,7 +156,7 @@ fn fused(
     model: &Arc<Model>,
     rig: &geometry::Rig,
     clip: &Clip,
-    (truth, track): (&[Vec<Point3<f64>>], Option<Track>),
+    (truth, track): (&[Vec<Point3<f64>>], Option<TrackSettings>),
 ) -> [f64; 2] {
     let mut settings = EstimatorSettings::default();
     settings.view.track = track;

@@ -1,6 +1,6 @@
 //! Section `[pose]` of a deployment file.
 
-use fmp::{Precision, Track};
+use fmp::{Precision, TrackSettings};
 use pipeline::{EvidenceWindow, ViewSettings};
 use serde::{Deserialize, Serialize};
 
@@ -52,7 +52,7 @@ pub enum Search {
 impl Default for Config {
     fn default() -> Self {
         let step = ViewSettings::default();
-        let track = Track::default();
+        let track = TrackSettings::default();
         Self {
             evidence_window: match step.window {
                 EvidenceWindow::All => Window::All(All::All),
@@ -86,7 +86,7 @@ impl Config {
             n_candidates: self.candidates,
             min_separation: self.min_separation,
             precision: self.precision,
-            track: (self.search == Search::Tracked).then_some(Track {
+            track: (self.search == Search::Tracked).then_some(TrackSettings {
                 levels: self.tracked_levels,
                 margin: self.tracked_margin,
                 full_every: self.tracked_full_every,
@@ -138,6 +138,6 @@ mod tests {
     #[test]
     fn who_asks_for_tracking_by_name_gets_its_defaults() {
         let config: Config = toml::from_str("search = \"tracked\"").unwrap();
-        assert_eq!(config.settings().track, Some(Track::default()));
+        assert_eq!(config.settings().track, Some(TrackSettings::default()));
     }
 }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fmp::{
-    Edge, Extra, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Responses, Solver, Spring,
-    Springs,
+    Edge, ExtraTerms, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Responses, Solver,
+    Spring, Springs,
 };
 use kernels::Isa;
 
@@ -59,20 +59,20 @@ fn steps(solver: &Solver, evidence: &Responses<'_>, threads: &str) {
             solver.best(&evidence, Some(&terms(round, false))),
         ));
     });
-    let mut again = solver.again(&evidence);
+    let mut incremental = solver.incremental(&evidence);
     let mut least = [full; 2];
     for (least, unchanged) in least.iter_mut().zip([false, true]) {
         *least = fastest(|| {
             round += 1;
             let terms = terms(round, unchanged);
-            drop(black_box(again.best(&terms, Some(&best))));
+            drop(black_box(incremental.best(&terms, Some(&best))));
         });
     }
     let [pruned, kept] = least;
     println!(
         "  {threads}: one step {full:6.2} ms; pruned to {} levels {pruned:6.2} ms; and with four \
          of five terms unchanged {kept:6.2} ms",
-        again.n_levels()
+        incremental.n_levels()
     );
 }
 
@@ -93,7 +93,7 @@ struct Lines<'a> {
     round: Vec<usize>,
 }
 
-impl Extra for Lines<'_> {
+impl ExtraTerms for Lines<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let cols = self.layout.levels[level].cols;
         let line = self.rows[part] + (self.round[part] % 3) as f32 * 0.25;

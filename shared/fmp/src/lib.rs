@@ -2,7 +2,7 @@
 //!
 //! Reading order: [`Model`] (what was trained), [`Layout`] (where the cells of the feature pyramid
 //! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
-//! which finds the best tree of parts exactly, and [`Pose`], its answer; [`Again`] solves the same
+//! which finds the best tree of parts exactly, and [`Pose`], its answer; [`IncrementalSolver`] solves the same
 //! evidence under changing terms with less work. A [`Scope`] is a part of the pyramid that is searched
 //! instead of all of it, and [`Tracker`] decides which. Responses are single precision and the same
 //! bits on every machine, unless another [`Precision`] is asked for by name.
@@ -35,8 +35,10 @@ pub use precision::Precision;
 pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
-pub use solve::{Again, Bound, Bounds, CandidateSettings, Effort, Extra, Solver};
-pub use track::{Moment, Track, Tracker};
+pub use solve::{
+    Bound, Bounds, CandidateSettings, ExtraTerms, IncrementalSolver, SolveStatistics, Solver,
+};
+pub use track::{FrameTime, TrackSettings, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4
 /// texture energies, 1 that is set in the padding only.

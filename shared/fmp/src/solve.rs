@@ -1,9 +1,9 @@
 //! The exact solution of the tree: votes from the leaves to the root, then back.
 
-mod again;
 mod bounds;
 mod distinct;
-mod effort;
+mod incremental;
+mod statistics;
 mod suppress;
 mod sweep;
 
@@ -14,19 +14,19 @@ use std::sync::{Arc, Mutex, PoisonError};
 use kernels::{Isa, VoteRule};
 use rayon::prelude::*;
 
-use self::effort::Tally;
+use self::statistics::Tally;
 use self::sweep::{Problem, Sweep, Workspace};
 use crate::extract::{in_pool, lock};
 use crate::pool::Pool;
 use crate::{Edge, Model, Pose, Responses, Spring, Springs};
-pub use again::Again;
 pub use bounds::{Bound, Bounds};
-pub use effort::Effort;
+pub use incremental::IncrementalSolver;
+pub use statistics::SolveStatistics;
 
 /// Terms that another view adds to the score of a part (the `xi` and `lambda` of eq. 3).
 ///
 /// Both are optional per part; a part without them is scored by this view alone.
-pub trait Extra: Sync {
+pub trait ExtraTerms: Sync {
     /// Adds this part's position term to the scores of some cells, the same for every type.
     ///
     /// Returns `false`, and leaves `score` alone, if the part has none.
@@ -39,12 +39,12 @@ pub trait Extra: Sync {
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
     /// An upper bound of what both terms together can add to any placement of the part: what lets
-    /// [`Again`] leave levels out, and poses on the others. Infinite where none is known.
+    /// [`IncrementalSolver`] leave levels out, and poses on the others. Infinite where none is known.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
 
-    /// What the part's terms depend on, besides what stays the same during the life of an [`Again`]:
+    /// What the part's terms depend on, besides what stays the same during the life of an [`IncrementalSolver`]:
     /// equal keys mean equal terms. `None` where they may always be others.
     fn key(&self, _part: usize) -> Option<u64> {
         None
@@ -140,7 +140,7 @@ impl Solver {
     /// # Panics
     ///
     /// If the evidence is another model's.
-    pub fn best(&self, evidence: &Responses<'_>, extra: Option<&dyn Extra>) -> Option<Pose> {
+    pub fn best(&self, evidence: &Responses<'_>, extra: Option<&dyn ExtraTerms>) -> Option<Pose> {
         self.best_on(evidence, evidence.levels(), extra)
     }
 
@@ -153,7 +153,7 @@ impl Solver {
         &self,
         evidence: &Responses<'_>,
         levels: &[u16],
-        extra: Option<&dyn Extra>,
+        extra: Option<&dyn ExtraTerms>,
     ) -> Option<Pose> {
         self.check(evidence);
         let search = Search {
@@ -188,7 +188,7 @@ impl Solver {
         &self,
         evidence: &Responses<'_>,
         level: u16,
-        extra: Option<&dyn Extra>,
+        extra: Option<&dyn ExtraTerms>,
     ) -> Vec<f32> {
         let sweeps = self.sweep_levels(evidence, &[level], extra, |sweep| {
             sweep.roots().map(|it| it.score).collect()
@@ -204,7 +204,12 @@ impl Solver {
     /// # Panics
     ///
     /// If the evidence is another model's, or it does not [cover](Responses::covers) the pose.
-    pub fn score(&self, evidence: &Responses<'_>, pose: &Pose, extra: Option<&dyn Extra>) -> f32 {
+    pub fn score(
+        &self,
+        evidence: &Responses<'_>,
+        pose: &Pose,
+        extra: Option<&dyn ExtraTerms>,
+    ) -> f32 {
         self.check(evidence);
         let problem = Problem::new(self, evidence, extra, pose.level);
         let mut scores = self.scores.take();
@@ -214,7 +219,7 @@ impl Solver {
     }
 
     /// What repeated solutions have taken so far.
-    pub fn effort(&self) -> Effort {
+    pub fn statistics(&self) -> SolveStatistics {
         self.tally.sums()
     }
 
@@ -263,7 +268,7 @@ impl Solver {
         &self,
         evidence: &Responses<'_>,
         levels: &[u16],
-        extra: Option<&dyn Extra>,
+        extra: Option<&dyn ExtraTerms>,
         answer: impl Fn(&Sweep<'_>) -> T + Sync,
     ) -> Vec<T> {
         self.check(evidence);
@@ -287,7 +292,7 @@ impl Solver {
 struct Search<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
-    extra: Option<&'a dyn Extra>,
+    extra: Option<&'a dyn ExtraTerms>,
     /// Where work is counted, if it is.
     tally: Option<&'a Tally>,
     /// The best root so far, and the workspace in which its tree can be followed.

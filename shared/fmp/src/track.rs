@@ -4,14 +4,14 @@ use crate::{Layout, Model, Pose, Region, Scope};
 
 /// When a frame is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
+pub struct FrameTime {
     /// Its number, counted in frames that are to be answered.
     pub frame: u64,
     /// Its time in the footage, seconds; none where no frame rate is known.
     pub seconds: Option<f64>,
 }
 
-impl From<u64> for Moment {
+impl From<u64> for FrameTime {
     fn from(frame: u64) -> Self {
         Self {
             frame,
@@ -22,7 +22,7 @@ impl From<u64> for Moment {
 
 /// How closely the last pose is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Track {
+pub struct TrackSettings {
     /// Levels either side of the last pose's that are searched.
     pub levels: u16,
     /// How far around the last pose's box is searched, as a share of the box's longer side.
@@ -43,7 +43,7 @@ pub struct Track {
     pub full_every_s: f64,
 }
 
-impl Default for Track {
+impl Default for TrackSettings {
     fn default() -> Self {
         Self {
             levels: 4,
@@ -63,21 +63,21 @@ impl Default for Track {
 ///
 /// A full search is made of the first frame, and whenever nothing was found, frames were left out,
 /// the last full search is long ago (in frames, or in seconds where a frame rate is known), or frames
-/// are too far apart in time; see [`Track`]. Between them only what is near the last pose is looked
+/// are too far apart in time; see [`TrackSettings`]. Between them only what is near the last pose is looked
 /// at: a better pose elsewhere is seen at the next full search. A frame in which nothing was found
-/// there, or something whose score has fallen, is searched once more, in full ([`Self::gives_up`]).
+/// there, or something whose score has fallen, is searched once more, in full ([`Self::needs_full_search`]).
 ///
 /// Knows no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tracker {
-    settings: Option<Track>,
+    settings: Option<TrackSettings>,
     last: Option<Last>,
 }
 
 /// What was found in the last frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Last {
-    at: Moment,
+    at: FrameTime,
     level: u16,
     /// Box `[x1, y1, x2, y2]` around all parts, pixels.
     around: [f64; 4],
@@ -87,13 +87,13 @@ struct Last {
 /// The last full search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Full {
-    at: Moment,
+    at: FrameTime,
     score: f32,
 }
 
 impl Tracker {
     /// Begins; without settings every frame is searched in full.
-    pub fn new(settings: Option<Track>) -> Self {
+    pub fn new(settings: Option<TrackSettings>) -> Self {
         Self {
             settings,
             last: None,
@@ -103,7 +103,7 @@ impl Tracker {
     /// What is to be searched of a frame.
     ///
     /// * `at`: when the frame is.
-    pub fn scope(&self, layout: &Layout, at: impl Into<Moment>) -> Scope {
+    pub fn scope(&self, layout: &Layout, at: impl Into<FrameTime>) -> Scope {
         let at = at.into();
         let near = || {
             let (settings, last) = (self.settings.as_ref()?, self.last.as_ref()?);
@@ -118,7 +118,7 @@ impl Tracker {
     ///
     /// * `scope`: as answered by [`Self::scope`].
     /// * `best`: the best pose found there, if there is one.
-    pub fn gives_up(&self, layout: &Layout, scope: &Scope, best: Option<&Pose>) -> bool {
+    pub fn needs_full_search(&self, layout: &Layout, scope: &Scope, best: Option<&Pose>) -> bool {
         let (Some(settings), Some(last)) = (&self.settings, &self.last) else {
             return false;
         };
@@ -131,10 +131,10 @@ impl Tracker {
     /// * `at`: as asked for.
     /// * `scope`: what was searched at last: as answered by [`Self::scope`], or everything.
     /// * `best`: the best pose, if there is one.
-    pub fn found(
+    pub fn update(
         &mut self,
         (model, layout): (&Model, &Layout),
-        (at, scope): (impl Into<Moment>, &Scope),
+        (at, scope): (impl Into<FrameTime>, &Scope),
         best: Option<&Pose>,
     ) {
         let at = at.into();
@@ -158,10 +158,10 @@ impl Tracker {
 
 impl Last {
     /// Whether a frame may be looked at near this one's pose only.
-    fn leads_to(&self, settings: &Track, at: Moment) -> bool {
+    fn leads_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
         let step = at.frame.checked_sub(self.at.frame).filter(|it| *it > 0);
         let age = at.frame.saturating_sub(self.full.at.frame);
-        let within = |from: Moment, most: f64| seconds(from, at).is_none_or(|it| it <= most);
+        let within = |from: FrameTime, most: f64| seconds(from, at).is_none_or(|it| it <= most);
         let is_recent = |most: f64| seconds(self.full.at, at).is_none_or(|it| it < most);
         step.is_some_and(|it| it <= settings.max_gap)
             && age < settings.full_every
@@ -170,7 +170,7 @@ impl Last {
     }
 
     /// What lies near this frame's pose, if any of it lies in the image.
-    fn near(&self, settings: &Track, layout: &Layout, at: Moment) -> Option<Scope> {
+    fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
         let moved = seconds(self.at, at).map_or(0.0, |it| settings.speed * it);
         let margin = settings.margin.max(moved) * (x2 - x1).max(y2 - y1);
@@ -194,6 +194,6 @@ impl Last {
 }
 
 /// From one moment to another, where both are known.
-fn seconds(from: Moment, to: Moment) -> Option<f64> {
+fn seconds(from: FrameTime, to: FrameTime) -> Option<f64> {
     Some(to.seconds? - from.seconds?)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use fmp::{Again, Extra, Pose, Responses, Solver};
+use fmp::{ExtraTerms, IncrementalSolver, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::optimise::{is_best, mean_movement, types};
@@ -100,7 +100,8 @@ pub fn estimate_all_views(
         .map(|(view, it)| own_score(view, it));
     let mut state = State::new(own.collect(), poses, &pairs);
     let order = order(input, &state.poses);
-    let mut again: Vec<Again<'_>> = evidence.iter().map(|it| solver.again(it)).collect();
+    let mut incremental: Vec<IncrementalSolver<'_>> =
+        evidence.iter().map(|it| solver.incremental(it)).collect();
     let mut known: Vec<Known> = vec![Known::default(); n_views];
     let (mut iterations, mut converged) = (Vec::new(), n_views < 2);
     let mut calm = Calm::of(n_views);
@@ -109,7 +110,7 @@ pub fn estimate_all_views(
         let supports = pairs.supports(target, &state.poses, &mut known[target]);
         let guesses = input.views[target].candidates.iter();
         let guesses = guesses.chain([&state.poses[target]]);
-        let found = again[target].best(&supports, guesses);
+        let found = incremental[target].best(&supports, guesses);
         debug_assert!(is_best(solver, evidence[target], &supports, found.as_ref()));
         let before = state.poses[target].clone();
         if let Some(pose) = found {
@@ -276,7 +277,7 @@ struct Supports<'a> {
     keys: Vec<u64>,
 }
 
-impl Extra for Supports<'_> {
+impl ExtraTerms for Supports<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let add = |any, it: &Consistency<'_>| it.add_position(part, level, first, score) || any;
         self.each.iter().fold(false, add)

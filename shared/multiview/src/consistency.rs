@@ -1,6 +1,6 @@
 //! The paper's terms between two views: eq. 3 to 7, with one side fixed or both given.
 
-use fmp::{Extra, Pose};
+use fmp::{ExtraTerms, Pose};
 
 use crate::term::Term;
 use crate::{Compatibility, PairInput, Settings, SwitchBy};
@@ -158,7 +158,7 @@ impl Consistency<'_> {
     }
 }
 
-impl Extra for Consistency<'_> {
+impl ExtraTerms for Consistency<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let Some(term) = self.terms[part].filter(|it| !it.is_constant()) else {
             return false;

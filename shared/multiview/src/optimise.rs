@@ -1,6 +1,6 @@
 //! Alternating exact single-view solutions of one pair of views, until nothing moves.
 
-use fmp::{Bounds, Extra, Pose, Responses, Solver};
+use fmp::{Bounds, ExtraTerms, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::released::{ReleasedPair, ReleasedTerms};
@@ -97,14 +97,14 @@ fn paper(
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
     let mut target = 1 - initial_support(pair, &poses);
-    let mut again = evidence.map(|it| solver.again(it));
+    let mut incremental = evidence.map(|it| solver.incremental(it));
     let (mut iterations, mut converged) = (Vec::new(), false);
     for iteration in 0..settings.max_iterations {
         let consistency = Consistency::new(&terms, target, &poses[1 - target]);
         // Another candidate may suit the support better than the pose that is left behind.
         let guesses = pair.views[target].candidates.iter();
         let guesses = guesses.chain([&poses[target]]);
-        let found = again[target].best(&consistency, guesses);
+        let found = incremental[target].best(&consistency, guesses);
         debug_assert!(is_best(
             solver,
             evidence[target],
@@ -160,11 +160,11 @@ fn released_pair(
     let released = ReleasedPair::new(settings, pair, start.exchanged);
     let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
     let mut target = 1 - initial_support(pair, &poses);
-    let mut again = evidence.map(|it| solver.again(it));
+    let mut incremental = evidence.map(|it| solver.incremental(it));
     let (mut iterations, mut converged) = (Vec::<Iteration>::new(), false);
     for _ in 0..settings.max_iterations {
         let terms = ReleasedTerms::new(&released, target, &poses[1 - target]);
-        let found = again[target].best(&terms, Some(&poses[target]));
+        let found = incremental[target].best(&terms, Some(&poses[target]));
         debug_assert!(is_best(solver, evidence[target], &terms, found.as_ref()));
         let Some(pose) = found else {
             break;
@@ -198,7 +198,7 @@ fn released_pair(
 pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,
-    extra: &dyn Extra,
+    extra: &dyn ExtraTerms,
     found: Option<&Pose>,
 ) -> bool {
     let is_right = |given: &Bounds| {

@@ -5,7 +5,7 @@
 //! views would switch off looks at that part (the program looks at part 1), and a type never seen in
 //! training adds nothing (the program's table holds NaN).
 
-use fmp::{Extra, Pose};
+use fmp::{ExtraTerms, Pose};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::consistency::{NO_SUPPORT, counterparts, support_key};
@@ -79,7 +79,7 @@ impl<'a> ReleasedTerms<'a> {
     }
 }
 
-impl Extra for ReleasedTerms<'_> {
+impl ExtraTerms for ReleasedTerms<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let Some(Line::Across(ends)) = self.lines[part] else {
             return false;

@@ -140,10 +140,10 @@ impl Estimator {
                 };
                 responses.resize(step.layout().n_responses(), 0.0);
                 let mut found = step.run(image, tracker.scope(step.layout(), frame), responses);
-                if step.gives_up(tracker, &found) {
+                if step.needs_full_search(tracker, &found) {
                     found = step.run(image, Scope::whole(step.layout()), responses);
                 }
-                step.follow(tracker, frame, &found);
+                step.update(tracker, frame, &found);
                 let answer = (!found.candidates.is_empty()).then(|| ViewResult {
                     candidates: found.candidates.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),

@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use fmp::{
-    Bounds, Extractor, Layout, LocalScore, Model, Moment, Pose, Precision, Responses, Scope,
-    Solver, Track, Tracker, local_scores,
+    Bounds, Extractor, FrameTime, Layout, LocalScore, Model, Pose, Precision, Responses, Scope,
+    Solver, TrackSettings, Tracker, local_scores,
 };
 use kernels::{NoAmx, Rgb8View};
 
@@ -45,7 +45,7 @@ pub struct ViewSettings {
     /// How exactly responses are computed.
     pub precision: Precision,
     /// How poses are followed from frame to frame; every frame is searched in full without it.
-    pub track: Option<Track>,
+    pub track: Option<TrackSettings>,
 }
 
 impl Default for ViewSettings {
@@ -146,16 +146,16 @@ impl ViewStep {
     }
 
     /// Whether what was found near the last pose is not to be believed, and the frame is to be searched in
-    /// full; see [`Tracker::gives_up`].
-    pub fn gives_up(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
-        tracker.gives_up(&self.layout, &found.scope, found.candidates.first())
+    /// full; see [`Tracker::needs_full_search`].
+    pub fn needs_full_search(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
+        tracker.needs_full_search(&self.layout, &found.scope, found.candidates.first())
     }
 
     /// Tells the tracker what was found in a frame.
     ///
     /// * `at`: as the tracker was asked about.
-    pub fn follow(&self, tracker: &mut Tracker, at: impl Into<Moment>, found: &ViewEstimate) {
+    pub fn update(&self, tracker: &mut Tracker, at: impl Into<FrameTime>, found: &ViewEstimate) {
         let of = (&**self.solver.model(), &*self.layout);
-        tracker.found(of, (at, &found.scope), found.candidates.first());
+        tracker.update(of, (at, &found.scope), found.candidates.first());
     }
 }

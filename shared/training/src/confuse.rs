@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use datasets::Picture;
-use fmp::{Extra, Extractor, Layout, Model, Pose, Responses, Solver};
+use fmp::{ExtraTerms, Extractor, Layout, Model, Pose, Responses, Solver};
 
 use crate::latent::Marked;
 
@@ -60,7 +60,7 @@ impl Loss<'_> {
     }
 }
 
-impl Extra for Loss<'_> {
+impl ExtraTerms for Loss<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let it = &self.layout.levels[level];
         let half = (self.side as f64 * it.scale - 1.0) / 2.0;

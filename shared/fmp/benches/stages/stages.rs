@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::sync::{Arc, Mutex};
 
-use fmp::{Extractor, Precision, Responses, Solver, Track, Tracker};
+use fmp::{Extractor, Precision, Responses, Solver, TrackSettings, Tracker};
 use kernels::{HogShape, HogWorkspace, Isa, Planes, ShrinkWorkspace, hog, reduce, resize};
 use rayon::prelude::*;
 
@@ -186,7 +186,7 @@ impl<'a> Bench<'a> {
     /// A frame of which only what is near the best pose is searched, by the default settings.
     fn tracked(&self, clock: &Clock, values: &mut [f32]) -> Times {
         let Workload { model, layout, .. } = self.workload;
-        let mut tracker = Tracker::new(Some(Track::default()));
+        let mut tracker = Tracker::new(Some(TrackSettings::default()));
         let mut frame = |number: u64| {
             let scope = tracker.scope(layout, number);
             let image = self.workload.image();
@@ -196,7 +196,7 @@ impl<'a> Bench<'a> {
             let evidence = Responses::within(layout, values, levels, scope);
             let best = self.solver.best(&evidence, None);
             if number == 0 {
-                tracker.found((model, layout), (number, &scope), best.as_ref());
+                tracker.update((model, layout), (number, &scope), best.as_ref());
             }
             black_box(best);
         };

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fmp::{Edge, Extra, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
+use fmp::{
+    Edge, ExtraTerms, Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs,
+};
 use kernels::Rgb8View;
 use skeleton::{N_PARTS, PARENT};
 
@@ -147,7 +149,7 @@ impl OtherView {
     }
 }
 
-impl Extra for OtherView {
+impl ExtraTerms for OtherView {
     fn add_position(&self, _part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         for (score, term) in score.iter_mut().zip(&self.maps[level][first..]) {
             *score += term;

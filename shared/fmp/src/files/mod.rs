@@ -16,7 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
-pub use tokens::Place;
+pub use tokens::TextPosition;
 
 use crate::{Model, ModelError, ModelSpec};
 

@@ -1,7 +1,7 @@
 //! The text format of the paper authors' released models.
 
 use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
-use super::tokens::{Place, Tokens, shortened};
+use super::tokens::{TextPosition, Tokens, shortened};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
 
 /// Why a text is not a model.
@@ -13,7 +13,7 @@ pub enum TextError {
         /// The key word.
         field: &'static str,
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// What stands there.
         got: String,
     },
@@ -23,7 +23,7 @@ pub enum TextError {
         /// The field that was being read.
         field: &'static str,
         /// Where.
-        place: Place,
+        place: TextPosition,
     },
     /// A number cannot be read.
     #[error("{place}: `{field}` expects {kind}, got `{got}`")]
@@ -31,7 +31,7 @@ pub enum TextError {
         /// The field that was being read.
         field: &'static str,
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// Which numbers would do.
         kind: &'static str,
         /// What stands there.
@@ -43,7 +43,7 @@ pub enum TextError {
         /// The field that was being read.
         field: &'static str,
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// Which number of the field.
         what: &'static str,
         /// What it says.
@@ -57,7 +57,7 @@ pub enum TextError {
         /// The field that was being read.
         field: &'static str,
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// The count.
         got: usize,
         /// Least accepted.
@@ -71,7 +71,7 @@ pub enum TextError {
     )]
     OtherLevel {
         /// Where the array begins.
-        place: Place,
+        place: TextPosition,
         /// 1-based spring.
         spring: usize,
         /// The anchor's third component.
@@ -81,7 +81,7 @@ pub enum TextError {
     #[error("{place}: expected the end of the file, got `{got}`")]
     Trailing {
         /// Where.
-        place: Place,
+        place: TextPosition,
         /// What stands there.
         got: String,
     },
@@ -182,7 +182,7 @@ fn count(
 
 fn agree<const N: usize>(
     field: &'static str,
-    place: Place,
+    place: TextPosition,
     claims: [(&'static str, usize, usize); N],
 ) -> Result<(), TextError> {
     match claims

@@ -7,14 +7,14 @@ use super::text::TextError;
 
 /// Where a token stands in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub struct TextPosition {
     /// Line, from 1.
     pub line: usize,
     /// Token of the file, from 1.
     pub token: usize,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for TextPosition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {} (token {})", self.line, self.token)
     }
@@ -24,21 +24,21 @@ impl fmt::Display for Place {
 #[derive(Debug, Clone)]
 pub(super) struct Tokens<'a> {
     rest: &'a str,
-    place: Place,
+    place: TextPosition,
 }
 
 impl<'a> Tokens<'a> {
     pub(super) fn new(text: &'a str) -> Self {
         let mut tokens = Self {
             rest: text,
-            place: Place { line: 1, token: 0 },
+            place: TextPosition { line: 1, token: 0 },
         };
         tokens.advance(0);
         tokens
     }
 
     /// Where the next token stands.
-    pub(super) fn place(&self) -> Place {
+    pub(super) fn place(&self) -> TextPosition {
         self.place
     }
 

@@ -1,7 +1,7 @@
 //! What every level can offer at most: the start of exact pruning.
 
 use super::sweep::Sweep;
-use super::{Extra, Solver};
+use super::{ExtraTerms, Solver};
 use crate::{Responses, Spring, Springs};
 
 /// For every level of a layout the score of its best pose without the terms of other views.
@@ -151,7 +151,7 @@ impl Solver {
     }
 
     /// Upper bound of what the terms can add to a pose, and the sum of the bounds' absolute values.
-    pub(super) fn max_gain(&self, extra: &dyn Extra) -> (f64, f64) {
+    pub(super) fn max_gain(&self, extra: &dyn ExtraTerms) -> (f64, f64) {
         let gains = (0..self.model.n_parts()).map(|part| f64::from(extra.max_gain(part)));
         gains.fold((0.0, 0.0), |sums, it| (sums.0 + it, sums.1 + it.abs()))
     }

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use kernels::{ChildScores, Grid, OwnScores, ScoreBuffer, Span, VoteWorkspace};
 
-use super::{Extra, Root, Solver};
+use super::{ExtraTerms, Root, Solver};
 use crate::{Placement, Pose, Responses, Window};
 
 /// Score planes of one level, used again from level to level.
@@ -50,7 +50,7 @@ pub(super) struct Sweep<'a> {
 pub(super) struct Problem<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
-    extra: Option<&'a dyn Extra>,
+    extra: Option<&'a dyn ExtraTerms>,
     level: u16,
     window: Window,
     /// The response maps of the level.
@@ -63,7 +63,7 @@ impl<'a> Problem<'a> {
     pub(super) fn new(
         solver: &'a Solver,
         evidence: &'a Responses<'a>,
-        extra: Option<&'a dyn Extra>,
+        extra: Option<&'a dyn ExtraTerms>,
         level: u16,
     ) -> Self {
         let window = evidence.window(usize::from(level));

@@ -29,7 +29,7 @@ pub(crate) fn takes_memory_for_the_answer_only() {
 /// Terms that take no memory.
 struct Unmoved;
 
-impl fmp::Extra for Unmoved {
+impl fmp::ExtraTerms for Unmoved {
     fn add_position(&self, part: usize, _: usize, first: usize, score: &mut [f32]) -> bool {
         for (cell, it) in score.iter_mut().enumerate() {
             *it -= ((first + cell + part) % 7) as f32 * 0.01;
@@ -61,11 +61,11 @@ pub(crate) fn takes_memory_for_the_answer_only_again() {
         let view = evidence.view();
         let bounds = solver.bounds(&view);
         let view = view.with_bounds(&bounds);
-        let mut again = solver.again(&view);
+        let mut incremental = solver.incremental(&view);
         let mut guess = solver.best(&view, None);
         for _ in 0..3 {
             let mut found = None;
-            let count = allocations(|| found = again.best(&Unmoved, guess.as_ref()));
+            let count = allocations(|| found = incremental.best(&Unmoved, guess.as_ref()));
             if round > 2 {
                 assert_eq!(count, 1);
             }

@@ -2,9 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod again;
 mod common;
 mod images;
+mod incremental;
 mod other_view;
 mod scope;
 mod solver;

@@ -1,13 +1,13 @@
 //! Made-up terms of other views.
 
-use fmp::Extra;
+use fmp::ExtraTerms;
 
 use crate::common::Noise;
 
 /// Made-up terms of another view: every second part has a position term.
 pub(crate) struct OtherView(pub(crate) u64);
 
-impl Extra for OtherView {
+impl ExtraTerms for OtherView {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         if !(self.0 as usize + part).is_multiple_of(2) {
             return false;
@@ -39,7 +39,7 @@ pub(crate) struct OtherViews {
     pub(crate) known: bool,
 }
 
-impl Extra for OtherViews {
+impl ExtraTerms for OtherViews {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let mut terms = vec![0.0; score.len()];
         // `OtherView` says that even parts have a term under even seeds.

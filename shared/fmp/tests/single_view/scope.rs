@@ -234,7 +234,7 @@ proptest! {
         let solver = Solver::new(Arc::clone(&model));
         let other = OtherView(seed);
         prop_assert_eq!(solver.distinct(&part, 4, 0.5), solver.distinct(&evidence.view(), 4, 0.5));
-        for extra in [None, Some(&other as &dyn fmp::Extra)] {
+        for extra in [None, Some(&other as &dyn fmp::ExtraTerms)] {
             let want = solver.best(&evidence.view(), extra);
             let got = solver.best(&part, extra);
             prop_assert_eq!(&got, &want);
@@ -243,14 +243,14 @@ proptest! {
                 prop_assert_eq!(solver.score(&part, &pose, extra), pose.score);
             }
         }
-        let mut again = solver.again(&part);
+        let mut incremental = solver.incremental(&part);
         let mut guess = solver.best(&evidence.view(), None);
         for round in 0..3 {
             let seeds = (0..n_parts as u64).map(|it| seed ^ (it * round / 2)).collect();
             let others = OtherViews { seeds, gain: 0.5, scale: 0.3, known: true };
             let want = solver.best(&evidence.view(), Some(&others));
             // A guess may lie where nothing has a value now.
-            prop_assert_eq!(&again.best(&others, guess.as_ref()), &want);
+            prop_assert_eq!(&incremental.best(&others, guess.as_ref()), &want);
             guess = guess.map(|mut it| {
                 it.parts[0].x = 0;
                 it

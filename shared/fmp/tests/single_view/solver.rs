@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fmp::{CandidateSettings, Extra, Model, Placement, Pose, Responses, Solver, Springs};
+use fmp::{CandidateSettings, ExtraTerms, Model, Placement, Pose, Responses, Solver, Springs};
 use proptest::prelude::*;
 
 use crate::common::{Evidence, Noise, tree};
@@ -34,7 +34,12 @@ fn all_poses(model: &Model, level: u16, [rows, cols]: [usize; 2]) -> Vec<Pose> {
 }
 
 /// Equation 1 in double precision, straight from the model.
-fn energy(model: &Model, evidence: &Responses<'_>, pose: &Pose, extra: Option<&dyn Extra>) -> f64 {
+fn energy(
+    model: &Model,
+    evidence: &Responses<'_>,
+    pose: &Pose,
+    extra: Option<&dyn ExtraTerms>,
+) -> f64 {
     let level = usize::from(pose.level);
     let it = &evidence.layout().levels[level];
     let mut sum = model.spec().root_bias;
@@ -77,7 +82,7 @@ proptest! {
         let evidence = Evidence::new(&mut noise, &model, &sizes);
         let evidence = evidence.view();
         let other = OtherView(seed);
-        let extra = fused.then_some(&other as &dyn Extra);
+        let extra = fused.then_some(&other as &dyn ExtraTerms);
         let solver = Solver::new(Arc::clone(&model));
         let best = solver.best(&evidence, extra).unwrap();
         let mut highest = f32::NEG_INFINITY;
@@ -242,6 +247,6 @@ fn who_watches_a_solver_sees_every_level_that_it_looks_at() {
     assert_eq!(seen, [0, 2, 4]);
     let evidence = evidence.with_bounds(&bounds);
     // Without a guess at least one level has to be looked at.
-    solver.again(&evidence).best(&OtherView(7), None);
+    solver.incremental(&evidence).best(&OtherView(7), None);
     assert!(solver.n_sweeps() > 4);
 }

@@ -1,10 +1,10 @@
 //! Where the next pose is looked for.
 
-use fmp::{Layout, Model, Moment, Placement, Pose, Scope, Track, Tracker};
+use fmp::{FrameTime, Layout, Model, Placement, Pose, Scope, TrackSettings, Tracker};
 
 use crate::common::{Noise, tree};
 
-const TRACK: Track = Track {
+const TRACK: TrackSettings = TrackSettings {
     levels: 2,
     margin: 0.5,
     full_every: 5,
@@ -22,7 +22,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(settings: Option<Track>) -> Self {
+    fn new(settings: Option<TrackSettings>) -> Self {
         let mut noise = Noise(3);
         let mut spec = tree(&mut noise, 3).spec().clone();
         spec.interval = 5;
@@ -35,25 +35,28 @@ impl Scene {
     }
 
     /// Whether a frame is searched in full, given the score that is found then.
-    fn is_full(&mut self, at: impl Into<Moment>, score: Option<f32>) -> bool {
+    fn is_full(&mut self, at: impl Into<FrameTime>, score: Option<f32>) -> bool {
         let (at, whole) = (at.into(), Scope::whole(&self.layout));
         let mut scope = self.tracker.scope(&self.layout, at);
         let pose = score.map(pose);
-        if self.tracker.gives_up(&self.layout, &scope, pose.as_ref()) {
+        if self
+            .tracker
+            .needs_full_search(&self.layout, &scope, pose.as_ref())
+        {
             scope = whole;
         }
         let of = (&*self.model, &self.layout);
-        self.tracker.found(of, (at, &scope), pose.as_ref());
+        self.tracker.update(of, (at, &scope), pose.as_ref());
         scope == whole
     }
 
     /// Which of ten frames are searched in full at a frame rate, all as good as the first.
     fn full_at(rate_hz: f64) -> Vec<u64> {
-        let mut scene = Self::new(Some(Track {
+        let mut scene = Self::new(Some(TrackSettings {
             full_every: 1000,
             ..TRACK
         }));
-        let at = |frame: u64| Moment {
+        let at = |frame: u64| FrameTime {
             frame,
             seconds: Some(frame as f64 / rate_hz),
         };
@@ -110,18 +113,18 @@ fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
 #[test]
 fn the_longer_ago_the_last_pose_is_the_farther_around_it_is_searched() {
     let mut scene = Scene::new(Some(TRACK));
-    let at = |seconds: f64| Moment {
+    let at = |seconds: f64| FrameTime {
         frame: 1,
         seconds: Some(seconds),
     };
-    let first = Moment {
+    let first = FrameTime {
         frame: 0,
         seconds: Some(0.0),
     };
     let pose = pose(1.0);
     let whole = Scope::whole(&scene.layout);
     let of = (&*scene.model, &scene.layout);
-    scene.tracker.found(of, (first, &whole), Some(&pose));
+    scene.tracker.update(of, (first, &whole), Some(&pose));
     let [x1, _, x2, _] = pose.bounding_box(&scene.model, &scene.layout);
     // Half a box's side at least, and a side more for every half of a second.
     for (seconds, share) in [(0.01, 0.5), (0.2, 0.5), (0.25, 0.5)] {
@@ -129,11 +132,11 @@ fn the_longer_ago_the_last_pose_is_the_farther_around_it_is_searched() {
         let begin = (x1 - share * (x2 - x1)).floor().max(0.0);
         assert_eq!(f64::from(scope.region().x[0]), begin, "{seconds} s");
     }
-    scene.tracker = Tracker::new(Some(Track {
+    scene.tracker = Tracker::new(Some(TrackSettings {
         margin: 0.1,
         ..TRACK
     }));
-    scene.tracker.found(of, (first, &whole), Some(&pose));
+    scene.tracker.update(of, (first, &whole), Some(&pose));
     let begin = |seconds: f64| scene.tracker.scope(&scene.layout, at(seconds)).region().x[0];
     assert!(begin(0.2) < begin(0.1) && begin(0.1) < begin(0.06));
     assert_eq!(begin(0.05), begin(0.0), "the margin at least");
@@ -182,7 +185,7 @@ fn levels_and_a_margin_around_the_last_pose_are_searched() {
 
 #[test]
 fn the_search_ends_with_the_image_and_with_the_levels() {
-    let track = Track {
+    let track = TrackSettings {
         levels: 100,
         margin: 9.0,
         ..TRACK
@@ -205,6 +208,6 @@ fn a_pose_beside_the_image_is_not_followed() {
         };
     }
     let of = (&*scene.model, &scene.layout);
-    scene.tracker.found(of, (0, &scope), Some(&beside));
+    scene.tracker.update(of, (0, &scope), Some(&beside));
     assert!(scene.is_full(1, None));
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fmp::{Bound, Bounds, Extra, Pose, Solver};
+use fmp::{Bound, Bounds, ExtraTerms, Pose, Solver};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -85,7 +85,7 @@ proptest! {
         let solver = Solver::new(Arc::clone(&model));
         let (view, terms) = (evidence.view(), Everywhere(gain));
         let want = solver.best(&view, Some(&terms));
-        let found = solver.again(&view).best(&terms, want.as_ref());
+        let found = solver.incremental(&view).best(&terms, want.as_ref());
         prop_assert_eq!(bits(found.as_ref()), bits(want.as_ref()));
     }
 }
@@ -106,7 +106,7 @@ proptest! {
         let solver = Solver::new(Arc::clone(&model));
         let (view, terms) = (evidence.view(), OnOnePart { part, term });
         let want = solver.best(&view, Some(&terms));
-        let found = solver.again(&view).best(&terms, want.as_ref());
+        let found = solver.incremental(&view).best(&terms, want.as_ref());
         prop_assert_eq!(bits(found.as_ref()), bits(want.as_ref()));
     }
 }
@@ -117,7 +117,7 @@ struct OnOnePart {
     term: f32,
 }
 
-impl Extra for OnOnePart {
+impl ExtraTerms for OnOnePart {
     fn add_position(&self, part: usize, _: usize, _: usize, score: &mut [f32]) -> bool {
         if part == self.part {
             for it in score {
@@ -151,10 +151,10 @@ proptest! {
         let bounds = Bounds::new(lies.iter().map(lie).collect());
         let solver = Solver::new(model);
         let view = evidence.view().with_bounds(&bounds);
-        let mut again = solver.again(&view);
+        let mut incremental = solver.incremental(&view);
         let mut last: Option<Pose> = None;
         for (terms, _) in &times {
-            last = again.best(terms, last.as_ref());
+            last = incremental.best(terms, last.as_ref());
             if let Some(pose) = &last {
                 // Panics if the pose does not lie on its level.
                 solver.score(&view, pose, Some(terms));
@@ -166,7 +166,7 @@ proptest! {
 /// The same term for all placements, equal to its bound.
 struct Everywhere(f32);
 
-impl Extra for Everywhere {
+impl ExtraTerms for Everywhere {
     fn add_position(&self, _: usize, _: usize, _: usize, score: &mut [f32]) -> bool {
         for it in score {
             *it += self.0;
@@ -192,7 +192,7 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
     } else {
         view
     };
-    let mut again = solver.again(&view);
+    let mut incremental = solver.incremental(&view);
     let mut last: Option<Pose> = None;
     for (terms, guess) in times {
         let elsewhere = last.clone().map(|it| Pose { level: 4, ..it });
@@ -201,7 +201,7 @@ fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews
             Guess::Last => last.as_ref(),
             Guess::Elsewhere => elsewhere.as_ref().filter(|_| view.levels().len() < 5),
         };
-        let found = again.best(terms, guess);
+        let found = incremental.best(terms, guess);
         let want = solver.best(&view, Some(terms));
         assert_eq!(bits(found.as_ref()), bits(want.as_ref()));
         last = found;

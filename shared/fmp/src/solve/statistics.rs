@@ -2,12 +2,12 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Sums over all solutions of all [`Again`](crate::Again) of a solver, since it was made.
+/// Sums over all solutions of all [`IncrementalSolver`](crate::IncrementalSolver) of a solver, since it was made.
 ///
 /// A vote is that of one part for one cell of its parent. With several threads the figures depend on
 /// which of them is faster; the answers do not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Effort {
+pub struct SolveStatistics {
     /// Solutions asked for.
     pub solutions: u64,
     /// Levels that were offered.
@@ -22,7 +22,7 @@ pub struct Effort {
     pub votes_cast: u64,
 }
 
-impl Effort {
+impl SolveStatistics {
     /// What was added since an earlier look.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
@@ -37,7 +37,7 @@ impl Effort {
     }
 }
 
-/// [`Effort`], counted by several threads.
+/// [`SolveStatistics`], counted by several threads.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     solutions: AtomicU64,
@@ -63,9 +63,9 @@ impl Tally {
         add(&self.votes_cast, cast);
     }
 
-    pub(super) fn sums(&self) -> Effort {
+    pub(super) fn sums(&self) -> SolveStatistics {
         let of = |sum: &AtomicU64| sum.load(Ordering::Relaxed);
-        Effort {
+        SolveStatistics {
             solutions: of(&self.solutions),
             levels_offered: of(&self.levels_offered),
             levels_solved: of(&self.levels_solved),

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::bounds::Upper;
 use super::sweep::{Problem, Workspace};
-use super::{Bounds, Extra, Search, Solver};
+use super::{Bounds, ExtraTerms, Search, Solver};
 use crate::extract::{in_pool, lock};
 use crate::{Pose, Responses};
 
@@ -17,14 +17,14 @@ const ROOM: usize = 64 << 20;
 /// Solves one view's evidence repeatedly, as the other views' terms change.
 ///
 /// The answers are those of [`Solver::best`], bit for bit, from less work: levels that cannot hold the
-/// best pose are left out ([`Bounds`], [`Extra::max_gain`]); on the others no term is taken to be worse
+/// best pose are left out ([`Bounds`], [`ExtraTerms::max_gain`]); on the others no term is taken to be worse
 /// than what rules a pose out already, so that votes come from near; and the scores of those sub-trees
-/// stay whose terms have not changed since the last time ([`Extra::key`]).
+/// stay whose terms have not changed since the last time ([`ExtraTerms::key`]).
 ///
 /// Keeps up to 64 MiB of score planes, those of the most promising levels, and gives them back to the
 /// solver when it is dropped.
 #[derive(Debug)]
-pub struct Again<'a> {
+pub struct IncrementalSolver<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
     own_bounds: Option<Bounds>,
@@ -44,10 +44,10 @@ impl Solver {
     /// # Panics
     ///
     /// If the evidence is another model's.
-    pub fn again<'a>(&'a self, evidence: &'a Responses<'a>) -> Again<'a> {
+    pub fn incremental<'a>(&'a self, evidence: &'a Responses<'a>) -> IncrementalSolver<'a> {
         self.check(evidence);
         let n_levels = evidence.layout().levels.len();
-        Again {
+        IncrementalSolver {
             solver: self,
             evidence,
             own_bounds: None,
@@ -59,7 +59,7 @@ impl Solver {
     }
 }
 
-impl Again<'_> {
+impl IncrementalSolver<'_> {
     /// The best pose over the offered levels; see [`Solver::best`].
     ///
     /// Without [`Responses::with_bounds`] the first call computes them.
@@ -72,7 +72,7 @@ impl Again<'_> {
     )]
     pub fn best<'b>(
         &mut self,
-        extra: &dyn Extra,
+        extra: &dyn ExtraTerms,
         guesses: impl IntoIterator<Item = &'b Pose>,
     ) -> Option<Pose> {
         let (solver, evidence) = (self.solver, self.evidence);
@@ -126,7 +126,7 @@ impl Again<'_> {
     )]
     fn choose_levels<'b>(
         &mut self,
-        extra: &dyn Extra,
+        extra: &dyn ExtraTerms,
         guesses: impl IntoIterator<Item = &'b Pose>,
     ) {
         let (solver, evidence) = (self.solver, self.evidence);
@@ -187,7 +187,7 @@ impl Again<'_> {
     }
 }
 
-impl Drop for Again<'_> {
+impl Drop for IncrementalSolver<'_> {
     fn drop(&mut self) {
         for kept in &self.kept {
             if let Some(it) = lock(kept).take() {
