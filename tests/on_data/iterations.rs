@@ -154,8 +154,8 @@ fn describe(effort: &SolveStatistics) -> String {
     let [solved, offered] =
         [effort.levels_solved, effort.levels_offered].map(|levels| levels as f64 / n);
     let percent = |a: u64, b: u64| 100.0 * a as f64 / b.max(1) as f64;
-    let left = percent(effort.votes_solved, effort.votes_offered);
-    let reused = 100.0 - percent(effort.votes_cast, effort.votes_solved);
+    let left = percent(effort.entries_solved, effort.entries_offered);
+    let reused = 100.0 - percent(effort.entries_computed, effort.entries_solved);
     format!("{solved:.1} of {offered:.0} ({left:.0} %) | {reused:.0} %")
 }
 
@@ -198,7 +198,7 @@ fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTabl
     }
     let effort = solver.statistics().since(&before);
     assert!(
-        effort.votes_cast < effort.votes_solved,
+        effort.entries_computed < effort.entries_solved,
         "{name}: messages are reused: {effort:?}"
     );
     let [n, one, two] = sums;

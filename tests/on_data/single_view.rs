@@ -185,13 +185,13 @@ fn responses_messages_and_root_scores_equal_the_test_vectors() {
 
     let cell = |at: &[usize]| at[0] * size[1] + at[1];
     let edge = stages.model.spec().parts[25].edge.as_ref().unwrap();
-    let votes = reference::votes(edge, &responses[150..156], size);
+    let messages = reference::messages(edge, &responses[150..156], size);
     let off = difference(&stages.array("message_part26_to_25"), |at| {
-        votes[at[2]].score[cell(at)]
+        messages[at[2]].score[cell(at)]
     });
-    assert!(off < 1e-12, "vote: {off:e}");
+    assert!(off < 1e-12, "message: {off:e}");
     let from_1 = |name: &str, of: fn(&Placement) -> u16| {
-        let pointer = |at: &[usize]| f64::from(of(&votes[at[2]].child[cell(at)])) + 1.0;
+        let pointer = |at: &[usize]| f64::from(of(&messages[at[2]].child[cell(at)])) + 1.0;
         assert_eq!(difference(&stages.array(name), pointer), 0.0, "{name}");
     };
     from_1("message_part26_Ix1based", |it| it.x);

@@ -53,7 +53,7 @@ pub fn responses(model: &Model, level: &LevelLayout, features: &[f64]) -> Vec<Ve
 
 /// What a child contributes to its parent, for one type of the parent; every map is `rows x cols`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Vote {
+pub struct Message {
     /// The best contribution.
     pub score: Vec<f64>,
     /// The child that makes it.
@@ -67,7 +67,7 @@ pub struct Vote {
 /// # Panics
 ///
 /// If the springs are per pair of types.
-pub fn votes(edge: &Edge, scores: &[Vec<f64>], size: [usize; 2]) -> Vec<Vote> {
+pub fn messages(edge: &Edge, scores: &[Vec<f64>], size: [usize; 2]) -> Vec<Message> {
     let Springs::PerChildType(springs) = &edge.springs else {
         panic_on_pairs();
     };
@@ -79,16 +79,16 @@ pub fn votes(edge: &Edge, scores: &[Vec<f64>], size: [usize; 2]) -> Vec<Vote> {
         })
         .collect();
     let of_parent_type = |bias: &Vec<f64>| {
-        let mut vote = Vote {
+        let mut message = Message {
             score: vec![f64::NEG_INFINITY; size[0] * size[1]],
             child: vec![Placement::default(); size[0] * size[1]],
         };
         for (mixture, (it, bias)) in transformed.iter().zip(bias).enumerate() {
             for cell in 0..size[0] * size[1] {
                 let score = it.score[cell] + bias;
-                if score > vote.score[cell] {
-                    vote.score[cell] = score;
-                    vote.child[cell] = Placement {
+                if score > message.score[cell] {
+                    message.score[cell] = score;
+                    message.child[cell] = Placement {
                         x: it.x[cell] as u16,
                         y: it.y[cell] as u16,
                         mixture: mixture as u8,
@@ -96,7 +96,7 @@ pub fn votes(edge: &Edge, scores: &[Vec<f64>], size: [usize; 2]) -> Vec<Vote> {
                 }
             }
         }
-        vote
+        message
     };
     edge.bias.iter().map(of_parent_type).collect()
 }
@@ -111,43 +111,43 @@ fn panic_on_pairs() -> ! {
 
 /// The solved tree of one level.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solved {
+pub struct Solution {
     /// Score of the best tree at every cell of the root for every type of the root, bias included.
     pub root: Vec<Vec<f64>>,
     /// Per part what it told its parent; empty for the root.
-    pub votes: Vec<Vec<Vote>>,
+    pub messages: Vec<Vec<Message>>,
 }
 
 /// Passes all votes of one level from the leaves to the root.
 ///
 /// * `responses`: one map per filter.
-pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solved {
+pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solution {
     let parts = &model.spec().parts;
     let own = |part: &crate::PartSpec| {
         let filters = part.filter_of_type.iter();
         filters.map(|&it| responses[it].clone()).collect::<Vec<_>>()
     };
     let mut scores: Vec<_> = parts.iter().map(own).collect();
-    let mut all_votes = vec![Vec::new(); parts.len()];
+    let mut all_messages = vec![Vec::new(); parts.len()];
     for part in (0..parts.len()).rev() {
         let Some(edge) = &parts[part].edge else {
             continue;
         };
-        let votes = votes(edge, &scores[part], size);
-        for (scores, vote) in scores[edge.parent].iter_mut().zip(&votes) {
-            for (score, vote) in scores.iter_mut().zip(&vote.score) {
-                *score += vote;
+        let messages = messages(edge, &scores[part], size);
+        for (scores, message) in scores[edge.parent].iter_mut().zip(&messages) {
+            for (score, message) in scores.iter_mut().zip(&message.score) {
+                *score += message;
             }
         }
-        all_votes[part] = votes;
+        all_messages[part] = messages;
     }
     let mut root = scores.swap_remove(0);
     for score in root.iter_mut().flatten() {
         *score += model.spec().root_bias;
     }
-    Solved {
+    Solution {
         root,
-        votes: all_votes,
+        messages: all_messages,
     }
 }
 
@@ -162,7 +162,7 @@ pub struct ReferencePose {
     pub parts: Vec<Placement>,
 }
 
-impl Solved {
+impl Solution {
     /// The best score of the root, its cell and its type; first cell, then first type.
     pub fn best(&self) -> (f64, usize, usize) {
         let n_cells = self.root.first().map_or(0, Vec::len);
@@ -190,11 +190,11 @@ impl Solved {
             y: (cell / cols) as u16,
             mixture: mixture as u8,
         }];
-        for (part, votes) in self.votes.iter().enumerate() {
+        for (part, messages) in self.messages.iter().enumerate() {
             if let Some(edge) = &model.spec().parts[part].edge {
                 let parent: Placement = parts[edge.parent];
                 let cell = usize::from(parent.y) * cols + usize::from(parent.x);
-                parts.push(votes[usize::from(parent.mixture)].child[cell]);
+                parts.push(messages[usize::from(parent.mixture)].child[cell]);
             }
         }
         parts

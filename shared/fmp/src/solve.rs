@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use kernels::{Isa, VoteRule};
+use kernels::{Isa, MessageRule};
 use rayon::prelude::*;
 
 use self::statistics::Tally;
@@ -76,7 +76,7 @@ pub struct Solver {
     model: Arc<Model>,
     isa: Isa,
     /// How every part votes; `None` for the root.
-    rules: Vec<Option<VoteRule>>,
+    rules: Vec<Option<MessageRule>>,
     /// Number of score planes before those of every part, and of all.
     first_planes: Vec<usize>,
     /// A list and no [`Pool`]: the one that fits a level best is taken, which a queue cannot look for.
@@ -326,7 +326,7 @@ impl Search<'_> {
         let problem = problem.with_slack(slack);
         let sweep = Sweep::run(&problem, &mut workspace);
         if let Some(tally) = self.tally {
-            tally.solved(problem.n_votes(), sweep.n_cast());
+            tally.solved(problem.n_entries(), sweep.n_computed());
         }
         let root = if self.wins(sweep.highest(), level) {
             sweep.best_root()
@@ -362,7 +362,7 @@ impl Search<'_> {
 }
 
 /// How the child of `edge` votes.
-fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> VoteRule {
+fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> MessageRule {
     let spring = |it: &Spring| kernels::Spring {
         w: it.w,
         anchor: it.anchor,
@@ -387,5 +387,5 @@ fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> VoteRule {
             }
         }
     }
-    VoteRule::new(n_types, springs, choices)
+    MessageRule::new(n_types, springs, choices)
 }

@@ -20,11 +20,11 @@ mod gradient;
 mod hog;
 mod image;
 mod isa;
+mod message;
 mod peak;
 mod planes;
 mod simd;
 mod spring;
-mod vote;
 
 /// A size for a test: the second where an interpreter (Miri) takes a thousand times as long.
 #[cfg(test)]
@@ -39,10 +39,13 @@ pub use envelope::{Transformed, transform_f64};
 pub use hog::{HogShape, HogWorkspace, MIRRORED_CHANNEL, N_CHANNELS, hog, hog_f64};
 pub use image::{ImageSizeError, Rgb8View};
 pub use isa::Isa;
+pub use message::{
+    ChildScores, Grid, MessageRule, MessageWorkspace, OwnScores, ScoreBuffer, ScoreRange,
+    TracedChild,
+};
 pub use peak::Peak;
 pub use planes::{
     PartOfResized, Planes, ShrinkWorkspace, reduce, reduce_by_taps, reduced, resize,
     resize_by_taps, resize_part,
 };
 pub use spring::Spring;
-pub use vote::{ChildScores, Found, Grid, OwnScores, ScoreBuffer, Span, VoteRule, VoteWorkspace};

@@ -23,7 +23,7 @@ pub(crate) struct Axis {
 }
 
 /// Cells by which a window is wider than exact arithmetic asks for; with the excess in
-/// [`Span::spread`](crate::Span), rounding cannot make a candidate outside of it tie with the best inside.
+/// [`ScoreRange::spread`](crate::ScoreRange), rounding cannot make a candidate outside of it tie with the best inside.
 const SLACK: f64 = 1e-3;
 
 /// Where the children lie that can be best for a parent, on one axis.

@@ -7,12 +7,12 @@ use serde::Serialize;
 use crate::arithmetic::Arithmetic;
 use crate::clock::Clock;
 use crate::readable::Ranges;
-use crate::stages::Apart;
+use crate::stages::StageTimes;
 use crate::workload::Workload;
 
 /// The floors of all stages.
 pub(crate) struct Floors {
-    pub(crate) ms: Apart,
+    pub(crate) ms: StageTimes,
     /// What they were measured by.
     pub(crate) peaks: Peaks,
 }
@@ -54,11 +54,11 @@ impl Floors {
                 max_plus: max_plus * 1e-6,
                 tiles: tiles.map(|it| it * 1e-6),
             },
-            ms: Apart {
+            ms: StageTimes {
                 shrink: shrinking(workload) / multiply_add,
                 hog: describing(workload) / multiply_add,
                 filters,
-                votes: candidates(workload, ranges) / max_plus,
+                messages: candidates(workload, ranges) / max_plus,
             },
         }
     }

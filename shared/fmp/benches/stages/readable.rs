@@ -5,12 +5,12 @@ use std::hint::black_box;
 use fmp::{Model, Springs, reference};
 
 use crate::clock::Clock;
-use crate::stages::Apart;
+use crate::stages::StageTimes;
 use crate::workload::Workload;
 
 /// Milliseconds of the reference, and what the floors need to know of the scores.
 pub(crate) struct Readable {
-    pub(crate) ms: Apart,
+    pub(crate) ms: StageTimes,
     pub(crate) ranges: Ranges,
 }
 
@@ -39,15 +39,15 @@ impl Readable {
         let mut responses = Vec::new();
         let filters =
             clock.measure(|| responses = reference::responses(model, level, &features[at]));
-        let votes = clock.measure(|| drop(black_box(reference::solve(model, &responses, size))));
+        let messages = clock.measure(|| drop(black_box(reference::solve(model, &responses, size))));
         let cells = |it: &fmp::LevelLayout| (it.rows * it.cols) as f64;
         let share = layout.levels.iter().map(cells).sum::<f64>() / cells(level);
         Self {
-            ms: Apart {
+            ms: StageTimes {
                 shrink: shrink.min,
                 hog: hog.min,
                 filters: filters.min * share,
-                votes: votes.min * share,
+                messages: messages.min * share,
             },
             ranges: ranges(model, &responses, size),
         }
@@ -68,10 +68,10 @@ fn ranges(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Ranges {
         if matches!(edge.springs, Springs::PerTypePair(_)) {
             continue;
         }
-        let votes = reference::votes(edge, &scores[part], size);
-        for (scores, vote) in scores[edge.parent].iter_mut().zip(votes) {
-            for (score, vote) in scores.iter_mut().zip(vote.score) {
-                *score += vote;
+        let messages = reference::messages(edge, &scores[part], size);
+        for (scores, message) in scores[edge.parent].iter_mut().zip(messages) {
+            for (score, message) in scores.iter_mut().zip(message.score) {
+                *score += message;
             }
         }
     }

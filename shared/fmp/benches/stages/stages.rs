@@ -33,14 +33,14 @@ impl Times {
 
 /// Milliseconds on one thread of the stages that others are made of.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Apart {
+pub(crate) struct StageTimes {
     pub(crate) shrink: f64,
     pub(crate) hog: f64,
     pub(crate) filters: f64,
-    pub(crate) votes: f64,
+    pub(crate) messages: f64,
 }
 
-impl Apart {
+impl StageTimes {
     /// Those of a stage together, if it is made of them.
     pub(crate) fn of(&self, stage: Stage) -> Option<f64> {
         let extract = self.shrink + self.hog + self.filters;
@@ -49,8 +49,8 @@ impl Apart {
             Stage::Hog => Some(self.hog),
             Stage::Filters => Some(self.filters),
             Stage::Extract => Some(extract),
-            Stage::Votes | Stage::Best | Stage::Iteration => Some(self.votes),
-            Stage::Frame => Some(extract + self.votes),
+            Stage::Messages | Stage::Best | Stage::Iteration => Some(self.messages),
+            Stage::Frame => Some(extract + self.messages),
             Stage::Backtrack | Stage::Tracked => None,
         }
     }
@@ -63,7 +63,7 @@ pub(crate) enum Stage {
     Hog,
     Filters,
     Extract,
-    Votes,
+    Messages,
     Backtrack,
     Best,
     Frame,
@@ -78,7 +78,7 @@ impl Stage {
             Self::Hog => "hog",
             Self::Filters => "filters",
             Self::Extract => "responses",
-            Self::Votes => "votes",
+            Self::Messages => "messages",
             Self::Backtrack => "backtrack",
             Self::Best => "best",
             Self::Frame => "frame",
@@ -155,11 +155,11 @@ impl<'a> Bench<'a> {
             all.insert(2, (Stage::Filters, extract.less(shrink).less(hog)));
         }
         let evidence = Responses::new(layout, &values, &self.levels);
-        if wants(&[Stage::Votes, Stage::Backtrack, Stage::Best]) {
-            let votes = clock.measure(|| self.votes(&evidence));
+        if wants(&[Stage::Messages, Stage::Backtrack, Stage::Best]) {
+            let messages = clock.measure(|| self.messages(&evidence));
             let best = clock.measure(|| drop(black_box(self.solver.best(&evidence, None))));
-            all.push((Stage::Votes, votes));
-            all.push((Stage::Backtrack, best.less(votes)));
+            all.push((Stage::Messages, messages));
+            all.push((Stage::Backtrack, best.less(messages)));
             all.push((Stage::Best, best));
         }
         if wants(&[Stage::Iteration]) {
@@ -258,11 +258,11 @@ impl<'a> Bench<'a> {
         })
     }
 
-    fn votes(&self, evidence: &Responses<'_>) {
-        let vote = |&level: &u16| drop(black_box(self.solver.root_scores(evidence, level, None)));
+    fn messages(&self, evidence: &Responses<'_>) {
+        let solve = |&level: &u16| drop(black_box(self.solver.root_scores(evidence, level, None)));
         match &self.pool {
-            Some(_) => self.levels.par_iter().for_each(vote),
-            None => self.levels.iter().for_each(vote),
+            Some(_) => self.levels.par_iter().for_each(solve),
+            None => self.levels.iter().for_each(solve),
         }
     }
 }

@@ -125,9 +125,9 @@ impl Solver {
     ///
     /// If the evidence is another model's.
     pub fn bounds(&self, evidence: &Responses<'_>) -> Bounds {
-        let votes = self.most_of_edges();
+        let edges = self.most_of_edges();
         let found = self.sweep_levels(evidence, evidence.levels(), None, |sweep| {
-            (sweep.level(), Bound::of(sweep, votes))
+            (sweep.level(), Bound::of(sweep, edges))
         });
         Bounds::of_some(evidence, found)
     }

@@ -88,9 +88,9 @@ impl IncrementalSolver<'_> {
             tally: Some(&solver.tally),
             best: Mutex::new(None),
         };
-        let votes = |&level: &u16| Problem::new(solver, evidence, None, level).n_votes();
-        let n_votes = evidence.levels().iter().map(votes).sum();
-        solver.tally.offered(evidence.levels().len(), n_votes);
+        let entries = |&level: &u16| Problem::new(solver, evidence, None, level).n_entries();
+        let n_entries = evidence.levels().iter().map(entries).sum();
+        solver.tally.offered(evidence.levels().len(), n_entries);
         let put_back = |level: u16, it: Workspace| this.put_back(level, it);
         let run = |&(upper, level): &(Upper, u16)| {
             let lowest = search.score().max(this.lowest);

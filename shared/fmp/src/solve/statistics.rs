@@ -15,11 +15,11 @@ pub struct SolveStatistics {
     /// Levels that bounds could not rule out.
     pub levels_solved: u64,
     /// Votes on all levels that were offered.
-    pub votes_offered: u64,
+    pub entries_offered: u64,
     /// Votes on the levels that bounds could not rule out.
-    pub votes_solved: u64,
+    pub entries_solved: u64,
     /// Votes that were cast, since they were not known from the solution before.
-    pub votes_cast: u64,
+    pub entries_computed: u64,
 }
 
 impl SolveStatistics {
@@ -30,9 +30,9 @@ impl SolveStatistics {
             solutions: self.solutions - before.solutions,
             levels_offered: self.levels_offered - before.levels_offered,
             levels_solved: self.levels_solved - before.levels_solved,
-            votes_offered: self.votes_offered - before.votes_offered,
-            votes_solved: self.votes_solved - before.votes_solved,
-            votes_cast: self.votes_cast - before.votes_cast,
+            entries_offered: self.entries_offered - before.entries_offered,
+            entries_solved: self.entries_solved - before.entries_solved,
+            entries_computed: self.entries_computed - before.entries_computed,
         }
     }
 }
@@ -43,24 +43,24 @@ pub(super) struct Tally {
     solutions: AtomicU64,
     levels_offered: AtomicU64,
     levels_solved: AtomicU64,
-    votes_offered: AtomicU64,
-    votes_solved: AtomicU64,
-    votes_cast: AtomicU64,
+    entries_offered: AtomicU64,
+    entries_solved: AtomicU64,
+    entries_computed: AtomicU64,
 }
 
 impl Tally {
     /// Counts a solution about to begin.
-    pub(super) fn offered(&self, levels: usize, votes: usize) {
+    pub(super) fn offered(&self, levels: usize, entries: usize) {
         add(&self.solutions, 1);
         add(&self.levels_offered, levels);
-        add(&self.votes_offered, votes);
+        add(&self.entries_offered, entries);
     }
 
     /// Counts a level.
-    pub(super) fn solved(&self, votes: usize, cast: usize) {
+    pub(super) fn solved(&self, entries: usize, computed: usize) {
         add(&self.levels_solved, 1);
-        add(&self.votes_solved, votes);
-        add(&self.votes_cast, cast);
+        add(&self.entries_solved, entries);
+        add(&self.entries_computed, computed);
     }
 
     pub(super) fn sums(&self) -> SolveStatistics {
@@ -69,9 +69,9 @@ impl Tally {
             solutions: of(&self.solutions),
             levels_offered: of(&self.levels_offered),
             levels_solved: of(&self.levels_solved),
-            votes_offered: of(&self.votes_offered),
-            votes_solved: of(&self.votes_solved),
-            votes_cast: of(&self.votes_cast),
+            entries_offered: of(&self.entries_offered),
+            entries_solved: of(&self.entries_solved),
+            entries_computed: of(&self.entries_computed),
         }
     }
 }

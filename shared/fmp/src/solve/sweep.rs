@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use kernels::{ChildScores, Grid, OwnScores, ScoreBuffer, Span, VoteWorkspace};
+use kernels::{ChildScores, Grid, MessageWorkspace, OwnScores, ScoreBuffer, ScoreRange};
 
 use super::{ExtraTerms, Root, Solver};
 use crate::{Placement, Pose, Responses, Window};
@@ -14,7 +14,7 @@ pub(super) struct Workspace {
     /// children's votes are added.
     planes: ScoreBuffer,
     /// One per plane.
-    spans: Vec<Span>,
+    ranges: Vec<ScoreRange>,
     /// The level whose planes these are, if they may serve again.
     level: Option<u16>,
     /// The slack under which they were computed.
@@ -28,10 +28,10 @@ pub(super) struct Workspace {
     /// Sum over the parts of the largest score that each has by itself.
     own: f64,
     /// Votes that have been cast in the last sweep.
-    n_cast: usize,
+    n_computed: usize,
     /// A part's position term, `rows x cols`.
     term: Vec<f32>,
-    votes: VoteWorkspace,
+    messages: MessageWorkspace,
 }
 
 /// A level on which all votes have been cast.
@@ -147,7 +147,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Votes that a sweep casts if it knows none.
-    pub(super) fn n_votes(&self) -> usize {
+    pub(super) fn n_entries(&self) -> usize {
         (self.solver.model.n_parts() - 1) * self.n_cells()
     }
 
@@ -178,16 +178,16 @@ impl<'a> Sweep<'a> {
                 let [of_parent, of_child] = [edge.parent, part].map(|it| solver.planes(it));
                 let planes = workspace.planes.scores_mut();
                 let (before, child) = planes.split_at_mut(grid.len(of_child.start));
-                let (spans, of_child_spans) = workspace.spans.split_at_mut(of_child.start);
+                let (ranges, child_ranges) = workspace.ranges.split_at_mut(of_child.start);
                 let child = ChildScores {
                     grid,
                     planes: &child[..grid.len(of_child.len()) + grid.margin()],
-                    spans: &of_child_spans[..of_child.len()],
+                    ranges: &child_ranges[..of_child.len()],
                 };
                 let parent = &mut before[grid.len(of_parent.start)..grid.len(of_parent.end)];
-                let parent = (parent, &mut spans[of_parent]);
-                rule.cast(solver.isa, child, parent, &mut workspace.votes);
-                workspace.n_cast += problem.n_cells();
+                let parent = (parent, &mut ranges[of_parent]);
+                rule.add_message(solver.isa, child, parent, &mut workspace.messages);
+                workspace.n_computed += problem.n_cells();
             }
         }
         Self::of(problem, workspace)
@@ -209,14 +209,14 @@ impl<'a> Sweep<'a> {
     }
 
     /// Votes that were cast.
-    pub(super) fn n_cast(&self) -> usize {
-        self.workspace.n_cast
+    pub(super) fn n_computed(&self) -> usize {
+        self.workspace.n_computed
     }
 
     /// The score of the best root of the level.
     pub(super) fn highest(&self) -> f32 {
-        let spans = &self.workspace.spans[self.solver.planes(0)];
-        let most = spans.iter().map(|it| it.most + self.solver.root_bias());
+        let ranges = &self.workspace.ranges[self.solver.planes(0)];
+        let most = ranges.iter().map(|it| it.max + self.solver.root_bias());
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
@@ -267,7 +267,7 @@ impl<'a> Sweep<'a> {
             let child = ChildScores {
                 grid: self.grid,
                 planes: self.planes(part),
-                spans: &self.workspace.spans[self.solver.planes(part)],
+                ranges: &self.workspace.ranges[self.solver.planes(part)],
             };
             let found = self.solver.rules[part].as_ref()?.trace(
                 child,
@@ -309,10 +309,10 @@ impl Workspace {
         self.planes.resize(grid.len(n_planes) + grid.margin());
         let margin = &mut self.planes.scores_mut()[grid.len(n_planes)..];
         margin.fill(f32::NEG_INFINITY);
-        self.spans.resize(n_planes, Span::NONE);
+        self.ranges.resize(n_planes, ScoreRange::NONE);
         self.term.resize(grid.rows * grid.cols, 0.0);
         self.own = 0.0;
-        self.n_cast = 0;
+        self.n_computed = 0;
         self.keys.resize(n_parts, None);
         self.stays.clear();
         let same_level = self.level.replace(problem.level) == Some(problem.level);
@@ -355,8 +355,8 @@ impl Workspace {
                 constant: problem.extra.map(|it| it.of_type(part, mixture)),
             };
             let scores = &mut self.planes.scores_mut()[grid.len(plane)..grid.len(plane + 1)];
-            self.spans[plane] = own.write(solver.isa, grid, scores);
-            most = most.max(self.spans[plane].most);
+            self.ranges[plane] = own.write(solver.isa, grid, scores);
+            most = most.max(self.ranges[plane].max);
         }
         self.own += f64::from(most.max(0.0));
     }
@@ -386,8 +386,8 @@ pub(super) fn score(problem: &Problem<'_>, pose: &Pose, scores: &mut Vec<f32>) -
             let [of_parent, of_child] = [edge.parent, part].map(|it| pose.parts[it]);
             let cell = |it: Placement| [usize::from(it.y), usize::from(it.x)];
             let types = [of_parent, of_child].map(|it| usize::from(it.mixture));
-            let vote = rule.vote(scores[part], types, cell(of_parent), cell(of_child));
-            scores[edge.parent] += vote;
+            let value = rule.value(scores[part], types, cell(of_parent), cell(of_child));
+            scores[edge.parent] += value;
         }
     }
     scores[0] + solver.root_bias()

@@ -3,39 +3,39 @@
 use std::hint::black_box;
 
 use super::buffer::ScoreBuffer;
-use super::ends::{Ends, Span};
-use super::stretch::Stretch;
-use super::{BLOCK, ChildScores, Grid, ROW_ALIGN, VoteRule};
+use super::range::{RunningRange, ScoreRange};
+use super::transform::Transform;
+use super::{BLOCK, ChildScores, Grid, MessageRule, ROW_ALIGN};
 use crate::simd::{Kernel, Simd};
 
-/// Buffers of [`VoteRule::cast`], used again from call to call.
+/// Buffers of [`MessageRule::add_message`], used again from call to call.
 #[derive(Debug, Default)]
-pub struct VoteWorkspace {
-    stretches: Vec<Stretch>,
+pub struct MessageWorkspace {
+    transforms: Vec<Transform>,
     /// A block of rows after the vertical pass, with room for candidates beside the grid.
     middle: ScoreBuffer,
     /// A block of rows of every transform.
     transformed: ScoreBuffer,
     /// Of every plane of the parent.
-    ends: Vec<Ends>,
+    running: Vec<RunningRange>,
 }
 
 /// All votes of a child.
-pub(super) struct Cast<'a> {
-    pub(super) rule: &'a VoteRule,
+pub(super) struct AddMessage<'a> {
+    pub(super) rule: &'a MessageRule,
     pub(super) child: ChildScores<'a>,
     /// The parent's planes and what becomes of their spans.
-    pub(super) parent: (&'a mut [f32], &'a mut [Span]),
-    pub(super) workspace: &'a mut VoteWorkspace,
+    pub(super) parent: (&'a mut [f32], &'a mut [ScoreRange]),
+    pub(super) workspace: &'a mut MessageWorkspace,
 }
 
-impl Kernel for Cast<'_> {
+impl Kernel for AddMessage<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
         let Self {
             rule,
             child,
-            parent: (parent, spans),
+            parent: (parent, ranges),
             workspace,
         } = self;
         let grid = child.grid;
@@ -48,22 +48,22 @@ impl Kernel for Cast<'_> {
                 n: BLOCK.min(grid.rows - first),
             };
             if work.n > BLOCK / 2 {
-                work.cast::<S, BLOCK>(simd, parent, workspace);
+                work.add_message::<S, BLOCK>(simd, parent, workspace);
             } else {
-                work.cast::<S, { BLOCK / 2 }>(simd, parent, workspace);
+                work.add_message::<S, { BLOCK / 2 }>(simd, parent, workspace);
             }
         }
-        for (span, ends) in spans.iter_mut().zip(&workspace.ends) {
-            *span = ends.span();
+        for (range, running) in ranges.iter_mut().zip(&workspace.running) {
+            *range = running.range();
         }
     }
 }
 
-impl VoteWorkspace {
-    /// Candidates that the last [`VoteRule::cast`] on a grid of this size looked at.
-    pub fn n_candidates(&self, rule: &VoteRule, grid: Grid) -> usize {
-        let stretches = self.stretches.iter().take(rule.springs.len());
-        let of_spring = stretches.map(|it| {
+impl MessageWorkspace {
+    /// Candidates that the last [`MessageRule::add_message`] on a grid of this size looked at.
+    pub fn n_candidates(&self, rule: &MessageRule, grid: Grid) -> usize {
+        let transforms = self.transforms.iter().take(rule.springs.len());
+        let of_spring = transforms.map(|it| {
             let down = it.down.n_candidates(grid.rows, BLOCK) * grid.cols;
             down + it.along.n_candidates(grid.cols, ROW_ALIGN) * grid.rows
         });
@@ -71,26 +71,26 @@ impl VoteWorkspace {
     }
 
     #[inline(always)]
-    fn prepare(&mut self, rule: &VoteRule, child: ChildScores<'_>) {
+    fn prepare(&mut self, rule: &MessageRule, child: ChildScores<'_>) {
         let grid = child.grid;
         let n_springs = rule.springs.len();
-        if self.stretches.len() < n_springs {
-            self.stretches.resize_with(n_springs, Stretch::default);
+        if self.transforms.len() < n_springs {
+            self.transforms.resize_with(n_springs, Transform::default);
         }
         self.transformed.resize(n_springs * BLOCK * grid.stride());
         let blocks = self.transformed.scores_mut();
         let blocks = blocks.chunks_exact_mut(BLOCK * grid.stride());
-        let stretches = self.stretches.iter_mut().zip(blocks);
-        for ((stretch, block), (plane, spring)) in stretches.zip(&rule.springs) {
-            stretch.prepare(grid, *plane, spring, child.spans[*plane].spread());
-            if stretch.impossible {
+        let transforms = self.transforms.iter_mut().zip(blocks);
+        for ((transform, block), (plane, spring)) in transforms.zip(&rule.springs) {
+            transform.prepare(grid, *plane, spring, child.ranges[*plane].spread());
+            if transform.impossible {
                 block.fill(f32::NEG_INFINITY);
             }
         }
         self.middle.resize(BLOCK * middle_stride(grid));
         self.middle.scores_mut().fill(f32::NEG_INFINITY);
-        self.ends.clear();
-        self.ends.resize(rule.choices.len(), Ends::NONE);
+        self.running.clear();
+        self.running.resize(rule.choices.len(), RunningRange::NONE);
     }
 }
 
@@ -103,7 +103,7 @@ fn middle_stride(grid: Grid) -> usize {
 /// Some rows of the parent, all of which try the same offsets.
 #[derive(Clone, Copy)]
 struct Block<'a> {
-    rule: &'a VoteRule,
+    rule: &'a MessageRule,
     child: ChildScores<'a>,
     first: usize,
     /// Number of rows.
@@ -113,45 +113,45 @@ struct Block<'a> {
 impl Block<'_> {
     /// Casts the votes for the block, computing `R` rows of which the last may not exist.
     #[inline(always)]
-    fn cast<S: Simd, const R: usize>(
+    fn add_message<S: Simd, const R: usize>(
         &self,
         simd: S,
         parent: &mut [f32],
-        workspace: &mut VoteWorkspace,
+        workspace: &mut MessageWorkspace,
     ) {
         let grid = self.child.grid;
-        let VoteWorkspace {
-            stretches,
+        let MessageWorkspace {
+            transforms,
             middle,
             transformed,
-            ends,
+            running,
         } = workspace;
         let size = BLOCK * grid.stride();
         let blocks = transformed.scores_mut().chunks_exact_mut(size);
-        for (stretch, out) in stretches.iter().zip(blocks) {
-            if !stretch.impossible {
-                self.stretch_down::<S, R>(simd, stretch, middle.scores_mut());
-                self.stretch_along::<S, R>(simd, stretch, middle.scores(), out);
+        for (transform, out) in transforms.iter().zip(blocks) {
+            if !transform.impossible {
+                self.transform_down::<S, R>(simd, transform, middle.scores_mut());
+                self.transform_along::<S, R>(simd, transform, middle.scores(), out);
             }
         }
         let transformed = transformed.scores();
-        for (l, (choices, ends)) in self.rule.choices.iter().zip(ends).enumerate() {
+        for (l, (choices, running)) in self.rule.choices.iter().zip(running).enumerate() {
             let rows = &mut parent[grid.at(l, self.first, 0)..][..self.n * grid.stride()];
-            self.add_best::<S, R>(simd, choices, transformed, (rows, ends));
+            self.add_best::<S, R>(simd, choices, transformed, (rows, running));
         }
     }
 
     #[inline(always)]
-    fn stretch_down<S: Simd, const R: usize>(
+    fn transform_down<S: Simd, const R: usize>(
         &self,
         simd: S,
-        stretch: &Stretch,
+        transform: &Transform,
         middle: &mut [f32],
     ) {
         let grid = self.child.grid;
         let stride = grid.stride();
-        let (offset, scores) = stretch.down.of_block(self.first / BLOCK);
-        let top = grid.at(stretch.plane, self.first, 0);
+        let (offset, scores) = transform.down.of_block(self.first / BLOCK);
+        let top = grid.at(transform.plane, self.first, 0);
         let top = top.wrapping_add_signed(offset * stride as isize);
         let lines = &self.child.planes[top..][..(scores.len() + R - 1) * stride];
         assert!(
@@ -193,10 +193,10 @@ impl Block<'_> {
     }
 
     #[inline(always)]
-    fn stretch_along<S: Simd, const R: usize>(
+    fn transform_along<S: Simd, const R: usize>(
         &self,
         simd: S,
-        stretch: &Stretch,
+        transform: &Transform,
         middle: &[f32],
         out: &mut [f32],
     ) {
@@ -205,7 +205,7 @@ impl Block<'_> {
         let stride = middle_stride(grid);
         assert!(middle.len() >= R * stride, "R rows");
         for x in (0..grid.cols).step_by(S::LANES) {
-            let (offset, scores) = stretch.along.of_block(x / ROW_ALIGN);
+            let (offset, scores) = transform.along.of_block(x / ROW_ALIGN);
             let first = (ROW_ALIGN + x).wrapping_add_signed(offset);
             assert!(
                 first + scores.len() + S::LANES <= stride + 1,
@@ -232,12 +232,12 @@ impl Block<'_> {
         simd: S,
         choices: &[(usize, f32)],
         transformed: &[f32],
-        (rows, ends): (&mut [f32], &mut Ends),
+        (rows, running): (&mut [f32], &mut RunningRange),
     ) {
         let grid = self.child.grid;
         let stride = grid.stride();
         let one = simd.splat(black_box(1.0));
-        let mut seen = ends.load(simd);
+        let mut seen = running.load(simd);
         for x in (0..grid.cols).step_by(S::LANES) {
             let mut best = [simd.splat(f32::NEG_INFINITY); R];
             for &(spring, bias) in choices {
@@ -252,9 +252,9 @@ impl Block<'_> {
                 let row = &mut row[x..];
                 let sum = simd.plus(simd.load(row), one, best);
                 simd.store(sum, row);
-                seen = Ends::see(simd, seen, sum, grid.cols - x);
+                seen = RunningRange::include(simd, seen, sum, grid.cols - x);
             }
         }
-        ends.store(simd, seen);
+        running.store(simd, seen);
     }
 }

@@ -5,18 +5,18 @@ use crate::simd::Simd;
 
 /// The least and the largest score of a plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Span {
+pub struct ScoreRange {
     /// The least one.
-    pub least: f32,
+    pub min: f32,
     /// The largest one.
-    pub most: f32,
+    pub max: f32,
 }
 
-impl Span {
+impl ScoreRange {
     /// Of no scores.
     pub const NONE: Self = Self {
-        least: f32::INFINITY,
-        most: f32::NEG_INFINITY,
+        min: f32::INFINITY,
+        max: f32::NEG_INFINITY,
     };
 
     /// Largest difference between two scores, and a little more.
@@ -26,40 +26,40 @@ impl Span {
     /// both ask for the whole plane to be searched.
     #[inline(always)]
     pub(crate) fn spread(self) -> f32 {
-        (self.most - self.least) + 1e-5 * (self.most.abs() + self.least.abs())
+        (self.max - self.min) + 1e-5 * (self.max.abs() + self.min.abs())
     }
 }
 
 /// Least and largest score seen, lane by lane.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ends {
-    least: [f32; ROW_ALIGN],
-    most: [f32; ROW_ALIGN],
+pub(super) struct RunningRange {
+    min: [f32; ROW_ALIGN],
+    max: [f32; ROW_ALIGN],
 }
 
-impl Ends {
+impl RunningRange {
     /// Nothing has been seen.
     pub(super) const NONE: Self = Self {
-        least: [f32::INFINITY; ROW_ALIGN],
-        most: [f32::NEG_INFINITY; ROW_ALIGN],
+        min: [f32::INFINITY; ROW_ALIGN],
+        max: [f32::NEG_INFINITY; ROW_ALIGN],
     };
 
     #[inline(always)]
     pub(super) fn load<S: Simd>(&self, simd: S) -> [S::V; 2] {
-        [simd.load(&self.least), simd.load(&self.most)]
+        [simd.load(&self.min), simd.load(&self.max)]
     }
 
     #[inline(always)]
-    pub(super) fn store<S: Simd>(&mut self, simd: S, [least, most]: [S::V; 2]) {
-        simd.store(least, &mut self.least);
-        simd.store(most, &mut self.most);
+    pub(super) fn store<S: Simd>(&mut self, simd: S, [min, max]: [S::V; 2]) {
+        simd.store(min, &mut self.min);
+        simd.store(max, &mut self.max);
     }
 
     /// Adds the scores of the first `n` lanes, the others holding minus infinity.
     #[inline(always)]
-    pub(super) fn see<S: Simd>(
+    pub(super) fn include<S: Simd>(
         simd: S,
-        [least, most]: [S::V; 2],
+        [min, max]: [S::V; 2],
         scores: S::V,
         n: usize,
     ) -> [S::V; 2] {
@@ -68,16 +68,16 @@ impl Ends {
         } else {
             scores
         };
-        [simd.min(counted, least), simd.max(scores, most)]
+        [simd.min(counted, min), simd.max(scores, max)]
     }
 
     #[inline(always)]
-    pub(super) fn span(&self) -> Span {
-        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+    pub(super) fn range(&self) -> ScoreRange {
+        let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
         for lane in 0..ROW_ALIGN {
-            least = least.min(self.least[lane]);
-            most = most.max(self.most[lane]);
+            min = min.min(self.min[lane]);
+            max = max.max(self.max[lane]);
         }
-        Span { least, most }
+        ScoreRange { min, max }
     }
 }

@@ -6,22 +6,22 @@
 //! a lower envelope: cells are independent then, so lanes are cells.
 
 mod buffer;
-mod ends;
 mod fast;
 mod own;
+mod range;
 #[cfg(test)]
 mod reference;
-mod stretch;
 mod trace;
+mod transform;
 
 use crate::isa::Isa;
 use crate::spring::Spring;
 
 pub use buffer::ScoreBuffer;
-pub use ends::Span;
-pub use fast::VoteWorkspace;
+pub use fast::MessageWorkspace;
 pub use own::OwnScores;
-pub use trace::Found;
+pub use range::ScoreRange;
+pub use trace::TracedChild;
 
 /// Scores are kept in rows of a multiple of this many cells.
 const ROW_ALIGN: usize = 16;
@@ -84,12 +84,12 @@ pub struct ChildScores<'a> {
     /// One plane per type and the margin after the last one; no NaN.
     pub planes: &'a [f32],
     /// Least and largest score of every plane.
-    pub spans: &'a [Span],
+    pub ranges: &'a [ScoreRange],
 }
 
 /// How a child votes: which springs it may hang on, and what each pair of types is worth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct VoteRule {
+pub struct MessageRule {
     n_child_types: usize,
     /// `(child type, spring)`.
     springs: Vec<(usize, Spring)>,
@@ -97,7 +97,7 @@ pub struct VoteRule {
     choices: Vec<Vec<(usize, f32)>>,
 }
 
-impl VoteRule {
+impl MessageRule {
     /// Makes a rule.
     ///
     /// * `n_child_types`: number of the child's score planes.
@@ -138,24 +138,24 @@ impl VoteRule {
     /// # Panics
     ///
     /// If the lengths disagree.
-    pub fn cast(
+    pub fn add_message(
         &self,
         isa: Isa,
         child: ChildScores<'_>,
-        (parent, spans): (&mut [f32], &mut [Span]),
-        workspace: &mut VoteWorkspace,
+        (parent, ranges): (&mut [f32], &mut [ScoreRange]),
+        workspace: &mut MessageWorkspace,
     ) {
         self.check(child);
         let n_types = self.choices.len();
         assert_eq!(parent.len(), child.grid.len(n_types), "parent planes");
-        assert_eq!(spans.len(), n_types, "one span per parent plane");
+        assert_eq!(ranges.len(), n_types, "one range per parent plane");
         if child.grid.is_empty() {
             return;
         }
-        isa.run(fast::Cast {
+        isa.run(fast::AddMessage {
             rule: self,
             child,
-            parent: (parent, spans),
+            parent: (parent, ranges),
             workspace,
         });
     }
@@ -164,9 +164,9 @@ impl VoteRule {
         let size = child.grid.len(self.n_child_types) + child.grid.margin();
         assert_eq!(child.planes.len(), size, "child planes");
         assert_eq!(
-            child.spans.len(),
+            child.ranges.len(),
             self.n_child_types,
-            "one span per child plane"
+            "one range per child plane"
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use super::ends::{Ends, Span};
+use super::range::{RunningRange, ScoreRange};
 use super::{Grid, MARGIN, ROW_ALIGN};
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
@@ -26,7 +26,7 @@ impl OwnScores<'_> {
     /// # Panics
     ///
     /// If the lengths disagree.
-    pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> Span {
+    pub fn write(&self, isa: Isa, grid: Grid, plane: &mut [f32]) -> ScoreRange {
         let cells = grid.rows * grid.cols;
         assert_eq!(self.map.len(), cells, "one response per cell");
         assert!(
@@ -35,36 +35,36 @@ impl OwnScores<'_> {
         );
         assert_eq!(plane.len(), grid.len(1), "one plane");
         if grid.is_empty() {
-            return Span::NONE;
+            return ScoreRange::NONE;
         }
-        let mut ends = Ends::NONE;
-        isa.run(Write {
+        let mut running = RunningRange::NONE;
+        isa.run(WriteOwnScores {
             own: self,
             grid,
             plane,
-            ends: &mut ends,
+            running: &mut running,
         });
-        ends.span()
+        running.range()
     }
 }
 
-struct Write<'a> {
+struct WriteOwnScores<'a> {
     own: &'a OwnScores<'a>,
     grid: Grid,
     plane: &'a mut [f32],
-    ends: &'a mut Ends,
+    running: &'a mut RunningRange,
 }
 
-impl Kernel for Write<'_> {
+impl Kernel for WriteOwnScores<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        *self.ends = write(simd, self.own, self.grid, self.plane);
+        *self.running = write(simd, self.own, self.grid, self.plane);
     }
 }
 
 /// As [`OwnScores::write`].
 #[inline(always)]
-fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> Ends {
+fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -> RunningRange {
     let (margin, plane) = plane.split_at_mut(MARGIN * grid.stride());
     margin.fill(f32::NEG_INFINITY);
     let sum = Sum {
@@ -73,8 +73,8 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
         one: simd.splat(black_box(1.0)),
         constant: own.constant.map(|it| simd.splat(it)),
     };
-    let mut ends = Ends::NONE;
-    let mut seen = ends.load(simd);
+    let mut running = RunningRange::NONE;
+    let mut seen = running.load(simd);
     let whole = grid.cols - grid.cols % S::LANES;
     for (y, line) in plane.chunks_exact_mut(grid.stride()).enumerate() {
         let (line, rest) = line.split_at_mut(whole);
@@ -82,7 +82,7 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
             let at = y * grid.cols + run * S::LANES;
             let scores = sum.of(|from| simd.load(&from[at..]));
             simd.store(scores, out);
-            seen = Ends::see(simd, seen, scores, S::LANES);
+            seen = RunningRange::include(simd, seen, scores, S::LANES);
         }
         let n = grid.cols - whole;
         for (run, out) in rest.chunks_exact_mut(S::LANES).enumerate() {
@@ -90,13 +90,13 @@ fn write<S: Simd>(simd: S, own: &OwnScores<'_>, grid: Grid, plane: &mut [f32]) -
             if run == 0 && n > 0 {
                 let at = y * grid.cols + whole;
                 scores = simd.first(n, sum.of(|from| load(simd, from, at, n)), scores);
-                seen = Ends::see(simd, seen, scores, n);
+                seen = RunningRange::include(simd, seen, scores, n);
             }
             simd.store(scores, out);
         }
     }
-    ends.store(simd, seen);
-    ends
+    running.store(simd, seen);
+    running
 }
 
 /// How the scores of a register are summed.

@@ -9,34 +9,38 @@ use crate::sized;
 /// A small problem: types, sizes, scores and springs.
 #[derive(Debug, Clone)]
 struct Case {
-    rule: VoteRule,
+    rule: MessageRule,
     grid: Grid,
     child: Vec<f32>,
     parent: Vec<f32>,
 }
 
 impl Case {
-    fn spans(&self) -> Vec<Span> {
+    fn ranges(&self) -> Vec<ScoreRange> {
         let planes = 0..self.child.len() / self.grid.len(1).max(1);
-        planes.map(|it| span(self.grid, &self.child, it)).collect()
+        planes.map(|it| range(self.grid, &self.child, it)).collect()
     }
 
-    fn scores<'a>(&'a self, spans: &'a [Span]) -> ChildScores<'a> {
+    fn scores<'a>(&'a self, ranges: &'a [ScoreRange]) -> ChildScores<'a> {
         ChildScores {
             grid: self.grid,
             planes: &self.child,
-            spans,
+            ranges,
         }
     }
 
     /// The parent's planes and their spans after the votes.
-    fn cast(&self, isa: Isa, workspace: &mut VoteWorkspace) -> (Vec<f32>, Vec<Span>) {
+    fn add_message(
+        &self,
+        isa: Isa,
+        workspace: &mut MessageWorkspace,
+    ) -> (Vec<f32>, Vec<ScoreRange>) {
         let mut parent = self.parent.clone();
-        let mut of_parent = vec![Span::NONE; self.rule.choices.len()];
-        let spans = self.spans();
-        let child = self.scores(&spans);
+        let mut of_parent = vec![ScoreRange::NONE; self.rule.choices.len()];
+        let ranges = self.ranges();
+        let child = self.scores(&ranges);
         self.rule
-            .cast(isa, child, (&mut parent, &mut of_parent), workspace);
+            .add_message(isa, child, (&mut parent, &mut of_parent), workspace);
         (parent, of_parent)
     }
 
@@ -55,16 +59,13 @@ impl Case {
 }
 
 /// The least and the largest score of a plane, by definition.
-fn span(grid: Grid, planes: &[f32], plane: usize) -> Span {
+fn range(grid: Grid, planes: &[f32], plane: usize) -> ScoreRange {
     let cells = (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| grid.at(plane, y, x)));
-    let Span {
-        mut least,
-        mut most,
-    } = Span::NONE;
+    let ScoreRange { mut min, mut max } = ScoreRange::NONE;
     for cell in cells {
-        (least, most) = (least.min(planes[cell]), most.max(planes[cell]));
+        (min, max) = (min.min(planes[cell]), max.max(planes[cell]));
     }
-    Span { least, most }
+    ScoreRange { min, max }
 }
 
 fn springs() -> impl Strategy<Value = Spring> {
@@ -122,7 +123,7 @@ fn cases(
                     });
                     let springs = springs.into_iter().enumerate();
                     Case {
-                        rule: VoteRule::new(
+                        rule: MessageRule::new(
                             children,
                             springs.map(|(s, spring)| (s % children, spring)).collect(),
                             choices.collect(),
@@ -146,13 +147,13 @@ proptest! {
         ],
     ) {
         let mut want = case.parent.clone();
-        reference::cast(&case.rule, case.grid, &case.child, &mut want);
-        let mut workspace = VoteWorkspace::default();
+        reference::add_message(&case.rule, case.grid, &case.child, &mut want);
+        let mut workspace = MessageWorkspace::default();
         for isa in Isa::available() {
-            let (parent, spans) = case.cast(isa, &mut workspace);
+            let (parent, ranges) = case.add_message(isa, &mut workspace);
             prop_assert_eq!(&parent, &want, "{:?}", isa);
-            for (l, it) in spans.into_iter().enumerate() {
-                prop_assert_eq!(it, span(case.grid, &want, l), "{:?}", isa);
+            for (l, it) in ranges.into_iter().enumerate() {
+                prop_assert_eq!(it, range(case.grid, &want, l), "{:?}", isa);
             }
         }
     }
@@ -177,31 +178,31 @@ proptest! {
             let mut plane = vec![f32::NAN; grid.len(1)];
             let found = own.write(isa, grid, &mut plane);
             prop_assert_eq!(&plane, &want, "{:?}", isa);
-            prop_assert_eq!(found, span(grid, &want, 0), "{:?}", isa);
+            prop_assert_eq!(found, range(grid, &want, 0), "{:?}", isa);
         }
     }
 
     #[test]
     fn a_workspace_remembers_nothing(a in cases(1..9, 1..sized(40, 9)), b in cases(1..9, 1..sized(40, 9))) {
-        let mut used = VoteWorkspace::default();
-        a.cast(Isa::best(), &mut used);
-        let fresh = b.cast(Isa::best(), &mut VoteWorkspace::default()).0;
-        prop_assert_eq!(b.cast(Isa::best(), &mut used).0, fresh);
+        let mut used = MessageWorkspace::default();
+        a.add_message(Isa::best(), &mut used);
+        let fresh = b.add_message(Isa::best(), &mut MessageWorkspace::default()).0;
+        prop_assert_eq!(b.add_message(Isa::best(), &mut used).0, fresh);
     }
 
     #[test]
     fn a_trace_finds_what_was_cast_and_the_first_of_equals(case in cases(1..sized(12, 5), 1..sized(20, 6))) {
-        let after = case.cast(Isa::best(), &mut VoteWorkspace::default()).0;
-        let (grid, spans) = (case.grid, case.spans());
+        let after = case.add_message(Isa::best(), &mut MessageWorkspace::default()).0;
+        let (grid, ranges) = (case.grid, case.ranges());
         for l in 0..case.rule.choices.len() {
             for (y, x) in (0..grid.rows).flat_map(|y| (0..grid.cols).map(move |x| (y, x))) {
                 let at = grid.at(l, y, x);
-                let found = case.rule.trace(case.scores(&spans), l, [y, x]);
-                let vote = found.map_or(f32::NEG_INFINITY, |it| it.score);
-                prop_assert_eq!(case.parent[at] + vote, after[at]);
+                let found = case.rule.trace(case.scores(&ranges), l, [y, x]);
+                let value = found.map_or(f32::NEG_INFINITY, |it| it.score);
+                prop_assert_eq!(case.parent[at] + value, after[at]);
                 let Some(found) = found else { continue };
                 let score = case.child[grid.at(found.child_type, found.y, found.x)];
-                let again = case.rule.vote(score, [l, found.child_type], [y, x], [found.y, found.x]);
+                let again = case.rule.value(score, [l, found.child_type], [y, x], [found.y, found.x]);
                 prop_assert!(again >= found.score);
                 let first = first_by_hand(&case, l, [y, x]);
                 prop_assert_eq!((found.child_type, found.x, found.y), first);
@@ -253,15 +254,15 @@ fn an_impossible_child_makes_its_parent_impossible() {
         anchor: [0, 0],
     };
     let case = Case {
-        rule: VoteRule::new(1, vec![(0, spring)], vec![vec![(0, 0.5)]]),
+        rule: MessageRule::new(1, vec![(0, spring)], vec![vec![(0, 0.5)]]),
         grid,
         child: with_margin(grid, &[f32::NEG_INFINITY; 6]),
         parent: Case::padded(grid, &[1.0; 6]),
     };
-    let mut workspace = VoteWorkspace::default();
-    let (parent, spans) = case.cast(Isa::best(), &mut workspace);
+    let mut workspace = MessageWorkspace::default();
+    let (parent, ranges) = case.add_message(Isa::best(), &mut workspace);
     assert!(parent.iter().all(|&it| it == f32::NEG_INFINITY));
-    assert!(spans[0].spread().is_nan());
-    let spans = case.spans();
-    assert_eq!(case.rule.trace(case.scores(&spans), 0, [1, 1]), None);
+    assert!(ranges[0].spread().is_nan());
+    let ranges = case.ranges();
+    assert_eq!(case.rule.trace(case.scores(&ranges), 0, [1, 1]), None);
 }

@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use kernels::{
-    ChildScores, Grid, Isa, OwnScores, Peak, ScoreBuffer, Span, Spring, VoteRule, VoteWorkspace,
-    transform_f64,
+    ChildScores, Grid, Isa, MessageRule, MessageWorkspace, OwnScores, Peak, ScoreBuffer,
+    ScoreRange, Spring, transform_f64,
 };
 
 const N_TYPES: usize = 6;
@@ -54,9 +54,9 @@ fn bias(l: usize, k: usize) -> f32 {
     ((l * 5 + k * 3) % 7) as f32 * -0.02
 }
 
-fn rule() -> VoteRule {
+fn rule() -> MessageRule {
     let choices = (0..N_TYPES).map(|l| (0..N_TYPES).map(|k| (k, bias(l, k))).collect());
-    VoteRule::new(N_TYPES, springs(), choices.collect())
+    MessageRule::new(N_TYPES, springs(), choices.collect())
 }
 
 /// Made-up responses, spread as those of trained filters are.
@@ -70,48 +70,48 @@ fn maps(grid: Grid) -> Vec<Vec<f32>> {
     (0..N_TYPES).map(map).collect()
 }
 
-fn measure(isa: Isa, rule: &VoteRule, grid: Grid, peak: f64) {
+fn measure(isa: Isa, rule: &MessageRule, grid: Grid, peak: f64) {
     let maps = maps(grid);
     let mut child = ScoreBuffer::default();
     child.resize(grid.len(N_TYPES) + grid.margin());
     child.scores_mut().fill(f32::NEG_INFINITY);
-    let mut spans = [Span::NONE; N_TYPES];
-    let mut own = |spans: &mut [Span]| {
+    let mut ranges = [ScoreRange::NONE; N_TYPES];
+    let mut own = |ranges: &mut [ScoreRange]| {
         let planes = child.scores_mut().chunks_exact_mut(grid.len(1));
-        for ((map, plane), span) in maps.iter().zip(planes).zip(spans) {
+        for ((map, plane), range) in maps.iter().zip(planes).zip(ranges) {
             let own = OwnScores {
                 map,
                 term: None,
                 constant: None,
             };
-            *span = own.write(isa, grid, plane);
+            *range = own.write(isa, grid, plane);
         }
     };
-    let layout = fastest(200, || own(&mut spans));
+    let layout = fastest(200, || own(&mut ranges));
     let mut parent = ScoreBuffer::default();
     parent.resize(grid.len(N_TYPES));
     parent.scores_mut().fill(0.0);
-    let mut of_parent = spans;
-    let mut workspace = VoteWorkspace::default();
+    let mut of_parent = ranges;
+    let mut workspace = MessageWorkspace::default();
     let child = ChildScores {
         grid,
         planes: child.scores(),
-        spans: &spans,
+        ranges: &ranges,
     };
-    let cast = fastest(400, || {
+    let micros = fastest(400, || {
         let parent = (parent.scores_mut(), &mut of_parent[..]);
-        rule.cast(isa, child, parent, &mut workspace);
+        rule.add_message(isa, child, parent, &mut workspace);
     });
     let slow = fastest(5, || reference(&maps, grid));
     let biases = N_TYPES * N_TYPES * grid.rows * grid.cols;
     let n = workspace.n_candidates(rule, grid) + biases;
-    let speed = n as f64 / cast / 1e3;
+    let speed = n as f64 / micros / 1e3;
     println!(
-        "  {:3} x {:3}: {cast:7.1} us and {layout:5.1} us to lay the child out, {:5.0} times the \
+        "  {:3} x {:3}: {micros:7.1} us and {layout:5.1} us to lay the child out, {:5.0} times the \
          reference, {speed:5.1} candidates/ns = {:3.0} % of registers",
         grid.rows,
         grid.cols,
-        slow / cast,
+        slow / micros,
         100.0 * speed / peak
     );
 }
@@ -130,7 +130,7 @@ fn reference(maps: &[Vec<f32>], grid: Grid) {
             let scores = scores.map(|(k, it)| it[cell] + f64::from(bias(l, k)));
             scores.fold(f64::NEG_INFINITY, f64::max)
         };
-        let vote: Vec<_> = (0..grid.rows * grid.cols).map(best).collect();
-        black_box(vote);
+        let message: Vec<_> = (0..grid.rows * grid.cols).map(best).collect();
+        black_box(message);
     }
 }

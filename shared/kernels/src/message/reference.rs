@@ -1,10 +1,10 @@
 //! The definition: every candidate, one after the other.
 
-use super::{Grid, VoteRule};
+use super::{Grid, MessageRule};
 use crate::spring::Spring;
 
-/// As [`VoteRule::cast`].
-pub(super) fn cast(rule: &VoteRule, grid: Grid, child: &[f32], parent: &mut [f32]) {
+/// As [`MessageRule::add_message`].
+pub(super) fn add_message(rule: &MessageRule, grid: Grid, child: &[f32], parent: &mut [f32]) {
     let transformed: Vec<_> = rule
         .springs
         .iter()
@@ -13,12 +13,12 @@ pub(super) fn cast(rule: &VoteRule, grid: Grid, child: &[f32], parent: &mut [f32
     for (l, choices) in rule.choices.iter().enumerate() {
         for y in 0..grid.rows {
             for x in 0..grid.cols {
-                let vote = choices
+                let value = choices
                     .iter()
                     .fold(f32::NEG_INFINITY, |best, &(spring, bias)| {
                         best.max(transformed[spring][y * grid.cols + x] + bias)
                     });
-                parent[grid.at(l, y, x)] += vote;
+                parent[grid.at(l, y, x)] += value;
             }
         }
     }

@@ -1,11 +1,11 @@
 //! Where a vote came from: the arguments of the maxima, looked up for one cell when they are asked for.
 
-use super::{ChildScores, Grid, VoteRule};
+use super::{ChildScores, Grid, MessageRule};
 use crate::spring::Spring;
 
 /// The child that a vote came from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct TracedChild {
     /// Value of the vote.
     pub score: f32,
     /// The child's type.
@@ -16,14 +16,14 @@ pub struct Found {
     pub x: usize,
 }
 
-impl VoteRule {
+impl MessageRule {
     /// The child that the vote at one cell of the parent came from.
     ///
-    /// Evaluates the same expressions as [`cast`](Self::cast), so `score` is what that added, bit for
+    /// Evaluates the same expressions as [`add_message`](Self::add_message), so `score` is what that added, bit for
     /// bit. Ties go to the first choice, then to the first column, then to the first row, as in the
     /// reference programs. `None` if every child is impossible.
     ///
-    /// * `child`: as for [`cast`](Self::cast).
+    /// * `child`: as for [`add_message`](Self::add_message).
     /// * `at`: `[row, column]` of the parent.
     ///
     /// # Panics
@@ -34,22 +34,22 @@ impl VoteRule {
         child: ChildScores<'_>,
         parent_type: usize,
         at: [usize; 2],
-    ) -> Option<Found> {
+    ) -> Option<TracedChild> {
         self.check(child);
         let grid = child.grid;
         assert!(at[0] < grid.rows && at[1] < grid.cols, "a cell of the grid");
-        let mut best: Option<Found> = None;
+        let mut best: Option<TracedChild> = None;
         for &(spring, bias) in &self.choices[parent_type] {
             let (child_type, spring) = &self.springs[spring];
             let plane = (child.planes, *child_type);
             let Some((score, [y, x])) =
-                best_child(grid, plane, spring, child.spans[*child_type].spread(), at)
+                best_child(grid, plane, spring, child.ranges[*child_type].spread(), at)
             else {
                 continue;
             };
             let score = score + bias;
             if best.map_or(score > f32::NEG_INFINITY, |it| score > it.score) {
-                best = Some(Found {
+                best = Some(TracedChild {
                     score,
                     child_type: *child_type,
                     y,
@@ -62,11 +62,11 @@ impl VoteRule {
 
     /// The value of a vote in which the child is given, or minus infinity if the types never meet.
     ///
-    /// The same expression as in [`cast`](Self::cast): `((score + vertical) + horizontal) + bias`.
+    /// The same expression as in [`add_message`](Self::add_message): `((score + vertical) + horizontal) + bias`.
     ///
     /// * `child_score`: of the child at `child`, `[row, column]`.
     /// * `types`: the parent's and the child's.
-    pub fn vote(
+    pub fn value(
         &self,
         child_score: f32,
         types: [usize; 2],
@@ -76,11 +76,11 @@ impl VoteRule {
         let [down, along] = [0, 1].map(|axis| child[axis] as isize - parent[axis] as isize);
         let choice = |&(spring, bias): &(usize, f32)| {
             let (child_type, spring) = &self.springs[spring];
-            let stretched = child_score + spring.y().score(down) + spring.x().score(along) + bias;
-            (*child_type == types[1]).then_some(stretched)
+            let value = child_score + spring.y().score(down) + spring.x().score(along) + bias;
+            (*child_type == types[1]).then_some(value)
         };
-        let votes = self.choices[types[0]].iter().filter_map(choice);
-        votes.fold(f32::NEG_INFINITY, f32::max)
+        let values = self.choices[types[0]].iter().filter_map(choice);
+        values.fold(f32::NEG_INFINITY, f32::max)
     }
 }
 
@@ -95,7 +95,7 @@ fn best_child(
     let rows = spring.y().reach(grid.rows, spread).window(at[0]);
     let cols = spring.x().reach(grid.cols, spread).window(at[1]);
     let mut best = None;
-    let mut most = f32::NEG_INFINITY;
+    let mut max = f32::NEG_INFINITY;
     for x in cols {
         let (mut column, mut row) = (f32::NEG_INFINITY, 0);
         for y in rows.clone() {
@@ -106,8 +106,8 @@ fn best_child(
             }
         }
         let score = column + spring.x().score(x as isize - at[1] as isize);
-        if score > most {
-            most = score;
+        if score > max {
+            max = score;
             best = Some((score, [row, x]));
         }
     }

@@ -7,7 +7,7 @@ use crate::spring::{Axis, Spring};
 
 /// What is fixed before the first candidate of a transform is tried.
 #[derive(Debug, Default, Clone)]
-pub(super) struct Stretch {
+pub(super) struct Transform {
     /// The child's plane.
     pub(super) plane: usize,
     /// All of the plane is minus infinity.
@@ -64,7 +64,7 @@ impl Pass {
     }
 }
 
-impl Stretch {
+impl Transform {
     #[inline(always)]
     pub(super) fn prepare(&mut self, grid: Grid, plane: usize, spring: &Spring, spread: f32) {
         self.plane = plane;
