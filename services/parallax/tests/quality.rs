@@ -14,7 +14,7 @@ use nalgebra::Point3;
 use onnx::{Network, Side};
 use pipeline::{SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
 use serde_json::{Value, json};
-use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
+use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
 
@@ -88,7 +88,7 @@ fn the_service_says_what_the_library_says() {
             let picture = planted::picture(camera, frame);
             let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
             let found = step.run(image, Scope::whole(&layout), &mut responses);
-            let seen = Seen {
+            let seen = ForecastInput {
                 image,
                 on: (&model, &layout),
                 candidates: &found.candidates,

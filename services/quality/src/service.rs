@@ -8,7 +8,7 @@ use kernels::Rgb8View;
 use messages::{FrameHeader, ViewPose, ViewQuality, topic};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Stage};
-use viewquality::{Forecaster, Predictor, Seen};
+use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;
 
 /// What one view's process has to do.
@@ -138,14 +138,14 @@ fn predict(
             return nothing();
         }
     };
-    let seen = Seen {
+    let input = ForecastInput {
         image,
         on: (model, layout),
         candidates: &candidates,
         scores: &scores,
         frame_scale: f64::from(frame_scale),
     };
-    let forecast = match looking.forecaster.run(&seen) {
+    let forecast = match looking.forecaster.run(&input) {
         Ok(forecast) => forecast,
         Err(error) => {
             tracing::warn!(frame_number, %error, "no prediction");

@@ -16,7 +16,7 @@ pub struct Forecaster {
 
 /// What a view saw and found.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct ForecastInput<'a> {
     /// The frame.
     pub image: Rgb8View<'a>,
     /// The model of the person, and the pyramid of the frame.
@@ -87,7 +87,7 @@ impl Forecaster {
     /// # Panics
     ///
     /// If the image has no pixels, or a candidate does not lie on the layout.
-    pub fn run(&mut self, seen: &Seen<'_>) -> Result<Forecast, ForecastError> {
+    pub fn run(&mut self, seen: &ForecastInput<'_>) -> Result<Forecast, ForecastError> {
         let (model, layout) = seen.on;
         let pose = seen.candidates.first().ok_or(EvidenceError::NoPose)?;
         let bounds = pose.bounding_box(model, layout);
@@ -190,7 +190,7 @@ mod tests {
                 mixture: 0,
             }],
         };
-        forecaster.run(&Seen {
+        forecaster.run(&ForecastInput {
             image: Rgb8View::new(80, 60, &pixels).unwrap(),
             on: (&model, &layout),
             candidates: &[pose],

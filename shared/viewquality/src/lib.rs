@@ -22,7 +22,7 @@ pub use evidence::{
     EVIDENCE_VERSION, EvidenceError, FAR, N_TYPES, PART_NUMBERS, POSE_NUMBERS, evidence,
     evidence_name, n_evidence,
 };
-pub use forecast::{Forecast, ForecastError, Forecaster, Seen};
+pub use forecast::{Forecast, ForecastError, ForecastInput, Forecaster};
 #[cfg(feature = "ort")]
 pub use network::OnnxRuntime;
 pub use network::{Network, NetworkError};

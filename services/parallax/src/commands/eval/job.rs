@@ -18,7 +18,7 @@ use pipeline::{SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 use skeleton::PARSE14;
-use viewquality::{Forecaster, Seen, Table};
+use viewquality::{ForecastInput, Forecaster, Table};
 
 use crate::{inputs, output};
 
@@ -164,7 +164,7 @@ impl Job {
         joints: Option<&Vec<[f64; 2]>>,
         frame_scale: f64,
     ) -> Option<(Expectation, Option<Predicted>)> {
-        let seen = Seen {
+        let seen = ForecastInput {
             image: look.image,
             on: (look.plan.model(), look.plan.layout()),
             candidates: &look.found.candidates,
