@@ -1,4 +1,4 @@
-//! One synchronised set of images in, one skeleton out, without processes.
+//! The whole pipeline in one process: one synchronised set of images in, one skeleton out.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::{
     Support, ViewEstimate, ViewResult, ViewSettings, ViewStep, Views, all_pairs,
 };
 
-/// Why an estimator could not be made.
+/// Why an estimator could not be created.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimatorError {
     /// A view's frames are too small for the model.
@@ -25,23 +25,23 @@ pub enum EstimatorError {
         /// How small.
         source: ImageTooSmall,
     },
-    /// The machine lacks what the precision needs.
+    /// The machine lacks an instruction set that the precision needs.
     #[error("precision")]
     Precision(#[from] NoAmx),
 }
 
-/// What one set of images gave.
+/// The result of one set of images.
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    /// What every view answered alone.
+    /// The result of every single view.
     pub answers: Vec<Option<ViewResult>>,
     /// The joint start: candidate and exchange of every view.
     pub start: Vec<Option<(usize, bool)>>,
-    /// What was searched of every view's image.
+    /// The part of every view's image that was searched.
     pub scopes: Vec<Option<Scope>>,
-    /// What every pair found; empty where all views are solved at once.
+    /// The result of every pair; empty if all views are solved at once.
     pub pairs: Vec<PairResult>,
-    /// What all views found at once, where they are solved so.
+    /// The result of all views at once, if they are solved so.
     pub all_views: Option<AllViewsResult>,
     /// The result.
     pub skeleton: Skeleton,
@@ -58,7 +58,7 @@ pub struct Estimator {
     responses: Vec<Vec<f32>>,
     /// One per view.
     trackers: Vec<Tracker>,
-    /// Frames so far.
+    /// Number of frames estimated so far.
     n_frames: u64,
 }
 
@@ -66,7 +66,7 @@ impl Estimator {
     /// Prepares the pipeline for a rig.
     ///
     /// * `cameras`: the cameras of the frames, after resizing and turning, in the rig's order; the
-    ///   frames' size is the camera's.
+    ///   size of the frames is that of the camera.
     ///
     /// # Errors
     ///
@@ -83,8 +83,8 @@ impl Estimator {
             .collect::<Result<Vec<_>, _>>()?;
         let steps: Vec<ViewStep> = plans
             .iter()
-            .map(|it| {
-                let layout = Arc::new(it.layout().clone());
+            .map(|plan| {
+                let layout = Arc::new(plan.layout().clone());
                 ViewStep::new(Arc::clone(model), layout, settings.view)
             })
             .collect::<Result<_, _>>()?;
@@ -110,9 +110,9 @@ impl Estimator {
         &self.plans
     }
 
-    /// Estimates the next frame: where poses are followed, it depends on the frames before it. Runs views
-    /// and pairs side by side on rayon's current pool; the result does not depend on the number of its
-    /// threads.
+    /// Estimates the next frame. Where poses are tracked, the result depends on the frames before.
+    /// Views and pairs run in parallel on the current rayon pool; the result does not depend on the
+    /// number of threads.
     ///
     /// * `images`: one per view; `None` for a view that is missing.
     /// * `sigma_px`: expected error of every part of every view, where there is a prediction.
@@ -139,41 +139,41 @@ impl Estimator {
                     return (None, None);
                 };
                 responses.resize(step.layout().n_responses(), 0.0);
-                let mut found = step.run(image, tracker.scope(step.layout(), frame), responses);
-                if step.needs_full_search(tracker, &found) {
-                    found = step.run(image, Scope::whole(step.layout()), responses);
+                let mut estimate = step.run(image, tracker.scope(step.layout(), frame), responses);
+                if step.needs_full_search(tracker, &estimate) {
+                    estimate = step.run(image, Scope::whole(step.layout()), responses);
                 }
-                step.update(tracker, frame, &found);
-                let answer = (!found.candidates.is_empty()).then(|| ViewResult {
-                    candidates: found.candidates.clone(),
+                step.update(tracker, frame, &estimate);
+                let answer = (!estimate.candidates.is_empty()).then(|| ViewResult {
+                    candidates: estimate.candidates.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                     tau_px: None,
                 });
-                (answer, Some(found))
+                (answer, Some(estimate))
             })
             .collect();
-        let (answers, found): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
+        let (answers, estimates): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
         let start = self.fuse.start(&answers);
         let evidence = |view: usize| {
-            let (layout, found) = (self.plans[view].layout(), found[view].as_ref()?);
+            let (layout, estimate) = (self.plans[view].layout(), estimates[view].as_ref()?);
             let values = &self.responses[view];
-            let evidence = Responses::within(layout, values, &found.levels, found.scope);
-            Some(evidence.with_bounds(&found.bounds))
+            let evidence = Responses::within(layout, values, &estimate.levels, estimate.scope);
+            Some(evidence.with_bounds(&estimate.bounds))
         };
-        let evidence: Vec<Option<Responses<'_>>> = (0..found.len()).map(evidence).collect();
+        let evidence: Vec<Option<Responses<'_>>> = (0..estimates.len()).map(evidence).collect();
         let (pairs, all_views) = match self.solved_in {
             Views::Pairs => (self.pairs(&answers, &evidence, &start), None),
             Views::All => {
-                let found = self.fuse.all_views(&answers, &evidence, Support::Mean);
-                (Vec::new(), found)
+                let result = self.fuse.all_views(&answers, &evidence, Support::Mean);
+                (Vec::new(), result)
             }
         };
-        let scopes = found
+        let scopes = estimates
             .iter()
-            .map(|it| it.as_ref().map(|it| it.scope))
+            .map(|estimate| estimate.as_ref().map(|estimate| estimate.scope))
             .collect();
         let skeleton = match &all_views {
-            Some(found) => self.skeleton.run_all_views(&answers, found),
+            Some(result) => self.skeleton.run_all_views(&answers, result),
             None => self.skeleton.run(&answers, &pairs),
         };
         Estimate {
@@ -186,7 +186,7 @@ impl Estimator {
         }
     }
 
-    /// What every pair of the views that answered found.
+    /// The results of all pairs of views that have one.
     fn pairs(
         &self,
         answers: &[Option<ViewResult>],
@@ -207,13 +207,13 @@ impl Estimator {
 pub struct EstimatorSettings {
     /// Of the single-view step.
     pub view: ViewSettings,
-    /// What the views of a frame are solved in.
+    /// Whether views are solved in pairs or all at once.
     pub views: Views,
     /// Of the fusion step.
     pub fuse: Settings,
     /// Part-type tables.
     pub tables: PairTables,
-    /// Of the last step.
+    /// Of the skeleton step.
     pub skeleton: SkeletonSettings,
 }
 
@@ -223,7 +223,7 @@ pub struct EstimatorSettings {
 ///
 /// [`EstimatorError::TooSmall`].
 pub fn plan(model: &Arc<Model>, camera: &Camera) -> Result<Arc<ViewPlan>, EstimatorError> {
-    let [width, height] = camera.intrinsics.size.map(|it| it as usize);
+    let [width, height] = camera.intrinsics.size.map(|side| side as usize);
     let layout = Layout::new(model, width, height).map_err(|source| EstimatorError::TooSmall {
         view: camera.name.clone(),
         source,

@@ -1,4 +1,5 @@
-//! The fusion step: pairs of views, each maximising its joint energy on evidence where it lies.
+//! The fusion step: maximises the joint energy of pairs of views, or of all views, on their
+//! evidence in place.
 
 use std::sync::Arc;
 
@@ -9,22 +10,23 @@ use multiview::{
     estimate_all_views, estimate_pair, rank_starts,
 };
 
-/// What a view answered for one frame, besides its evidence.
+/// The single-view result of one frame, besides its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
     /// Distinct poses, best first; never empty.
     pub candidates: Vec<Pose>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
     pub sigma_px: Option<Vec<f32>>,
-    /// Thresholds that came with it, pixels of the frame; they count where the settings have none.
+    /// Thresholds that came with the prediction, pixels of the frame; used where the settings have
+    /// none.
     pub tau_px: Option<Vec<f32>>,
 }
 
 impl ViewResult {
-    /// Whether all its poses lie where there is evidence. Those of one frame may not: a process that was restarted
-    /// answers it again, and searches elsewhere than the life whose evidence came before.
+    /// Whether all its poses lie where there is evidence. They may not: a restarted process can
+    /// repeat a frame with another search window than the process whose evidence arrived before.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
-        self.candidates.iter().all(|it| evidence.covers(it))
+        self.candidates.iter().all(|pose| evidence.covers(pose))
     }
 }
 
@@ -33,7 +35,7 @@ impl ViewResult {
 pub struct PairTables {
     /// Of pairs `(first, second)` of views with `first < second`.
     pub of_pairs: Vec<(usize, usize, TypeTables)>,
-    /// Of all other pairs, by the angle under which they see the person.
+    /// Of all other pairs, by the angle between the views at the person.
     pub by_angle: Option<Arc<AngleTables>>,
 }
 
@@ -46,7 +48,7 @@ pub struct FuseStep {
     tables: PairTables,
 }
 
-/// What a pair found: one estimate per assumption about facing.
+/// The result of a pair: one estimate per assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairResult {
     /// The two views, ascending.
@@ -55,60 +57,62 @@ pub struct PairResult {
     pub hypotheses: Vec<PairEstimate>,
 }
 
-/// Assumptions about facing that all views at once are tried under; as many as the message of a pair holds.
+/// Number of assumptions about facing that are tried with all views at once; the message of a pair
+/// has room for as many.
 const N_STARTS: usize = 2;
 
-/// What the views of a frame are solved in.
+/// Whether the views of a frame are solved in pairs or all at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Views {
-    /// Pairs, whose poses are then combined: the paper's way.
+    /// In pairs, whose poses are then combined: the paper's method.
     #[default]
     Pairs,
-    /// All at once, every view supported by the mean of the terms of all others.
+    /// All at once; each view is supported by the mean of the terms of all others.
     All,
 }
 
-/// How much the terms of a pair weigh where all views are solved at once.
+/// Weight of the terms of a pair where all views are solved at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// As much as alone: the others of a view add up.
+    /// Weight 1: the terms of the other views add up.
     Sum,
-    /// The others of a view together weigh what the one other view of a pair does.
+    /// The other views together weigh as much as the one other view of a pair.
     Mean,
 }
 
-/// What all views found at once.
+/// The result of all views at once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsResult {
-    /// The views that answered, ascending.
+    /// The views with a result, ascending.
     pub views: Vec<usize>,
     /// One estimate per assumption about facing; never empty.
     pub hypotheses: Vec<AllViewsHypothesis>,
 }
 
-/// What all views found at once under one assumption about facing.
+/// The result of all views at once under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsHypothesis {
-    /// Whether left and right of each view were taken to be exchanged with respect to the first.
+    /// Whether left and right of each view were assumed to be exchanged with respect to the first
+    /// view.
     pub exchanged: Vec<bool>,
-    /// The result, by index into the views that answered.
+    /// The result, by index into the views.
     pub estimate: AllViewsEstimate,
 }
 
 impl AllViewsResult {
-    /// What is left without the views that `keep` does not want; `None` if fewer than two are.
+    /// Drops the views that `keep` rejects; `None` if fewer than two are left.
     pub fn only(mut self, keep: impl Fn(usize) -> bool) -> Option<Self> {
         let kept: Vec<usize> = (0..self.views.len())
-            .filter(|it| keep(self.views[*it]))
+            .filter(|idx| keep(self.views[*idx]))
             .collect();
         if kept.len() < 2 {
             return None;
         }
-        self.views = kept.iter().map(|it| self.views[*it]).collect();
-        for it in &mut self.hypotheses {
-            it.exchanged = kept.iter().map(|place| it.exchanged[*place]).collect();
-            let poses = &it.estimate.poses;
-            it.estimate.poses = kept.iter().map(|place| poses[*place].clone()).collect();
+        self.views = kept.iter().map(|idx| self.views[*idx]).collect();
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.exchanged = kept.iter().map(|idx| hypothesis.exchanged[*idx]).collect();
+            let poses = &hypothesis.estimate.poses;
+            hypothesis.estimate.poses = kept.iter().map(|idx| poses[*idx].clone()).collect();
         }
         Some(self)
     }
@@ -132,18 +136,18 @@ impl FuseStep {
         }
     }
 
-    /// Levels that were solved so far ([`Solver::n_sweeps`]); another thread may watch it.
+    /// Number of levels solved so far ([`Solver::n_sweeps`]); may be read by another thread.
     pub fn n_sweeps(&self) -> u64 {
         self.solver.n_sweeps()
     }
 
-    /// The joint start of a frame; `None` for the views that gave no answer.
+    /// The joint start of a frame; `None` for views without a result.
     ///
-    /// Every fusion worker computes it for all views, from their (small) answers alone, so that all
-    /// pairs start from the same person.
+    /// Every fusion worker computes it for all views, from their (small) single-view results alone,
+    /// so that all pairs start from the same person.
     pub fn start(&self, answers: &[Option<ViewResult>]) -> Vec<Option<(usize, bool)>> {
         let present: Vec<usize> = (0..answers.len())
-            .filter(|it| answers[*it].is_some())
+            .filter(|view| answers[*view].is_some())
             .collect();
         if present.is_empty() {
             return vec![None; answers.len()];
@@ -153,8 +157,8 @@ impl FuseStep {
             .filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)))
             .collect();
         let tables = |first: usize, second: usize| {
-            let places = [present[first], present[second]];
-            self.tables(places, [&views[first], &views[second]])
+            let pair = [present[first], present[second]];
+            self.tables(pair, [&views[first], &views[second]])
         };
         let Start {
             candidates,
@@ -170,7 +174,7 @@ impl FuseStep {
 
     /// Solves one pair from the joint start.
     ///
-    /// * Returns `None` if either view gave no answer, or one whose poses its evidence does not
+    /// * Returns `None` if either view has no result, or one whose poses its evidence does not
     ///   [cover](Responses::covers).
     pub fn pair(
         &self,
@@ -196,13 +200,13 @@ impl FuseStep {
         };
         let (candidate_a, exchanged_a) = start[first]?;
         let (candidate_b, exchanged_b) = start[second]?;
-        let bounds = evidence.map(|it| match it.bounds() {
+        let bounds = evidence.map(|evidence| match evidence.bounds() {
             Some(_) => None,
-            None => Some(self.solver.bounds(it)),
+            None => Some(self.solver.bounds(evidence)),
         });
-        let evidence = [0, 1].map(|it| match &bounds[it] {
-            Some(bounds) => evidence[it].with_bounds(bounds),
-            None => *evidence[it],
+        let evidence = [0, 1].map(|side| match &bounds[side] {
+            Some(bounds) => evidence[side].with_bounds(bounds),
+            None => *evidence[side],
         });
         let hypothesis = |exchanged: bool| {
             let start = PairStart {
@@ -226,19 +230,20 @@ impl FuseStep {
         Some(PairResult { views, hypotheses })
     }
 
-    /// Solves all views at once, from the best starts under different assumptions about who sees the
-    /// person from behind.
+    /// Solves all views at once, from the best starts under different assumptions about which views
+    /// see the person from behind.
     ///
-    /// * `evidence`: of the views that answered; best with their bounds.
-    /// * Returns `None` if fewer than two views have an answer, and evidence that [covers](Responses::covers) its poses.
+    /// * `evidence`: of the views with a result; should carry its bounds.
+    /// * Returns `None` if fewer than two views have a result whose poses their evidence
+    ///   [covers](Responses::covers).
     pub fn all_views(
         &self,
         answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
         support: Support,
     ) -> Option<AllViewsResult> {
-        let present = |it: &usize| {
-            let both = answers[*it].as_ref().zip(evidence[*it].as_ref());
+        let present = |view: &usize| {
+            let both = answers[*view].as_ref().zip(evidence[*view].as_ref());
             both.is_some_and(|(answer, evidence)| answer.is_within(evidence))
         };
         let present: Vec<usize> = (0..answers.len()).filter(present).collect();
@@ -246,15 +251,15 @@ impl FuseStep {
             return None;
         }
         let views = present.iter();
-        let views = views.filter_map(|&it| Some(self.view_answer(it, answers[it].as_ref()?)));
+        let views = views.filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)));
         let views: Vec<ViewInput<'_>> = views.collect();
-        let evidence = present.iter().filter_map(|&it| evidence[it].as_ref());
+        let evidence = present.iter().filter_map(|&view| evidence[view].as_ref());
         let evidence: Vec<&Responses<'_>> = evidence.collect();
         let input = AllViewsInput {
             views: &views,
             tables: &|first, second| {
-                let places = [present[first], present[second]];
-                self.tables(places, [&views[first], &views[second]])
+                let pair = [present[first], present[second]];
+                self.tables(pair, [&views[first], &views[second]])
             },
             weight: match support {
                 Support::Sum => 1.0,
@@ -288,10 +293,10 @@ impl FuseStep {
         }
     }
 
-    /// The tables of a pair: its own, or those of the angle under which its views see the person.
+    /// The tables of a pair: its own, or those for the angle between the views at the person.
     fn tables(&self, pair: [usize; 2], views: [&ViewInput<'_>; 2]) -> Option<&TypeTables> {
         let mut own = self.tables.of_pairs.iter();
-        if let Some(own) = own.find(|it| [it.0, it.1] == pair) {
+        if let Some(own) = own.find(|table| [table.0, table.1] == pair) {
             return Some(&own.2);
         }
         let by_angle = self.tables.by_angle.as_ref()?;

@@ -1,14 +1,14 @@
-//! What fusion found, by pairs or by all views at once, under every assumption about facing.
+//! The result of fusion, by pairs or by all views at once, under every assumption about facing.
 
 use fmp::Pose;
 use multiview::{Exchanges, PairEnergies, PairEstimate, is_exchanged, rank_facing};
 
 use crate::{AllViewsHypothesis, AllViewsResult, PairResult};
 
-/// Assignments of facing that are compared with all views at once.
+/// Number of facing assignments that are compared over all views.
 const N_HYPOTHESES: usize = 16;
 
-/// What fusion found, either way.
+/// The result of fusion, in pairs or all views at once.
 pub(crate) enum Fused<'a> {
     /// In ascending order of their views.
     Pairs(Vec<&'a PairResult>),
@@ -19,73 +19,75 @@ impl<'a> Fused<'a> {
     pub(crate) fn n_pairs(&self) -> usize {
         match self {
             Self::Pairs(pairs) => pairs.len(),
-            Self::AllViews(it) => it.views.len() * (it.views.len() - 1) / 2,
+            Self::AllViews(result) => result.views.len() * (result.views.len() - 1) / 2,
         }
     }
 
-    /// The assumptions about facing that are worth a look, with the energy of all views.
+    /// The best assumptions about facing, with the energy of all views.
     pub(crate) fn facing(&self, present: Exchanges) -> Vec<(Exchanges, f64)> {
         match self {
             Self::Pairs(pairs) => {
-                let energies = pairs.iter().filter_map(|it| match &it.hypotheses[..] {
+                let energies = pairs.iter().filter_map(|pair| match &pair.hypotheses[..] {
                     [same, opposite] => Some(PairEnergies {
-                        views: it.views,
+                        views: pair.views,
                         same_or_opposite: [same.energy, opposite.energy],
                     }),
                     _ => None,
                 });
                 rank_facing(present, &energies.collect::<Vec<_>>(), N_HYPOTHESES)
             }
-            Self::AllViews(it) => {
-                let all = it.hypotheses.iter();
-                all.map(|of| (exchanges(it, of), of.estimate.energy))
+            Self::AllViews(result) => {
+                let all = result.hypotheses.iter();
+                all.map(|hypothesis| (exchanges(result, hypothesis), hypothesis.estimate.energy))
                     .collect()
             }
         }
     }
 
-    /// What a view was found to be under an assumption about facing: a pose of each of its pairs, or
-    /// the one of all views, with its energy.
+    /// The poses of a view under an assumption about facing, with their energies: one per pair of
+    /// the view, or the single one of all views.
     pub(crate) fn poses(&self, view: usize, exchanged: Exchanges) -> Vec<(f64, &'a Pose)> {
         match self {
             Self::Pairs(pairs) => {
                 let of_pair = |pair: &&'a PairResult| {
-                    let side = pair.views.iter().position(|it| *it == view)?;
+                    let side = pair.views.iter().position(|other| *other == view)?;
                     let estimate = chosen(pair, exchanged)?;
                     Some((estimate.energy, &estimate.poses[side]))
                 };
                 pairs.iter().filter_map(of_pair).collect()
             }
-            Self::AllViews(found) => {
-                let all = found.views.iter().fold(0, |mask, view| mask | (1 << view));
-                let fits = |it: &&AllViewsHypothesis| {
-                    [exchanged & all, !exchanged & all].contains(&exchanges(found, it))
+            Self::AllViews(result) => {
+                let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
+                let fits = |hypothesis: &&AllViewsHypothesis| {
+                    [exchanged & all, !exchanged & all].contains(&exchanges(result, hypothesis))
                 };
-                let chosen = found.hypotheses.iter().find(fits);
-                let chosen = chosen.or_else(|| found.hypotheses.first());
-                let place = found.views.iter().position(|it| *it == view);
-                let pose = |(it, place): (&'a AllViewsHypothesis, usize)| {
-                    (it.estimate.energy, &it.estimate.poses[place])
+                let chosen = result.hypotheses.iter().find(fits);
+                let chosen = chosen.or_else(|| result.hypotheses.first());
+                let idx = result.views.iter().position(|other| *other == view);
+                let pose = |(hypothesis, idx): (&'a AllViewsHypothesis, usize)| {
+                    (hypothesis.estimate.energy, &hypothesis.estimate.poses[idx])
                 };
-                chosen.zip(place).map(pose).into_iter().collect()
+                chosen.zip(idx).map(pose).into_iter().collect()
             }
         }
     }
 }
 
-/// The views that a hypothesis takes to be exchanged with respect to the first.
-fn exchanges(found: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
-    let each = found.views.iter().zip(&hypothesis.exchanged);
-    each.fold(0, |mask, (view, it)| mask | Exchanges::from(*it) << view)
+/// The views that a hypothesis assumes to be exchanged with respect to the first.
+fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
+    let each = result.views.iter().zip(&hypothesis.exchanged);
+    each.fold(0, |mask, (view, exchanged)| {
+        mask | Exchanges::from(*exchanged) << view
+    })
 }
 
-/// The hypothesis of a pair that agrees with the joint decision.
+/// The hypothesis of a pair that agrees with the joint facing decision.
 fn chosen(pair: &PairResult, exchanged: Exchanges) -> Option<&PairEstimate> {
     let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
     let opposite = first != second;
     pair.hypotheses
         .iter()
-        .find(|it| it.start.exchanged == opposite)
+        .find(|hypothesis| hypothesis.start.exchanged == opposite)
         .or_else(|| pair.hypotheses.first())
 }
 
@@ -96,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// A pose that is told from others by the place of its only part.
+    /// A pose identified by the column of its only part.
     fn pose(x: u16) -> Pose {
         let at = Placement {
             x,
@@ -110,8 +112,8 @@ mod tests {
         }
     }
 
-    /// Views 1, 2 and 4 of a rig, under two assumptions.
-    fn answer() -> AllViewsResult {
+    /// A result of views 1, 2 and 4 of a rig, under two assumptions.
+    fn result() -> AllViewsResult {
         let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
             exchanged: exchanged.to_vec(),
             estimate: AllViewsEstimate {
@@ -133,22 +135,25 @@ mod tests {
 
     #[test]
     fn all_views_at_once_rank_facing_by_their_energies() {
-        let answer = answer();
-        let got = Fused::AllViews(&answer).facing(0b11110);
+        let result = result();
+        let got = Fused::AllViews(&result).facing(0b11110);
         assert_eq!(got, [(0b00100, 5.0), (0b10000, 3.0)]);
     }
 
     #[test]
-    fn a_view_has_the_pose_of_the_assumption_that_was_chosen_or_of_its_complement() {
-        let answer = answer();
-        let found = Fused::AllViews(&answer);
-        let place = |view, exchanged| {
-            let poses = found.poses(view, exchanged);
-            poses.iter().map(|it| it.1.parts[0].x).collect::<Vec<_>>()
+    fn a_view_has_the_pose_of_the_chosen_facing_or_of_its_complement() {
+        let result = result();
+        let fused = Fused::AllViews(&result);
+        let columns = |view, exchanged| {
+            let poses = fused.poses(view, exchanged);
+            poses
+                .iter()
+                .map(|pose| pose.1.parts[0].x)
+                .collect::<Vec<_>>()
         };
-        assert_eq!(place(2, 0b00100), [11]);
-        assert_eq!(place(2, 0b10000), [21]);
-        assert_eq!(place(4, 0b00110), [22], "all but view 4");
-        assert_eq!(place(0, 0b00100), [0_u16; 0], "it did not answer");
+        assert_eq!(columns(2, 0b00100), [11]);
+        assert_eq!(columns(2, 0b10000), [21]);
+        assert_eq!(columns(4, 0b00110), [22], "all but view 4");
+        assert_eq!(columns(0, 0b00100), [0_u16; 0], "a view without a result");
     }
 }

@@ -1,7 +1,7 @@
-//! All the pure steps, and the whole of them in one process.
+//! The pure processing steps, and all of them in one process.
 //!
-//! The services call the steps one by one; [`Estimator`] runs them one after the other, and is what
-//! the system tests compare the processes with: the same input gives the same bits.
+//! The services call the steps one by one. [`Estimator`] runs them in sequence; the system tests
+//! compare the processes with it: the same input gives the same bits.
 #![forbid(unsafe_code)]
 
 mod fuse_step;

@@ -1,4 +1,5 @@
-//! The last step: one pose per view out of the pairs, left and right settled, joints in the world.
+//! The skeleton step: combines the pairs' poses into one pose per view, decides left and right, and
+//! triangulates the joints.
 
 use std::sync::Arc;
 
@@ -15,43 +16,43 @@ use skeleton::{JointMap, JointSet, PARSE14};
 use crate::fused::Fused;
 use crate::{AllViewsResult, PairResult, ViewResult};
 
-/// How a view's pose is made of those of its pairs.
+/// How the pose of a view is made from the poses of its pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Combine {
     /// Their mean: the paper's section 7.
     #[default]
     Mean,
-    /// Part by part the answers that all views can mean together ([`multiview::consensus()`]).
+    /// For every part the result that is consistent over all views ([`multiview::consensus()`]).
     Consensus,
 }
 
-/// Settings of the last step.
+/// Settings of the skeleton step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSettings {
     /// Which joints to triangulate.
     pub joints: &'static JointSet,
-    /// From parts to these joints, as learned; each the mean of its own parts without it.
+    /// Learned map from parts to these joints; without it a joint is the mean of its own parts.
     pub joint_map: Option<Arc<JointMap>>,
     /// How to triangulate.
     pub triangulation: geometry::Settings,
-    /// Uncertainty of a joint in one view, cells of the level it was found on.
+    /// Uncertainty of a joint in one view, cells of the level on which it was fused.
     pub sigma_cells: f64,
-    /// How much of the expected errors of a joint's parts is added to that (as variances are), where they
-    /// were predicted; 0 for nothing.
+    /// Weight of the expected errors of a joint's parts, where they were predicted; they are added
+    /// to `sigma_cells` as variances. 0: not used.
     pub error_weight: f64,
-    /// How a view's pose is made of those of its pairs.
+    /// How the pose of a view is made from the poses of its pairs.
     pub combine: Combine,
-    /// How the views come to agree on a part. Facing is always decided on poses that do: mixtures of
-    /// poses that found different limbs fit together under no assumption about left and right.
+    /// How the views agree on a part. The decision about facing always uses the consensus: a mean
+    /// of poses with different limbs is consistent under no assumption about left and right.
     pub consensus: ConsensusSettings,
     /// Decide which views see the person from behind.
     pub facing: bool,
-    /// How facing is followed over time.
+    /// How facing is tracked over time.
     pub facing_filter: FacingSettings,
     /// Weight of the agreement of all views in the decision about facing: score per squared cell of
-    /// distance between a part and its reprojection, the all-views form of the geometric term.
+    /// distance between a part and its reprojection. It is the geometric term over all views.
     pub agreement: f64,
-    /// Distance beyond which disagreement counts no more, cells.
+    /// Distance at which the penalty for disagreement is capped, cells.
     pub max_distance_cells: f64,
 }
 
@@ -76,11 +77,11 @@ impl Default for SkeletonSettings {
 /// One view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedView {
-    /// The pose that its pairs make, parts named after the side of the body.
+    /// The pose combined from its pairs; parts are named by the side of the body.
     pub pose: FusedPose,
     /// Whether the view sees the person from behind.
     pub exchanged: bool,
-    /// Mean size of a cell of the levels it was found on, pixels of the frame.
+    /// Mean cell size of the levels on which it was fused, pixels of the frame.
     pub cell_px: f64,
     /// Score of the view's own best candidate.
     pub single_score: f64,
@@ -89,17 +90,17 @@ pub struct FusedView {
 /// The result of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
-    /// The joints of the joint set, each with its position or why there is none.
+    /// The joints of the joint set, each with its position or the reason why there is none.
     pub joints: Vec<Result<Triangulated, TriangulateError>>,
-    /// The views of the rig; `None` where a view gave no answer.
+    /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
     /// How many pairs were averaged.
     pub n_pairs: usize,
-    /// Energy of the chosen assignment of facing less that of the best other one.
+    /// Energy of the chosen facing assignment minus that of the best other one.
     pub facing_margin: f64,
 }
 
-/// The last step for a rig; remembers the facing of the frame before.
+/// The skeleton step for a rig; keeps the facing of the frame before.
 #[derive(Debug)]
 pub struct SkeletonStep {
     plans: Vec<Arc<ViewPlan>>,
@@ -123,34 +124,34 @@ impl SkeletonStep {
         }
     }
 
-    /// Settles one frame.
+    /// Computes the skeleton of one frame from pairs.
     ///
-    /// * `answers`: the single-view answers; a view without a pair keeps its own.
+    /// * `answers`: the single-view results; a view without a pair keeps its own pose.
     /// * `pairs`: in any order; their number and views may differ from frame to frame.
     pub fn run(&mut self, answers: &[Option<ViewResult>], pairs: &[PairResult]) -> Skeleton {
         let mut pairs: Vec<&PairResult> = pairs.iter().collect();
-        pairs.sort_by_key(|it| it.views);
+        pairs.sort_by_key(|pair| pair.views);
         self.settle(answers, &Fused::Pairs(pairs))
     }
 
-    /// Settles one frame whose views were solved at once.
+    /// Computes the skeleton of one frame whose views were solved all at once.
     ///
-    /// * `answers`: the single-view answers; a view that was not solved keeps its own.
+    /// * `answers`: the single-view results; a view that was not solved keeps its own pose.
     pub fn run_all_views(
         &mut self,
         answers: &[Option<ViewResult>],
-        found: &AllViewsResult,
+        fused: &AllViewsResult,
     ) -> Skeleton {
-        self.settle(answers, &Fused::AllViews(found))
+        self.settle(answers, &Fused::AllViews(fused))
     }
 
-    fn settle(&mut self, answers: &[Option<ViewResult>], found: &Fused<'_>) -> Skeleton {
+    fn settle(&mut self, answers: &[Option<ViewResult>], fused: &Fused<'_>) -> Skeleton {
         let (exchanged, facing_margin) = if self.settings.facing && self.can_exchange() {
-            self.decide_facing(answers, found)
+            self.decide_facing(answers, fused)
         } else {
             (0, f64::INFINITY)
         };
-        let candidates = self.candidates(answers, found, exchanged);
+        let candidates = self.candidates(answers, fused, exchanged);
         let views = match self.settings.combine {
             Combine::Mean => fuse(&candidates, exchanged),
             Combine::Consensus => self.agreed(&candidates, exchanged),
@@ -165,14 +166,14 @@ impl SkeletonStep {
         Skeleton {
             joints,
             views,
-            n_pairs: found.n_pairs(),
+            n_pairs: fused.n_pairs(),
             facing_margin,
         }
     }
 
-    /// Of every view: the expected errors of its joints, pixels of the frame, weighed; none where nothing was
-    /// predicted. That of a joint is the mean of those of its parts, of which none is further off than the
-    /// frame is large.
+    /// The weighted expected errors of the joints of every view, pixels of the frame; empty where
+    /// nothing was predicted. The expected error of a joint is the mean over its parts, each capped
+    /// at the diagonal of the frame.
     fn expected_errors(
         &self,
         answers: &[Option<ViewResult>],
@@ -181,53 +182,60 @@ impl SkeletonStep {
         let of_view = |(view, answer): (usize, &Option<ViewResult>)| {
             let of_parts = answer.as_ref()?.sigma_px.as_ref()?.iter();
             let [width, height] = self.plans[view].camera().intrinsics.size.map(f64::from);
-            let weighed = |it: &f32| {
-                let it = f64::from(*it).min(width.hypot(height));
-                it * self.settings.error_weight
+            let weighed = |sigma: &f32| {
+                let sigma = f64::from(*sigma).min(width.hypot(height));
+                sigma * self.settings.error_weight
             };
-            // The second number is there for the sake of what is written for points.
+            // The second number is only there because `anatomical` and `from_parts` take points.
             let of_parts: Vec<[f64; 2]> = of_parts.map(|it| [weighed(it), 0.0]).collect();
             let of_parts = anatomical(&of_parts, self.mirror(view, exchanged));
             let of_joints = self.settings.joints.from_parts(&of_parts).into_iter();
-            Some(of_joints.map(|[it, _]| it).collect())
+            Some(of_joints.map(|[sigma, _]| sigma).collect())
         };
         let views = answers.iter().enumerate();
-        views.map(|it| of_view(it).unwrap_or_default()).collect()
+        views
+            .map(|view| of_view(view).unwrap_or_default())
+            .collect()
     }
 
-    /// The mirror of the parts where a view sees the person from behind.
+    /// The mirror permutation of the parts for a view that sees the person from behind.
     fn mirror(&self, view: usize, exchanged: Exchanges) -> Option<&[usize]> {
         let mirror = self.plans[view].model().spec().mirror.as_deref();
         mirror.filter(|_| is_exchanged(exchanged, view))
     }
 
     fn can_exchange(&self) -> bool {
-        let has_sides = |it: &Arc<ViewPlan>| {
-            let spec = it.model().spec();
+        let has_sides = |plan: &Arc<ViewPlan>| {
+            let spec = plan.model().spec();
             spec.mirror.is_some() && spec.parts.len() == skeleton::N_PARTS
         };
         self.plans.first().is_some_and(has_sides)
     }
 
-    /// Which views see the person from behind, and by what margin.
+    /// The views that see the person from behind, and the margin of the decision.
     fn decide_facing(
         &mut self,
         answers: &[Option<ViewResult>],
-        found: &Fused<'_>,
+        fused: &Fused<'_>,
     ) -> (Exchanges, f64) {
-        let present = answers.iter().enumerate().fold(0, |mask, (view, it)| {
-            mask | Exchanges::from(it.is_some()) << view
+        let present = answers.iter().enumerate().fold(0, |mask, (view, answer)| {
+            mask | Exchanges::from(answer.is_some()) << view
         });
-        let hypotheses: Vec<FacingHypothesis> = found
+        let hypotheses: Vec<FacingHypothesis> = fused
             .facing(present)
             .into_iter()
             .map(|(exchanges, energy)| {
-                let views = self.agreed(&self.candidates(answers, found, exchanges), exchanges);
+                let views = self.agreed(&self.candidates(answers, fused, exchanges), exchanges);
                 let parts = self.triangulate(&views, skeleton::N_PARTS, <[_]>::to_vec, &[]);
                 let joints: Vec<Option<Point3<f64>>> = PARSE14
                     .joints
                     .iter()
-                    .map(|it| parts[it.parts[0]].as_ref().ok().map(|it| it.in_world))
+                    .map(|joint| {
+                        parts[joint.parts[0]]
+                            .as_ref()
+                            .ok()
+                            .map(|point| point.in_world)
+                    })
                     .collect();
                 FacingHypothesis {
                     exchanges,
@@ -242,7 +250,7 @@ impl SkeletonStep {
         (facing.exchanges, facing.margin)
     }
 
-    /// The geometric term over all views at once: how far every part is from its reprojection.
+    /// The geometric term over all views: the squared distance of every part from its reprojection.
     fn agreement(
         &self,
         views: &[Option<FusedView>],
@@ -251,7 +259,7 @@ impl SkeletonStep {
         let cap = self.settings.max_distance_cells.powi(2);
         let of_view = |residual_px: f64, view: &FusedView| {
             let cells = residual_px / view.cell_px;
-            // A view that does not show the point disagrees as much as one can.
+            // A view that cannot see the point counts as the largest disagreement.
             if cells.is_nan() {
                 cap
             } else {
@@ -259,23 +267,23 @@ impl SkeletonStep {
             }
         };
         let of_part = |part: &Result<Triangulated, TriangulateError>| -> f64 {
-            let seen = views.iter().enumerate();
-            let seen = seen.filter_map(|(view, it)| Some((view, it.as_ref()?)));
+            let present = views.iter().enumerate();
+            let present = present.filter_map(|(view, fused)| Some((view, fused.as_ref()?)));
             match part {
-                Ok(it) => seen
-                    .map(|(view, of)| of_view(it.residuals_px[view], of))
+                Ok(point) => present
+                    .map(|(view, fused)| of_view(point.residuals_px[view], fused))
                     .sum(),
-                Err(_) => seen.count() as f64 * cap,
+                Err(_) => present.count() as f64 * cap,
             }
         };
         -self.settings.agreement * parts.iter().map(of_part).sum::<f64>()
     }
 
-    /// What every view was found to be, by each of its pairs or by all views, under an assignment of facing.
+    /// The poses of every view, one per pair or that of all views, under a facing assignment.
     fn candidates(
         &self,
         answers: &[Option<ViewResult>],
-        found: &Fused<'_>,
+        fused: &Fused<'_>,
         exchanged: Exchanges,
     ) -> Vec<Option<Candidates>> {
         let of_view = |view: usize| {
@@ -289,9 +297,9 @@ impl SkeletonStep {
                     .map(|part| plan.centre(pose, mirror.map_or(part, |mirror| mirror[part])))
                     .collect(),
             };
-            let found = found.poses(view, exchanged).into_iter();
+            let poses = fused.poses(view, exchanged).into_iter();
             Some(Candidates {
-                found: found
+                of_pairs: poses
                     .map(|(energy, pose)| candidate(energy, pose))
                     .collect(),
                 own: candidate(f64::from(best.score), best),
@@ -300,7 +308,7 @@ impl SkeletonStep {
         (0..self.plans.len()).map(of_view).collect()
     }
 
-    /// One pose per view, of what the views agree on.
+    /// One pose per view, from the consensus of the views.
     fn agreed(
         &self,
         candidates: &[Option<Candidates>],
@@ -332,7 +340,7 @@ impl SkeletonStep {
         views
     }
 
-    /// What the pairs of a view saw, yet without points.
+    /// The camera and uncertainty of a view, still without points.
     fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
         let cell_px = view.map_or(1.0, |it| it.cell_px);
         Sightings {
@@ -344,8 +352,8 @@ impl SkeletonStep {
 
     /// Triangulates points of the fused poses.
     ///
-    /// * `points`: from the part centres of a view to the `n_points` points wanted.
-    /// * `expected_px`: expected errors of these points in the views that have any.
+    /// * `points`: computes the `n_points` wanted points from the part centres of a view.
+    /// * `expected_px`: expected errors of these points, for the views that have them.
     fn triangulate(
         &self,
         views: &[Option<FusedView>],
@@ -353,21 +361,21 @@ impl SkeletonStep {
         points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
         expected_px: &[Vec<f64>],
     ) -> Vec<Result<Triangulated, TriangulateError>> {
-        let seen = views.iter().enumerate();
-        let seen: Vec<(usize, &FusedView, Vec<[f64; 2]>)> = seen
-            .filter_map(|(view, it)| {
-                let it = it.as_ref()?;
-                Some((view, it, points(&it.pose.centres_px)))
+        let present = views.iter().enumerate();
+        let present: Vec<(usize, &FusedView, Vec<[f64; 2]>)> = present
+            .filter_map(|(view, fused)| {
+                let fused = fused.as_ref()?;
+                Some((view, fused, points(&fused.pose.centres_px)))
             })
             .collect();
         let expected_px = |view: usize, point: usize| {
             let of_view = expected_px.get(view)?;
             of_view.get(point).copied()
         };
-        let mut observations: Vec<Observation<'_>> = Vec::with_capacity(seen.len());
+        let mut observations: Vec<Observation<'_>> = Vec::with_capacity(present.len());
         let triangulate = |point: usize| {
             observations.clear();
-            let observed = seen.iter();
+            let observed = present.iter();
             observations.extend(observed.map(|(view, fused, points)| {
                 Observation {
                     camera: self.plans[*view].camera(),
@@ -377,13 +385,13 @@ impl SkeletonStep {
                 }
             }));
             let found = geometry::triangulate(&observations, &self.settings.triangulation)?;
-            Ok(by_view(found, seen.iter().map(|it| it.0)))
+            Ok(by_view(found, present.iter().map(|view| view.0)))
         };
         (0..n_points).map(triangulate).collect()
     }
 }
 
-/// A pose of one view, parts named after the side of the body.
+/// A pose of one view; parts are named by the side of the body.
 #[derive(Debug, Clone)]
 struct Candidate {
     energy: f64,
@@ -391,55 +399,60 @@ struct Candidate {
     centres_px: Vec<[f64; 2]>,
 }
 
-/// The poses that one view's pairs found, and the one it found alone.
+/// The poses of one view's pairs, and its own single-view pose.
 #[derive(Debug, Clone)]
 struct Candidates {
-    found: Vec<Candidate>,
+    of_pairs: Vec<Candidate>,
     own: Candidate,
 }
 
 impl Candidates {
-    /// The pairs' poses, or the view's own where it is in no pair.
+    /// The pairs' poses, or the view's own if it is in no pair.
     fn all(&self) -> &[Candidate] {
-        if self.found.is_empty() {
+        if self.of_pairs.is_empty() {
             std::slice::from_ref(&self.own)
         } else {
-            &self.found
+            &self.of_pairs
         }
     }
 }
 
 /// The mean pose of every view.
 fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
-    let fuse_view = |(view, it): (usize, &Option<Candidates>)| {
-        let it = it.as_ref()?;
-        let candidates: Vec<_> = it
+    let fuse_view = |(view, candidates): (usize, &Option<Candidates>)| {
+        let candidates = candidates.as_ref()?;
+        let poses: Vec<_> = candidates
             .all()
             .iter()
-            .map(|it| (it.energy, it.centres_px.as_slice()))
+            .map(|pose| (pose.energy, pose.centres_px.as_slice()))
             .collect();
-        let n = candidates.len() as f64;
+        let n = poses.len() as f64;
         Some(FusedView {
             pose: FusedPose {
-                n_pairs: it.found.len(),
-                ..average(&candidates)?
+                n_pairs: candidates.of_pairs.len(),
+                ..average(&poses)?
             },
             exchanged: is_exchanged(exchanged, view),
-            cell_px: it.all().iter().map(|it| it.cell_px).sum::<f64>() / n,
-            single_score: it.own.energy,
+            cell_px: candidates
+                .all()
+                .iter()
+                .map(|pose| pose.cell_px)
+                .sum::<f64>()
+                / n,
+            single_score: candidates.own.energy,
         })
     };
     views.iter().enumerate().map(fuse_view).collect()
 }
 
-/// Renumbers the observations of a joint as the views of the rig.
-fn by_view(mut found: Triangulated, views: impl Iterator<Item = usize>) -> Triangulated {
-    let (used, residuals) = (found.views_used, found.residuals_px);
-    found.views_used = 0;
-    found.residuals_px.fill(f64::NAN);
+/// Reorders the observations of a joint by the views of the rig.
+fn by_view(mut triangulated: Triangulated, views: impl Iterator<Item = usize>) -> Triangulated {
+    let (used, residuals) = (triangulated.views_used, triangulated.residuals_px);
+    triangulated.views_used = 0;
+    triangulated.residuals_px.fill(f64::NAN);
     for (i, view) in views.enumerate() {
-        found.views_used |= (used >> i & 1) << view;
-        found.residuals_px[view] = residuals[i];
+        triangulated.views_used |= (used >> i & 1) << view;
+        triangulated.residuals_px[view] = residuals[i];
     }
-    found
+    triangulated
 }

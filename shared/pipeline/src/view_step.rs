@@ -15,21 +15,21 @@ pub enum EvidenceWindow {
     /// Every level.
     #[default]
     All,
-    /// The levels at most this many away from the level of any candidate: of every candidate, not
-    /// only of the best one, so that a view whose own answer is wrong is not trapped.
+    /// The levels that are at most this far from the level of any candidate. All candidates count,
+    /// not only the best one, so that fusion can correct a view whose best candidate is wrong.
     Around(u16),
 }
 
 impl EvidenceWindow {
-    /// Those of the searched levels that are offered for these candidates, ascending.
+    /// The searched levels that are offered as evidence for these candidates, ascending.
     pub fn levels(self, searched: Range<u16>, candidates: &[Pose]) -> Vec<u16> {
         let offered = |level: u16| match self {
             Self::All => true,
             Self::Around(reach) => candidates
                 .iter()
-                .any(|it| it.level.abs_diff(level) <= reach),
+                .any(|pose| pose.level.abs_diff(level) <= reach),
         };
-        searched.filter(|it| offered(*it)).collect()
+        searched.filter(|level| offered(*level)).collect()
     }
 }
 
@@ -38,13 +38,13 @@ impl EvidenceWindow {
 pub struct ViewSettings {
     /// Levels offered as evidence.
     pub window: EvidenceWindow,
-    /// Most candidates.
+    /// Largest number of candidates.
     pub n_candidates: usize,
-    /// Least mean distance between the part centres of two candidates, box sides.
+    /// Smallest mean distance between the part centres of two candidates, box sides.
     pub min_separation: f64,
-    /// How exactly responses are computed.
+    /// Precision of the responses.
     pub precision: Precision,
-    /// How poses are followed from frame to frame; every frame is searched in full without it.
+    /// How poses are tracked from frame to frame; without it every frame is searched in full.
     pub track: Option<TrackSettings>,
 }
 
@@ -60,18 +60,18 @@ impl Default for ViewSettings {
     }
 }
 
-/// What the single-view step found, besides the responses it wrote.
+/// The result of the single-view step, besides the responses it wrote.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewEstimate {
     /// Distinct poses, best first.
     pub candidates: Vec<Pose>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
-    /// How well each part of the best pose fits where it lies; empty without one.
+    /// How well each part of the best pose fits at its position; empty without a pose.
     pub local: Vec<LocalScore>,
-    /// What every level can offer at most.
+    /// Upper bounds of the scores on every level.
     pub bounds: Bounds,
-    /// What was searched, and is covered by the responses.
+    /// The part of the image that was searched and that the responses cover.
     pub scope: Scope,
 }
 
@@ -89,7 +89,7 @@ impl ViewStep {
     ///
     /// # Errors
     ///
-    /// What the machine lacks for the precision.
+    /// If the machine lacks an instruction set that the precision needs.
     pub fn new(
         model: Arc<Model>,
         layout: Arc<Layout>,
@@ -108,15 +108,15 @@ impl ViewStep {
         &self.layout
     }
 
-    /// Begins to follow poses through the frames of a camera, as the settings say.
+    /// Creates a tracker for the frames of one camera, with the settings of the step.
     pub fn tracker(&self) -> Tracker {
         Tracker::new(self.settings.track)
     }
 
     /// Solves one frame within a scope.
     ///
-    /// * `scope`: what [`Tracker::scope`] says, or [`Scope::whole`].
-    /// * `responses`: [`Layout::n_values`] values of the scope at least, overwritten; may lie in
+    /// * `scope`: from [`Tracker::scope`], or [`Scope::whole`].
+    /// * `responses`: at least [`Layout::n_values`] values of the scope, overwritten; may lie in
     ///   shared memory.
     ///
     /// # Panics
@@ -134,7 +134,7 @@ impl ViewStep {
             self.settings.min_separation,
         );
         let best = candidates.first();
-        let local = best.map(|it| local_scores(self.solver.model(), &evidence, it));
+        let local = best.map(|pose| local_scores(self.solver.model(), &evidence, pose));
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
             candidates,
@@ -145,15 +145,15 @@ impl ViewStep {
         }
     }
 
-    /// Whether what was found near the last pose is not to be believed, and the frame is to be searched in
+    /// Whether the result near the last pose is unreliable, so that the frame must be searched in
     /// full; see [`Tracker::needs_full_search`].
     pub fn needs_full_search(&self, tracker: &Tracker, found: &ViewEstimate) -> bool {
         tracker.needs_full_search(&self.layout, &found.scope, found.candidates.first())
     }
 
-    /// Tells the tracker what was found in a frame.
+    /// Updates the tracker with the result of a frame.
     ///
-    /// * `at`: as the tracker was asked about.
+    /// * `at`: the time that was passed to [`Tracker::scope`].
     pub fn update(&self, tracker: &mut Tracker, at: impl Into<FrameTime>, found: &ViewEstimate) {
         let of = (&**self.solver.model(), &*self.layout);
         tracker.update(of, (at, &found.scope), found.candidates.first());

@@ -3,7 +3,7 @@
 /// One evaluated joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Joint {
-    /// Name, as the data set has it.
+    /// Name in the data set.
     pub name: &'static str,
     /// The joint is the mean of the centres of these parts (0-based).
     pub parts: &'static [usize],
@@ -24,7 +24,7 @@ impl JointSet {
     /// The three joint sets, the default first.
     pub const ALL: [&'static Self; 3] = [&PARSE14, &UMPM15, &HUMANEVA20];
 
-    /// The joint set of that name, if there is one.
+    /// The joint set with that name, if there is one.
     #[must_use]
     pub fn by_name(name: &str) -> Option<&'static Self> {
         Self::ALL.into_iter().find(|set| set.name == name)
@@ -37,7 +37,7 @@ impl JointSet {
     ///
     /// # Panics
     ///
-    /// If there are fewer centres than the parts that the joints name.
+    /// If there are fewer centres than the joints need.
     #[must_use]
     pub fn from_parts<const D: usize>(&self, centres: &[[f64; D]]) -> Vec<[f64; D]> {
         self.joints
@@ -55,20 +55,20 @@ impl JointSet {
     }
 }
 
-/// A linear map from parts to joints, learned from people whose joints are known.
+/// A linear map from parts to joints, learned from people with known joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointMap {
     weights: Vec<Vec<f64>>,
 }
 
 impl JointMap {
-    /// From a row of weights, one for each part, for every joint; a row sums to 1.
+    /// Creates the map from one row of weights per joint, one weight per part; a row sums to 1.
     ///
-    /// * Returns `None` if the rows are not of one length, or there are none.
+    /// * Returns `None` if there are no rows, or if their lengths differ.
     #[must_use]
     pub fn new(weights: Vec<Vec<f64>>) -> Option<Self> {
         let n_parts = weights.first()?.len();
-        let fits = weights.iter().all(|it| it.len() == n_parts);
+        let fits = weights.iter().all(|row| row.len() == n_parts);
         fits.then_some(Self { weights })
     }
 
@@ -249,10 +249,11 @@ mod tests {
     fn every_joint_set_is_closed_under_the_mirror() {
         for set in JointSet::ALL {
             for joint in set.joints {
-                let mut mirrored: Vec<usize> = joint.parts.iter().map(|&it| MIRROR[it]).collect();
+                let mut mirrored: Vec<usize> =
+                    joint.parts.iter().map(|&part| MIRROR[part]).collect();
                 mirrored.sort_unstable();
                 assert!(
-                    set.joints.iter().any(|it| it.parts == mirrored),
+                    set.joints.iter().any(|joint| joint.parts == mirrored),
                     "{}",
                     joint.name
                 );

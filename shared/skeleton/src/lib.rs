@@ -1,9 +1,9 @@
 //! The body: parts of the 26-part model, evaluated joints, and the maps between them.
 //!
 //! A *part* is what the detector finds (a filter on the image); a *joint* is what is evaluated.
-//! Parts are numbered from 0 here and from 1 in the reference programs and in everything a user
-//! sees. The model names its parts by the side of the *image* they lie on when the person faces the
-//! camera: `mirror` is the exchange that makes a person seen from behind anatomically right.
+//! Parts are numbered from 0 here, and from 1 in the reference programs and in everything a user
+//! sees. The model names its parts by the side of the *image* on which they lie when the person
+//! faces the camera; `mirror` exchanges them for a person seen from behind.
 #![forbid(unsafe_code)]
 
 mod joints;

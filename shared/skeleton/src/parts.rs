@@ -35,7 +35,7 @@ pub const PART_NAMES: [&str; N_PARTS] = [
     "left ankle",
 ];
 
-/// Parent of every part; the root is its own absence.
+/// Parent of every part; `None` for the root.
 pub const PARENT: [Option<usize>; N_PARTS] = [
     None,
     Some(0),
@@ -65,7 +65,7 @@ pub const PARENT: [Option<usize>; N_PARTS] = [
     Some(24),
 ];
 
-/// The part on the other side of the body; the head and the neck are their own.
+/// The part on the other side of the body; head and neck are their own mirror.
 pub const MIRROR: [usize; N_PARTS] = [
     0, 1, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13,
 ];
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn parents_come_before_their_children() {
         for (part, parent) in PARENT.iter().enumerate() {
-            assert!(parent.is_none_or(|it| it < part), "part {part}");
+            assert!(parent.is_none_or(|parent| parent < part), "part {part}");
         }
     }
 }

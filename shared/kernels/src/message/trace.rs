@@ -1,4 +1,4 @@
-//! Where a vote came from: the arguments of the maxima, looked up for one cell when they are asked for.
+//! Looks up which child a message entry came from: the arguments of the maxima, for one cell.
 
 use super::{ChildScores, Grid, MessageRule};
 use crate::spring::Spring;
