@@ -1,25 +1,27 @@
-//! Which frames a stage takes that cannot keep up, so that all stages take the same.
+//! Selects which frames a stage processes when it cannot keep up, such that all stages select the
+//! same frames.
 
-/// Answers that must take too long, or be quick, in a row before another cadence is chosen.
+/// Number of slow, or quick, results in a row before the stride changes.
 const N_SLOW: u32 = 3;
 const N_QUICK: u32 = 8;
-/// Share of the time to the next frame that an answer may take if twice as many are to be taken.
+/// The stride is halved only if a result takes less than this share of the time that is then
+/// available.
 const IDLE: f64 = 0.7;
-/// Most frames from one that is taken to the next.
+/// Largest stride.
 const MOST: u64 = 1 << 16;
 
-/// Finds out how many frames to pass over where the latest one wins.
+/// Chooses the stride of the processed frames in realtime delivery.
 ///
-/// Stages that each take whatever is newest when they are free take different frames, and what they
-/// say cannot be joined. So a stage takes every n-th frame only, with n a power of two that follows
-/// from how long its answers take: the frames of the slowest are then among those of all others, and
-/// nobody has to be asked.
+/// If every stage processed the newest frame whenever it is idle, the stages would process
+/// different frames, and their results could not be joined. So a stage processes every n-th frame,
+/// with n a power of two that follows from its processing time. The frames of the slowest stage are
+/// then processed by all other stages too, without communication between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cadence {
     stride: u64,
     n_slow: u32,
     n_quick: u32,
-    /// The frame before, and when it was captured.
+    /// Number and capture time of the frame before, nanoseconds.
     last: Option<(u64, u64)>,
 }
 
@@ -35,26 +37,26 @@ impl Default for Cadence {
 }
 
 impl Cadence {
-    /// Whether a frame is one of those that are taken.
+    /// Whether a frame is to be processed.
     ///
     /// * `nth`: its number among the frames in use, the same in all stages.
     pub fn takes(&self, nth: u64) -> bool {
         nth.is_multiple_of(self.stride)
     }
 
-    /// Frames from one that is taken to the next.
+    /// The stride: number of frames from one processed frame to the next.
     pub fn stride(&self) -> u64 {
         self.stride
     }
 
-    /// Notes that a frame was answered.
+    /// Records that a frame was processed, and adapts the stride.
     ///
-    /// * `captured_at_nanos`: from which the time between frames follows.
-    /// * `busy_nanos`: how long the answer took.
+    /// * `captured_at_nanos`: capture time, which gives the time between frames.
+    /// * `busy_nanos`: processing time.
     pub fn answered(&mut self, nth: u64, captured_at_nanos: u64, busy_nanos: u64) {
         let last = self.last.replace((nth, captured_at_nanos));
         let Some((frames, nanos)) = last.and_then(|(frame, at)| {
-            let frames = nth.checked_sub(frame).filter(|it| *it > 0)?;
+            let frames = nth.checked_sub(frame).filter(|step| *step > 0)?;
             Some((frames, captured_at_nanos.saturating_sub(at).max(1)))
         }) else {
             return;
@@ -88,7 +90,8 @@ mod tests {
 
     use super::*;
 
-    /// Frames 100 ns apart, each of which takes so long to answer; the frames that are taken.
+    /// Simulates frames 100 ns apart with a fixed processing time, and returns the processed
+    /// frames.
     fn taken(cadence: &mut Cadence, frames: core::ops::Range<u64>, busy: u64) -> Vec<u64> {
         let mut free_at = 0;
         let mut taken = Vec::new();
@@ -104,13 +107,13 @@ mod tests {
     }
 
     #[test]
-    fn who_keeps_up_takes_every_frame() {
+    fn a_fast_stage_processes_every_frame() {
         let mut cadence = Cadence::default();
         assert_eq!(taken(&mut cadence, 0..50, 80), (0..50).collect::<Vec<_>>());
     }
 
     #[test]
-    fn who_is_slow_takes_every_nth_frame_with_n_a_power_of_two() {
+    fn a_slow_stage_processes_every_nth_frame_with_n_a_power_of_two() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 250);
         assert_eq!(cadence.stride(), 4);
@@ -118,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn one_slow_answer_changes_nothing() {
+    fn one_slow_result_does_not_change_the_stride() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..5, 50);
         taken(&mut cadence, 5..6, 700);
@@ -127,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn who_becomes_quick_takes_more_frames_again() {
+    fn a_stage_that_becomes_faster_processes_more_frames_again() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 350);
         assert_eq!(cadence.stride(), 4);
@@ -136,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn who_would_hardly_keep_up_with_more_frames_stays() {
+    fn the_stride_stays_if_the_stage_could_barely_process_twice_as_many_frames() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 105);
         assert_eq!(cadence.stride(), 2);
@@ -145,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_go_nowhere_do_no_harm() {
+    fn invalid_frame_numbers_and_times_keep_the_stride_in_range() {
         let mut cadence = Cadence::default();
         for (nth, at, busy) in [
             (5, 9, 9),
@@ -161,7 +164,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_frames_of_the_slower_are_among_those_of_the_faster(
+        fn the_frames_of_the_slower_stage_are_a_subset_of_those_of_the_faster(
             busy in prop::array::uniform2(1_u64..5000),
         ) {
             let [mut one, mut other] = [Cadence::default(), Cadence::default()];

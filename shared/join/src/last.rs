@@ -1,28 +1,29 @@
-//! What each sender said last, for frames that it was not waited for.
+//! The last message of each sender, for frames that are not to wait for this sender.
 
 use std::collections::VecDeque;
 
-/// How many words of each sender are kept: one may be ahead of the frame that is asked about.
+/// Number of messages kept per sender; a sender may be ahead of the frame that is being joined.
 const KEPT: usize = 4;
 
-/// Keeps the last words of several senders while they are fresh.
+/// Keeps the last messages of several senders for a limited time.
 #[derive(Debug)]
 pub struct Last<T> {
-    of_input: Vec<VecDeque<Word<T>>>,
+    of_input: Vec<VecDeque<Entry<T>>>,
     max_age_nanos: u64,
 }
 
 #[derive(Debug)]
-struct Word<T> {
+struct Entry<T> {
     frame: u64,
     captured_at: u64,
     item: T,
 }
 
 impl<T> Last<T> {
-    /// Begins with nothing.
+    /// Starts without messages.
     ///
-    /// * `max_age_nanos`: beyond which a word is not used, from capture to capture.
+    /// * `max_age_nanos`: the largest difference in capture time between a frame and a message used
+    ///   for it.
     pub fn new(n_inputs: usize, max_age_nanos: u64) -> Self {
         Self {
             of_input: (0..n_inputs).map(|_| VecDeque::new()).collect(),
@@ -30,31 +31,32 @@ impl<T> Last<T> {
         }
     }
 
-    /// Keeps what was said about a frame; in any order of frames.
+    /// Stores a message about a frame; frames may come in any order.
     ///
     /// * `captured_at`: when the frame was captured, nanoseconds.
     pub fn keep(&mut self, input: usize, frame: u64, captured_at: u64, item: T) {
-        let Some(words) = self.of_input.get_mut(input) else {
+        let Some(entries) = self.of_input.get_mut(input) else {
             return;
         };
-        let at = words.partition_point(|it| it.frame < frame);
-        let word = Word {
+        let at = entries.partition_point(|entry| entry.frame < frame);
+        let entry = Entry {
             frame,
             captured_at,
             item,
         };
-        words.insert(at, word);
-        if words.len() > KEPT {
-            words.pop_front();
+        entries.insert(at, entry);
+        if entries.len() > KEPT {
+            entries.pop_front();
         }
     }
 
-    /// The latest word about this frame or one before it, if it is fresh, and how many frames it is old.
+    /// The latest stored message about this frame or an earlier one, if it is recent enough, and
+    /// its age in frames.
     pub fn of(&self, input: usize, frame: u64, captured_at: u64) -> Option<(u64, &T)> {
-        let words = self.of_input.get(input)?;
-        let it = words.iter().rev().find(|it| it.frame <= frame)?;
-        let age = captured_at.saturating_sub(it.captured_at);
-        (age <= self.max_age_nanos).then_some((frame - it.frame, &it.item))
+        let entries = self.of_input.get(input)?;
+        let entry = entries.iter().rev().find(|entry| entry.frame <= frame)?;
+        let age = captured_at.saturating_sub(entry.captured_at);
+        (age <= self.max_age_nanos).then_some((frame - entry.frame, &entry.item))
     }
 }
 
@@ -63,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_word_serves_later_frames_while_it_is_fresh() {
+    fn the_last_message_is_used_for_later_frames_until_it_is_too_old() {
         let mut last = Last::new(2, 100);
         assert_eq!(last.of(0, 5, 50), None);
         last.keep(0, 3, 30, 'a');
@@ -75,17 +77,17 @@ mod tests {
     }
 
     #[test]
-    fn a_sender_that_is_ahead_does_not_speak_of_earlier_frames() {
+    fn a_message_is_not_used_for_earlier_frames() {
         let mut last = Last::new(1, 100);
         last.keep(0, 8, 80, 'c');
         assert_eq!(last.of(0, 7, 70), None);
-        last.keep(0, 6, 60, 'a'); // it came late
+        last.keep(0, 6, 60, 'a'); // arrives late
         assert_eq!(last.of(0, 7, 70), Some((1, &'a')));
         assert_eq!(last.of(0, 9, 90), Some((1, &'c')));
     }
 
     #[test]
-    fn old_words_make_room() {
+    fn old_messages_are_dropped() {
         let mut last = Last::new(1, 1000);
         for frame in 0..10 {
             last.keep(0, frame, frame, frame);
@@ -93,6 +95,6 @@ mod tests {
         assert_eq!(last.of(0, 5, 5), None);
         assert_eq!(last.of(0, 6, 6), Some((0, &6)));
         last.keep(7, 0, 0, 0);
-        assert_eq!(last.of(7, 0, 0), None, "nobody");
+        assert_eq!(last.of(7, 0, 0), None, "no such input");
     }
 }

@@ -1,8 +1,9 @@
-//! Brings together what several senders say about one frame, and never waits for ever.
+//! Joins the messages of several inputs by frame, with a bounded wait.
 //!
-//! A frame is complete once every input has spoken about it, or can no longer do so: it has spoken
-//! about a later one, it has ended, or it has been silent for too long and counts as down. Nothing
-//! here reads a clock: the caller says what time it is, so every rule is tested without waiting.
+//! A frame is complete once every input has sent its message, or will not send it any more: it has
+//! sent a later frame, it has ended, or it has been silent for too long and counts as down. Nothing
+//! here reads a clock: the caller passes the time, so that every rule can be tested without
+//! waiting.
 #![forbid(unsafe_code)]
 
 mod cadence;
@@ -13,37 +14,38 @@ use std::collections::BTreeMap;
 pub use cadence::Cadence;
 pub use last::Last;
 
-/// What was brought together about one frame.
+/// The joined messages of one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Joined<T> {
     /// Index of the frame.
     pub frame: u64,
-    /// One entry per input; `None` where it said nothing in time.
+    /// One entry per input; `None` if its message did not arrive in time.
     pub items: Vec<Option<T>>,
 }
 
-/// What became of a message.
+/// The outcome of [`Joiner::push`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Push {
-    /// It waits for the others.
+    /// The message was accepted and waits for the other inputs.
     Taken,
-    /// Its frame has already been given out, or its input has already spoken about that frame.
+    /// Its frame has already been returned, or its input has already sent that frame.
     Late,
-    /// So many frames wait for others that there is no room for one more.
+    /// Too many frames are pending.
     Full,
 }
 
-/// Most frames that wait at the same time: hours of them, or a sender that counts wrong.
+/// Largest number of pending frames: hours of frames, or the sign of a sender with wrong frame
+/// numbers.
 const MOST_PENDING: usize = 1 << 16;
 
-/// Collects messages by frame, in the order of frames.
+/// Collects messages by frame and returns the frames in order.
 #[derive(Debug)]
 pub struct Joiner<T> {
     inputs: Vec<Input>,
     pending: BTreeMap<u64, Slot<T>>,
     patience_nanos: u64,
     alive_patience_nanos: u64,
-    /// Frames below this have been given out.
+    /// All frames below this number have been returned.
     next_frame: u64,
 }
 
@@ -54,17 +56,19 @@ struct Input {
     alive_at: Option<u64>,
     ended: bool,
     down: bool,
-    /// How long a frame waits for it at most.
+    /// Longest time that a frame waits for this input.
     deadline: Option<u64>,
 }
 
 impl Input {
-    /// Whether it has been silent for too long; `patience` with nobody there, and with somebody.
+    /// Whether it has been silent for too long. `patience`: without a sign of life, and with one.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.heard_at.unwrap_or(0)));
         let absence = silence.min(self.alive_at.map_or(u64::MAX, elapsed));
-        let is_overdue = self.deadline.is_some_and(|it| elapsed(began_at) >= it);
+        let is_overdue = self
+            .deadline
+            .is_some_and(|deadline| elapsed(began_at) >= deadline);
         is_overdue || absence >= patience[0] || silence >= patience[1]
     }
 }
@@ -76,7 +80,7 @@ struct Slot<T> {
 }
 
 impl<T> Joiner<T> {
-    /// A joiner of so many inputs.
+    /// Creates a joiner for a number of inputs.
     ///
     /// * `patience_nanos`: how long an input may be silent while others wait for it.
     pub fn new(n_inputs: usize, patience_nanos: u64) -> Self {
@@ -89,8 +93,8 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// As [`Self::new`], where nothing may be lost: an input that is known to be alive may take ten times
-    /// as long, for it is computing.
+    /// As [`Self::new`], for lossless delivery: an input whose process is alive may take ten times
+    /// as long, because it is computing.
     pub fn lossless(n_inputs: usize, patience_nanos: u64) -> Self {
         Self {
             alive_patience_nanos: patience_nanos.saturating_mul(10),
@@ -98,34 +102,35 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Says that no frame waits for an input longer than this, however alive its sender is: its words
-    /// are welcome and not necessary.
+    /// Sets a deadline for an input: no frame waits longer for it, even if its sender is alive. For
+    /// inputs that are optional.
     pub fn hurry(&mut self, input: usize, deadline_nanos: u64) {
-        if let Some(it) = self.inputs.get_mut(input) {
-            it.deadline = Some(deadline_nanos);
+        if let Some(input) = self.inputs.get_mut(input) {
+            input.deadline = Some(deadline_nanos);
         }
     }
 
-    /// Notes that whoever sends on an input is alive, though it has nothing to say yet.
+    /// Records a sign of life of an input's sender that carries no frame.
     pub fn alive(&mut self, input: usize, now: u64) {
-        if let Some(it) = self.inputs.get_mut(input) {
-            it.alive_at = Some(now);
+        if let Some(input) = self.inputs.get_mut(input) {
+            input.alive_at = Some(now);
         }
     }
 
-    /// Takes a message.
+    /// Accepts a message.
     ///
-    /// * `input`: who sends, below the number of inputs; another is ignored as late.
-    /// * `now`: nanoseconds of a clock that never goes back.
+    /// * `input`: index of the input; a message with an index out of range is rejected as late.
+    /// * `now`: time of a monotonic clock, nanoseconds.
     pub fn push(&mut self, input: usize, frame: u64, item: T, now: u64) -> Push {
         let n = self.inputs.len();
-        let Some(it) = self.inputs.get_mut(input) else {
+        let Some(sender) = self.inputs.get_mut(input) else {
             return Push::Late;
         };
-        it.heard_at = Some(now);
-        it.down = false;
-        // Not the largest: who once spoke of a frame far ahead is waited for again once it counts right.
-        it.last_frame = Some(frame);
+        sender.heard_at = Some(now);
+        sender.down = false;
+        // Not the maximum: after one frame number far ahead, the input is waited for again once its
+        // numbers are right.
+        sender.last_frame = Some(frame);
         if frame < self.next_frame {
             return Push::Late;
         }
@@ -143,27 +148,28 @@ impl<T> Joiner<T> {
         Push::Taken
     }
 
-    /// Notes that an input will say no more.
+    /// Records that an input has ended.
     pub fn end(&mut self, input: usize) {
-        if let Some(it) = self.inputs.get_mut(input) {
-            it.ended = true;
+        if let Some(input) = self.inputs.get_mut(input) {
+            input.ended = true;
         }
     }
 
-    /// The earliest frame, if nothing more is to be expected for it.
+    /// The earliest pending frame, if it is complete.
     ///
-    /// Call it until it gives `None`: several frames may have become complete at once. An input that
-    /// is given up on is not waited for again until it speaks.
+    /// Call this until it returns `None`: several frames may be complete. An input that is given up
+    /// is not waited for again until its next message.
     pub fn next(&mut self, now: u64) -> Option<Joined<T>> {
         let (&frame, slot) = self.pending.first_key_value()?;
         let patience = [self.patience_nanos, self.alive_patience_nanos];
-        for (it, item) in self.inputs.iter_mut().zip(&slot.items) {
-            let past = it.ended || it.down || it.last_frame.is_some_and(|last| last > frame);
+        for (input, item) in self.inputs.iter_mut().zip(&slot.items) {
+            let past =
+                input.ended || input.down || input.last_frame.is_some_and(|last| last > frame);
             if item.is_some() || past {
                 continue;
             }
-            if it.silent_since(slot.began_at, now, patience) {
-                it.down = true;
+            if input.silent_since(slot.began_at, now, patience) {
+                input.down = true;
             } else {
                 return None;
             }
@@ -176,9 +182,9 @@ impl<T> Joiner<T> {
         })
     }
 
-    /// The latest complete frame that is wanted, and how many others were passed over.
+    /// The latest complete frame that is wanted, and the number of other frames that were skipped.
     ///
-    /// * `wants`: whether a frame is one of those that are taken.
+    /// * `wants`: whether a frame is to be processed.
     pub fn latest(
         &mut self,
         now: u64,
@@ -197,30 +203,31 @@ impl<T> Joiner<T> {
         (latest, n_passed)
     }
 
-    /// Inputs that are not waited for because they fell silent.
+    /// Whether an input is not waited for because it has been silent for too long.
     pub fn is_down(&self, input: usize) -> bool {
-        self.inputs.get(input).is_some_and(|it| it.down)
+        self.inputs.get(input).is_some_and(|input| input.down)
     }
 
-    /// Frames that wait for somebody.
+    /// Number of frames that wait for inputs.
     pub fn n_pending(&self) -> usize {
         self.pending.len()
     }
 
-    /// Whether there is nothing more to come: all inputs have ended, or one has and the others have
-    /// been silent for too long, and every frame was given out.
+    /// Whether the stream is over: all inputs have ended, or at least one has and the others have
+    /// been silent for too long, and every frame has been returned.
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
-        let silent = |it: &Input| {
-            it.heard_at
-                .is_some_and(|at| it.silent_since(at, now, patience))
+        let silent = |input: &Input| {
+            input
+                .heard_at
+                .is_some_and(|at| input.silent_since(at, now, patience))
         };
         self.pending.is_empty()
-            && self.inputs.iter().any(|it| it.ended)
+            && self.inputs.iter().any(|input| input.ended)
             && self
                 .inputs
                 .iter()
-                .all(|it| it.ended || it.down || silent(it))
+                .all(|input| input.ended || input.down || silent(input))
     }
 }
 
@@ -232,7 +239,12 @@ mod tests {
 
     fn frames<T>(joiner: &mut Joiner<T>, now: u64) -> Vec<(u64, Vec<bool>)> {
         std::iter::from_fn(|| joiner.next(now))
-            .map(|it| (it.frame, it.items.iter().map(Option::is_some).collect()))
+            .map(|joined| {
+                (
+                    joined.frame,
+                    joined.items.iter().map(Option::is_some).collect(),
+                )
+            })
             .collect()
     }
 
@@ -247,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn who_once_counted_wrong_is_waited_for_again() {
+    fn an_input_with_one_wrong_frame_number_is_waited_for_again() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(1, u64::MAX, (), 0);
         joiner.push(0, 0, (), 0);
@@ -264,18 +276,18 @@ mod tests {
     }
 
     #[test]
-    fn who_speaks_of_ever_more_frames_fills_no_memory() {
+    fn the_number_of_pending_frames_is_limited() {
         let mut joiner = Joiner::new(2, 100);
         for frame in 0..MOST_PENDING as u64 {
             assert_eq!(joiner.push(1, frame, (), 0), Push::Taken);
         }
         assert_eq!(joiner.push(1, 1 << 20, (), 0), Push::Full);
-        assert_eq!(joiner.push(0, 5, (), 0), Push::Taken, "a frame that waits");
+        assert_eq!(joiner.push(0, 5, (), 0), Push::Taken, "a pending frame");
         assert_eq!(joiner.n_pending(), MOST_PENDING);
     }
 
     #[test]
-    fn an_input_that_has_gone_on_is_not_waited_for() {
+    fn an_input_that_has_sent_a_later_frame_is_not_waited_for() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.push(1, 1, (), 0);
@@ -283,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_input_is_down_until_it_speaks() {
+    fn a_silent_input_is_down_until_its_next_message() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 10);
         assert_eq!(frames(&mut joiner, 109), []);
@@ -297,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_is_slow_but_alive_is_waited_for() {
+    fn an_input_that_sends_slowly_is_waited_for() {
         let mut joiner = Joiner::new(2, 100);
         for frame in 0..4 {
             joiner.push(0, frame, (), 0);
@@ -311,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_is_there_may_take_longer() {
+    fn in_lossless_delivery_a_live_input_may_take_ten_times_as_long() {
         let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         for now in (0..1000).step_by(50) {
@@ -322,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn no_frame_waits_for_a_welcome_word_past_its_deadline() {
+    fn no_frame_waits_for_an_optional_input_past_its_deadline() {
         let mut joiner = Joiner::lossless(2, 1000);
         joiner.hurry(1, 30);
         joiner.push(0, 0, 'a', 0);
@@ -330,7 +342,7 @@ mod tests {
         assert_eq!(frames(&mut joiner, 29), []);
         joiner.alive(1, 30);
         assert_eq!(frames(&mut joiner, 30), [(0, vec![true, false])]);
-        // It is not waited for again until it speaks, though it speaks too late.
+        // It is not waited for again until its next message, even if that is late.
         joiner.push(0, 1, 'b', 40);
         assert_eq!(frames(&mut joiner, 40), [(1, vec![true, false])]);
         assert_eq!(joiner.push(1, 0, 'c', 45), Push::Late);
@@ -340,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_has_gone_is_given_the_short_patience() {
+    fn in_lossless_delivery_an_input_without_sign_of_life_gets_the_normal_patience() {
         let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.alive(1, 50);
@@ -349,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_after_its_frame_is_late() {
+    fn a_message_for_a_returned_frame_is_late() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 5, (), 0);
         joiner.push(1, 6, (), 0);
@@ -360,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_frame_passes_over_earlier_ones() {
+    fn the_latest_frame_skips_earlier_ones() {
         let mut joiner = Joiner::new(1, 100);
         for frame in 0..3 {
             joiner.push(0, frame, frame, 0);
@@ -370,19 +382,19 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_not_wanted_are_passed_over() {
+    fn unwanted_frames_are_skipped() {
         let mut joiner = Joiner::new(1, 100);
         for frame in 0..5 {
             joiner.push(0, frame, frame, 0);
         }
-        let (got, n_passed) = joiner.latest(0, |it| it.frame == 3);
+        let (got, n_passed) = joiner.latest(0, |joined| joined.frame == 3);
         assert_eq!((got.unwrap().frame, n_passed), (3, 4));
         joiner.push(0, 5, 5, 0);
         assert_eq!(joiner.latest(0, |_| false), (None, 1));
     }
 
     #[test]
-    fn it_is_over_when_all_have_ended_and_all_is_given_out() {
+    fn the_stream_is_over_when_all_inputs_have_ended_and_all_frames_are_returned() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.end(0);
@@ -393,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_died_before_its_end_does_not_keep_it_going() {
+    fn an_input_that_died_before_its_end_does_not_keep_the_stream_open() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.push(1, 0, (), 0);
@@ -404,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_over_before_anybody_has_ended() {
+    fn the_stream_is_not_over_before_any_input_has_ended() {
         let mut joiner: Joiner<()> = Joiner::new(2, 100);
         assert!(!joiner.is_over(u64::MAX));
         joiner.push(0, 0, (), 0);
@@ -414,17 +426,17 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_message_is_given_out_once_or_called_late_in_the_order_of_frames(
+        fn every_message_is_returned_once_in_frame_order_or_is_late(
             events in prop::collection::vec((0_usize..3, 0_u64..8, 0_u64..40), 0..60),
         ) {
             let mut joiner = Joiner::new(3, 50);
             let (mut now, mut taken, mut given, mut last) = (0, 0, 0, None);
             let mut drain = |joiner: &mut Joiner<u64>, now: u64| {
-                while let Some(it) = joiner.next(now) {
-                    assert!(last < Some(it.frame), "in order");
-                    last = Some(it.frame);
-                    assert!(it.items.iter().flatten().all(|item| *item == it.frame));
-                    given += it.items.iter().flatten().count();
+                while let Some(joined) = joiner.next(now) {
+                    assert!(last < Some(joined.frame), "in order");
+                    last = Some(joined.frame);
+                    assert!(joined.items.iter().flatten().all(|item| *item == joined.frame));
+                    given += joined.items.iter().flatten().count();
                 }
             };
             for (input, frame, pause) in events {

@@ -5,38 +5,39 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{MAX_LEVELS, Stamp, Status, Timing};
 
-/// Travels as the user header of the responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
-/// alignment makes them begin on a cache line.
+/// The user header of a sample of responses: `[f32]`, those of an `fmp::Scope`, without gaps. Its
+/// alignment places the responses at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("EvidenceHeader.v3")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {
-    /// Which frame.
+    /// The frame.
     pub stamp: Stamp,
-    /// When.
+    /// When it was received and sent.
     pub timing: Timing,
-    /// Width of the image the evidence is of, pixels.
+    /// Width of the image, pixels.
     pub width: u32,
     /// Height of the image, pixels.
     pub height: u32,
     /// Whether there is evidence.
     pub status: Status,
-    /// How many entries of `levels` count.
+    /// Number of valid entries of `levels`.
     pub n_levels: u32,
-    /// First column of the image that there are responses of, and the one after the last, pixels.
+    /// First column of the image that the responses cover, and the one after the last, pixels.
     pub x: [u32; 2],
-    /// First row, and the one after the last, pixels.
+    /// First row that they cover, and the one after the last, pixels.
     pub y: [u32; 2],
-    /// First level that there are responses of, and the one after the last.
+    /// First level that has responses, and the one after the last.
     pub scope_levels: [u16; 2],
     /// Levels of the pyramid that hold valid values, ascending.
     pub levels: [u16; MAX_LEVELS],
-    /// Score of the best pose on each of `levels`, by this view alone; infinite where it is not known.
+    /// Score of the best pose on each of `levels`, by this view alone; infinite where it is
+    /// unknown.
     pub best: [f32; MAX_LEVELS],
-    /// More than any sum on the way to a score on each of `levels`, by this view alone.
+    /// Upper bound of all partial sums of a score on each of `levels`, by this view alone.
     pub size: [f32; MAX_LEVELS],
-    /// Keeps the layout free of padding.
+    /// Explicit padding.
     pub reserved: [u32; 11],
 }
 

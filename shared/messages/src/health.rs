@@ -1,11 +1,12 @@
-//! Signs of life.
+//! Heartbeats.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::Refusal;
 
-/// Sent by every process a few times a second; a counter that stands still means a hang.
+/// The heartbeat, which every process sends a few times a second. A loop counter that does not
+/// change means that the process hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Health.v4")]
 #[repr(C)]
@@ -14,17 +15,18 @@ pub struct Health {
     pub session: u64,
     /// Process id.
     pub pid: u32,
-    /// How often the process has been restarted.
+    /// Number of restarts of the process.
     pub epoch: u32,
-    /// Turns of the process's main loop.
+    /// Number of turns of the process's main loop.
     pub n_loops: u64,
-    /// `CLOCK_MONOTONIC`, nanoseconds.
+    /// When it was sent, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
-    /// Messages taken in.
+    /// Number of messages received.
     pub n_received: u64,
-    /// Messages sent out.
+    /// Number of messages sent.
     pub n_sent: u64,
-    /// Messages or frames lost before they reached this process, or that came too late.
+    /// Number of messages or frames that were lost before they reached this process, or arrived too
+    /// late.
     pub n_dropped: u64,
     /// Last frame sent.
     pub last_frame: u64,
@@ -32,16 +34,16 @@ pub struct Health {
     pub p50_micros: u64,
     /// 99th percentile of the computing time, microseconds.
     pub p99_micros: u64,
-    /// Most physical memory that the process has held, shared memory that it has mapped included,
-    /// bytes; 0 where the system does not say.
+    /// Peak physical memory of the process, mapped shared memory included, bytes; 0 where the
+    /// system does not report it.
     pub peak_memory_bytes: u64,
-    /// 1 once the process has seen the end of the footage and passed it on.
+    /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
-    /// Processor time that all threads of the process have used, milliseconds, modulo 2^32; 0 where the system
-    /// does not say.
+    /// Processor time of all threads of the process, milliseconds, modulo 2^32; 0 where the system
+    /// does not report it.
     pub cpu_millis: u32,
-    /// Work that the process has before it, if it knows (capture: frames in the footage), else 0.
+    /// Total amount of work, if the process can tell it (capture: frames in the footage), else 0.
     pub n_total: u64,
-    /// Messages that were refused, by cause: [`Refusal::ALL`].
+    /// Number of refused messages by cause, see [`Refusal::ALL`].
     pub refused: [u64; Refusal::N],
 }

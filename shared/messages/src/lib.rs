@@ -1,9 +1,9 @@
-//! Plain data that crosses process boundaries, the names it travels under, and nothing else.
+//! Plain data that crosses process boundaries, and the names of the topics.
 //!
-//! Every message begins with a [`Stamp`], says with a [`Status`] whether it carries a result or why
-//! not, and with [`Timing`] what it cost. Counts come before fixed-size arrays; entries past the
-//! count are zero. Receivers treat every count and index as untrusted (`wire` checks them).
-//! All are `Pod`: without padding, and any bytes of the right number are one, so that they can be
+//! Every message begins with a [`Stamp`]; a [`Status`] tells whether it carries a result, or why
+//! not; [`Timing`] tells when it was made. Counts come before fixed-size arrays; entries beyond the
+//! count are zero. Receivers must treat every count and index as untrusted (`wire` checks them).
+//! All messages are `Pod`: they have no padding and every bit pattern is valid, so they can be
 //! written to a file and read again.
 #![forbid(unsafe_code)]
 
@@ -30,15 +30,15 @@ pub use quality::ViewQuality;
 pub use refusal::Refusal;
 pub use stamp::{Stamp, Status, Timing};
 
-/// Most parts of a model that messages can carry.
+/// Largest number of parts of a model.
 pub const MAX_PARTS: usize = 32;
-/// Most views of a rig.
+/// Largest number of views of a rig.
 pub const MAX_VIEWS: usize = 16;
-/// Most candidates that a view offers.
+/// Largest number of candidates of a view.
 pub const MAX_CANDIDATES: usize = 8;
-/// Most joints of a joint set.
+/// Largest number of joints of a joint set.
 pub const MAX_JOINTS: usize = 32;
-/// Most levels of a pyramid (96 = 15 000 pixels at ten levels an octave).
+/// Largest number of levels of a pyramid (96 is enough for 15 000 pixels at ten levels per octave).
 pub const MAX_LEVELS: usize = 96;
 
 const _: () = {

@@ -1,22 +1,22 @@
-//! Where the time of one process goes, and what it has lost.
+//! Where a process spends its time, and what it has lost.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Most rows of a [`Metrics`]: a wait for every view, and what is not of one view.
+/// Largest number of rows of a [`Metrics`]: one wait per view, and those that belong to no view.
 pub const MAX_ROWS: usize = 24;
-/// Longest name of a view that [`Metrics`] carries, bytes; a longer one is cut.
+/// Longest view name in [`Metrics`], bytes; longer names are cut.
 pub const MAX_NAME: usize = 32;
-/// Number of causes that [`Metrics::n_dropped`] tells apart.
+/// Number of causes in [`Metrics::n_dropped`].
 pub const N_CAUSES: usize = 5;
-/// In place of a view where a number is about none or about all of them.
+/// Replaces the view index of a number that belongs to no view, or to all.
 pub const NO_VIEW: u32 = u32::MAX;
-/// In place of the length of a queue where there is none.
+/// Replaces the queue length of a process without a queue.
 pub const NO_QUEUE: u32 = u32::MAX;
 
-/// What a process has done in this life, sent by every process about once a second, when somebody
-/// begins to look, and at its end. Percentiles are those of the whole life, of a histogram with two
-/// significant digits.
+/// The metrics of a process since its last start. Every process sends them about once a second,
+/// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
+/// histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Metrics.v1")]
 #[repr(C)]
@@ -25,42 +25,42 @@ pub struct Metrics {
     pub session: u64,
     /// Process id.
     pub pid: u32,
-    /// How often the process has been restarted.
+    /// Number of restarts of the process.
     pub epoch: u32,
-    /// When the process began to count, `CLOCK_MONOTONIC`, nanoseconds.
+    /// When counting began, `CLOCK_MONOTONIC`, nanoseconds.
     pub began_at_nanos: u64,
     /// When this was sent, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
-    /// Messages taken in.
+    /// Number of messages received.
     pub n_received: u64,
-    /// Messages sent out; the recorder: results written.
+    /// Number of messages sent; the process `results`: results written.
     pub n_sent: u64,
-    /// Messages sent out per second over the last seconds, in thousandths.
+    /// Messages sent per second over the last seconds, in thousandths.
     pub sent_millihertz: u64,
-    /// Messages or frames lost, by cause: see [`Cause`].
+    /// Number of messages or frames lost, by [`Cause`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Evidence sent out, bytes.
+    /// Evidence sent, bytes.
     pub evidence_bytes: u64,
-    /// Physical memory that the process holds, shared memory that it has mapped included, bytes; 0
-    /// where the system does not say.
+    /// Physical memory of the process, mapped shared memory included, bytes; 0 where the system
+    /// does not report it.
     pub memory_bytes: u64,
-    /// The most it has ever held, bytes.
+    /// Its peak, bytes.
     pub peak_memory_bytes: u64,
-    /// Frames or results that wait in the process, or [`NO_QUEUE`].
+    /// Number of frames or results that wait in the process, or [`NO_QUEUE`].
     pub queue: u32,
-    /// The most that ever waited, or [`NO_QUEUE`].
+    /// The largest number that ever waited, or [`NO_QUEUE`].
     pub longest_queue: u32,
-    /// Its view, or [`NO_VIEW`].
+    /// The view of the process, or [`NO_VIEW`].
     pub view: u32,
-    /// 1 once the process has seen the end of the footage and passed it on.
+    /// 1 once the process has reached the end of the stream and forwarded it.
     pub finished: u32,
-    /// Name of its view, UTF-8, filled up with zeros.
+    /// Name of the view, UTF-8, padded with zeros.
     pub name: [u8; MAX_NAME],
-    /// How many rows follow.
+    /// Number of valid rows.
     pub n_rows: u32,
-    /// Keeps the layout free of padding.
+    /// Explicit padding.
     pub reserved: u32,
-    /// Durations, by stage and view; no two are of the same.
+    /// Durations, at most one row for each span and view.
     pub rows: [MetricsRow; MAX_ROWS],
 }
 
@@ -91,30 +91,30 @@ impl Default for Metrics {
     }
 }
 
-/// Durations of one stage of the work, nanoseconds.
+/// Durations of one span, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("MetricsRow.v1")]
 #[repr(C)]
 pub struct MetricsRow {
-    /// Which stage: see [`Span`].
+    /// The span.
     pub span: Span,
-    /// Of which view, or [`NO_VIEW`].
+    /// The view, or [`NO_VIEW`].
     pub view: u32,
-    /// How many were measured.
+    /// Number of measurements.
     pub count: u64,
-    /// How many per second over the last seconds, in thousandths.
+    /// Measurements per second over the last seconds, in thousandths.
     pub millihertz: u64,
-    /// Half are no longer.
+    /// Median.
     pub p50_nanos: u64,
-    /// 99 of 100 are no longer.
+    /// 99th percentile.
     pub p99_nanos: u64,
-    /// 999 of 1000 are no longer.
+    /// 99.9th percentile.
     pub p99_9_nanos: u64,
-    /// The longest.
+    /// Maximum.
     pub max_nanos: u64,
 }
 
-/// What a duration is the duration of. A transparent number, as [`Status`](crate::Status) is.
+/// What a duration measures. A transparent number, as [`Status`](crate::Status).
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, ZeroCopySend, Pod, Zeroable,
 )]
@@ -123,18 +123,20 @@ pub struct MetricsRow {
 pub struct Span(pub u32);
 
 impl Span {
-    /// From a message being sent until work on it begins: transport, a busy receiver, other views.
+    /// From the sending of a message until work on it begins: transport, a busy receiver, waiting
+    /// for other views.
     pub const WAITING: Self = Self(0);
     /// Work on a frame.
     pub const COMPUTING: Self = Self(1);
-    /// Taking memory for the answer and sending it; where nothing may be lost, slow receivers too.
+    /// Reserving memory for the result and sending it; in lossless delivery also waiting for slow
+    /// receivers.
     pub const PUBLISHING: Self = Self(2);
-    /// From the capture of a frame until this process's answer to it was ready to be sent.
+    /// From the capture of a frame until the result of this process is ready to be sent.
     pub const SINCE_CAPTURE: Self = Self(3);
-    /// From the capture of a frame until its result was ready to be sent.
+    /// From the capture of a frame until its final result is ready to be sent.
     pub const END_TO_END: Self = Self(4);
 
-    /// All of them.
+    /// All spans.
     pub const ALL: [Self; 5] = [
         Self::WAITING,
         Self::COMPUTING,
@@ -143,7 +145,7 @@ impl Span {
         Self::END_TO_END,
     ];
 
-    /// In words.
+    /// The name for people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -157,23 +159,23 @@ impl Span {
     }
 }
 
-/// Why something was lost; its number is its place in [`Metrics::n_dropped`].
+/// Why messages or frames were lost; the discriminant is the index into [`Metrics::n_dropped`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cause {
-    /// The camera's side was behind its clock, and passed frames over.
+    /// The frame source fell behind its clock and skipped frames.
     BehindClock,
-    /// The process was busy, and newer frames took the place of these.
+    /// The process was busy, and newer frames replaced these.
     Busy,
-    /// It came after its frame had been answered.
+    /// The message arrived after its frame had been processed.
     Late,
-    /// Too many waited already.
+    /// The queue was full.
     QueueFull,
-    /// It could not be read.
+    /// The message could not be read.
     Malformed,
 }
 
 impl Cause {
-    /// All of them, in order.
+    /// All causes, in order.
     pub const ALL: [Self; N_CAUSES] = [
         Self::BehindClock,
         Self::Busy,
@@ -182,7 +184,7 @@ impl Cause {
         Self::Malformed,
     ];
 
-    /// In words.
+    /// The name for people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! The result: joints in the world, and what every view made of it.
+//! The final result: joints in the world, and the fused pose of every view.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -10,11 +10,12 @@ use crate::{MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
 #[type_name("Joint3d.v1")]
 #[repr(C)]
 pub struct Joint3d {
-    /// Position in the world of the rig, metres.
+    /// Position in the world frame of the rig, metres.
     pub in_world: [f64; 3],
     /// Covariance `[xx, xy, xz, yy, yz, zz]`, metres^2.
     pub covariance: [f64; 6],
-    /// Root mean square distance of the reprojected joint from the views used, pixels.
+    /// Root mean square distance of the joint's reprojections from the observations that were used,
+    /// pixels.
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
@@ -35,11 +36,11 @@ pub struct FusedView {
     pub status: Status,
     /// 1 if the view sees the person from behind, and left and right have been exchanged.
     pub exchanged: u32,
-    /// How many centres count.
+    /// Number of valid centres.
     pub n_parts: u32,
     /// Centre of every anatomical part, pixels of the frame.
     pub centres_px: [[f64; 2]; MAX_PARTS],
-    /// Score of the view's single-view answer.
+    /// Score of the view's best single-view candidate.
     pub single_score: f64,
 }
 
@@ -48,24 +49,24 @@ pub struct FusedView {
 #[type_name("Pose3d.v1")]
 #[repr(C)]
 pub struct Pose3d {
-    /// Which frame; `view` is 0.
+    /// The frame; `view` is 0.
     pub stamp: Stamp,
-    /// When.
+    /// When it was received and sent.
     pub timing: Timing,
     /// Whether there is a skeleton.
     pub status: Status,
-    /// How many joints count.
+    /// Number of valid joints.
     pub n_joints: u32,
-    /// How many views count.
+    /// Number of valid views.
     pub n_views: u32,
-    /// Bit `v` is set if view `v` delivered a pose in time.
+    /// Bit `v` is set if the pose of view `v` arrived in time.
     pub views_present: u32,
     /// Bit `v` is set if any joint uses view `v`.
     pub views_used: u32,
-    /// How many pairs delivered.
+    /// Number of pairs with a result.
     pub n_pairs: u32,
-    /// How sure the exchange of left and right is: energy of the chosen assignment less that of the
-    /// best other one.
+    /// How certain the decision about left and right is: energy of the chosen assignment minus that
+    /// of the best other one.
     pub facing_margin: f64,
     /// The joints.
     pub joints: [Joint3d; MAX_JOINTS],

@@ -1,4 +1,4 @@
-//! How far off a view is expected to be.
+//! Expected errors of a view.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -10,24 +10,25 @@ use crate::{MAX_PARTS, Stamp, Status, Timing};
 #[type_name("ViewQuality.v2")]
 #[repr(C)]
 pub struct ViewQuality {
-    /// Which frame of which view.
+    /// The frame and the view.
     pub stamp: Stamp,
-    /// When.
+    /// When it was received and sent.
     pub timing: Timing,
-    /// Whether there is a prediction; without one fusion treats every part as usable.
+    /// Whether there is a prediction; without one, fusion treats every part as usable.
     pub status: Status,
-    /// How many parts count.
+    /// Number of valid parts.
     pub n_parts: u32,
     /// Expected distance of the part's centre from the truth, pixels of the frame.
     pub sigma_px: [f32; MAX_PARTS],
-    /// How many thresholds count: those of all parts, or none.
+    /// Number of valid thresholds: all parts, or none.
     pub n_thresholds: u32,
-    /// Who predicted: a number made of the bytes of the file; 0 for no network.
+    /// Fingerprint of the network's file; 0 without a network.
     pub network: u32,
-    /// Error beyond which a part is switched off, pixels of the frame, as the network's file says.
+    /// Error above which a part is switched off, pixels of the frame, from the network's file.
     pub tau_px: [f32; MAX_PARTS],
-    /// What the network looked at: `[x1, y1, x2, y2]`, centres of the outermost pixels of the frame.
+    /// The input tile of the network: `[x1, y1, x2, y2]`, centres of the outermost pixels of the
+    /// frame.
     pub tile: [f32; 4],
-    /// What the prediction took, nanoseconds.
+    /// Time that the prediction took, nanoseconds.
     pub took_nanos: u64,
 }

@@ -1,24 +1,24 @@
 //! Why a receiver refused a message.
 
-/// Why a receiver refused a message: its sender is broken, or is no part of the deployment.
+/// Why a receiver refused a message: its sender is faulty, or does not belong to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refusal {
-    /// It is from another run.
+    /// It belongs to another session.
     Session,
-    /// It does not come from whom the topic belongs to: another view, pair or process.
+    /// Its view, pair or process is not the one that the topic belongs to.
     Sender,
-    /// It speaks of a time or a frame that nobody can have seen yet.
+    /// Its time or frame number lies in the future.
     Time,
-    /// A count or a size is not what the receiver works on.
+    /// A count or a size does not match the receiver's.
     Size,
-    /// An index points outside.
+    /// An index is out of range.
     Index,
-    /// A number is not finite, or negative where it may not be.
+    /// A number is not finite, or is negative where it must not be.
     Number,
 }
 
 impl Refusal {
-    /// How many causes there are.
+    /// Number of causes.
     pub const N: usize = 6;
 
     /// All causes, in the order of [`Health::refused`](crate::Health::refused).
@@ -31,7 +31,7 @@ impl Refusal {
         Self::Number,
     ];
 
-    /// In a word.
+    /// The name for people.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,9 +1,9 @@
-//! Which frame of which view, how it went, and when.
+//! Identity, status and times of a message.
 
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// What a message belongs to. Stages join on (session, frame), never on arrival.
+/// What a message belongs to. Stages join by (session, frame), never by time of arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Stamp.v1")]
 #[repr(C)]
@@ -17,13 +17,13 @@ pub struct Stamp {
     /// Index of the view in the rig, or of the pair in a [`PairPose`](crate::PairPose); 0 in a
     /// message about all views.
     pub view: u32,
-    /// How often the sender has been restarted.
+    /// Number of restarts of the sender.
     pub epoch: u32,
 }
 
 /// Whether a message carries a result, or why not.
 ///
-/// A transparent number rather than an enum: whatever bytes arrive, reading them is defined.
+/// A transparent number rather than an enum: any received bit pattern is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Status.v1")]
 #[repr(C)]
@@ -32,37 +32,37 @@ pub struct Status(pub u32);
 impl Status {
     /// The message carries a result.
     pub const OK: Self = Self(0);
-    /// Nothing follows: the footage has ended. The rest of the message is empty.
+    /// End of stream: nothing follows. The rest of the message is empty.
     pub const END: Self = Self(1);
     /// The source could not deliver this frame.
     pub const NO_FRAME: Self = Self(2);
     /// No pose scored above the threshold.
     pub const NO_DETECTION: Self = Self(3);
-    /// The predictor has nothing to say about this frame.
+    /// The predictor has no result for this frame.
     pub const NO_PREDICTION: Self = Self(4);
-    /// Too few views were there in time.
+    /// Too few views arrived in time.
     pub const TOO_FEW_VIEWS: Self = Self(5);
-    /// A message that this one needed was malformed.
+    /// A message that was needed for this one was malformed.
     pub const BAD_INPUT: Self = Self(6);
 
-    /// The picture is the same, bit for bit, as many before it: the camera stands still.
+    /// The picture is bit-identical to many before it: the camera is frozen.
     pub const FROZEN: Self = Self(7);
-    /// The camera says the same time as of the frame before.
+    /// The camera reports the same time as for the frame before.
     pub const TIME_REPEATED: Self = Self(8);
-    /// The camera says an earlier time than of the frame before.
+    /// The camera reports an earlier time than for the frame before.
     pub const TIME_WENT_BACK: Self = Self(9);
-    /// The camera's time does not follow from that of the frame before.
+    /// The camera's time is not consistent with that of the frame before.
     pub const CLOCK_JUMPED: Self = Self(10);
-    /// The picture has another size than those that the run began with.
+    /// The size of the picture has changed since the run began.
     pub const WRONG_SIZE: Self = Self(11);
     /// There is no camera, or it does not answer.
     pub const UNPLUGGED: Self = Self(12);
-    /// The camera went on to a later frame.
+    /// The camera skipped this frame.
     pub const LEFT_OUT: Self = Self(13);
     /// The picture cannot be decoded.
     pub const DAMAGED: Self = Self(14);
 
-    /// What can be wrong with a camera: all reasons for a frame without a picture that it gives itself.
+    /// Camera faults: all reasons for a frame without a picture that a camera itself can cause.
     pub const CAMERA_FAULTS: [Self; 9] = [
         Self::NO_FRAME,
         Self::FROZEN,
@@ -75,7 +75,7 @@ impl Status {
         Self::DAMAGED,
     ];
 
-    /// The reason in words.
+    /// The reason for people.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
@@ -99,14 +99,16 @@ impl Status {
     }
 }
 
-/// When a stage had all it needed, and when it sent its answer; `CLOCK_MONOTONIC`, nanoseconds.
+/// When a stage had received all inputs, and when it sent its result; `CLOCK_MONOTONIC`,
+/// nanoseconds.
 ///
-/// The difference is computation; from one stage's `sent` to the next one's `received` is transport.
+/// The difference is computing time; the time from one stage's `sent` to the next stage's
+/// `received` is transport.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Timing.v1")]
 #[repr(C)]
 pub struct Timing {
-    /// The last input arrived (capture: the pixels were asked for).
+    /// When the last input arrived (capture: when the pixels were requested).
     pub received_at_nanos: u64,
     /// Just before the message was sent.
     pub sent_at_nanos: u64,

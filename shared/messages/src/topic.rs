@@ -1,7 +1,7 @@
-//! Names of the services of a deployment. The number is the version of what travels there.
+//! Names of the topics of a deployment. The number is the version of the message type.
 //!
-//! Views, pairs and processes are named by index or by role, so that no user text gets into a
-//! service name.
+//! Views, pairs and processes are named by index or by role, so that no text from the user gets
+//! into a topic name.
 
 /// Pixels of a view: `[u8]` with [`FrameHeader`](crate::FrameHeader).
 #[must_use]
@@ -27,7 +27,7 @@ pub fn view_quality(view: usize) -> String {
     format!("view-quality/v2/{view}")
 }
 
-/// Answers of one fusion worker: [`PairPose`](crate::PairPose).
+/// Results of one fusion worker: [`PairPose`](crate::PairPose).
 #[must_use]
 pub fn pair_pose(worker: usize) -> String {
     format!("pair-pose/v3/{worker}")
@@ -39,7 +39,7 @@ pub fn pose3d() -> String {
     "pose3d/v1".to_owned()
 }
 
-/// Signs of life of a process: [`Health`](crate::Health).
+/// Heartbeats of a process: [`Health`](crate::Health).
 ///
 /// * `process`: its unique name in the deployment, for example `pose-2`.
 #[must_use]
@@ -55,7 +55,7 @@ pub fn metrics(process: &str) -> String {
     format!("{METRICS}{process}")
 }
 
-/// The process whose [`metrics`] travel on a topic, if they do.
+/// The process whose [`metrics`] are sent on a topic; `None` for other topics.
 #[must_use]
 pub fn process_of_metrics(topic: &str) -> Option<&str> {
     topic.strip_prefix(METRICS)
