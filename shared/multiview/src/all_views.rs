@@ -1,4 +1,5 @@
-//! All views at once: one view is solved while every other one supports it, in turn until nothing moves.
+//! Fuses all views at once: each view is solved in turn, supported by all others, until
+//! convergence.
 
 use std::collections::BTreeMap;
 
@@ -8,39 +9,39 @@ use crate::consistency::{Consistency, PairTerms};
 use crate::optimise::{is_best, mean_movement, types};
 use crate::{Epipolar, Iteration, PairInput, Settings, TypeTables, ViewInput};
 
-/// All views of one frame that answered.
+/// All views of one frame that have a result.
 #[derive(Clone, Copy)]
 pub struct AllViewsInput<'a> {
     /// The views.
     pub views: &'a [ViewInput<'a>],
     /// Part-type tables of a pair `(first, second)` of indices into `views`, `first < second`.
     pub tables: &'a dyn Fn(usize, usize) -> Option<&'a TypeTables>,
-    /// Weight of the terms of a pair. 1 adds those of all pairs as they are; `1 / (n - 1)` gives the
-    /// supports of a view together as much weight as the one support of a pair has.
+    /// Weight of the terms of a pair. 1 uses those of all pairs unchanged; `1 / (n - 1)` gives all
+    /// supports of a view together the weight of the single support in a pair.
     pub weight: f64,
 }
 
-/// Where all views start from.
+/// The start of the optimisation of all views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AllViewsStart<'a> {
     /// Candidate of every view.
     pub candidates: &'a [usize],
-    /// Whether left and right of a view are exchanged with respect to the first.
+    /// Whether left and right of a view are exchanged with respect to the first view.
     pub exchanged: &'a [bool],
 }
 
-/// What all views agreed on.
+/// The result of all views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsEstimate {
-    /// The energy at the end.
+    /// The final energy.
     pub energy: f64,
-    /// The way there; the target of each is an index into the views.
+    /// The solutions, in order; their targets are indices into the views.
     pub iterations: Vec<Iteration>,
-    /// Whether nothing moved any more at the end.
+    /// Whether the poses had converged at the end.
     pub converged: bool,
     /// Share of the consistency terms that were switched on, over all pairs and parts.
     pub active: f64,
-    /// The pose in every view; parts as the model names them, not exchanged.
+    /// The pose in every view; parts are named by the model, not exchanged.
     pub poses: Vec<Pose>,
 }
 
@@ -48,28 +49,35 @@ pub struct AllViewsEstimate {
 ///
 /// The paper's eq. 3 with a sum over all views and all pairs of them,
 /// `sum_v S(v) + weight sum_{v<u} (alpha xi + beta lambda)(v, u)`,
-/// which its conclusion leaves for later work. One view is solved exactly while all others are fixed: its terms
-/// are the sums of those that each other view alone would add, so the graph stays a tree. Views
-/// take turns, those that are trusted least first, and a solution is taken only if the energy rises: it
-/// never falls, and a cycle is impossible (but see [`SwitchBy::Support`](crate::SwitchBy::Support)). It ends when no view can raise the energy alone
-/// (but for what `epsilon_px` lets pass), or after `max_iterations / 2` solutions of every view.
+/// which the paper leaves for later work. One view is solved exactly while all others are fixed.
+/// Its terms are the sums of those that each other view alone would add, so the graph remains a
+/// tree. Views take turns, the least trusted first. A solution is accepted only if the energy
+/// rises, so the energy never falls and a cycle is impossible (except with
+/// [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no view alone can raise the
+/// energy (up to the tolerance of `epsilon_px`), or after `max_iterations / 2` solutions of every
+/// view.
 ///
-/// What it is worth, by PCP3D of `parallax eval` on 134 instants (three views, 14 of them four; the crate's page tells which), the mean of
-/// the terms (a weight of `1 / (n - 1)`), two starts, against the mean of pairs: 73.3 against 71.0 by geometry, with 15 solutions of a
-/// single view against 20 (four views: 23 against 40); 75.9 against 75.1 with the network's expected errors. The sum of the terms
-/// (a weight of 1) 72.6, with 17 solutions (four views: 32). With an earlier model three views were better off in pairs (73.4
-/// against 71.1), and where one of the four cameras was moved by two degrees they still are on these 14 instants (79.8 against 75.0 by geometry), but not on
-/// all 70 frames (78.3 with types against 80.0), nor with the network (81.3 against 84.3).
+/// Benefit, as PCP3D of `parallax eval` on 134 instants (three views, 14 of them four; see the
+/// documentation of the crate), for the mean of the terms (weight `1 / (n - 1)`) and two starts,
+/// compared with the mean of pairs: 73.3 against 71.0 by geometry, with 15 solutions of a single
+/// view against 20 (four views: 23 against 40); 75.9 against 75.1 with the network's expected
+/// errors. The sum of the terms (weight 1) gives 72.6, with 17 solutions (four views: 32). With an
+/// earlier model three views were better in pairs (73.4 against 71.1). Where one of the four
+/// cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0
+/// by geometry), but neither on all 70 frames (78.3 with types against 80.0) nor with the network
+/// (81.3 against 84.3).
 ///
-/// A deployment asks for it by `views = "all"` in its section `[fuse]`, with the mean of the terms and two starts.
+/// A deployment selects this by `views = "all"` in its section `[fuse]`, with the mean of the terms
+/// and two starts.
 ///
-/// [`EnergyKind::Released`](crate::EnergyKind::Released) has no such form; the terms are the paper's.
+/// There is no such form of [`EnergyKind::Released`](crate::EnergyKind::Released); the terms are
+/// the paper's.
 ///
-/// * `evidence`: the responses of every view, where they lie; best with their bounds.
+/// * `evidence`: the responses of every view; should carry their bounds.
 ///
 /// # Panics
 ///
-/// If the lists are not of one length.
+/// If the lists differ in length.
 pub fn estimate_all_views(
     solver: &Solver,
     settings: &Settings,
@@ -86,7 +94,8 @@ pub fn estimate_all_views(
     };
     let inputs = inputs(input);
     let pairs = Pairs::new(&of_pair, &inputs, start.exchanged);
-    let candidate = |(view, it): (&ViewInput<'_>, &usize)| view.candidates[*it].clone();
+    let candidate =
+        |(view, candidate): (&ViewInput<'_>, &usize)| view.candidates[*candidate].clone();
     let poses: Vec<Pose> = input
         .views
         .iter()
@@ -97,23 +106,28 @@ pub fn estimate_all_views(
     let own = poses
         .iter()
         .enumerate()
-        .map(|(view, it)| own_score(view, it));
+        .map(|(view, pose)| own_score(view, pose));
     let mut state = State::new(own.collect(), poses, &pairs);
     let order = order(input, &state.poses);
     let mut incremental: Vec<IncrementalSolver<'_>> =
         evidence.iter().map(|it| solver.incremental(it)).collect();
-    let mut known: Vec<Known> = vec![Known::default(); n_views];
+    let mut term_keys: Vec<TermKeys> = vec![TermKeys::default(); n_views];
     let (mut iterations, mut converged) = (Vec::new(), n_views < 2);
-    let mut calm = Calm::of(n_views);
+    let mut convergence = Convergence::of(n_views);
     let most = (settings.max_iterations * n_views).div_ceil(2);
     for &target in order.iter().cycle().take(if converged { 0 } else { most }) {
-        let supports = pairs.supports(target, &state.poses, &mut known[target]);
+        let supports = pairs.supports(target, &state.poses, &mut term_keys[target]);
         let guesses = input.views[target].candidates.iter();
         let guesses = guesses.chain([&state.poses[target]]);
-        let found = incremental[target].best(&supports, guesses);
-        debug_assert!(is_best(solver, evidence[target], &supports, found.as_ref()));
+        let solution = incremental[target].best(&supports, guesses);
+        debug_assert!(is_best(
+            solver,
+            evidence[target],
+            &supports,
+            solution.as_ref()
+        ));
         let before = state.poses[target].clone();
-        if let Some(pose) = found {
+        if let Some(pose) = solution {
             let own = own_score(target, &pose);
             state.take_if_better(target, own, pose, &pairs);
         }
@@ -126,7 +140,7 @@ pub fn estimate_all_views(
             moved_px,
             pose: after.clone(),
         });
-        converged = calm.after(moved_px <= settings.epsilon_px && same_types);
+        converged = convergence.after(moved_px <= settings.epsilon_px && same_types);
         if converged {
             break;
         }
@@ -140,15 +154,15 @@ pub fn estimate_all_views(
     }
 }
 
-/// Knows when no view can be moved any more.
-struct Calm {
+/// Detects when no view can move any more.
+struct Convergence {
     n_views: usize,
-    /// Solutions since the last that moved its view.
+    /// Number of solutions since the last one that moved its view.
     n_still: usize,
     has_moved: bool,
 }
 
-impl Calm {
+impl Convergence {
     fn of(n_views: usize) -> Self {
         Self {
             n_views,
@@ -157,20 +171,20 @@ impl Calm {
         }
     }
 
-    /// Counts a solution; returns whether it was the last that is needed.
+    /// Counts a solution; returns whether the optimisation has converged.
     fn after(&mut self, is_still: bool) -> bool {
         self.n_still = if is_still { self.n_still + 1 } else { 0 };
         self.has_moved |= !is_still;
-        // Who moved last was solved against all the others as they still are.
+        // The last view that moved was solved against all others as they are now.
         self.n_still + usize::from(self.has_moved) >= self.n_views
     }
 }
 
-/// Views in the order in which they are solved: highest expected error first, or lowest score
-/// where any view has no expectation; among equals the last.
+/// The order in which views are solved: highest expected error first, or lowest score first if any
+/// view has no expected errors; among equals the last view first.
 fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     let expected = input.views.iter();
-    let expected = expected.map(|it| it.sigma_px.map(|it| it.iter().sum::<f32>()));
+    let expected = expected.map(|view| view.sigma_px.map(|sigma_px| sigma_px.iter().sum::<f32>()));
     let trust: Vec<f32> = match expected.collect::<Option<Vec<f32>>>() {
         Some(errors) => errors.iter().map(|it| -it).collect(),
         None => poses.iter().map(|it| it.score).collect(),
@@ -180,7 +194,7 @@ fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     order
 }
 
-/// All pairs: `[first][second - first - 1]`.
+/// All pairs of views: `[first][second - first - 1]`.
 fn inputs<'a>(input: &AllViewsInput<'a>) -> Vec<Vec<PairInput<'a>>> {
     let n = input.views.len();
     let pair = |first: usize, second: usize| PairInput {
@@ -202,8 +216,8 @@ impl<'a> Pairs<'a> {
         let of_first = |(first, pairs): (usize, &'a Vec<PairInput<'a>>)| {
             let seconds = exchanged[first + 1..].iter();
             let terms = pairs.iter().zip(seconds);
-            let terms =
-                terms.map(|(pair, it)| PairTerms::new(settings, pair, *it != exchanged[first]));
+            let terms = terms
+                .map(|(pair, second)| PairTerms::new(settings, pair, *second != exchanged[first]));
             terms.collect()
         };
         Self {
@@ -211,7 +225,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The terms of two views, and the place of the first one given among them.
+    /// The terms of two views, and the index of the first given view among the two.
     fn of(&self, view: usize, other: usize) -> (&PairTerms<'a>, usize) {
         let (first, second) = (view.min(other), view.max(other));
         (
@@ -220,7 +234,7 @@ impl<'a> Pairs<'a> {
         )
     }
 
-    /// The consistency sums of a pose of one view with the poses of another.
+    /// The consistency sums of a pose of one view and a pose of another.
     fn between(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
         match self.of(view, other) {
             (terms, 0) => terms.between(pose, others),
@@ -228,7 +242,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The same with the terms that are on while `view` is solved.
+    /// As [`Self::between`], with the terms that are switched on while `view` is solved.
     fn for_target(&self, view: usize, pose: &Pose, other: usize, others: &Pose) -> f64 {
         match self.of(view, other) {
             (terms, 0) => terms.for_target(0, pose, others),
@@ -236,16 +250,23 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// What all other views add to a target.
-    fn supports<'b>(&'b self, target: usize, poses: &'b [Pose], known: &mut Known) -> Supports<'b> {
-        let others = (0..poses.len()).filter(|it| *it != target);
+    /// The terms that all other views add to a target.
+    fn supports<'b>(
+        &'b self,
+        target: usize,
+        poses: &'b [Pose],
+        term_keys: &mut TermKeys,
+    ) -> Supports<'b> {
+        let others = (0..poses.len()).filter(|other| *other != target);
         let one = |other: usize| {
             let (terms, side) = self.of(target, other);
             Consistency::new(terms, side, &poses[other])
         };
         let each: Vec<Consistency<'b>> = others.map(one).collect();
         let n_parts = poses[target].parts.len();
-        let keys = (0..n_parts).map(|part| known.key(&each, part)).collect();
+        let keys = (0..n_parts)
+            .map(|part| term_keys.key(&each, part))
+            .collect();
         Supports { each, keys }
     }
 
@@ -256,22 +277,22 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// Numbers for what the terms of a part depend on: as that is more than a number holds, each kind that
-/// comes up gets the next one.
+/// Assigns numbers to the dependencies of a part's terms. A dependency is larger than a `u64`, so
+/// each distinct one gets the next number.
 #[derive(Debug, Clone, Default)]
-struct Known {
+struct TermKeys {
     kinds: BTreeMap<(usize, Vec<Option<u64>>), u64>,
 }
 
-impl Known {
+impl TermKeys {
     fn key(&mut self, each: &[Consistency<'_>], part: usize) -> u64 {
         let next = self.kinds.len() as u64;
-        let kind = each.iter().map(|it| it.key(part)).collect();
+        let kind = each.iter().map(|terms| terms.key(part)).collect();
         *self.kinds.entry((part, kind)).or_insert(next)
     }
 }
 
-/// The terms of a target while all other views stand still: the sums of those of each.
+/// The terms of a target while all other views are fixed: the sums over the other views.
 struct Supports<'a> {
     each: Vec<Consistency<'a>>,
     keys: Vec<u64>,
@@ -279,16 +300,20 @@ struct Supports<'a> {
 
 impl ExtraTerms for Supports<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
-        let add = |any, it: &Consistency<'_>| it.add_position(part, level, first, score) || any;
+        let add =
+            |any, terms: &Consistency<'_>| terms.add_position(part, level, first, score) || any;
         self.each.iter().fold(false, add)
     }
 
     fn of_type(&self, part: usize, mixture: usize) -> f32 {
-        self.each.iter().map(|it| it.of_type(part, mixture)).sum()
+        self.each
+            .iter()
+            .map(|terms| terms.of_type(part, mixture))
+            .sum()
     }
 
     fn max_gain(&self, part: usize) -> f32 {
-        self.each.iter().map(|it| it.max_gain(part)).sum()
+        self.each.iter().map(|terms| terms.max_gain(part)).sum()
     }
 
     fn key(&self, part: usize) -> Option<u64> {
@@ -296,7 +321,7 @@ impl ExtraTerms for Supports<'_> {
     }
 }
 
-/// The poses, and what they are worth.
+/// The poses and the values of their terms.
 struct State {
     poses: Vec<Pose>,
     own: Vec<f64>,
@@ -328,15 +353,15 @@ impl State {
         self.own.iter().sum::<f64>() + pairs.map(|(a, b)| self.between[a][b]).sum::<f64>()
     }
 
-    /// Takes a pose over if the energy rises, as the view sees it.
+    /// Accepts a pose if it raises the energy as seen by the view.
     fn take_if_better(&mut self, view: usize, own: f64, pose: Pose, pairs: &Pairs<'_>) {
-        let others = (0..self.poses.len()).filter(|it| *it != view);
-        let seen = |pose: &Pose| -> f64 {
+        let others = (0..self.poses.len()).filter(|other| *other != view);
+        let gain = |pose: &Pose| -> f64 {
             let others = others.clone();
-            let terms = others.map(|it| pairs.for_target(view, pose, it, &self.poses[it]));
+            let terms = others.map(|other| pairs.for_target(view, pose, other, &self.poses[other]));
             terms.sum()
         };
-        if own + seen(&pose) > self.own[view] + seen(&self.poses[view]) {
+        if own + gain(&pose) > self.own[view] + gain(&self.poses[view]) {
             for other in others {
                 let value = pairs.between(view, &pose, other, &self.poses[other]);
                 self.between[other][view] = value;

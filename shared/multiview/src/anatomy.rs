@@ -1,13 +1,14 @@
-//! Which side of a skeleton is its right: heads, knees, elbows and bent backs know what is in front.
+//! Decides which side of a skeleton is the right one, from the direction in which heads, knees,
+//! elbows and backs bend.
 //!
-//! Exchanging left and right in all views at once changes no energy, so two views can tell whether
-//! they agree but not which of them is from behind. The labelled skeleton itself can: with `l` from its
-//! right to its left and `u` from its pelvis to its neck, `l x u` points to its front if the labels are
-//! right and to its back if they are exchanged, and bodies bend forwards.
+//! Exchanging left and right in all views at once changes no energy: two views can tell whether
+//! they agree, but not which of them is from behind. The labelled skeleton can tell. With `l` from
+//! its right to its left and `u` from its pelvis to its neck, `l x u` points to the front if the
+//! labels are right, and to the back if they are exchanged; and bodies bend forwards.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Joints of the PARSE order that the evidence looks at.
+/// Indices of the PARSE joints that the evidence uses.
 const R_ANKLE: usize = 0;
 const R_KNEE: usize = 1;
 const R_HIP: usize = 2;
@@ -23,15 +24,15 @@ const L_WRIST: usize = 11;
 const NECK: usize = 12;
 const HEAD: usize = 13;
 
-/// How much a labelled skeleton looks as if its left and right were right, in trunk lengths.
+/// Evidence that left and right of a labelled skeleton are correct, in trunk lengths.
 ///
-/// The sum of how far the head is in front of the neck, the knees in front of the line from hip to
-/// ankle, the elbows behind the line from shoulder to wrist, and, if the world says which way is up,
-/// the neck in front of the pelvis. Exactly negated when left and right are exchanged. No source: our
-/// own rule for what the paper leaves open.
+/// The sum of the distances of the head in front of the neck, the knees in front of the line from
+/// hip to ankle, the elbows behind the line from shoulder to wrist and, if the up direction is
+/// known, the neck in front of the pelvis. Negated exactly when left and right are exchanged. There
+/// is no source: this is our own rule for what the paper leaves open.
 ///
-/// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing one counts for nothing.
-/// * Returns 0 where trunk or sides are missing.
+/// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing joint contributes 0.
+/// * Returns 0 if the trunk or both sides are missing.
 pub fn anatomical_evidence(
     joints: &[Option<Point3<f64>>],
     up_in_world: Option<UnitVector3<f64>>,
@@ -91,13 +92,13 @@ mod tests {
             [0.0, 0.0, 1.45],
             [0.08, 0.0, 1.7],
         ]
-        .map(|it| Some(Point3::from(it)))
+        .map(|point| Some(Point3::from(point)))
         .to_vec()
     }
 
     fn exchanged(joints: &[Option<Point3<f64>>]) -> Vec<Option<Point3<f64>>> {
         [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13]
-            .map(|it| joints[it])
+            .map(|joint| joints[joint])
             .to_vec()
     }
 
@@ -108,13 +109,13 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_back_speaks_louder_when_up_is_known() {
+    fn a_bent_back_gives_more_evidence_when_up_is_known() {
         let bent = |joint: Option<Point3<f64>>| {
-            joint.map(|it| {
-                if it.z > 1.0 {
-                    Point3::new(it.z - 0.9, it.y, 0.9 + it.x)
+            joint.map(|point| {
+                if point.z > 1.0 {
+                    Point3::new(point.z - 0.9, point.y, 0.9 + point.x)
                 } else {
-                    it
+                    point
                 }
             })
         };
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn without_hips_nothing_is_said() {
+    fn without_hips_there_is_no_evidence() {
         let mut joints = standing();
         joints[R_HIP] = None;
         assert_eq!(anatomical_evidence(&joints, None), 0.0);
@@ -137,7 +138,7 @@ mod tests {
             let joints: Vec<_> = standing()
                 .iter()
                 .zip(offsets.chunks(3))
-                .map(|(joint, d)| joint.map(|it| it + Vector3::new(d[0], d[1], d[2])))
+                .map(|(joint, d)| joint.map(|point| point + Vector3::new(d[0], d[1], d[2])))
                 .collect();
             let up = Some(Vector3::z_axis());
             let sum = anatomical_evidence(&joints, up) + anatomical_evidence(&exchanged(&joints), up);
@@ -147,7 +148,7 @@ mod tests {
         #[test]
         fn moving_and_turning_the_world_changes_nothing(yaw in -3.0..3.0_f64, x in -5.0..5.0_f64) {
             let moved = Isometry3::new(Vector3::new(x, 1.0, 0.2), Vector3::z() * yaw);
-            let joints: Vec<_> = standing().iter().map(|it| it.map(|it| moved * it)).collect();
+            let joints: Vec<_> = standing().iter().map(|joint| joint.map(|point| moved * point)).collect();
             let up = Some(Vector3::z_axis());
             let (here, there) = (anatomical_evidence(&standing(), up), anatomical_evidence(&joints, up));
             prop_assert!((here - there).abs() < 1e-9);

@@ -1,4 +1,5 @@
-//! Part-type tables for views that nobody trained on, chosen by the angle between them.
+//! Part-type tables for camera pairs without training data, selected by the angle between the
+//! views.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,23 +7,26 @@ use nalgebra::{Point2, Vector3};
 
 use crate::{TypeTables, ViewInput};
 
-/// Part-type tables by the angle under which two views see the person.
+/// Part-type tables by the angle between two views, as seen from the person.
 ///
-/// The full circle is cut into bins of equal width; the angles of one half are given, the other half holds the
-/// same tables with the views exchanged. A pair takes the table of the bin that its angle falls into.
+/// The circle is divided into bins of equal width. Tables are given for one half; the other half
+/// has the same tables with the views exchanged. A pair uses the table of the bin that its angle
+/// falls into.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleTables {
-    /// By angle from -180 degrees; `None` where nothing is known.
+    /// By angle from -180 degrees; `None` where there is no table.
     bins: Vec<Option<TypeTables>>,
 }
 
 impl AngleTables {
-    /// From the tables of half the circle.
+    /// Creates the tables of the whole circle from those of one half.
     ///
-    /// * `half`: of `n` tables the `i`-th is for angles from `i` to `i + 1` times `180 / n` degrees.
+    /// * `half`: the `i`-th of `n` tables is for angles from `i` to `i + 1` times `180 / n`
+    ///   degrees.
     /// * `mirror`: the part on the other side of every part; the parts themselves if the model has no sides.
     pub fn new(half: Vec<Option<TypeTables>>, mirror: &[usize]) -> Self {
-        let reversed = |it: &Option<TypeTables>| it.as_ref().map(|it| it.reversed(mirror));
+        let reversed =
+            |tables: &Option<TypeTables>| tables.as_ref().map(|tables| tables.reversed(mirror));
         let mut bins: Vec<Option<TypeTables>> = half.iter().rev().map(reversed).collect();
         bins.extend(half);
         Self { bins }
@@ -37,34 +41,35 @@ impl AngleTables {
     }
 }
 
-/// The angle between two cameras as seen from the person: how far around the person one has to go from the first
-/// to the second, radians from -pi to pi, counter-clockwise as seen from above.
+/// The angle between two cameras as seen from the person: the rotation about the person from the
+/// first to the second, radians from -pi to pi, counter-clockwise as seen from above.
 ///
-/// The person is where the rays through the middles of the views' best poses meet, so the angle at the person
-/// is that between the rays, and where exactly they meet does not matter. Up is what the pictures show as
-/// up. `None` where the lens model has no answer, or a view looks straight up or down.
+/// The person is where the rays through the centres of the views' best poses meet. The angle at the
+/// person is therefore that between the rays, and the exact meeting point does not matter. Up is
+/// the mean up direction of the pictures. `None` where the lens model has no solution, or a view
+/// looks straight up or down.
 pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f64> {
     let ups = [first, second].map(up);
     let up = (ups[0] + ups[1]).try_normalize(1e-6)?;
-    let level = |answer: &ViewInput<'_>| {
-        let ray = ray(answer)?;
+    let level = |view: &ViewInput<'_>| {
+        let ray = ray(view)?;
         (ray - up * ray.dot(&up)).try_normalize(1e-3)
     };
     let [from, to] = [level(first)?, level(second)?];
     Some(from.cross(&to).dot(&up).atan2(from.dot(&to)))
 }
 
-/// Against gravity, as the view's picture shows it, in the world.
-fn up(answer: &ViewInput<'_>) -> Vector3<f64> {
-    let turn = answer.plan.camera().camera_from_world.rotation.inverse();
+/// The up direction of the view's picture, in the world.
+fn up(view: &ViewInput<'_>) -> Vector3<f64> {
+    let turn = view.plan.camera().camera_from_world.rotation.inverse();
     turn * -Vector3::y()
 }
 
 /// Direction from the camera to the person, in the world.
-fn ray(answer: &ViewInput<'_>) -> Option<Vector3<f64>> {
-    let centres = answer.plan.centres(answer.candidates.first()?);
+fn ray(view: &ViewInput<'_>) -> Option<Vector3<f64>> {
+    let centres = view.plan.centres(view.candidates.first()?);
     let n = centres.len().max(1) as f64;
-    let mean = [0, 1].map(|axis| centres.iter().map(|it| it[axis]).sum::<f64>() / n);
-    let ray = answer.plan.camera().ray(&Point2::from(mean))?;
+    let mean = [0, 1].map(|axis| centres.iter().map(|centre| centre[axis]).sum::<f64>() / n);
+    let ray = view.plan.camera().ray(&Point2::from(mean))?;
     Some(ray.direction.into_inner())
 }

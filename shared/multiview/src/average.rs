@@ -1,11 +1,11 @@
-//! One pose per view out of the poses that its pairs found.
+//! Averages the poses of a view's pairs.
 
 /// The pose of one view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedPose {
     /// Centre of every anatomical part, pixels of the frame.
     pub centres_px: Vec<[f64; 2]>,
-    /// Pairs that were averaged; 0 if this is the view's own answer.
+    /// Number of pairs that were averaged; 0 if this is the view's own pose.
     pub n_pairs: usize,
     /// Sum of the energies of those pairs.
     pub energy: f64,
@@ -37,7 +37,7 @@ pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     })
 }
 
-/// Renames the parts of an exchanged view after the side of the body instead of the side of the image.
+/// Renames the parts of an exchanged view by the side of the body instead of the side of the image.
 pub fn anatomical(centres: &[[f64; 2]], mirror: Option<&[usize]>) -> Vec<[f64; 2]> {
     match mirror {
         Some(mirror) => mirror.iter().map(|&part| centres[part]).collect(),
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn candidates_are_averaged_part_by_part() {
+    fn candidates_are_averaged_per_part() {
         let (first, second) = ([[0.0, 0.0], [4.0, 2.0]], [[2.0, 4.0], [6.0, 2.0]]);
         let got = average(&[(1.0, &first), (0.5, &second)]).expect("two candidates");
         assert_eq!(got.centres_px, [[1.0, 2.0], [5.0, 2.0]]);
@@ -58,14 +58,14 @@ mod tests {
     }
 
     #[test]
-    fn an_exchanged_view_is_renamed() {
+    fn the_parts_of_an_exchanged_view_are_renamed() {
         let centres = [[0.0; 2], [1.0; 2], [2.0; 2]];
         let got = anatomical(&centres, Some(&[0, 2, 1]));
         assert_eq!(got, [[0.0; 2], [2.0; 2], [1.0; 2]]);
     }
 
     #[test]
-    fn no_candidate_is_no_pose() {
+    fn without_candidates_there_is_no_pose() {
         assert_eq!(average(&[]), None);
     }
 }

@@ -1,26 +1,26 @@
-//! How well the types of a part in two views go together, as learned from training images.
+//! Compatibility of the types of a part in two views, learned from training images.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A number for every part and pair of types, `[part][type in first view][type in second view]`.
+/// A value for every part and pair of types, `[part][type in first view][type in second view]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compatibility {
     values: Vec<DMatrix<f64>>,
     n_unseen: usize,
 }
 
-/// Why a table was refused.
+/// Why a table was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CompatibilityError {
-    /// More or fewer rows than the model has types.
+    /// The number of rows differs from the number of types of the model.
     #[error("the table has {got} rows, expected {expected}: one per part and type")]
     Rows {
         /// Rows found.
         got: usize,
-        /// Types of all parts.
+        /// Number of types of all parts.
         expected: usize,
     },
-    /// A row has another length than the part has types.
+    /// The length of a row differs from the number of types of the part.
     #[error("line {line}: {got} columns, expected {expected}: the part, and one per type")]
     Columns {
         /// Line, from 1.
@@ -35,22 +35,22 @@ pub enum CompatibilityError {
     Part {
         /// Line, from 1.
         line: usize,
-        /// What stands there.
+        /// The field.
         got: String,
         /// 1-based part.
         expected: usize,
     },
-    /// A field is no probability, and not all of its row is NaN.
+    /// A field is not a probability, and not all of its row is NaN.
     #[error("line {line}, column {column}: `{got}` is not a probability from 0 to 1")]
     Probability {
         /// Line, from 1.
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What stands there.
+        /// The field.
         got: String,
     },
-    /// A row is no distribution.
+    /// The probabilities of a row do not sum to 1.
     #[error("line {line}: the probabilities sum to {sum}, expected 1")]
     Sum {
         /// Line, from 1.
@@ -58,24 +58,24 @@ pub enum CompatibilityError {
         /// Their sum.
         sum: f64,
     },
-    /// Two tables are about different models.
+    /// Two tables belong to different models.
     #[error("the two tables have {first:?} and {second:?} types per part")]
     Shape {
-        /// Types of every part in the one table.
+        /// Number of types of every part in the first table.
         first: Vec<usize>,
-        /// In the other.
+        /// In the second table.
         second: Vec<usize>,
     },
 }
 
 impl Compatibility {
-    /// Reads a table in the authors' form: conditional probabilities, without a header.
+    /// Reads a table in the authors' format: conditional probabilities, without a header.
     ///
-    /// One line per part and type of the *first*-named view (parts in order, types within them), with
-    /// the 1-based part and then `p(type in second view | type in first view)` for every type of the
-    /// second view, separated by commas. A type of the first view that the training never saw has a
-    /// line of NaN or of zeros: nothing is known of it, so it is read as zeros, which add nothing to
-    /// any score, and counted by [`Self::n_unseen`].
+    /// One line per part and type of the *first*-named view (parts in order, types within them):
+    /// the 1-based part, then `p(type in second view | type in first view)` for every type of the
+    /// second view, separated by commas. A type of the first view that did not occur in training
+    /// has a line of NaN or of zeros. It is read as zeros, which add nothing to any score, and
+    /// counted by [`Self::n_unseen`].
     ///
     /// * `n_types`: number of types of every part.
     ///
@@ -113,20 +113,22 @@ impl Compatibility {
         Ok(table)
     }
 
-    /// Finds `p(type in first view, type in second view)` from the conditionals of both directions.
+    /// Computes `p(type in first view, type in second view)` from the conditionals of both
+    /// directions.
     ///
-    /// With `R = p(b | a)` and `Q = p(a | b)` the marginal `p(a)` satisfies `p(a) = p(a) R Q`: it is
-    /// the stationary distribution of the chain that goes from a type of the first view to one of the
-    /// second and back. Then `p(b) = p(a) R`, and both `p(a) R` and `p(b) Q` are the joint; if the
-    /// tables contradict each other, they are two joints with the same marginals, and the result is
-    /// their mean. Types never seen get 0.
+    /// With `R = p(b | a)` and `Q = p(a | b)` the marginal `p(a)` satisfies `p(a) = p(a) R Q`: it
+    /// is the stationary distribution of the chain that goes from a type of the first view to one
+    /// of the second and back. Then `p(b) = p(a) R`, and both `p(a) R` and `p(b) Q` are the joint
+    /// distribution. If the tables contradict each other, these are two joints with the same
+    /// marginals, and the result is their mean. Types that did not occur get 0.
     ///
-    /// Where the types fall into groups that never meet, the tables do not tell how frequent the
-    /// groups are; every group then counts as often as it has types in the first view.
+    /// If the types form groups that never occur together, the tables do not determine the
+    /// frequency of the groups; every group is then weighted by its number of types in the first
+    /// view.
     ///
     /// * `second_given_first`: `p(b | a)`, `[part][a][b]`; `first_given_second`: `p(a | b)`,
     ///   `[part][b][a]`, as [`Self::parse`] reads them from the two files of a pair.
-    /// * Returns the joint, which sums to 1 for every part that was seen, and the largest total
+    /// * Returns the joint, which sums to 1 for every part that occurred, and the largest total
     ///   variation distance between a part's two joints: 0 where the tables agree, at most 1.
     ///
     /// # Errors
@@ -153,11 +155,11 @@ impl Compatibility {
         Ok((Self::of(values), disagreement))
     }
 
-    /// The entry of a part for a pair of types; 0 where nothing is known.
+    /// The entry of a part for a pair of types; 0 where it is unknown.
     ///
     /// # Panics
     ///
-    /// If the part or one of the types is not in the table.
+    /// If the part or one of the types is out of range.
     pub fn value(&self, part: usize, first: usize, second: usize) -> f64 {
         self.values[part][(first, second)]
     }
@@ -167,7 +169,7 @@ impl Compatibility {
         self.values.iter().map(DMatrix::nrows).collect()
     }
 
-    /// Number of parts' types of the first view of which nothing is known.
+    /// Number of types of the first view, over all parts, that did not occur in training.
     pub fn n_unseen(&self) -> usize {
         self.n_unseen
     }
@@ -178,21 +180,27 @@ impl Compatibility {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
     }
 
-    /// The table whose part `i` is this one's `parts[i]`.
+    /// The table whose part `i` is part `parts[i]` of this one.
     pub(crate) fn permuted(&self, parts: &[usize]) -> Self {
-        Self::of(parts.iter().map(|&it| self.values[it].clone()).collect())
+        Self::of(
+            parts
+                .iter()
+                .map(|&part| self.values[part].clone())
+                .collect(),
+        )
     }
 
     /// `p(type in second view | type in first view)` of a joint table.
     #[must_use]
     pub fn conditional(&self) -> Self {
-        let normalised = |it: &DMatrix<f64>| normalise_rows(it.clone());
+        let normalised = |matrix: &DMatrix<f64>| normalise_rows(matrix.clone());
         Self::of(self.values.iter().map(normalised).collect())
     }
 
-    /// A table of given values, one matrix a part: rows are types in the first view.
+    /// Creates a table from one matrix per part: rows are types in the first view.
     pub fn of(values: Vec<DMatrix<f64>>) -> Self {
-        let unseen = |it: &DMatrix<f64>| it.row_iter().filter(|row| row.sum() <= 0.0).count();
+        let unseen =
+            |matrix: &DMatrix<f64>| matrix.row_iter().filter(|row| row.sum() <= 0.0).count();
         Self {
             n_unseen: values.iter().map(unseen).sum(),
             values,
@@ -200,10 +208,10 @@ impl Compatibility {
     }
 }
 
-/// Most by which rounding to five digits may move the sum of a row.
+/// Largest deviation of a row's sum that rounding to five digits may cause.
 const ROUNDING: f64 = 1e-3;
 
-/// Reads one row; `None` if nothing is known of its type.
+/// Reads one row; `None` if its type did not occur in training.
 fn parse_row(
     line: usize,
     row: &str,
@@ -228,7 +236,7 @@ fn parse_row(
     let probabilities = &fields[1..];
     if probabilities
         .iter()
-        .all(|it| it.eq_ignore_ascii_case("nan"))
+        .all(|field| field.eq_ignore_ascii_case("nan"))
     {
         return Ok(None);
     }
@@ -259,7 +267,7 @@ fn shortened(field: &str) -> String {
     field.chars().take(24).collect()
 }
 
-/// The joint `[a, b]` twice: from `second = p(b | a)`, and from `first = p(a | b)`.
+/// The joint `[a, b]` twice: from `second = p(b | a)` and from `first = p(a | b)`.
 fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let (second, first) = without_unseen(second.clone(), first.clone());
     let n = second.nrows();
@@ -267,7 +275,8 @@ fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     if seen.sum() == 0.0 {
         return [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
     }
-    // Half of every step stays, so that the chain cannot oscillate; squared, it takes 2^64 steps.
+    // Half of the probability stays in every step, so that the chain cannot oscillate; by squaring,
+    // 64 rounds take 2^64 steps.
     let mut steps = normalise_rows((&second * &first + DMatrix::identity(n, n)) / 2.0);
     for _ in 0..64 {
         steps = normalise_rows(&steps * &steps);
@@ -280,12 +289,12 @@ fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     ]
 }
 
-/// Makes the tables agree on which types were seen, and every row of those a distribution.
+/// Makes the tables agree on which types occur, and normalises their rows.
 fn without_unseen(
     mut second: DMatrix<f64>,
     mut first: DMatrix<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    // Each round removes a type of either view, or none is left to be removed.
+    // Every round removes at least one type, until none is left to be removed.
     for _ in 0..2 * second.nrows() {
         clear_unseen(&first, &mut second);
         clear_unseen(&second, &mut first);
@@ -302,7 +311,7 @@ fn clear_unseen(from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
     }
 }
 
-/// Scales every row to sum 1; a row of zeros stays.
+/// Scales every row to sum 1; a row of zeros stays zero.
 fn normalise_rows(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     for mut row in matrix.row_iter_mut() {
         let sum = row.sum();
@@ -323,7 +332,7 @@ mod tests {
         Compatibility::of(vec![DMatrix::from_fn(2, 2, |row, col| rows[row][col])])
     }
 
-    /// Joints of one part with 4 types, of which the last was never seen in the first view.
+    /// Joints of one part with 4 types, the last of which does not occur in the first view.
     fn joint() -> impl Strategy<Value = Compatibility> {
         prop::collection::vec(0.01..1.0, 16).prop_map(|mut cells| {
             cells[12..].fill(0.0);
@@ -338,7 +347,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_planted_joint_is_found_from_its_conditionals(planted in joint()) {
+        fn a_joint_is_recovered_from_its_conditionals(planted in joint()) {
             let conditionals = [planted.conditional(), planted.transposed().conditional()];
             let (found, disagreement) =
                 Compatibility::joint_from_conditionals(&conditionals[0], &conditionals[1]).unwrap();
@@ -360,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_that_contradict_each_other_are_told() {
+    fn tables_that_contradict_each_other_are_reported() {
         let alike = table(&[[1.0, 0.0], [0.0, 1.0]]);
         let exchanged = table(&[[0.0, 1.0], [1.0, 0.0]]);
         let (joint, disagreement) =
@@ -370,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chain_that_goes_to_and_fro_settles() {
+    fn a_periodic_chain_converges() {
         let to_and_fro = [0.0, 0.5, 0.5, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
         let second = Compatibility::of(vec![DMatrix::from_row_slice(3, 3, &to_and_fro)]);
         let first = Compatibility::of(vec![DMatrix::identity(3, 3)]);
@@ -381,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_that_never_meet_count_by_their_types() {
+    fn separate_groups_of_types_are_weighted_by_their_number_of_types() {
         let apart = table(&[[1.0, 0.0], [0.0, 1.0]]);
         let (joint, disagreement) = Compatibility::joint_from_conditionals(&apart, &apart).unwrap();
         assert!(largest_difference(&joint, &table(&[[0.5, 0.0], [0.0, 0.5]])) < 1e-12);
@@ -389,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn a_type_that_only_one_table_has_seen_counts_as_unseen() {
+    fn a_type_that_occurs_in_one_table_only_counts_as_unseen() {
         let second = table(&[[0.5, 0.5], [0.0, 1.0]]);
         let first = table(&[[1.0, 0.0], [0.0, 0.0]]);
         let (joint, _) = Compatibility::joint_from_conditionals(&second, &first).unwrap();
@@ -403,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_of_different_models_are_refused() {
+    fn tables_of_different_models_are_rejected() {
         let small = table(&[[1.0, 0.0], [0.0, 1.0]]);
         let large = Compatibility::of(vec![DMatrix::identity(3, 3)]);
         let error = Compatibility::joint_from_conditionals(&small, &large).unwrap_err();
@@ -415,7 +424,7 @@ mod tests {
 
     const TEXT: &str = "1,0.25,0.75\n1,NaN,NaN\n2,0,0\n2,0.33333,0.66667\n";
 
-    fn said_of(text: &str) -> String {
+    fn outcome(text: &str) -> String {
         match Compatibility::parse(text, &[2, 2]) {
             Ok(table) => format!("fine: {} unseen", table.n_unseen()),
             Err(error) => error.to_string(),
@@ -430,14 +439,14 @@ mod tests {
     }
 
     #[test]
-    fn a_type_never_seen_adds_nothing_and_is_counted() {
+    fn an_unseen_type_has_zeros_and_is_counted() {
         let table = Compatibility::parse(TEXT, &[2, 2]).unwrap();
         assert_eq!([table.value(0, 1, 0), table.value(1, 0, 1)], [0.0, 0.0]);
         assert_eq!(table.n_unseen(), 2);
     }
 
     #[test]
-    fn names_the_line_and_the_column_of_what_is_wrong() {
+    fn errors_name_line_and_column() {
         let cases = [
             (
                 "0.75",
@@ -477,7 +486,7 @@ mod tests {
             ),
         ];
         for (from, to, expected) in cases {
-            assert_eq!(said_of(&TEXT.replace(from, to)), expected);
+            assert_eq!(outcome(&TEXT.replace(from, to)), expected);
         }
     }
 
@@ -486,7 +495,7 @@ mod tests {
         fn a_changed_table_never_panics(at in 0..TEXT.len(), to in "[0-9a-zN.,\\n-]{0,8}") {
             let mut text = TEXT.to_owned();
             text.replace_range(at..(at + 3).min(TEXT.len()), &to);
-            let _outcome = said_of(&text);
+            let _outcome = outcome(&text);
         }
     }
 }

@@ -1,10 +1,10 @@
-//! One position of a part per view, out of those that the view's pairs found, such that all views mean
-//! the same point of the world.
+//! Selects one position of a part per view from those of the view's pairs, such that all views
+//! agree on one point of the world.
 
 use geometry::{Camera, Ray};
 use nalgebra::{Point2, Point3};
 
-/// Where one view's pairs saw a part.
+/// The positions of a part in the pairs of one view.
 #[derive(Debug, Clone)]
 pub struct Sightings<'a> {
     /// The camera of the frame.
@@ -15,14 +15,14 @@ pub struct Sightings<'a> {
     pub points_px: Vec<[f64; 2]>,
 }
 
-/// How a position is chosen.
+/// Settings of the consensus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConsensusSettings {
-    /// Reprojection error at which a view begins to pull less, sigma.
+    /// Reprojection error above which the pull of a view decreases, sigma.
     pub loss_sigmas: f64,
-    /// Distance up to which two pairs of a view are said to have found the same, sigma.
+    /// Distance up to which two pairs of a view count as having the same position, sigma.
     pub same_sigmas: f64,
-    /// What the votes of a view's pairs weigh against agreement between the views.
+    /// Weight of the votes of a view's pairs, relative to the agreement between views.
     pub vote_weight: f64,
 }
 
@@ -36,7 +36,7 @@ impl Default for ConsensusSettings {
     }
 }
 
-/// Stands for the error of a view that cannot see a point, sigma.
+/// Replaces the error of a view that cannot see a point, sigma.
 const UNSEEN: f64 = 1e6;
 
 /// A position that some of a view's pairs found.
@@ -44,24 +44,25 @@ const UNSEEN: f64 = 1e6;
 struct Choice {
     at: Point2<f64>,
     ray: Option<Ray>,
-    /// What choosing it costs.
+    /// Cost of choosing it.
     cost: f64,
 }
 
 /// Chooses a part's position in every view.
 ///
-/// The paper takes the mean over a view's pairs. Where the pairs disagree, as they do about crossed
-/// legs and lifted arms, the mean lies between two answers and belongs to neither. Here the point of the
-/// world is sought that most views have an answer for: over all points `X` in which the rays of two
-/// answers of different views meet, the least
+/// The paper takes the mean over a view's pairs. Where the pairs disagree, as for crossed legs and
+/// lifted arms, the mean lies between two positions and fits neither. This function looks for the
+/// point of the world that most views support: over all points `X` in which the rays of positions
+/// of two views meet, the minimum of
 ///
-/// `sum over views of min over answers k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
+/// `sum over views of min over positions k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
 ///
-/// where `r_k` is the distance of `X`'s image from the answer in sigma, and `n_k` of the view's `n` pairs
-/// gave it. The means compete as well, at the price of one answer that a single pair gave: where nothing
-/// fits together, they win. A view that has one answer keeps it. No source: our own rule.
+/// where `r_k` is the distance of the projection of `X` from position `k` in sigma, and `n_k` of
+/// the view's `n` pairs found that position. The means are a further alternative, with the cost of
+/// one position that a single pair found; they are chosen if nothing else is consistent. A view
+/// with a single position keeps it. There is no source: this is our own rule.
 ///
-/// * Returns one position per view, pixels; `None` for a view without sightings.
+/// * Returns one position per view, pixels; `None` for a view without positions.
 pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
     let mut workspace = ConsensusWorkspace::default();
     workspace.agree(settings, views).collect()
@@ -137,7 +138,7 @@ fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f6
     -settings.loss_sigmas.powi(2) * settings.vote_weight * share.ln()
 }
 
-/// The different answers of a view, in the order in which they were first given.
+/// The distinct positions of a view, in order of first occurrence.
 ///
 /// Answers close to the first one of their kind are one answer, at their mean.
 fn distinct(
@@ -270,7 +271,7 @@ fn nearest(
     costs.fold(dearest, |least, it| if it.1 < least.1 { it } else { least })
 }
 
-/// The point nearest to both rays; `None` if they are parallel or it lies behind one of them.
+/// The point closest to both rays; `None` if they are parallel or it lies behind one of them.
 fn meeting_point(a: &Ray, b: &Ray) -> Option<Point3<f64>> {
     let between = b.origin - a.origin;
     let cosine = a.direction.dot(&b.direction);
@@ -297,7 +298,7 @@ mod tests {
 
     use super::*;
 
-    /// Cameras on a circle of 4 m, looking at the origin.
+    /// Cameras on a circle of radius 4 m, looking at the origin.
     fn cameras(n: usize) -> Vec<Camera> {
         let camera = |i: usize| {
             let angle = 0.9 * i as f64;
@@ -322,7 +323,7 @@ mod tests {
         (0..n).map(camera).collect()
     }
 
-    fn seen(camera: &Camera, point: [f64; 3]) -> [f64; 2] {
+    fn projected(camera: &Camera, point: [f64; 3]) -> [f64; 2] {
         camera.project(&Point3::from(point)).unwrap().into()
     }
 
@@ -346,10 +347,10 @@ mod tests {
     const OTHER_KNEE: [f64; 3] = [-0.2, 0.15, 0.2];
 
     #[test]
-    fn the_answer_that_fits_the_other_views_beats_the_more_frequent_one() {
+    fn a_position_that_fits_the_other_views_beats_a_more_frequent_one() {
         let cameras = cameras(4);
-        let right = |view: usize| seen(&cameras[view], KNEE);
-        let wrong = |view: usize| seen(&cameras[view], OTHER_KNEE);
+        let right = |view: usize| projected(&cameras[view], KNEE);
+        let wrong = |view: usize| projected(&cameras[view], OTHER_KNEE);
         let views = sightings(&cameras, |view| match view {
             0 => vec![wrong(0), right(0), wrong(0)],
             _ => vec![right(view); 3],
@@ -362,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn one_answer_a_view_is_kept_whatever_the_others_say() {
+    fn a_single_position_per_view_is_kept() {
         let cameras = cameras(3);
         let points = [[10.0, 20.0], [300.0, 7.0], [55.0, 390.0]];
         let views = sightings(&cameras, |view| vec![points[view]]);
@@ -370,10 +371,10 @@ mod tests {
     }
 
     #[test]
-    fn a_view_without_sightings_has_none_and_does_not_count() {
+    fn a_view_without_positions_gets_none_and_is_ignored() {
         let cameras = cameras(4);
-        let right = |view: usize| seen(&cameras[view], KNEE);
-        let wrong = |view: usize| seen(&cameras[view], OTHER_KNEE);
+        let right = |view: usize| projected(&cameras[view], KNEE);
+        let wrong = |view: usize| projected(&cameras[view], OTHER_KNEE);
         let views = sightings(&cameras, |view| match view {
             0 => vec![wrong(0), right(0)],
             1 => Vec::new(),
@@ -385,33 +386,33 @@ mod tests {
     }
 
     #[test]
-    fn where_only_the_means_fit_together_they_are_taken() {
+    fn the_means_are_chosen_if_nothing_else_is_consistent() {
         let cameras = cameras(4);
         let views = sightings(&cameras, |view| {
-            let [x, y] = seen(&cameras[view], KNEE);
-            // To all sides, so that no two answers of different views meet near a third.
+            let [x, y] = projected(&cameras[view], KNEE);
+            // In all directions, so that no two positions of different views meet near a third.
             let [dx, dy] = [[60.0, 80.0], [-70.0, 75.0], [65.0, -90.0], [-85.0, -60.0]][view];
             vec![[x + dx, y + dy], [x - dx, y - dy]]
         });
         for (view, got) in choose(&views).into_iter().enumerate() {
-            let ([x, y], [gx, gy]) = (seen(&cameras[view], KNEE), got.unwrap());
+            let ([x, y], [gx, gy]) = (projected(&cameras[view], KNEE), got.unwrap());
             assert!((gx - x).hypot(gy - y) < 1e-9, "view {view}: {gx} {gy}");
         }
     }
 
     #[test]
-    fn answers_that_differ_by_less_than_they_are_sure_of_are_one() {
+    fn positions_closer_than_their_uncertainty_are_merged() {
         let cameras = cameras(2);
-        let [x, y] = seen(&cameras[0], KNEE);
+        let [x, y] = projected(&cameras[0], KNEE);
         let views = sightings(&cameras, |view| match view {
             0 => vec![[x - 1.0, y], [x + 1.0, y]],
-            _ => vec![seen(&cameras[1], KNEE)],
+            _ => vec![projected(&cameras[1], KNEE)],
         });
         assert_eq!(choose(&views)[0], Some([x, y]));
     }
 
     #[test]
-    fn cameras_in_one_place_keep_the_means() {
+    fn cameras_at_one_place_keep_the_means() {
         let camera = cameras(1).remove(0);
         let cameras = [camera.clone(), camera];
         let views = sightings(&cameras, |_| vec![[100.0, 100.0], [200.0, 100.0]]);
@@ -420,7 +421,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_view_gets_an_answer_of_its_own_or_its_mean(
+        fn every_view_gets_one_of_its_positions_or_their_mean(
             points in prop::collection::vec(prop::collection::vec([0.0..400.0_f64, 0.0..400.0], 1..4), 2..5),
         ) {
             let cameras = cameras(points.len());

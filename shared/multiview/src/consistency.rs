@@ -1,16 +1,17 @@
-//! The paper's terms between two views: eq. 3 to 7, with one side fixed or both given.
+//! The paper's terms between two views (eq. 3 to 7), with one view fixed or both given.
 
 use fmp::{ExtraTerms, Pose};
 
 use crate::term::Term;
 use crate::{Compatibility, PairInput, Settings, SwitchBy};
 
-/// Everything about the terms of a pair that does not change from one iteration to the next.
+/// The parts of a pair's terms that stay the same from iteration to iteration.
 #[derive(Debug)]
 pub(crate) struct PairTerms<'a> {
     settings: &'a Settings,
     pair: &'a PairInput<'a>,
-    /// `counterpart[i]` of the second view is the anatomical part that `i` of the first view shows.
+    /// `counterpart[i]` is the part of the second view that shows the same limb as part `i` of the
+    /// first.
     counterpart: Vec<usize>,
     /// `[target][part of the first view]`.
     active: [Vec<bool>; 2],
@@ -18,20 +19,20 @@ pub(crate) struct PairTerms<'a> {
 }
 
 impl<'a> PairTerms<'a> {
-    /// The terms of a pair.
+    /// Creates the terms of a pair.
     ///
-    /// * `exchanged`: the second view shows the other side of the body; such a pair has a table of its
-    ///   own, or goes without the appearance term.
+    /// * `exchanged`: the second view shows the other side of the body. Such a pair needs a table
+    ///   of its own, or has no appearance term.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let model = pair.views[0].plan.model();
         let counterpart = counterparts(model, exchanged);
         let active = active_parts(settings, pair, &counterpart);
         let table = pair.tables.filter(|_| settings.beta != 0.0);
-        let table = table.and_then(|it| {
+        let table = table.and_then(|tables| {
             if exchanged {
-                it.exchanged.as_deref()
+                tables.exchanged.as_deref()
             } else {
-                Some(it.joint.as_ref())
+                Some(tables.joint.as_ref())
             }
         });
         Self {
@@ -43,14 +44,15 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// The switches `a_i` of eq. 6, by part of the first view: on if the terms are on for either view.
+    /// The switches `a_i` of eq. 6 by part of the first view: on if the terms are on for either
+    /// view.
     pub(crate) fn active(&self) -> Vec<bool> {
         let [first, second] = &self.active;
         first.iter().zip(second).map(|(a, b)| *a || *b).collect()
     }
 
-    /// Value of the two consistency sums of eq. 3 for two given poses; the mean of what either view
-    /// makes of them, where the switches differ.
+    /// The value of the two consistency sums of eq. 3 for two given poses; if the switches of the
+    /// views differ, the mean of the values as seen by each.
     pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
         let value = self.for_target(0, first, second);
         if self.active[0] == self.active[1] {
@@ -60,7 +62,7 @@ impl<'a> PairTerms<'a> {
         }
     }
 
-    /// The same, with the terms that are on while `target` is solved.
+    /// As [`Self::between`], with the terms that are switched on while `target` is solved.
     pub(crate) fn for_target(&self, target: usize, first: &Pose, second: &Pose) -> f64 {
         let plan = self.pair.views[0].plan;
         let scale2 = plan.scale(usize::from(first.level)).powi(2);
@@ -131,7 +133,7 @@ impl<'a> PairTerms<'a> {
     }
 }
 
-/// The terms as the target view sees them while the support stands still.
+/// The terms as seen by the target view while the support is fixed.
 #[derive(Debug)]
 pub(crate) struct Consistency<'a> {
     pair_terms: &'a PairTerms<'a>,
@@ -160,7 +162,7 @@ impl Consistency<'_> {
 
 impl ExtraTerms for Consistency<'_> {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
-        let Some(term) = self.terms[part].filter(|it| !it.is_constant()) else {
+        let Some(term) = self.terms[part].filter(|term| !term.is_constant()) else {
             return false;
         };
         let plan = self.pair_terms.pair.views[self.target].plan;
@@ -180,7 +182,7 @@ impl ExtraTerms for Consistency<'_> {
 
     fn max_gain(&self, part: usize) -> f32 {
         let position = if self.terms[part].is_none() || self.pair_terms.settings.alpha >= 0.0 {
-            // Distances only cost.
+            // Distances only reduce the score.
             0.0
         } else {
             f32::INFINITY
@@ -205,7 +207,7 @@ impl ExtraTerms for Consistency<'_> {
 /// The key of a part whose support adds nothing.
 pub(crate) const NO_SUPPORT: u64 = u64::MAX;
 
-/// All of a support that the terms of one pair can depend on.
+/// Everything about a support that the terms of one pair depend on, as a key.
 pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     let at = support.parts[part];
     let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);
@@ -213,7 +215,7 @@ pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     fields.into_iter().fold(level, |key, it| key << 16 | it)
 }
 
-/// For every part of one view the part of the other view that shows the same limb.
+/// For every part of one view, the part of the other view that shows the same limb.
 pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
     match (&model.spec().mirror, exchanged) {
         (Some(mirror), true) => mirror.clone(),
@@ -221,14 +223,14 @@ pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
     }
 }
 
-/// Eq. 6, by the view that is solved and by part of the first view: a part is off if an expected error of it that
-/// counts exceeds its threshold.
+/// Eq. 6 for either target view, by part of the first view: a part is off if a relevant expected
+/// error exceeds its threshold.
 fn active_parts(
     settings: &Settings,
     pair: &PairInput<'_>,
     counterpart: &[usize],
 ) -> [Vec<bool>; 2] {
-    // Without a prediction a part is expected to be right.
+    // Without a prediction a part is assumed to be usable.
     let expected = |view: usize, part: usize| {
         let expectation = pair.views[view].expectation(settings, part);
         expectation.unwrap_or([0.0, 1.0])
@@ -240,7 +242,7 @@ fn active_parts(
             .collect()
     };
     let usable = |[sigma, tau]: [f32; 2]| sigma <= tau;
-    // In thresholds, since a person may be larger in one view than in the other.
+    // Compared in thresholds, since a person can be larger in one view than in the other.
     let no_worse =
         |[sigma, tau]: [f32; 2], [other, other_tau]: [f32; 2]| sigma * other_tau <= other * tau;
     match settings.switch {

@@ -1,6 +1,7 @@
-//! Which views see the person from behind: ranked by the energies of all pairs, followed over time.
+//! Decides which views see the person from behind: ranks assignments by the energies of all pairs
+//! and tracks them over time.
 
-/// What one pair found under either assumption about its two views.
+/// The result of one pair under either assumption about its two views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairEnergies {
     /// The views.
@@ -9,19 +10,19 @@ pub struct PairEnergies {
     pub same_or_opposite: [f64; 2],
 }
 
-/// Most views for which all assignments are tried.
+/// Largest number of views for which all assignments are enumerated.
 const MAX_VIEWS: usize = 16;
 
-/// One exchange of left and right per view, bit `v` for view `v`.
+/// Bit `v` is set if left and right of view `v` are exchanged.
 pub type Exchanges = u32;
 
-/// The assignments of exchanges that the pairs like best.
+/// Ranks the assignments of exchanges by the sum of the pairs' energies.
 ///
-/// A pair tells only whether its two views agree, so the first view that is there is never exchanged
-/// here; exchanging all views is another matter (see [`FacingFilter`]). Of a view without a pair the
-/// energies say nothing: it is exchanged and not.
+/// A pair only tells whether its two views agree. The first present view is therefore never
+/// exchanged here; exchanging all views is decided by [`FacingFilter`]. For a view without a pair
+/// both assignments are returned.
 ///
-/// * `present`: bit `v` is set if view `v` is there; the pairs' views are.
+/// * `present`: bit `v` is set if view `v` is present; the views of the pairs are.
 /// * Returns at most `limit` assignments with the sum of the pairs' energies, best first.
 ///
 /// # Panics
@@ -32,24 +33,24 @@ pub fn rank_facing(
     pairs: &[PairEnergies],
     limit: usize,
 ) -> Vec<(Exchanges, f64)> {
-    let paired = pairs.iter().flat_map(|it| it.views);
+    let paired = pairs.iter().flat_map(|pair| pair.views);
     let present = paired.fold(present, |mask, view| mask | 1 << view);
-    let seen: Vec<usize> = (0..Exchanges::BITS as usize)
+    let views: Vec<usize> = (0..Exchanges::BITS as usize)
         .filter(|view| is_exchanged(present, *view))
         .collect();
-    assert!(seen.len() <= MAX_VIEWS, "at most {MAX_VIEWS} views");
+    assert!(views.len() <= MAX_VIEWS, "at most {MAX_VIEWS} views");
     let spread = |free: u32| {
-        let later = seen.iter().skip(1).enumerate();
+        let later = views.iter().skip(1).enumerate();
         later.fold(0, |mask, (i, view)| mask | (free >> i & 1) << view)
     };
     let energy = |mask: Exchanges| -> f64 {
-        let of_pair = |it: &PairEnergies| {
-            let opposite = is_exchanged(mask, it.views[0]) != is_exchanged(mask, it.views[1]);
-            it.same_or_opposite[usize::from(opposite)]
+        let of_pair = |pair: &PairEnergies| {
+            let opposite = is_exchanged(mask, pair.views[0]) != is_exchanged(mask, pair.views[1]);
+            pair.same_or_opposite[usize::from(opposite)]
         };
         pairs.iter().map(of_pair).sum()
     };
-    let mut ranked: Vec<(Exchanges, f64)> = (0..1_u32 << seen.len().saturating_sub(1))
+    let mut ranked: Vec<(Exchanges, f64)> = (0..1_u32 << views.len().saturating_sub(1))
         .map(spread)
         .map(|mask| (mask, energy(mask)))
         .collect();
@@ -63,27 +64,27 @@ pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
     exchanges >> view & 1 == 1
 }
 
-/// One assignment of a frame, and what speaks for it.
+/// One assignment of a frame, with its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingHypothesis {
     /// Exchanges with respect to the first view.
     pub exchanges: Exchanges,
-    /// Energy of all views together under it.
+    /// Energy of all views under it.
     pub energy: f64,
-    /// How much the labelled skeleton looks anatomically right under it; the complement looks as much
-    /// wrong (see [`anatomical_evidence`](crate::anatomical_evidence)).
+    /// Evidence that the labelled skeleton is anatomically correct under it; that of the complement
+    /// is its negative (see [`anatomical_evidence`](crate::anatomical_evidence)).
     pub anatomy: f64,
 }
 
-/// How strongly a frame's facing holds on to that of the frame before.
+/// How strongly the facing of a frame depends on the frame before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingSettings {
-    /// Energy that it costs to exchange one view from one frame to the next.
+    /// Energy cost of exchanging one view from one frame to the next.
     pub change_cost: f64,
-    /// Share of what earlier frames said that is still believed in the next one, 0..1. The default
-    /// forgets half in 34 frames: people keep facing one way for longer than a stoop or a stride lasts.
+    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves it in 34
+    /// frames: people face one way for longer than a stoop or a stride takes.
     pub memory: f64,
-    /// Energy of one unit of anatomical evidence.
+    /// Energy per unit of anatomical evidence.
     pub anatomy_weight: f64,
 }
 
@@ -102,16 +103,18 @@ impl Default for FacingSettings {
 pub struct Facing {
     /// Which views see the person from behind.
     pub exchanges: Exchanges,
-    /// The hypothesis it belongs to, an index into those given.
+    /// The index of the hypothesis that it belongs to.
     pub hypothesis: usize,
-    /// How far it is ahead of the best assignment in which other views agree; infinite if there is none.
+    /// How far it is ahead of the best assignment with other agreements between views; infinite if
+    /// there is none.
     pub margin: f64,
 }
 
-/// Follows the facing of all views over time: a hidden Markov model, filtered by its best path.
+/// Tracks the facing of all views over time: a hidden Markov model with a Viterbi filter.
 ///
-/// The score of an assignment is what this frame says for it plus the best way to get there from the
-/// frame before, where every exchanged view costs. One frame alone is decided by its own energies.
+/// The score of an assignment is its score in this frame plus the best score of a path from the
+/// frame before, where every exchanged view has a cost. The first frame is decided by its own
+/// energies alone.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FacingFilter {
     scores: Vec<(Exchanges, f64)>,
@@ -120,8 +123,8 @@ pub struct FacingFilter {
 impl FacingFilter {
     /// Decides a frame.
     ///
-    /// * `hypotheses`: the frame's assignments, relative to the first view; never empty.
-    /// * `present`: bit `v` is set if view `v` has a say in this frame.
+    /// * `hypotheses`: the frame's assignments, relative to the first view; not empty.
+    /// * `present`: bit `v` is set if view `v` takes part in this frame.
     ///
     /// # Panics
     ///
@@ -133,14 +136,14 @@ impl FacingFilter {
         present: Exchanges,
     ) -> Facing {
         let mut scored: Vec<(usize, Exchanges, f64)> = Vec::with_capacity(2 * hypotheses.len());
-        for (i, it) in hypotheses.iter().enumerate() {
-            let anatomy = settings.anatomy_weight * it.anatomy;
-            let complement = !it.exchanges & present;
-            for (exchanges, said) in [
-                (it.exchanges, it.energy + anatomy),
-                (complement, it.energy - anatomy),
+        for (i, hypothesis) in hypotheses.iter().enumerate() {
+            let anatomy = settings.anatomy_weight * hypothesis.anatomy;
+            let complement = !hypothesis.exchanges & present;
+            for (exchanges, own) in [
+                (hypothesis.exchanges, hypothesis.energy + anatomy),
+                (complement, hypothesis.energy - anatomy),
             ] {
-                let score = said + self.best_way(settings, exchanges, present);
+                let score = own + self.best_path(settings, exchanges, present);
                 scored.push((i, exchanges, score));
             }
         }
@@ -149,15 +152,18 @@ impl FacingFilter {
             scored
                 .iter()
                 .copied()
-                .fold((0, 0, f64::NEG_INFINITY), |best, it| {
-                    if it.2 > best.2 { it } else { best }
+                .fold((0, 0, f64::NEG_INFINITY), |best, next| {
+                    if next.2 > best.2 { next } else { best }
                 });
         let runner_up = scored
             .iter()
-            .filter(|it| it.0 != hypothesis)
-            .map(|it| it.2)
+            .filter(|scored| scored.0 != hypothesis)
+            .map(|scored| scored.2)
             .fold(f64::NEG_INFINITY, f64::max);
-        self.scores = scored.iter().map(|it| (it.1, it.2 - top)).collect();
+        self.scores = scored
+            .iter()
+            .map(|scored| (scored.1, scored.2 - top))
+            .collect();
         Facing {
             exchanges,
             hypothesis,
@@ -165,7 +171,7 @@ impl FacingFilter {
         }
     }
 
-    fn best_way(&self, settings: &FacingSettings, to: Exchanges, present: Exchanges) -> f64 {
+    fn best_path(&self, settings: &FacingSettings, to: Exchanges, present: Exchanges) -> f64 {
         let from = |&(exchanges, score): &(Exchanges, f64)| {
             let changed = ((exchanges ^ to) & present).count_ones();
             settings.memory * score - settings.change_cost * f64::from(changed)
@@ -199,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn views_from_behind_are_told_from_those_in_front() {
+    fn views_from_behind_are_distinguished_from_those_in_front() {
         let pairs = [
             pair(0, 1, 2.0, 1.0),
             pair(0, 2, 1.0, 1.5),
@@ -212,7 +218,7 @@ mod tests {
 
     #[test]
     fn one_pair_is_outvoted_by_the_others() {
-        // The pair (1, 2) alone would say "same".
+        // The pair (1, 2) alone would prefer the same facing.
         let pairs = [
             pair(0, 1, 2.0, 1.0),
             pair(0, 2, 1.0, 2.0),
@@ -222,13 +228,13 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_is_missing_is_left_alone() {
+    fn a_missing_view_is_not_exchanged() {
         let got = rank_facing(0b110, &[pair(1, 2, 0.0, 1.0)], 8);
         assert_eq!(got, [(0b100, 1.0), (0b000, 0.0)]);
     }
 
     #[test]
-    fn of_a_view_without_a_pair_both_are_possible() {
+    fn both_assignments_of_a_view_without_a_pair_are_returned() {
         let got = rank_facing(0b111, &[pair(1, 2, 0.0, 1.0)], 8);
         let opposite = [(0b010, 1.0), (0b100, 1.0)];
         assert_eq!(got, [opposite, [(0b000, 0.0), (0b110, 0.0)]].concat());
@@ -236,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn anatomy_tells_an_assignment_from_its_complement() {
+    fn anatomy_distinguishes_an_assignment_from_its_complement() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
         let got = filter.decide(&settings, &[hypothesis(0b010, 1.0, -0.3)], 0b011);
@@ -257,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_person_who_turns_round_is_followed() {
+    fn a_person_turning_round_is_followed() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
         let front = [hypothesis(0b00, 1.0, 0.5)];
@@ -272,12 +278,12 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_is_missing_has_no_say_in_a_change() {
+    fn a_missing_view_does_not_count_as_a_change() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
         let all = [hypothesis(0b110, 2.0, 0.2), hypothesis(0b000, 0.0, 0.2)];
         assert_eq!(filter.decide(&settings, &all, 0b111).exchanges, 0b110);
-        // Without view 1 the same state is called 0b100.
+        // Without view 1 the same state is 0b100.
         let without = [hypothesis(0b100, 1.0, 0.1), hypothesis(0b000, 1.0, 0.1)];
         assert_eq!(filter.decide(&settings, &without, 0b101).exchanges, 0b100);
     }

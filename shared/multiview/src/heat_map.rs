@@ -1,20 +1,22 @@
-//! The authors' heat map: closeness of every cell to a rasterised epipolar line, between 0 and 1.
+//! The authors' heat map: the closeness of every cell to a rasterised epipolar line, between 0 and
+//! 1.
 //!
-//! Written from the description of what the released program computes: a line one pixel wide is
-//! drawn on an image of the original size, the image is shrunk by area to the size of the response
-//! map, every cell whose average differs from the background is on the line, a 3x3 chamfer distance
-//! transform measures cells from it, and `1 - sqrt(d / d_max)` is the heat. The map also covers the
-//! padding cells, so the line is off by up to a cell towards the borders; that is the program's way.
+//! Written from the description of the released program. A line one pixel wide is drawn on an image
+//! of the original size, and the image is reduced by area to the size of the response map. Every
+//! cell whose average differs from the background is on the line. A 3x3 chamfer distance transform
+//! measures the distance of all cells from it, and `1 - sqrt(d / d_max)` is the heat. The map also
+//! covers the padding cells, so the line is off by up to a cell towards the borders, as in the
+//! program.
 
 /// Weights of the 3x3 chamfer mask.
 const STRAIGHT: f32 = 0.955;
 const DIAGONAL: f32 = 1.3693;
 
-/// Heat of an epipolar line, as the released program has it: 1 on the line, 0 in the farthest cell.
+/// Heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
 ///
-/// `1 - sqrt(d / d_max)` with `d` a cell's chamfer distance from the line, `d_max` the map's largest;
-/// zeros if the line misses the image. Public for comparison with the program; the terms of
-/// [`EnergyKind::Released`](crate::EnergyKind::Released) are made of it.
+/// `1 - sqrt(d / d_max)` with `d` the chamfer distance of a cell from the line and `d_max` the
+/// largest of the map; zeros if the line misses the image. Public for comparison with the program;
+/// the terms of [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
 ///
 /// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
 ///   pixels (from 1); rounded half to even, then used as if counted from 0.
@@ -22,15 +24,15 @@ const DIAGONAL: f32 = 1.3693;
 /// * `rows`, `cols`: size of the response map; returns one value per cell, row major.
 pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: usize) -> Vec<f32> {
     let covered = coverage(ends, image_size, rows, cols);
-    // Eight-bit averaging: white (255) turns to 254 from half a grey level on.
+    // Averages have eight bits: white (255) becomes 254 from half a grey level on.
     let on_line = |covered: f64| covered > 0.5 / 255.0;
     let distance = |covered: f64| if on_line(covered) { 0.0 } else { f32::INFINITY };
     let mut map: Vec<f32> = covered.into_iter().map(distance).collect();
     chamfer(&mut map, cols);
     let largest = map.iter().copied().fold(0.0, f32::max);
     if largest.is_finite() && largest > 0.0 {
-        for it in &mut map {
-            *it = 1.0 - (*it / largest).sqrt();
+        for heat in &mut map {
+            *heat = 1.0 - (*heat / largest).sqrt();
         }
     } else {
         map.fill(0.0);
@@ -43,7 +45,7 @@ fn coverage(ends: [[f64; 2]; 2], size: [usize; 2], rows: usize, cols: usize) -> 
     let [width, height] = size;
     let cell = [width as f64 / cols as f64, height as f64 / rows as f64];
     let mut covered = vec![0.0; rows * cols];
-    let ends = ends.map(|end| end.map(|it| it.round_ties_even() as i64));
+    let ends = ends.map(|end| end.map(|side| side.round_ties_even() as i64));
     let Some([from, to]) = clip(ends, [width as i64 - 1, height as i64 - 1]) else {
         return covered;
     };
@@ -71,12 +73,13 @@ fn overlap(index: usize, cell: f64, pixel: f64) -> f64 {
     (hi.min(pixel + 1.0) - lo.max(pixel)).max(0.0)
 }
 
-/// Sides of the image that a point may lie beyond, besides left (1) and right (2).
+/// Sides of the image beyond which a point lies, besides left (1) and right (2).
 const ABOVE: i64 = 0b0100;
 const BELOW: i64 = 0b1000;
 const VERTICAL: i64 = ABOVE | BELOW;
 
-/// Clips a line to `[0, right] x [0, bottom]` (Cohen & Sutherland), integers truncated towards zero.
+/// Clips a line to `[0, right] x [0, bottom]` (Cohen & Sutherland); integers are truncated towards
+/// zero.
 fn clip(ends: [[i64; 2]; 2], [right, bottom]: [i64; 2]) -> Option<[[i64; 2]; 2]> {
     let [[mut x1, mut y1], [mut x2, mut y2]] = ends;
     let side = |x: i64| i64::from(x < 0) + 2 * i64::from(x > right);
@@ -134,7 +137,8 @@ fn line_pixels(from: [i64; 2], to: [i64; 2]) -> impl Iterator<Item = [i64; 2]> {
     })
 }
 
-/// The 3x3 chamfer distance transform in place: down and to the right, then up and to the left.
+/// The 3x3 chamfer distance transform, in place: a pass down and to the right, then one up and to
+/// the left.
 fn chamfer(distance: &mut [f32], cols: usize) {
     let along_row = |before: f32, here: &mut f32| {
         *here = here.min(before + STRAIGHT);
@@ -155,7 +159,7 @@ fn chamfer(distance: &mut [f32], cols: usize) {
     }
 }
 
-/// Steps from one row to the next, straight and to either side.
+/// Propagates distances from one row to the next, straight and diagonally.
 fn across_rows(from: &[f32], here: &mut [f32]) {
     let step = |from: &[f32], here: &mut [f32], length: f32| {
         for (from, here) in from.iter().zip(here) {
@@ -174,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_that_misses_the_image_warms_nothing() {
+    fn a_line_that_misses_the_image_gives_zero_heat() {
         let missed = heat_map([[-1.0, -1.0]; 2], [64, 48], 6, 8);
         assert_eq!(missed, vec![0.0; 48]);
     }
@@ -182,7 +186,7 @@ mod tests {
     #[test]
     fn the_line_is_hot_and_the_farthest_cell_is_cold() {
         let map = heat_map([[0.5, 24.0], [64.5, 24.0]], [64, 48], 12, 16);
-        let row = |it: usize| map[it * 16];
+        let row = |row: usize| map[row * 16];
         assert_eq!(row(6), 1.0);
         assert_eq!(row(0), 0.0);
         assert!(row(5) > row(4) && row(4) > row(3), "cools with distance");
@@ -190,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_between_two_pixels_go_to_the_even_one() {
+    fn ends_between_two_pixels_are_rounded_to_the_even_one() {
         for (y, row) in [(10.5, 10), (11.5, 12)] {
             let map = heat_map([[0.5, y], [64.5, y]], [64, 48], 48, 64);
             assert_eq!(map[row * 64 + 5], 1.0);
@@ -199,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertical_line_is_drawn_too() {
+    fn a_vertical_line_is_drawn() {
         let map = heat_map([[32.0, 0.5], [32.0, 48.5]], [64, 48], 12, 16);
         for row in 0..12 {
             assert_eq!(map[row * 16 + 8], 1.0, "row {row}");
@@ -207,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn the_direction_of_the_line_does_not_matter() {
+    fn the_direction_of_the_line_makes_no_difference() {
         let there = heat_map([[3.0, 40.0], [60.0, 5.0]], [64, 48], 12, 16);
         let back = heat_map([[60.0, 5.0], [3.0, 40.0]], [64, 48], 12, 16);
         assert_eq!(there, back);
@@ -223,9 +227,9 @@ mod tests {
     }
 
     proptest! {
-        /// Nothing stands in the way, so the shortest way is diagonal first, then straight.
+        /// There are no obstacles, so the shortest path is diagonal first, then straight.
         #[test]
-        fn the_chamfer_distance_is_that_of_the_shortest_way(
+        fn the_chamfer_distance_is_the_length_of_the_shortest_path(
             sources in prop::collection::vec((0..7_usize, 0..9_usize), 1..4),
         ) {
             let mut distance = [f32::INFINITY; 7 * 9];
@@ -234,12 +238,12 @@ mod tests {
             }
             chamfer(&mut distance, 9);
             for (cell, got) in distance.iter().enumerate() {
-                let way = |(row, col): &(usize, usize)| {
+                let path = |(row, col): &(usize, usize)| {
                     let (down, right) = (row.abs_diff(cell / 9), col.abs_diff(cell % 9));
                     let diagonal = down.min(right);
                     DIAGONAL * diagonal as f32 + STRAIGHT * (down.max(right) - diagonal) as f32
                 };
-                let expect = sources.iter().map(way).fold(f32::INFINITY, f32::min);
+                let expect = sources.iter().map(path).fold(f32::INFINITY, f32::min);
                 prop_assert!((got - expect).abs() < 1e-4, "{got} {expect}");
             }
         }

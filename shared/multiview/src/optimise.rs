@@ -1,4 +1,4 @@
-//! Alternating exact single-view solutions of one pair of views, until nothing moves.
+//! Fuses one pair of views by alternating exact single-view solutions until convergence.
 
 use fmp::{Bounds, ExtraTerms, Pose, Responses, Solver};
 
@@ -17,7 +17,7 @@ pub struct PairInput<'a> {
     pub tables: Option<&'a TypeTables>,
 }
 
-/// Where a pair starts from.
+/// The start of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PairStart {
     /// Candidate of either view.
@@ -26,53 +26,56 @@ pub struct PairStart {
     pub exchanged: bool,
 }
 
-/// One single-view solution on the way.
+/// One single-view solution of the optimisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iteration {
-    /// The view that was solved, 0 or 1; the other one supported.
+    /// The view that was solved, 0 or 1; the other one was the support.
     pub target: usize,
-    /// Energy of the pair after it (`Paper`), or the score of the target's pose (`Released`).
+    /// Energy of the pair after the solution (`Paper`), or score of the target's pose (`Released`).
     pub score: f64,
     /// Mean movement of the target's part centres, pixels.
     pub moved_px: f64,
-    /// The target's pose after it.
+    /// The target's pose after the solution.
     pub pose: Pose,
 }
 
-/// What a pair agreed on under one assumption.
+/// The result of a pair under one assumption about facing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairEstimate {
-    /// Where it started.
+    /// The start.
     pub start: PairStart,
-    /// The joint energy (eq. 3) at the end; `Released`: sum of the two last scores.
+    /// The final joint energy (eq. 3); `Released`: the sum of the last scores of the two views.
     pub energy: f64,
-    /// The way there.
+    /// The solutions, in order.
     pub iterations: Vec<Iteration>,
-    /// Whether nothing moved any more at the end.
+    /// Whether the poses had converged at the end.
     pub converged: bool,
-    /// Whether the consistency terms of each part of the first view were switched on; `Released`: while
-    /// the first view was the support, which says nothing about the second view as a support.
+    /// Whether the consistency terms of each part of the first view were switched on; `Released`:
+    /// while the first view was the support, which does not describe the second view as a support.
     pub active: Vec<bool>,
-    /// The pose in the first and in the second view; parts as the model names them, not exchanged.
+    /// The pose in the first and in the second view; parts are named by the model, not exchanged.
     pub poses: [Pose; 2],
 }
 
 /// Maximises the joint energy of a pair from a given start.
 ///
 /// Eq. 3 of the paper is maximised by solving one view exactly while the other one (the support) is
-/// fixed, then exchanging roles (section 6). The first support is the view of lower expected error,
-/// summed over its parts, or the one of higher score if either view has no expectation.
+/// fixed, then exchanging roles (section 6). The first support is the view with the lower expected
+/// error, summed over its parts, or the one with the higher score if either view has no expected
+/// errors.
 ///
-/// Under [`EnergyKind::Paper`] a solution is taken only if the energy rises, as the view that is solved
-/// sees it; with [`SwitchBy::Either`](crate::SwitchBy::Either) both see the same, so the energy never falls
-/// and a cycle is impossible. It ends when a view answers the other one's answer by staying as it is:
-/// then neither view alone can raise the energy (but for what `epsilon_px` lets pass).
+/// Under [`EnergyKind::Paper`] a solution is accepted only if it raises the energy as seen by the
+/// target. With [`SwitchBy::Either`](crate::SwitchBy::Either) both views see the same energy, so it
+/// never falls and a cycle is impossible. The loop ends when a view does not move after a solution
+/// of the other: then neither view alone can raise the energy (up to the tolerance of
+/// `epsilon_px`).
 ///
-/// Under [`EnergyKind::Released`] every solution is taken, whatever its score, as in the authors'
-/// program, until both views have moved by `epsilon_px` at most; a cycle ends at the cap on iterations.
+/// Under [`EnergyKind::Released`] every solution is accepted, whatever its score, as in the
+/// authors' program, until both views have moved by at most `epsilon_px`; a cycle ends at the limit
+/// of iterations.
 ///
-/// * `evidence`: the responses of either view, where they lie; with their bounds
-///   ([`Responses::with_bounds`]), if they are solved more than once.
+/// * `evidence`: the responses of either view; they should carry their bounds
+///   ([`Responses::with_bounds`]) if they are solved more than once.
 pub fn estimate_pair(
     solver: &Solver,
     settings: &Settings,
@@ -94,14 +97,14 @@ fn paper(
     start: PairStart,
 ) -> PairEstimate {
     let terms = PairTerms::new(settings, pair, start.exchanged);
-    let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
-    let mut own = [0, 1].map(|it| own_score(solver, evidence[it], &poses[it]));
+    let mut poses = [0, 1].map(|side| pair.views[side].candidates[start.candidates[side]].clone());
+    let mut own = [0, 1].map(|side| own_score(solver, evidence[side], &poses[side]));
     let mut target = 1 - initial_support(pair, &poses);
-    let mut incremental = evidence.map(|it| solver.incremental(it));
+    let mut incremental = evidence.map(|evidence| solver.incremental(evidence));
     let (mut iterations, mut converged) = (Vec::new(), false);
     for iteration in 0..settings.max_iterations {
         let consistency = Consistency::new(&terms, target, &poses[1 - target]);
-        // Another candidate may suit the support better than the pose that is left behind.
+        // Another candidate may suit the support better than the current pose.
         let guesses = pair.views[target].candidates.iter();
         let guesses = guesses.chain([&poses[target]]);
         let found = incremental[target].best(&consistency, guesses);
@@ -133,7 +136,7 @@ fn paper(
             moved_px,
             pose: poses[target].clone(),
         });
-        // From the second iteration on the support has itself been solved against this target.
+        // From the second iteration on, the support has itself been solved against this target.
         if iteration > 0 && moved_px <= settings.epsilon_px && same_types {
             converged = true;
             break;
@@ -158,9 +161,9 @@ fn released_pair(
     start: PairStart,
 ) -> PairEstimate {
     let released = ReleasedPair::new(settings, pair, start.exchanged);
-    let mut poses = [0, 1].map(|it| pair.views[it].candidates[start.candidates[it]].clone());
+    let mut poses = [0, 1].map(|side| pair.views[side].candidates[start.candidates[side]].clone());
     let mut target = 1 - initial_support(pair, &poses);
-    let mut incremental = evidence.map(|it| solver.incremental(it));
+    let mut incremental = evidence.map(|evidence| solver.incremental(evidence));
     let (mut iterations, mut converged) = (Vec::<Iteration>::new(), false);
     for _ in 0..settings.max_iterations {
         let terms = ReleasedTerms::new(&released, target, &poses[1 - target]);
@@ -177,7 +180,7 @@ fn released_pair(
             moved_px,
             pose: poses[target].clone(),
         });
-        let settled = |it: &Iteration| it.moved_px <= settings.epsilon_px;
+        let settled = |iteration: &Iteration| iteration.moved_px <= settings.epsilon_px;
         if iterations.len() >= 2 && iterations[iterations.len() - 2..].iter().all(settled) {
             converged = true;
             break;
@@ -186,7 +189,7 @@ fn released_pair(
     }
     PairEstimate {
         start,
-        energy: poses.iter().map(|it| f64::from(it.score)).sum(),
+        energy: poses.iter().map(|pose| f64::from(pose.score)).sum(),
         iterations,
         converged,
         active: released.weights()[0].clone(),
@@ -194,7 +197,8 @@ fn released_pair(
     }
 }
 
-/// Whether shortcuts have changed nothing; whoever comes with wrong bounds gets what they say.
+/// Whether the shortcuts gave the exact result; always true with bounds that are not those of the
+/// evidence.
 pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,
@@ -203,23 +207,23 @@ pub(crate) fn is_best(
 ) -> bool {
     let is_right = |given: &Bounds| {
         let right = solver.bounds(evidence);
-        let mut levels = evidence.levels().iter().map(|&it| usize::from(it));
-        levels.all(|it| given.levels()[it] == right.levels()[it])
+        let mut levels = evidence.levels().iter().map(|&level| usize::from(level));
+        levels.all(|level| given.levels()[level] == right.levels()[level])
     };
     !evidence.bounds().is_none_or(is_right) || solver.best(evidence, Some(extra)).as_ref() == found
 }
 
-/// Score of a pose in its own view alone, eq. 1.
+/// Score of a pose in its own view alone (eq. 1).
 fn own_score(solver: &Solver, evidence: &Responses<'_>, pose: &Pose) -> f64 {
     f64::from(solver.score(evidence, pose, None))
 }
 
-/// The view whose single-view pose is expected to be better: lower expected error, or higher score
-/// where either view has no expectation; ties go to the first view.
+/// The first support: the view with the lower expected error, or the higher score if either view
+/// has no expected errors; ties go to the first view.
 fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
     let expected = pair
         .views
-        .map(|view| view.sigma_px.map(|it| it.iter().sum::<f32>()));
+        .map(|view| view.sigma_px.map(|sigma_px| sigma_px.iter().sum::<f32>()));
     match expected {
         [Some(first), Some(second)] => usize::from(second < first),
         _ => usize::from(poses[1].score > poses[0].score),
@@ -227,7 +231,7 @@ fn initial_support(pair: &PairInput<'_>, poses: &[Pose; 2]) -> usize {
 }
 
 pub(crate) fn types(pose: &Pose) -> impl Iterator<Item = u8> {
-    pose.parts.iter().map(|it| it.mixture)
+    pose.parts.iter().map(|part| part.mixture)
 }
 
 /// Mean distance between the part centres of two poses, pixels.

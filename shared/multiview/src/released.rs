@@ -1,9 +1,9 @@
-//! What the authors' program adds to a view's scores, as its description has it.
+//! The terms that the authors' program adds to a view's scores, implemented from its description.
 //!
-//! Three things are corrected where the description calls them bugs: a support outside its table adds
-//! nothing (the program draws a line around the top-left corner), the rescue of a part that both
-//! views would switch off looks at that part (the program looks at part 1), and a type never seen in
-//! training adds nothing (the program's table holds NaN).
+//! Three points that the description calls bugs are corrected. A support outside its table adds
+//! nothing (the program draws a line around the top-left corner). The rescue of a part that both
+//! views would switch off checks that part (the program checks part 1). A type that did not occur
+//! in training adds nothing (the program's table holds NaN).
 
 use fmp::{ExtraTerms, Pose};
 use nalgebra::{Matrix3, Vector3};
@@ -12,12 +12,13 @@ use crate::consistency::{NO_SUPPORT, counterparts, support_key};
 use crate::heat_map::heat_map;
 use crate::{Compatibility, PairInput, Settings};
 
-/// Everything about the terms of a pair that does not change from one iteration to the next.
+/// The parts of a pair's terms that stay the same from iteration to iteration.
 #[derive(Debug)]
 pub(crate) struct ReleasedPair<'a> {
     settings: &'a Settings,
     pair: &'a PairInput<'a>,
-    /// `counterpart[i]` of the one view is the anatomical part that `i` of the other view shows.
+    /// `counterpart[i]` is the part of the other view that shows the same limb as part `i` of the
+    /// one.
     counterpart: Vec<usize>,
     weights: [Vec<bool>; 2],
     /// `p(type in the other view | type in this view)` of either view.
@@ -25,8 +26,8 @@ pub(crate) struct ReleasedPair<'a> {
 }
 
 impl<'a> ReleasedPair<'a> {
-    /// * `exchanged`: the second view shows the other side of the body; such a pair goes without the
-    ///   type tables, which are learned on views as the model names their parts.
+    /// * `exchanged`: the second view shows the other side of the body; such a pair does not use
+    ///   the type tables, which are learned on views with the model's part names.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let counterpart = counterparts(pair.views[0].plan.model(), exchanged);
         Self {
@@ -37,30 +38,30 @@ impl<'a> ReleasedPair<'a> {
             tables: pair
                 .tables
                 .filter(|_| !exchanged && settings.beta != 0.0)
-                .map(|it| it.conditional.each_ref().map(AsRef::as_ref)),
+                .map(|tables| tables.conditional.each_ref().map(AsRef::as_ref)),
         }
     }
 
-    /// Which parts of either view may support the other one.
+    /// The parts of either view that may support the other one.
     pub(crate) fn weights(&self) -> &[Vec<bool>; 2] {
         &self.weights
     }
 }
 
-/// The released program's extra scores for one target and a fixed support.
+/// The released program's extra terms for one target and a fixed support.
 #[derive(Debug)]
 pub(crate) struct ReleasedTerms<'a> {
     released: &'a ReleasedPair<'a>,
     target: usize,
     support: &'a Pose,
-    /// Of every part of the target; `None` where the part adds nothing.
+    /// For every part of the target; `None` where the part adds nothing.
     lines: Vec<Option<Line>>,
 }
 
 impl<'a> ReleasedTerms<'a> {
     pub(crate) fn new(released: &'a ReleasedPair<'a>, target: usize, support: &'a Pose) -> Self {
         let pair = released.pair;
-        let [target_plan, support_plan] = [target, 1 - target].map(|it| pair.views[it].plan);
+        let [target_plan, support_plan] = [target, 1 - target].map(|view| pair.views[view].plan);
         let target_from_support = pair.epipolar.support_from_target(target == 1);
         let line = |part: &usize| {
             let support_layout = support_plan.layout();
@@ -85,8 +86,13 @@ impl ExtraTerms for ReleasedTerms<'_> {
             return false;
         };
         let layout = self.released.pair.views[self.target].plan.layout();
-        let it = &layout.levels[level];
-        let heat = heat_map(ends, layout.image_size, it.rows, it.cols);
+        let level_layout = &layout.levels[level];
+        let heat = heat_map(
+            ends,
+            layout.image_size,
+            level_layout.rows,
+            level_layout.cols,
+        );
         for (score, heat) in score.iter_mut().zip(&heat[first..]) {
             *score += (self.released.settings.alpha * f64::from(*heat)) as f32;
         }
@@ -97,9 +103,9 @@ impl ExtraTerms for ReleasedTerms<'_> {
         match (self.released.tables, self.lines[part]) {
             (Some(tables), Some(_)) => {
                 let other = self.released.counterpart[part];
-                let seen = usize::from(self.support.parts[other].mixture);
+                let support_type = usize::from(self.support.parts[other].mixture);
                 let table = tables[1 - self.target];
-                (self.released.settings.beta * table.value(part, seen, mixture)) as f32
+                (self.released.settings.beta * table.value(part, support_type, mixture)) as f32
             }
             _ => 0.0,
         }
@@ -107,7 +113,7 @@ impl ExtraTerms for ReleasedTerms<'_> {
 
     fn max_gain(&self, part: usize) -> f32 {
         let heat = match self.lines[part] {
-            // Heat lies between 0 and 1.
+            // Heat is between 0 and 1.
             Some(Line::Across(_)) => (self.released.settings.alpha as f32).max(0.0),
             _ => 0.0,
         };
@@ -128,23 +134,23 @@ impl ExtraTerms for ReleasedTerms<'_> {
 
 /// The whole pixel, counted from 0, at which the program looks up the line of a support.
 ///
-/// * `from_one`: centre of the support, pixels from 1, as the program computes it.
-/// * `size`: of its image, which is that of the program's table. The pixels of the last row and
-///   column are in the table, but the program takes them for outside.
+/// * `from_one`: centre of the support, pixels counted from 1, as the program computes it.
+/// * `size`: of its image, which is the size of the program's table. The table contains the pixels
+///   of the last row and column, but the program treats them as outside.
 fn looked_up(from_one: [f64; 2], size: [usize; 2]) -> Option<[f64; 2]> {
-    // Half away from zero.
+    // Rounds half away from zero.
     let from_one = from_one.map(f64::round);
     let inside = |at: f64, side: usize| 0.0 < at && at < side as f64;
     (inside(from_one[0], size[0]) && inside(from_one[1], size[1]))
-        .then(|| from_one.map(|it| it - 1.0))
+        .then(|| from_one.map(|side| side - 1.0))
 }
 
 /// The epipolar line of a support in the image of the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Line {
-    /// Misses the image, and warms nothing.
+    /// The line misses the image and adds no heat.
     Outside,
-    /// Meets the border at these points, `[x, y]` in pixels counted from 1.
+    /// Intersects the border at these points, `[x, y]` in pixels counted from 1.
     Across([[f64; 2]; 2]),
 }
 
@@ -169,14 +175,18 @@ impl Line {
     }
 }
 
-/// Switches of either view, by its parts: off where its expected error exceeds the threshold.
+/// The switches of either view, by its parts: off where the expected error exceeds the threshold.
 ///
-/// Where both views would be off and their expectations differ by more than the part's median
-/// training error, the better one is switched back on (the intended form of the program's
-/// rescue; its own test looks at the wrong part).
+/// Where both views would be off and their expected errors differ by more than the part's median
+/// training error, the better one is switched back on (the intended form of the program's rescue,
+/// which checks the wrong part).
 fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
     let n_parts = counterpart.len();
-    let sigma = |view: usize, part: usize| pair.views[view].sigma_px.and_then(|it| it.get(part));
+    let sigma = |view: usize, part: usize| {
+        pair.views[view]
+            .sigma_px
+            .and_then(|sigma_px| sigma_px.get(part))
+    };
     let is_on = |view: usize, part: usize| {
         let expectation = pair.views[view].expectation(settings, part);
         expectation.is_none_or(|[sigma, tau]| sigma <= tau)
@@ -215,13 +225,13 @@ mod tests {
     }
 
     #[test]
-    fn a_line_across_ends_at_the_outer_edges_of_the_image() {
+    fn a_horizontal_line_ends_at_the_outer_edges_of_the_image() {
         let line = Line::new(&side_by_side(), [7.0, 20.0], [64, 48]);
         assert_eq!(line, Line::Across([[0.5, 21.0], [64.5, 21.0]]));
     }
 
     #[test]
-    fn an_upright_line_ends_at_top_and_bottom() {
+    fn a_vertical_line_ends_at_top_and_bottom() {
         let above_each_other = Matrix3::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0);
         let line = Line::new(&above_each_other, [7.0, 20.0], [64, 48]);
         assert_eq!(line, Line::Across([[8.0, 0.5], [8.0, 48.5]]));
@@ -240,10 +250,10 @@ mod tests {
         assert_eq!(looked_up([7.4, 20.5], [64, 48]), Some([6.0, 20.0]));
     }
 
-    /// The head top of `HumanEva`'s C3: cell 35 of the eleventh level, whose cells are exactly 8 pixels.
-    /// 263.49999999999983 + 1 went to the pixel on its left.
+    /// The head top of `HumanEva`'s C3: cell 35 of the eleventh level, whose cells are exactly 8
+    /// pixels. 263.49999999999983 + 1 was rounded to the pixel on its left.
     #[test]
-    fn a_support_half_way_between_pixels_is_looked_up_where_the_program_looks() {
+    fn a_support_between_two_pixels_is_rounded_as_in_the_program() {
         let filter = fmp::Filter {
             rows: 6,
             cols: 6,
@@ -277,10 +287,10 @@ mod tests {
     }
 
     #[test]
-    fn a_support_outside_its_own_image_is_in_no_table() {
+    fn a_support_outside_its_image_is_not_in_the_table() {
         assert_eq!(looked_up([0.4, 21.0], [64, 48]), None);
         assert_eq!(looked_up([8.0, 101.0], [64, 48]), None);
-        // The program takes the last row and column for outside.
+        // The program treats the last row and column as outside.
         assert_eq!(looked_up([64.0, 21.0], [64, 48]), None);
         assert_eq!(looked_up([63.0, 47.0], [64, 48]), Some([62.0, 46.0]));
     }

@@ -1,34 +1,35 @@
-//! What a deployment may choose about fusion.
+//! Settings of fusion.
 
 use std::sync::Arc;
 
 use crate::Compatibility;
 
-/// Which energy ties two views together.
+/// The energy of the terms between two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EnergyKind {
     /// The paper's: squared point-to-line distances in both directions, joint type table, a part
-    /// switched off if either view is expected to be off (but see [`SwitchBy`]).
+    /// switched off if either view is expected to be off (see [`SwitchBy`]).
     #[default]
     Paper,
-    /// What the authors' program computes: normalised heat maps, conditional type tables, a part
-    /// switched off by the supporting view alone.
+    /// That of the authors' program: normalised heat maps, conditional type tables, a part switched
+    /// off by the supporting view alone.
     Released,
 }
 
-/// Whose expected error switches the terms of a part off, in the paper's energy.
+/// Which expected error switches the terms of a part off, in the paper's energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SwitchBy {
     /// That of either view: the paper's eq. 6.
     #[default]
     Either,
-    /// That of the support alone, as in the authors' program: a view that can tell goes on helping one that
-    /// cannot, and is not asked to follow it. Each view then has an energy of its own; that of a pair is
-    /// their mean, and may fall on the way.
+    /// That of the support alone, as in the authors' program: a reliable view continues to correct
+    /// an unreliable one, and does not follow it. Each view then has its own energy; the energy of
+    /// a pair is their mean, and may fall during the optimisation.
     Support,
-    /// That of the support, where it is also the worse of the two (each in its own thresholds): of two views
-    /// neither of which can tell, the better one goes on helping the other, so that errors that are expected
-    /// everywhere do not leave every view alone. Energies as with [`Self::Support`].
+    /// That of the support, if it is also the worse of the two views (each relative to its
+    /// thresholds): of two unreliable views the better one continues to support the other, so that
+    /// errors that are expected everywhere do not separate all views. Energies as with
+    /// [`Self::Support`].
     Worse,
 }
 
@@ -37,16 +38,17 @@ pub enum SwitchBy {
 pub struct TypeTables {
     /// `p(type in second | type in first)` and the reverse, for [`EnergyKind::Released`].
     pub conditional: [Arc<Compatibility>; 2],
-    /// `p(type in first, type in second)`, or another value of two types, for [`EnergyKind::Paper`].
+    /// `p(type in first, type in second)`, or another value of two types, for
+    /// [`EnergyKind::Paper`].
     pub joint: Arc<Compatibility>,
-    /// The same for views of which one sees the person's other side: rows are types of the first view's
-    /// part, columns those of the part of the second view that shows the same limb. `None`: such views
-    /// go without the term.
+    /// The same for views of which one sees the other side of the person: rows are types of the
+    /// first view's part, columns those of the second view's part that shows the same limb. `None`:
+    /// such views have no appearance term.
     pub exchanged: Option<Arc<Compatibility>>,
 }
 
 impl TypeTables {
-    /// The tables of the same views, the second one named first.
+    /// The tables of the same views with the second one named first.
     ///
     /// * `mirror`: the part on the other side of every part; the parts themselves if the model has no sides.
     #[must_use]
@@ -58,12 +60,12 @@ impl TypeTables {
             exchanged: self
                 .exchanged
                 .as_ref()
-                .map(|it| Arc::new(it.transposed().permuted(mirror))),
+                .map(|table| Arc::new(table.transposed().permuted(mirror))),
         }
     }
 }
 
-/// Settings of the optimiser; the defaults are the documentation.
+/// Settings of the optimiser.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Which energy.
@@ -71,34 +73,35 @@ pub struct Settings {
     /// Weight of the geometric term.
     ///
     /// `Paper`: score per squared cell. Distances are divided by the cell size of the pose's own
-    /// level before they are squared, so that the weight means the same for a near and a far person
-    /// and at every resolution, and compares directly with the springs of the model (whose weakest
-    /// is 0.01 per squared cell). `Released`: score of a cell on the line; 0.07 in the authors' runs.
+    /// level before they are squared, so that the weight has the same effect for near and far
+    /// people and at every resolution, and can be compared with the springs of the model (the
+    /// weakest of which is 0.01 per squared cell). `Released`: score of a cell on the line; 0.07 in
+    /// the authors' runs.
     pub alpha: f64,
     /// Weight of the appearance term: score of two types that always occur together.
     pub beta: f64,
-    /// Distance beyond which the geometric term of the paper's energy grows no more, cells.
-    /// Infinite is the paper's own form.
+    /// Distance at which the geometric term of the paper's energy is capped, cells. Infinite is the
+    /// paper's own form.
     pub max_distance_cells: f64,
-    /// Most single-view solutions of a pair.
+    /// Largest number of single-view solutions of a pair.
     pub max_iterations: usize,
-    /// Mean movement of the part centres below which a view counts as settled, pixels.
+    /// Mean movement of the part centres below which a view counts as converged, pixels.
     pub epsilon_px: f64,
     /// Expected error above which a part is switched off, pixels of the frame, one per part; empty:
     /// never.
     pub tau_px: Vec<f32>,
-    /// Whose expected error counts.
+    /// Which expected error switches a part off.
     pub switch: SwitchBy,
-    /// The same in tenths of the person's size in the view, the longer side of the rectangle around the centres of
-    /// its best pose; where `tau_px` is empty.
+    /// The same in tenths of the person's size in the view, which is the longer side of the
+    /// rectangle around the part centres of its best pose; used if `tau_px` is empty.
     pub tau_tenths: Vec<f32>,
-    /// `Released` only: difference of the expected errors beyond which the better of two views that
+    /// `Released` only: difference of the expected errors above which the better of two views that
     /// are both off is switched on again, pixels, one per part (the median training errors); empty:
     /// never.
     pub rescue_px: Vec<f32>,
-    /// Decide for every view whether left and right are exchanged; off in the paper.
+    /// Decide for every view whether left and right are exchanged; the paper does not.
     pub facing: bool,
-    /// Most candidates of a view that a start may combine; 1 is the paper's start.
+    /// Largest number of candidates of a view that the start may combine; 1 is the paper's start.
     pub n_candidates: usize,
 }
 

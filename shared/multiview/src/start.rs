@@ -1,9 +1,10 @@
-//! The start of a frame: which candidate of every view is the person, and which way each view sees it.
+//! The start of a frame: which candidate of every view is the person, and from which side each view
+//! sees it.
 
 use crate::consistency::PairTerms;
 use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
 
-/// Exhaustive search is used up to this many joint states.
+/// Up to this number of joint states the search is exhaustive.
 const MAX_STATES: usize = 200_000;
 
 /// The joint start of all views of a frame.
@@ -17,17 +18,17 @@ pub struct Start {
     pub energy: f64,
 }
 
-/// Chooses the candidates, and the exchange of left and right, that the energies of all pairs like best.
+/// Chooses the candidates and exchanges of left and right with the highest energy over all pairs.
 ///
-/// The sum of eq. 3 over all pairs of views is maximised over one candidate per view and one exchange
-/// per view but the first (an exchange in all views changes nothing that two views could tell). With
-/// one candidate per view and `facing` off this is the paper's start. Up to 200 000 joint states are
-/// searched through; beyond that views join one by one and are then revised until nothing changes.
-/// Among equals the lower candidates win. The terms between views are the paper's under
-/// [`EnergyKind::Released`](crate::EnergyKind::Released) too, whose program has no choice of a start:
-/// with its alpha, which is meant for heat maps, they weigh heavily.
+/// The sum of eq. 3 over all pairs of views is maximised over one candidate per view and one
+/// exchange per view except the first (an exchange in all views changes no energy). With one
+/// candidate per view and `facing` off this is the paper's start. Up to 200 000 joint states are
+/// searched exhaustively; beyond that views are added one by one and then revised until nothing
+/// changes. Ties go to the lower candidates. The terms between views are the paper's also under
+/// [`EnergyKind::Released`](crate::EnergyKind::Released), whose program has no choice of a start;
+/// its alpha, which is meant for heat maps, gives them a large weight.
 ///
-/// * `views`: the views that answered, in a fixed order.
+/// * `views`: the views with a result, in a fixed order.
 /// * `tables`: part-type tables of a pair of indices into `views`.
 pub fn choose_start<'a>(
     settings: &Settings,
@@ -35,28 +36,32 @@ pub fn choose_start<'a>(
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Start {
     let all = views.iter().enumerate();
-    let all = all.map(|(view, answer)| states(settings, answer, view));
+    let all = all.map(|(view, view_input)| states(settings, view_input, view));
     best_of(settings, views, tables, &all.collect::<Vec<_>>())
 }
 
-/// The best start under every assumption about who sees the person from behind, highest energy first.
+/// The best start under every assumption about which views see the person from behind, highest
+/// energy first.
 ///
-/// There are `2^(n - 1)` of them for `n` views, if `facing` is to be decided, and one if not. Equals keep the order
-/// of the binary numbers that the views from the second on make.
+/// There are `2^(n - 1)` of them for `n` views if `facing` is to be decided, else one. Equals are
+/// ordered by the binary number with bit `v - 1` for view `v`.
 pub fn rank_starts<'a>(
     settings: &Settings,
     views: &[ViewInput<'a>],
     tables: &dyn Fn(usize, usize) -> Option<&'a TypeTables>,
 ) -> Vec<Start> {
-    let can_exchange = |it: &ViewInput<'_>| it.plan.model().spec().mirror.is_some();
+    let can_exchange = |view: &ViewInput<'_>| view.plan.model().spec().mirror.is_some();
     let n_free = if settings.facing && views.iter().all(can_exchange) {
         views.len().saturating_sub(1)
     } else {
         0
     };
     let start = |pattern: usize| {
-        let states = views.iter().enumerate().map(|(view, answer)| {
-            let n = answer.candidates.len().min(settings.n_candidates.max(1));
+        let states = views.iter().enumerate().map(|(view, view_input)| {
+            let n = view_input
+                .candidates
+                .len()
+                .min(settings.n_candidates.max(1));
             let exchanged = view > 0 && pattern >> (view - 1) & 1 == 1;
             let state = |candidate| State {
                 candidate,
@@ -71,7 +76,7 @@ pub fn rank_starts<'a>(
     starts
 }
 
-/// The joint state that the energies of all pairs like best.
+/// The joint state with the highest energy over all pairs.
 fn best_of<'a>(
     settings: &Settings,
     views: &[ViewInput<'a>],
@@ -81,10 +86,10 @@ fn best_of<'a>(
     let unary: Vec<Vec<f64>> = views
         .iter()
         .zip(states)
-        .map(|(answer, states)| {
+        .map(|(view_input, states)| {
             let weight = views.len().saturating_sub(1).max(1) as f64;
-            let score = |it: &State| f64::from(answer.candidates[it.candidate].score);
-            states.iter().map(|it| weight * score(it)).collect()
+            let score = |state: &State| f64::from(view_input.candidates[state.candidate].score);
+            states.iter().map(|state| weight * score(state)).collect()
         })
         .collect();
     let problem = Problem {
@@ -94,8 +99,8 @@ fn best_of<'a>(
     let (chosen, energy) = problem.solve();
     let pick = |view: usize| states[view][chosen[view]];
     Start {
-        candidates: (0..views.len()).map(|it| pick(it).candidate).collect(),
-        exchanged: (0..views.len()).map(|it| pick(it).exchanged).collect(),
+        candidates: (0..views.len()).map(|view| pick(view).candidate).collect(),
+        exchanged: (0..views.len()).map(|view| pick(view).exchanged).collect(),
         energy,
     }
 }
@@ -106,9 +111,13 @@ struct State {
     exchanged: bool,
 }
 
-fn states(settings: &Settings, answer: &ViewInput<'_>, view: usize) -> Vec<State> {
-    let can_exchange = settings.facing && answer.plan.model().spec().mirror.is_some() && view > 0;
-    let n = answer.candidates.len().min(settings.n_candidates.max(1));
+fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<State> {
+    let can_exchange =
+        settings.facing && view_input.plan.model().spec().mirror.is_some() && view > 0;
+    let n = view_input
+        .candidates
+        .len()
+        .min(settings.n_candidates.max(1));
     [false, true]
         .into_iter()
         .take(1 + usize::from(can_exchange))
@@ -169,8 +178,8 @@ impl Problem {
         let n_states = self
             .unary
             .iter()
-            .try_fold(1_usize, |product, it| product.checked_mul(it.len()));
-        if n_states.is_some_and(|it| it <= MAX_STATES) {
+            .try_fold(1_usize, |product, states| product.checked_mul(states.len()));
+        if n_states.is_some_and(|n| n <= MAX_STATES) {
             let mut best = (vec![0; self.unary.len()], f64::NEG_INFINITY);
             self.search(&mut Vec::new(), 0.0, &mut best);
             best
@@ -179,13 +188,13 @@ impl Problem {
         }
     }
 
-    /// What `state` of the next view adds to the views chosen so far.
+    /// The gain from `state` in the next view, given the views chosen so far.
     fn gain(&self, chosen: &[usize], state: usize) -> f64 {
         let view = chosen.len();
         let pairs: f64 = chosen
             .iter()
             .enumerate()
-            .map(|(other, &theirs)| self.between[other][view - other - 1][theirs][state])
+            .map(|(other, &other_state)| self.between[other][view - other - 1][other_state][state])
             .sum();
         self.unary[view][state] + pairs
     }
@@ -211,21 +220,23 @@ impl Problem {
             .sum()
     }
 
-    /// Greedy from every state of the first view, then one view at a time until nothing changes.
+    /// Greedy from every state of the first view, then coordinate ascent until nothing changes.
     fn climb(&self) -> (Vec<usize>, f64) {
         let mut best = (vec![0; self.unary.len()], f64::NEG_INFINITY);
         for first in 0..self.unary[0].len() {
             let mut chosen = vec![first];
             while chosen.len() < self.unary.len() {
-                let next = argmax(self.unary[chosen.len()].len(), |it| self.gain(&chosen, it));
+                let next = argmax(self.unary[chosen.len()].len(), |state| {
+                    self.gain(&chosen, state)
+                });
                 chosen.push(next);
             }
             let mut value = self.value(&chosen);
             loop {
                 for view in 0..chosen.len() {
-                    chosen[view] = argmax(self.unary[view].len(), |it| {
+                    chosen[view] = argmax(self.unary[view].len(), |state| {
                         let mut trial = chosen.clone();
-                        trial[view] = it;
+                        trial[view] = state;
                         self.value(&trial)
                     });
                 }
@@ -245,10 +256,10 @@ impl Problem {
 
 fn argmax(n: usize, value: impl Fn(usize) -> f64) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
-    for it in 0..n {
-        let value = value(it);
+    for idx in 0..n {
+        let value = value(idx);
         if value > best.1 {
-            best = (it, value);
+            best = (idx, value);
         }
     }
     best.0
@@ -278,7 +289,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_search_beats_every_assignment(problem in problems()) {
+        fn the_exhaustive_search_finds_the_best_assignment(problem in problems()) {
             let (chosen, value) = problem.solve();
             prop_assert!((problem.value(&chosen) - value).abs() < 1e-9);
             for state in 0..81 {
@@ -288,7 +299,7 @@ mod tests {
         }
 
         #[test]
-        fn climbing_ends_where_no_single_view_can_improve(problem in problems()) {
+        fn the_greedy_search_ends_where_no_single_view_can_improve(problem in problems()) {
             let (chosen, value) = problem.climb();
             for view in 0..4 {
                 for state in 0..3 {

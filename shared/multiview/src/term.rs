@@ -4,25 +4,25 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::ViewPlan;
 
-/// Squared distance that stands for "the lens model has no answer here", cells^2.
+/// The squared distance where the lens model has no solution, cells^2.
 const UNSEEN: f64 = 1e6;
 
 /// The geometry of an ordered pair of views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Epipolar {
-    /// Line in the second view of a point in the first, both in undistorted pixels.
+    /// Maps a point in the first view to its line in the second, both in undistorted pixels.
     pub second_from_first: Matrix3<f64>,
 }
 
 impl Epipolar {
-    /// From the cameras of the two frames.
+    /// Creates the geometry from the cameras of the two frames.
     pub fn new(first: &ViewPlan, second: &ViewPlan) -> Self {
         Self {
             second_from_first: geometry::epipolar::fundamental(first.camera(), second.camera()),
         }
     }
 
-    /// Line in the support view of a point in the target view.
+    /// Maps a point in the target view to its line in the support view.
     pub(crate) fn support_from_target(&self, target_is_first: bool) -> Matrix3<f64> {
         if target_is_first {
             self.second_from_first
@@ -34,10 +34,10 @@ impl Epipolar {
 
 /// The term `xi` of eq. 4, negated, as a function of the target's position, for a fixed support.
 ///
-/// With `r = q' F p`: the squared distances of `p` from the line of `q`, and of `q` from the line of
-/// `p`, are `r^2 / |F'q|^2` and `r^2 / |Fp|^2` (norms of the first two components), each divided by
-/// the squared cell size of its own view: the paper's alpha, which weighs pixels, then means the same
-/// at every level of the pyramid and at every resolution of the cameras.
+/// With `r = q' F p` the squared distances of `p` from the line of `q`, and of `q` from the line of
+/// `p`, are `r^2 / |F'q|^2` and `r^2 / |Fp|^2` (norms of the first two components). Each is divided
+/// by the squared cell size of its own view, so that the paper's alpha, which weighs pixels, has
+/// the same effect at every level of the pyramid and at every resolution of the cameras.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Term {
     support_from_target: Matrix3<f64>,
@@ -46,13 +46,13 @@ pub(crate) struct Term {
     /// `1 / (n^2)` of that line.
     inverse_norm2: f64,
     support_scale2: f64,
-    /// Bounds either distance, cells^2.
+    /// Cap of either squared distance, cells^2.
     cap: f64,
 }
 
 impl Term {
-    /// The term of a support at `support_px` (undistorted), or `None` if it has no line: it lies on
-    /// the epipole, or the cameras stand in one place.
+    /// The term of a support at `support_px` (undistorted); `None` if it has no line: it lies on
+    /// the epipole, or the camera centres coincide.
     pub(crate) fn new(
         support_from_target: Matrix3<f64>,
         support_px: [f64; 2],
@@ -71,8 +71,8 @@ impl Term {
         })
     }
 
-    /// Whether the term is the same wherever the target is: the lens model has no answer for the
-    /// support.
+    /// Whether the term is the same at every target position: the lens model has no solution for
+    /// the support.
     pub(crate) fn is_constant(&self) -> bool {
         self.inverse_norm2.is_nan()
     }
@@ -88,7 +88,8 @@ impl Term {
         let r2 = r * r;
         let in_target = r2 * self.inverse_norm2 / target_scale2;
         let in_support = r2 / ((mx * mx + my * my) * self.support_scale2);
-        // `min` also turns the NaN of an unseen place, and of the epipole, into the cap.
+        // `min` also replaces the NaN of a position without a solution, and of the epipole, by the
+        // cap.
         in_target.min(self.cap) + in_support.min(self.cap)
     }
 }
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_count_in_cells_of_their_own_view() {
+    fn distances_are_measured_in_cells_of_their_own_view() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, f64::INFINITY).unwrap();
         // 8 pixels are 2 cells of the support (4 px) and 4 cells of the target (2 px).
         let got = term.distance2([7.0, 38.0], 4.0);
@@ -120,27 +121,27 @@ mod tests {
     }
 
     #[test]
-    fn the_cap_bounds_either_direction() {
+    fn the_cap_applies_to_either_direction() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, 3.0).unwrap();
         let got = term.distance2([7.0, 38.0], 4.0);
         assert!((got - (4.0 + 9.0)).abs() < 1e-12, "{got}");
     }
 
     #[test]
-    fn an_unseen_cell_is_far_but_finite() {
+    fn a_cell_without_lens_solution_has_a_large_finite_distance() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, f64::INFINITY).unwrap();
         assert_eq!(term.distance2([f64::NAN; 2], 4.0), 2.0 * UNSEEN);
     }
 
     #[test]
-    fn an_unseen_support_is_as_far_from_everywhere() {
+    fn a_support_without_lens_solution_has_the_same_distance_everywhere() {
         let term = Term::new(side_by_side(), [f64::NAN; 2], 4.0, 3.0).unwrap();
         assert!(term.is_constant());
         assert_eq!(term.distance2([7.0, 38.0], 4.0), 2.0 * 9.0);
     }
 
     #[test]
-    fn a_support_without_a_line_says_nothing() {
+    fn a_support_without_a_line_has_no_term() {
         let in_one_place = Matrix3::zeros();
         assert!(Term::new(in_one_place, [50.0, 30.0], 4.0, 3.0).is_none());
     }
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn it_vanishes_along_the_epipolar_curve_of_distorted_views() {
+    fn the_term_vanishes_along_the_epipolar_curve_of_distorted_views() {
         let first = distorted("first", -0.3, Isometry3::identity());
         let turned = Isometry3::new(Vector3::new(-2.0, 0.1, 0.8), Vector3::new(0.0, 0.7, 0.1));
         let second = distorted("second", -0.25, turned);
@@ -174,7 +175,8 @@ mod tests {
             let term = Term::new(second_from_first, [q.x, q.y], 4.0, f64::INFINITY).unwrap();
             term.distance2([p.x, p.y], 16.0)
         };
-        // A segment of the world that the second view sees as one point: 2 to 4 m along its ray.
+        // A segment of the world that the second view projects to one point: 2 to 4 m along its
+        // ray.
         let pixel = Point2::new(90.0, 60.0);
         let ray = second.ray(&pixel).unwrap();
         let ideal = second.undistorted_px(&pixel).unwrap();

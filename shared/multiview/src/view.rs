@@ -1,4 +1,5 @@
-//! What a view brings to fusion: its camera, where its cells lie, and its own answer.
+//! The data of a view for fusion: its camera, the positions of its cells, and its single-view
+//! result.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,39 +9,44 @@ use nalgebra::Point2;
 
 use crate::Settings;
 
-/// A view prepared once: camera, pyramid, and where every cell's centre lies without lens distortion.
+/// A prepared view: camera, pyramid, and the undistorted centre of every cell.
 #[derive(Debug)]
 pub struct ViewPlan {
     camera: Camera,
     model: Arc<Model>,
     layout: Arc<Layout>,
-    /// The sizes of filters, `[rows, cols]` in cells.
+    /// The distinct filter sizes, `[rows, cols]` in cells.
     sizes: Vec<[usize; 2]>,
-    /// Which of them every part has.
+    /// The index into `sizes` for every part.
     class_of_part: Vec<usize>,
     /// `[class][level]`: undistorted centre of every cell, row major, pixels; NaN where the lens
-    /// model has no answer. Made when it is first asked for: all together they take as long as some frames, and
-    /// people are found on few levels.
+    /// model has no solution. Computed at first use: all levels together take as long as some
+    /// frames, and people are found on few levels.
     cells: Vec<Vec<OnceLock<Vec<[f64; 2]>>>>,
 }
 
 impl ViewPlan {
     /// Prepares a view.
     ///
-    /// A part's centre is that of its first type's filter; in a model that mixes filter sizes within
-    /// one part the others are off by at most half the difference, in cells.
+    /// A part's centre is that of its first type's filter. In a model that mixes filter sizes
+    /// within one part, the centres of the other types are off by at most half the difference, in
+    /// cells.
     ///
-    /// * `camera`: the camera of the frame that the pyramid was built on, after resizing and turning.
+    /// * `camera`: the camera of the frame that the pyramid is built on, after resizing and
+    ///   turning.
     pub fn new(camera: Camera, model: Arc<Model>, layout: Arc<Layout>) -> Self {
         let mut sizes: Vec<[usize; 2]> = Vec::new();
         let class_of_part = (0..model.n_parts())
             .map(|part| {
                 let filter = model.filter(part, 0);
                 let size = [filter.rows, filter.cols];
-                sizes.iter().position(|it| *it == size).unwrap_or_else(|| {
-                    sizes.push(size);
-                    sizes.len() - 1
-                })
+                sizes
+                    .iter()
+                    .position(|other| *other == size)
+                    .unwrap_or_else(|| {
+                        sizes.push(size);
+                        sizes.len() - 1
+                    })
             })
             .collect();
         Self {
@@ -80,7 +86,7 @@ impl ViewPlan {
         self.cells[class][level].get_or_init(make)
     }
 
-    /// Undistorted centre of a part of a pose, pixels; NaN where the lens model has no answer.
+    /// Undistorted centre of a part of a pose, pixels; NaN where the lens model has no solution.
     pub fn ideal_centre(&self, pose: &Pose, part: usize) -> [f64; 2] {
         let level = usize::from(pose.level);
         let at = pose.parts[part];
@@ -88,8 +94,8 @@ impl ViewPlan {
         self.cells(part, level)[cell]
     }
 
-    /// How large the person of a pose is: the longer side of the rectangle around the centres of its parts, pixels
-    /// of the frame.
+    /// The size of the person of a pose: the longer side of the rectangle around the centres of its
+    /// parts, pixels of the frame.
     pub fn size(&self, pose: &Pose) -> f64 {
         let parts = 0..pose.parts.len();
         let side = |axis: usize| {
@@ -119,12 +125,12 @@ fn undistorted_cells(
     level: usize,
     size: [usize; 2],
 ) -> Vec<[f64; 2]> {
-    let it = &layout.levels[level];
-    (0..it.rows * it.cols)
+    let level_layout = &layout.levels[level];
+    (0..level_layout.rows * level_layout.cols)
         .map(|cell| {
             let at = Placement {
-                x: (cell % it.cols) as u16,
-                y: (cell / it.cols) as u16,
+                x: (cell % level_layout.cols) as u16,
+                y: (cell / level_layout.cols) as u16,
                 mixture: 0,
             };
             let [x, y] = layout.centre(level, size, at);
@@ -135,22 +141,22 @@ fn undistorted_cells(
         .collect()
 }
 
-/// What one view says about one frame, besides its evidence.
+/// The single-view result of one view for one frame, besides its evidence.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewInput<'a> {
     /// The prepared view.
     pub plan: &'a ViewPlan,
-    /// Its distinct candidates, best first; never empty.
+    /// Its distinct candidates, best first; not empty.
     pub candidates: &'a [Pose],
     /// Expected error of every part, pixels; `None` where there is no prediction.
     pub sigma_px: Option<&'a [f32]>,
-    /// Thresholds that came with the prediction, pixels; they count where
-    /// [`Settings::tau_px`] and [`Settings::tau_tenths`] are empty.
+    /// Thresholds that came with the prediction, pixels; used if [`Settings::tau_px`] and
+    /// [`Settings::tau_tenths`] are empty.
     pub tau_px: Option<&'a [f32]>,
 }
 
 impl ViewInput<'_> {
-    /// Expected error and threshold of a part, where there are both.
+    /// Expected error and threshold of a part, if it has both.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;
         let tau = if !settings.tau_px.is_empty() {

@@ -1,4 +1,4 @@
-//! Laws of the optimiser of all views at once.
+//! Properties of the optimiser of all views at once.
 
 use fmp::{Pose, Responses};
 use multiview::{
@@ -11,7 +11,7 @@ use crate::oracle;
 use crate::paper::{ROUNDING, SIZES, TINY, all_poses};
 use crate::planted::{Scene, settings};
 
-/// What a problem is told by, besides its seed.
+/// The parameters of a problem, besides its seed.
 #[derive(Debug, Clone)]
 struct Start {
     candidates: Vec<usize>,
@@ -34,8 +34,8 @@ fn starts(n_views: usize) -> impl Strategy<Value = Start> {
 }
 
 fn fuse(scene: &Scene, settings: &Settings, start: &Start) -> AllViewsEstimate {
-    let views: Vec<ViewInput<'_>> = scene.views.iter().map(|it| it.answer()).collect();
-    let evidence: Vec<Responses<'_>> = scene.views.iter().map(|it| it.evidence()).collect();
+    let views: Vec<ViewInput<'_>> = scene.views.iter().map(|view| view.input()).collect();
+    let evidence: Vec<Responses<'_>> = scene.views.iter().map(|view| view.evidence()).collect();
     let evidence: Vec<&Responses<'_>> = evidence.iter().collect();
     let input = AllViewsInput {
         views: &views,
@@ -49,10 +49,12 @@ fn fuse(scene: &Scene, settings: &Settings, start: &Start) -> AllViewsEstimate {
     estimate_all_views(&scene.solver, settings, &input, &evidence, from)
 }
 
-/// The energy of some poses, written down a second time.
+/// The energy of given poses, computed independently.
 fn energy(scene: &Scene, settings: &Settings, start: &Start, poses: &[Pose]) -> f64 {
     let n = poses.len();
-    let own: f64 = (0..n).map(|it| oracle::own(scene, it, &poses[it])).sum();
+    let own: f64 = (0..n)
+        .map(|view| oracle::own(scene, view, &poses[view]))
+        .sum();
     let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
     let between = pairs.map(|[a, b]| {
         let exchanged = start.exchanged[a] != start.exchanged[b];
@@ -64,13 +66,13 @@ fn energy(scene: &Scene, settings: &Settings, start: &Start, poses: &[Pose]) -> 
 fn first_poses(scene: &Scene, start: &Start) -> Vec<Pose> {
     let candidates = scene.views.iter().zip(&start.candidates);
     candidates
-        .map(|(view, &it)| view.candidates[it].clone())
+        .map(|(view, &candidate)| view.candidates[candidate].clone())
         .collect()
 }
 
 proptest! {
     #[test]
-    fn two_views_at_once_are_a_pair(seed: u64, start in starts(2)) {
+    fn two_views_at_once_give_the_result_of_a_pair(seed: u64, start in starts(2)) {
         let (scene, settings) = (Scene::new(seed, 2, &SIZES), settings(seed));
         let all = fuse(&scene, &settings, &start);
         let from = PairStart {
@@ -93,11 +95,11 @@ proptest! {
         let found = fuse(&scene, &settings, &start);
         let mut poses = first_poses(&scene, &start);
         let mut before = energy(&scene, &settings, &start, &poses) - ROUNDING;
-        for it in &found.iterations {
-            prop_assert!(it.score >= before, "{} after {before}", it.score);
-            poses[it.target] = it.pose.clone();
-            prop_assert!((it.score - energy(&scene, &settings, &start, &poses)).abs() < ROUNDING);
-            before = it.score;
+        for iteration in &found.iterations {
+            prop_assert!(iteration.score >= before, "{} after {before}", iteration.score);
+            poses[iteration.target] = iteration.pose.clone();
+            prop_assert!((iteration.score - energy(&scene, &settings, &start, &poses)).abs() < ROUNDING);
+            before = iteration.score;
         }
         prop_assert!(found.converged);
         prop_assert_eq!(&found.poses, &poses);
@@ -119,7 +121,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn at_the_end_no_view_alone_can_do_better(
+    fn at_the_end_no_view_alone_can_raise_the_energy(
         seed: u64,
         start in starts(3),
         sizes in prop::sample::select(TINY.to_vec()),
@@ -138,7 +140,7 @@ proptest! {
 }
 
 #[test]
-fn one_view_is_what_it_is() {
+fn a_single_view_keeps_its_start() {
     let scene = Scene::new(3, 1, &SIZES);
     let start = Start {
         candidates: vec![2],

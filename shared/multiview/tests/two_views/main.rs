@@ -1,4 +1,5 @@
-//! Laws of the optimiser on small planted scenes, against an energy written down a second time.
+//! Properties of the optimiser on small artificial scenes, checked against an independent
+//! computation of the energy.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 

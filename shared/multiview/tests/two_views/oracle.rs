@@ -1,5 +1,5 @@
-//! The energies, written down a second time: the paper's from eq. 1, 3, 4 and 6, the program's from its
-//! description.
+//! Independent computation of the energies: the paper's from eq. 1, 3, 4 and 6, the program's from
+//! its description.
 
 use fmp::Pose;
 use geometry::epipolar;
@@ -41,7 +41,7 @@ pub(crate) fn between(
             continue;
         }
         sum -= settings.alpha * distance2(scene, settings, views, poses, parts);
-        // The scene has tables of its first two views.
+        // The scene has tables for its first two views.
         if views == [0, 1] {
             let types = [0, 1].map(|side| usize::from(poses[side].parts[parts[side]].mixture));
             assert!(types.iter().all(|it| *it < N_TYPES));
@@ -57,7 +57,7 @@ pub(crate) fn between(
     sum
 }
 
-/// Eq. 6, one view's half of it.
+/// Eq. 6 for one view.
 fn is_usable(scene: &Scene, settings: &Settings, view: usize, part: usize) -> bool {
     match (&scene.views[view].sigma_px, settings.tau_px.get(part)) {
         (Some(sigma), Some(tau)) => sigma[part] <= *tau,
@@ -73,7 +73,7 @@ fn distance2(
     poses: [&Pose; 2],
     parts: [usize; 2],
 ) -> f64 {
-    let [a, b] = views.map(|it| scene.views[it].plan.camera());
+    let [a, b] = views.map(|view| scene.views[view].plan.camera());
     let cap = settings.max_distance_cells.powi(2).min(1e6);
     let ideal = |side: usize| {
         let plan = &scene.views[views[side]].plan;
@@ -92,7 +92,7 @@ fn distance2(
     of_side(0) + of_side(1)
 }
 
-/// What the released program would call the score of `poses[target]`, the other pose being fixed.
+/// The released program's score of `poses[target]`, with the other pose fixed.
 pub(crate) fn released(
     scene: &Scene,
     settings: &Settings,
@@ -114,27 +114,28 @@ pub(crate) fn released(
         }
         sum += settings.alpha * heat(scene, target, &poses[target], part, pixel);
         if !exchanged {
-            let [seen, own] =
-                [support, target].map(|it| usize::from(poses[it].parts[part].mixture));
-            sum += settings.beta * scene.tables.conditional[support].value(part, seen, own);
+            let [support_type, own] =
+                [support, target].map(|view| usize::from(poses[view].parts[part].mixture));
+            sum += settings.beta * scene.tables.conditional[support].value(part, support_type, own);
         }
     }
     sum
 }
 
-/// Whether a part of the support is on: it is good enough, or both are bad but it is clearly better.
+/// Whether a part of the support is on: it is good enough, or both are bad but it is clearly
+/// better.
 ///
 /// * `parts`: of the support and of the target.
 fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {
     let views = [support, 1 - support];
-    let [here, there] = [0, 1].map(|it| is_usable(scene, settings, views[it], parts[it]));
-    let sigma = |it: usize| scene.views[views[it]].sigma_px.as_ref().unwrap()[parts[it]];
+    let [here, there] = [0, 1].map(|side| is_usable(scene, settings, views[side], parts[side]));
+    let sigma = |side: usize| scene.views[views[side]].sigma_px.as_ref().unwrap()[parts[side]];
     here || (!there && sigma(0) < sigma(1) - settings.rescue_px[parts[0]])
 }
 
-/// Heat at a part of the target of the line of a support at `pixel`, counted from 1.
+/// Heat of the line of a support at `pixel` (counted from 1), at a part of the target.
 fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
-    let [here, there] = [target, 1 - target].map(|it| scene.views[it].plan.camera());
+    let [here, there] = [target, 1 - target].map(|view| scene.views[view].plan.camera());
     let fundamental = epipolar::fundamental(there, here);
     let at = Point2::from(pixel.map(|it| it - 1.0));
     let line = epipolar::epipolar_line(&fundamental, &at).unwrap();
@@ -154,8 +155,8 @@ fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2])
         }
     }
     let [from, to] = ends[..] else { return 0.0 };
-    let it = &layout.levels[usize::from(pose.level)];
-    let map = heat_map([from, to], layout.image_size, it.rows, it.cols);
-    let cell = usize::from(pose.parts[part].y) * it.cols + usize::from(pose.parts[part].x);
+    let level = &layout.levels[usize::from(pose.level)];
+    let map = heat_map([from, to], layout.image_size, level.rows, level.cols);
+    let cell = usize::from(pose.parts[part].y) * level.cols + usize::from(pose.parts[part].x);
     f64::from(map[cell])
 }

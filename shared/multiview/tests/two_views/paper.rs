@@ -1,4 +1,4 @@
-//! Laws of the paper's energy and of its optimiser.
+//! Properties of the paper's energy and of its optimiser.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::planted::{
 };
 
 pub(crate) const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
-/// Few enough cells to try every pose there is; in the second, only types can change.
+/// Small enough to try every pose; in the second, only types can change.
 pub(crate) const TINY: [&[[usize; 2]]; 2] = [&[[3, 4], [2, 2]], &[[1, 1]]];
 /// Single-view scores are sums in single precision.
 pub(crate) const ROUNDING: f64 = 1e-4;
@@ -33,8 +33,8 @@ fn parts(estimate: &PairEstimate) -> [(u16, Vec<Placement>); 2] {
 /// Every pose of a view.
 pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
     let mut poses = Vec::new();
-    for (level, it) in plan.layout().levels.iter().enumerate() {
-        let n = it.rows * it.cols * N_TYPES;
+    for (level, level_layout) in plan.layout().levels.iter().enumerate() {
+        let n = level_layout.rows * level_layout.cols * N_TYPES;
         for mut index in 0..n.pow(N_PARTS as u32) {
             let mut next = |count: usize| {
                 let digit = index % count;
@@ -43,8 +43,8 @@ pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
             };
             let parts = (0..N_PARTS).map(|_| Placement {
                 mixture: next(N_TYPES) as u8,
-                x: next(it.cols) as u16,
-                y: next(it.rows) as u16,
+                x: next(level_layout.cols) as u16,
+                y: next(level_layout.rows) as u16,
             });
             poses.push(Pose {
                 score: 0.0,
@@ -57,27 +57,27 @@ pub(crate) fn all_poses(plan: &ViewPlan) -> Vec<Pose> {
 }
 
 proptest! {
-    /// They come from another process.
+    /// Bounds come from another process.
     #[test]
-    fn bounds_change_nothing_unless_they_lie_and_then_do_no_harm(
+    fn correct_bounds_change_nothing_and_wrong_bounds_do_not_panic(
         seed in any::<u64>(),
         start in starts(),
-        lies in proptest::collection::vec((-20.0..20.0_f32, 0.0..20.0_f32), 2 * SIZES.len()),
+        values in proptest::collection::vec((-20.0..20.0_f32, 0.0..20.0_f32), 2 * SIZES.len()),
         released: bool,
     ) {
         let scene = Scene::new(seed, 2, &SIZES);
         let energy = if released { EnergyKind::Released } else { EnergyKind::Paper };
         let settings = Settings { energy, ..settings(seed) };
-        let evidence = [0, 1].map(|it| scene.views[it].evidence());
+        let evidence = [0, 1].map(|view| scene.views[view].evidence());
         let fuse = |bounds: &[Bounds; 2]| {
-            let evidence = [0, 1].map(|it| evidence[it].with_bounds(&bounds[it]));
+            let evidence = [0, 1].map(|view| evidence[view].with_bounds(&bounds[view]));
             scene.fuse_evidence(&settings, [0, 1], start, evidence.each_ref())
         };
-        let right = evidence.each_ref().map(|it| scene.solver.bounds(it));
+        let right = evidence.each_ref().map(|evidence| scene.solver.bounds(evidence));
         prop_assert_eq!(fuse(&right), scene.fuse(&settings, [0, 1], start));
-        let lie = |&(best, size): &(f32, f32)| Bound { best, size };
-        let lies: Vec<Bound> = lies.iter().map(lie).collect();
-        let wrong = [0, 1].map(|it| Bounds::new(lies[it * SIZES.len()..][..SIZES.len()].to_vec()));
+        let bound = |&(best, size): &(f32, f32)| Bound { best, size };
+        let values: Vec<Bound> = values.iter().map(bound).collect();
+        let wrong = [0, 1].map(|view| Bounds::new(values[view * SIZES.len()..][..SIZES.len()].to_vec()));
         let found = fuse(&wrong);
         prop_assert!(found.iterations.len() <= settings.max_iterations);
     }
@@ -91,13 +91,13 @@ proptest! {
         let energy = |poses: &[Pose; 2]| {
             oracle::energy(&scene, &settings, [0, 1], poses.each_ref(), start.exchanged)
         };
-        let mut poses = [0, 1].map(|it| scene.views[it].candidates[start.candidates[it]].clone());
+        let mut poses = [0, 1].map(|view| scene.views[view].candidates[start.candidates[view]].clone());
         let mut before = energy(&poses) - ROUNDING;
-        for it in &found.iterations {
-            prop_assert!(it.score >= before, "{} after {before}", it.score);
-            poses[it.target] = it.pose.clone();
-            prop_assert!((it.score - energy(&poses)).abs() < ROUNDING);
-            before = it.score;
+        for iteration in &found.iterations {
+            prop_assert!(iteration.score >= before, "{} after {before}", iteration.score);
+            poses[iteration.target] = iteration.pose.clone();
+            prop_assert!((iteration.score - energy(&poses)).abs() < ROUNDING);
+            before = iteration.score;
         }
         prop_assert!(found.converged);
         prop_assert_eq!(&found.poses, &poses);
@@ -108,19 +108,19 @@ proptest! {
     fn rounding_neither_lowers_the_energy_nor_makes_it_cycle(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         for view in &mut scene.views {
-            // Sums of scores this large are right to a tenth or so.
-            view.values.iter_mut().for_each(|it| *it += 1e6);
+            // Sums of scores this large are accurate to about a tenth.
+            view.values.iter_mut().for_each(|value| *value += 1e6);
         }
         let found = scene.fuse(&settings(seed), [0, 1], start);
         prop_assert!(found.converged);
-        let energies: Vec<f64> = found.iterations.iter().map(|it| it.score).collect();
+        let energies: Vec<f64> = found.iterations.iter().map(|iteration| iteration.score).collect();
         prop_assert!(energies.is_sorted(), "{energies:?}");
     }
 
     #[test]
     fn exchanging_the_views_exchanges_their_poses(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
-        // The scene knows no tables of the pair (1, 0).
+        // The scene has no tables for the pair (1, 0).
         let settings = Settings { beta: 0.0, ..settings(seed) };
         // A tie would go to the first view in either order.
         scene.views[0].sigma_px = None;
@@ -130,8 +130,8 @@ proptest! {
         prop_assert!((there.energy - back.energy).abs() < ROUNDING);
         let [first, second] = parts(&back);
         prop_assert_eq!(parts(&there), [second, first]);
-        let targets = |it: &PairEstimate| it.iterations.iter().map(|it| it.target).collect::<Vec<_>>();
-        let exchanged: Vec<usize> = targets(&back).into_iter().map(|it| 1 - it).collect();
+        let targets = |estimate: &PairEstimate| estimate.iterations.iter().map(|iteration| iteration.target).collect::<Vec<_>>();
+        let exchanged: Vec<usize> = targets(&back).into_iter().map(|target| 1 - target).collect();
         prop_assert_eq!(targets(&there), exchanged);
     }
 
@@ -144,12 +144,12 @@ proptest! {
         let exchanged = scene.fuse(&settings, [0, 1], start);
         prop_assert!((plain.energy - exchanged.energy).abs() < ROUNDING);
         let [first, second] = parts(&exchanged);
-        let back = [first, second].map(|(level, it)| (level, MIRROR.map(|part| it[part]).to_vec()));
+        let back = [first, second].map(|(level, parts)| (level, MIRROR.map(|part| parts[part]).to_vec()));
         prop_assert_eq!(parts(&plain), back);
     }
 
     #[test]
-    fn a_view_from_behind_is_understood_when_its_sides_are_exchanged(seed: u64, start in starts()) {
+    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_exchanged(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { beta: 0.0, ..settings(seed) };
         let plain = scene.fuse(&settings, [0, 1], start);
@@ -165,26 +165,26 @@ proptest! {
     }
 
     #[test]
-    fn parts_that_are_off_feel_no_force(seed: u64, blind in 0..2_usize, start in starts()) {
+    fn parts_that_are_off_have_no_terms(seed: u64, blind in 0..2_usize, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         scene.views[blind].sigma_px = Some(vec![9.0; N_PARTS]);
         let settings = Settings { tau_px: vec![8.0; N_PARTS], ..settings(seed) };
         let found = scene.fuse(&settings, [0, 1], start);
         prop_assert_eq!(&found.active, &[false; N_PARTS]);
-        let alone = [0, 1].map(|it| scene.views[it].candidates[0].clone());
-        prop_assert_eq!(found.poses.each_ref().map(|it| &it.parts), alone.each_ref().map(|it| &it.parts));
-        let sum: f64 = alone.iter().map(|it| f64::from(it.score)).sum();
+        let alone = [0, 1].map(|view| scene.views[view].candidates[0].clone());
+        prop_assert_eq!(found.poses.each_ref().map(|pose| &pose.parts), alone.each_ref().map(|pose| &pose.parts));
+        let sum: f64 = alone.iter().map(|pose| f64::from(pose.score)).sum();
         prop_assert!((found.energy - sum).abs() < ROUNDING);
     }
 
     #[test]
-    fn where_the_support_alone_counts_the_view_that_cannot_tell_follows_the_one_that_can(
+    fn with_switching_by_support_the_unreliable_view_follows_the_reliable_one(
         seed: u64,
         blind in 0..2_usize,
         (switch, sees) in prop::sample::select(vec![
             (SwitchBy::Support, 1.0),
             (SwitchBy::Worse, 1.0),
-            // Neither can tell, and one less than the other.
+            // Neither is usable, and one is worse than the other.
             (SwitchBy::Worse, 8.5),
         ]),
         start in starts(),
@@ -201,16 +201,16 @@ proptest! {
         let found = scene.fuse(&settings, [0, 1], start);
         prop_assert!(found.converged);
         let alone = &scene.views[1 - blind].candidates[0];
-        prop_assert_eq!(&found.poses[1 - blind].parts, &alone.parts, "it asks nobody");
-        let worth = |pose: &Pose| {
+        prop_assert_eq!(&found.poses[1 - blind].parts, &alone.parts, "it has no support");
+        let energy = |pose: &Pose| {
             let mut poses = found.poses.clone();
             poses[blind] = pose.clone();
             oracle::own(&scene, blind, pose)
                 + oracle::between(&scene, &all_on, [0, 1], poses.each_ref(), start.exchanged)
         };
-        let followed = worth(&found.poses[blind]);
+        let followed = energy(&found.poses[blind]);
         for candidate in &scene.views[blind].candidates {
-            prop_assert!(followed >= worth(candidate) - ROUNDING);
+            prop_assert!(followed >= energy(candidate) - ROUNDING);
         }
     }
 
@@ -233,7 +233,7 @@ proptest! {
             let mut camera = view.plan.camera().clone();
             let inside = &mut camera.intrinsics;
             (inside.fx, inside.fy) = (2.0 * inside.fx, 2.0 * inside.fy);
-            // Pixels count from the centre of the first one.
+            // Pixels are counted from the centre of the first one.
             (inside.cx, inside.cy) = (2.0 * inside.cx + 0.5, 2.0 * inside.cy + 0.5);
             inside.size = inside.size.map(|it| 2 * it);
             let model = Arc::clone(scene.solver.model());
@@ -245,15 +245,15 @@ proptest! {
     }
 
     #[test]
-    fn cells_lie_where_the_lens_would_put_them_without_distortion(seed: u64) {
+    fn cell_centres_are_those_without_lens_distortion(seed: u64) {
         let scene = Scene::new(seed, 1, &SIZES);
         let plan = &scene.views[0].plan;
         let mut pose = scene.views[0].candidates[0].clone();
-        for (level, it) in plan.layout().levels.iter().enumerate() {
+        for (level, level_layout) in plan.layout().levels.iter().enumerate() {
             pose.level = level as u16;
             for (cell, ideal) in plan.cells(0, level).iter().enumerate() {
-                pose.parts[0].x = (cell % it.cols) as u16;
-                pose.parts[0].y = (cell / it.cols) as u16;
+                pose.parts[0].x = (cell % level_layout.cols) as u16;
+                pose.parts[0].y = (cell / level_layout.cols) as u16;
                 let centre = Point2::from(plan.centres(&pose)[0]);
                 let Some(back) = plan.camera().distort_px(&Point2::from(*ideal)) else {
                     prop_assert!(plan.camera().undistorted_px(&centre).is_none());
@@ -265,7 +265,7 @@ proptest! {
     }
 
     #[test]
-    fn a_view_that_sees_nothing_is_pulled_to_the_lines_of_the_other(seed: u64, blind in 0..2_usize) {
+    fn a_view_without_evidence_is_pulled_to_the_lines_of_the_other(seed: u64, blind in 0..2_usize) {
         let mut scene = Scene::new(seed, 2, &[[12, 16]]);
         let settings = Settings {
             alpha: 1e4,
@@ -273,35 +273,36 @@ proptest! {
             max_distance_cells: 20.0,
             ..Settings::default()
         };
-        for (view, it) in scene.views.iter_mut().enumerate() {
-            it.sigma_px = None;
-            it.values.fill(0.0);
-            if view != blind {
-                it.believe(1, 1e9);
+        for (index, view) in scene.views.iter_mut().enumerate() {
+            view.sigma_px = None;
+            view.values.fill(0.0);
+            if index != blind {
+                view.add_evidence(1, 1e9);
             }
-            it.candidates = vec![scene.solver.best(&it.evidence(), None).unwrap()];
+            view.candidates = vec![scene.solver.best(&view.evidence(), None).unwrap()];
         }
         let found = scene.fuse(&settings, [0, 1], FROM_BEST);
         prop_assert_eq!(&found.poses[1 - blind].parts, &scene.views[1 - blind].candidates[0].parts);
         let best = all_placements(&scene, &settings, blind, &found.poses);
         let got = oracle::between(&scene, &settings, [0, 1], found.poses.each_ref(), false);
-        // The springs, 120 at most, are nothing beside a cell's worth of alpha.
+        // The springs, 120 at most, are negligible compared with alpha times a cell.
         prop_assert!(got >= best - 500.0, "{got} of {best}");
     }
 }
 
-/// The best that the terms alone can be, each part of `view` by itself, the other view fixed.
+/// The best value of the terms alone: each part of `view` is optimised independently, the other
+/// view is fixed.
 fn all_placements(scene: &Scene, settings: &Settings, view: usize, poses: &[Pose; 2]) -> f64 {
-    let it = &scene.views[view].plan.layout().levels[0];
+    let level = &scene.views[view].plan.layout().levels[0];
     let with = |part: usize, cell: usize| {
         let mut moved = poses.clone();
-        moved[view].parts[part].x = (cell % it.cols) as u16;
-        moved[view].parts[part].y = (cell / it.cols) as u16;
+        moved[view].parts[part].x = (cell % level.cols) as u16;
+        moved[view].parts[part].y = (cell / level.cols) as u16;
         oracle::between(scene, settings, [0, 1], moved.each_ref(), false)
     };
     let now = oracle::between(scene, settings, [0, 1], poses.each_ref(), false);
     let gain = |part: usize| {
-        let cells = (0..it.rows * it.cols).map(|cell| with(part, cell) - now);
+        let cells = (0..level.rows * level.cols).map(|cell| with(part, cell) - now);
         cells.fold(0.0, f64::max)
     };
     now + (0..N_PARTS).map(gain).sum::<f64>()
@@ -327,7 +328,7 @@ proptest! {
 }
 
 #[test]
-fn types_that_still_change_are_followed_although_nothing_moves() {
+fn the_optimiser_continues_while_only_types_change() {
     let sizes = [[1, 1]];
     for seed in 0..300 {
         let scene = Scene::new(seed, 2, &sizes);
@@ -348,7 +349,7 @@ fn types_that_still_change_are_followed_although_nothing_moves() {
 }
 
 #[test]
-fn a_support_without_an_answer_of_its_lens_says_nothing() {
+fn a_support_without_lens_solution_has_no_effect() {
     for seed in 0..20 {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let layout = Arc::new(layout(&SIZES, 4.0));
@@ -391,7 +392,7 @@ fn an_expected_error_at_the_threshold_is_not_above_it() {
 }
 
 #[test]
-fn thresholds_that_came_with_a_prediction_count_where_the_settings_have_none() {
+fn thresholds_of_a_prediction_are_used_where_the_settings_have_none() {
     let mut scene = Scene::new(1, 2, &SIZES);
     scene.views[0].sigma_px = Some(vec![5.0; N_PARTS]);
     scene.views[1].sigma_px = Some(vec![5.0; N_PARTS]);
@@ -404,22 +405,22 @@ fn thresholds_that_came_with_a_prediction_count_where_the_settings_have_none() {
     assert_eq!(found.active, [true, true, false]);
 }
 
-/// The view that supports the other one first.
+/// The view that is the first support.
 fn first_support(sigma_px: [Option<[f32; N_PARTS]>; 2], seed: u64) -> (usize, usize) {
     let mut scene = Scene::new(seed, 2, &SIZES);
     for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {
-        view.sigma_px = sigma.map(|it| it.to_vec());
+        view.sigma_px = sigma.map(|sigma_px| sigma_px.to_vec());
     }
     let found = scene.fuse(&settings(seed), [0, 1], FROM_BEST);
-    let [a, b] = [0, 1].map(|it| scene.views[it].candidates[0].score);
+    let [a, b] = [0, 1].map(|view| scene.views[view].candidates[0].score);
     (1 - found.iterations[0].target, usize::from(b > a))
 }
 
 #[test]
-fn the_first_support_is_the_view_of_lower_expected_error() {
+fn the_first_support_is_the_view_with_lower_expected_error() {
     for seed in 0..20 {
         let good = Some([1.0, 2.0, 2.5]);
-        // The largest error of a part is not what counts.
+        // The largest error of a part does not matter.
         let bad = Some([2.0, 2.0, 2.0]);
         assert_eq!(first_support([good, bad], seed).0, 0);
         assert_eq!(first_support([bad, good], seed).0, 1);
@@ -428,20 +429,20 @@ fn the_first_support_is_the_view_of_lower_expected_error() {
 }
 
 #[test]
-fn without_an_expectation_the_first_support_is_the_view_of_higher_score() {
-    let mut seen = [0, 0];
+fn without_expected_errors_the_first_support_is_the_view_with_higher_score() {
+    let mut counts = [0, 0];
     for seed in 0..20 {
         for sigma in [[None, None], [None, Some([1.0; 3])], [Some([1.0; 3]), None]] {
             let (first, higher) = first_support(sigma, seed);
             assert_eq!(first, higher);
-            seen[first] += 1;
+            counts[first] += 1;
         }
     }
-    assert!(seen.iter().all(|it| *it > 0), "{seen:?}");
+    assert!(counts.iter().all(|it| *it > 0), "{counts:?}");
 }
 
 #[test]
-fn no_iterations_leave_the_start_as_it_is() {
+fn without_iterations_the_start_is_returned() {
     let (scene, mut settings) = (Scene::new(1, 2, &SIZES), settings(1));
     settings.max_iterations = 0;
     let start = PairStart {
@@ -456,7 +457,7 @@ fn no_iterations_leave_the_start_as_it_is() {
 }
 
 #[test]
-fn the_noise_is_spread() {
+fn the_noise_has_the_expected_mean() {
     let mut noise = Noise(3);
     let mean = (0..1000).map(|_| noise.unit()).sum::<f64>() / 1000.0;
     assert!((mean - 0.5).abs() < 0.05, "{mean}");

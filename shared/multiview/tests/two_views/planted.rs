@@ -1,4 +1,5 @@
-//! Small scenes: a root with two arms that mirror each other, seen by cameras on a circle.
+//! Small artificial scenes: a root with two arms that mirror each other, seen by cameras on a
+//! circle.
 
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ pub(crate) const N_TYPES: usize = 2;
 /// The arms exchange sides.
 pub(crate) const MIRROR: [usize; N_PARTS] = [0, 2, 1];
 
-/// Numbers that look random and depend on the seed only.
+/// A deterministic generator of pseudorandom numbers.
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
@@ -39,7 +40,7 @@ impl Noise {
     }
 }
 
-/// A model whose two sides are alike.
+/// A model with two equal sides.
 pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     let mut spring = || Spring {
         w: [
@@ -81,13 +82,14 @@ pub(crate) fn model(noise: &mut Noise) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// A pyramid of levels of `sizes` `[rows, cols]`, the first of cells of `cell_px`, each twice as coarse.
+/// A pyramid with levels of `sizes` `[rows, cols]`; the first has cells of `cell_px`, and each next
+/// level is twice as coarse.
 pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
     let [rows, cols] = sizes[0];
     let image_size = [cols, rows].map(|it| (it as f64 * cell_px) as usize);
     let mut offset = 0;
     let level = |(level, &[rows, cols]): (usize, &[usize; 2])| {
-        let it = LevelLayout {
+        let level_layout = LevelLayout {
             scale: cell_px * f64::from(1 << level),
             image_size,
             padded: [rows, cols],
@@ -96,7 +98,7 @@ pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
             offset,
         };
         offset += rows * cols * N_PARTS * N_TYPES;
-        it
+        level_layout
     };
     Layout {
         image_size,
@@ -110,7 +112,7 @@ pub(crate) fn layout(sizes: &[[usize; 2]], cell_px: f64) -> Layout {
 pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensModel) -> Camera {
     let eye = Point3::new(4.0 * bearing.cos(), 4.0 * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
+    // `look_at_rh` is x right, y up, z backward; half a turn about x gives OpenCV's axes.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     let [width, rows] = size.map(|it| it as f64);
     Camera {
@@ -127,7 +129,7 @@ pub(crate) fn camera(bearing: f64, height: f64, size: [usize; 2], lens: LensMode
     }
 }
 
-/// No distortion, a mild one, a fisheye, and one that leaves the corners without an answer.
+/// No distortion, a mild one, a fisheye, and one without solution in the corners.
 pub(crate) fn lenses() -> [LensModel; 4] {
     let radial = |k1: f64, k2: f64| LensModel::BrownConrady {
         k: [k1, k2, 0.0, 0.0, 0.0, 0.0],
@@ -157,7 +159,7 @@ impl View {
         Responses::new(self.plan.layout(), &self.values, &self.levels)
     }
 
-    pub(crate) fn answer(&self) -> ViewInput<'_> {
+    pub(crate) fn input(&self) -> ViewInput<'_> {
         ViewInput {
             plan: &self.plan,
             candidates: &self.candidates,
@@ -167,14 +169,14 @@ impl View {
     }
 
     /// Adds evidence for one of the view's candidates.
-    pub(crate) fn believe(&mut self, candidate: usize, score: f32) {
+    pub(crate) fn add_evidence(&mut self, candidate: usize, score: f32) {
         let pose = &self.candidates[candidate];
         let layout = self.plan.layout();
         let cols = layout.levels[usize::from(pose.level)].cols;
-        for (part, it) in pose.parts.iter().enumerate() {
-            let filter = part * N_TYPES + usize::from(it.mixture);
+        for (part, placement) in pose.parts.iter().enumerate() {
+            let filter = part * N_TYPES + usize::from(placement.mixture);
             let map = layout.map_range(usize::from(pose.level), filter);
-            self.values[map][usize::from(it.y) * cols + usize::from(it.x)] += score;
+            self.values[map][usize::from(placement.y) * cols + usize::from(placement.x)] += score;
         }
     }
 
@@ -184,7 +186,7 @@ impl View {
         for level in 0..layout.levels.len() {
             for mixture in 0..N_TYPES {
                 let [right, left] =
-                    [1, 2].map(|it| layout.map_range(level, it * N_TYPES + mixture));
+                    [1, 2].map(|part| layout.map_range(level, part * N_TYPES + mixture));
                 for (a, b) in right.zip(left) {
                     self.values.swap(a, b);
                 }
@@ -202,12 +204,12 @@ impl View {
 /// The pose with the two sides of the model exchanged.
 pub(crate) fn mirrored(pose: &Pose) -> Pose {
     Pose {
-        parts: MIRROR.map(|it| pose.parts[it]).to_vec(),
+        parts: MIRROR.map(|part| pose.parts[part]).to_vec(),
         ..pose.clone()
     }
 }
 
-/// Several views of one made-up instant.
+/// Several views of one artificial instant.
 pub(crate) struct Scene {
     pub(crate) solver: Solver,
     pub(crate) views: Vec<View>,
@@ -215,7 +217,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// A scene of made-up evidence on levels of `sizes`, told by its seed.
+    /// A scene of random evidence on levels of `sizes`.
     pub(crate) fn new(seed: u64, n_views: usize, sizes: &[[usize; 2]]) -> Self {
         let noise = &mut Noise(seed);
         let model = model(noise);
@@ -263,11 +265,11 @@ impl Scene {
         views: [usize; 2],
         start: PairStart,
     ) -> PairEstimate {
-        let evidence = views.map(|it| self.views[it].evidence());
+        let evidence = views.map(|view| self.views[view].evidence());
         self.fuse_evidence(settings, views, start, evidence.each_ref())
     }
 
-    /// The same on evidence of these views that is given.
+    /// As [`Self::fuse`], on given evidence of these views.
     pub(crate) fn fuse_evidence(
         &self,
         settings: &Settings,
@@ -275,9 +277,9 @@ impl Scene {
         start: PairStart,
         evidence: [&Responses<'_>; 2],
     ) -> PairEstimate {
-        let [first, second] = views.map(|it| &self.views[it]);
+        let [first, second] = views.map(|view| &self.views[view]);
         let input = PairInput {
-            views: [first.answer(), second.answer()],
+            views: [first.input(), second.input()],
             epipolar: Epipolar::new(&first.plan, &second.plan),
             tables: (views == [0, 1]).then_some(&self.tables),
         };
@@ -285,7 +287,7 @@ impl Scene {
     }
 }
 
-/// Settings that let a part be off, the terms matter, and nothing end too early.
+/// Settings with which parts can be off, the terms matter, and the iterations suffice.
 pub(crate) fn settings(seed: u64) -> Settings {
     let noise = &mut Noise(seed ^ 0xABCD);
     Settings {
@@ -304,17 +306,17 @@ pub(crate) const FROM_BEST: PairStart = PairStart {
     exchanged: false,
 };
 
-/// A pose anywhere on any level, with its own score.
+/// A random pose on a random level, with its own score.
 fn pose(noise: &mut Noise, solver: &Solver, view: &View) -> Pose {
     let level = noise.pick(&view.levels);
-    let it = &view.plan.layout().levels[usize::from(level)];
+    let level_layout = &view.plan.layout().levels[usize::from(level)];
     let mut pose = Pose {
         score: 0.0,
         level,
         parts: (0..N_PARTS)
             .map(|_| Placement {
-                x: (noise.unit() * it.cols as f64) as u16,
-                y: (noise.unit() * it.rows as f64) as u16,
+                x: (noise.unit() * level_layout.cols as f64) as u16,
+                y: (noise.unit() * level_layout.rows as f64) as u16,
                 mixture: (noise.unit() * N_TYPES as f64) as u8,
             })
             .collect(),
@@ -323,7 +325,7 @@ fn pose(noise: &mut Noise, solver: &Solver, view: &View) -> Pose {
     pose
 }
 
-/// Type tables of the first two views, each about its own world.
+/// Random type tables of the first two views.
 fn tables(noise: &mut Noise) -> TypeTables {
     let mut table = || {
         let rows = (0..N_PARTS * N_TYPES).map(|row| {

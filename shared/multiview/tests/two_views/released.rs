@@ -1,4 +1,4 @@
-//! Laws of the released energy, and where its optimiser is worse than the paper's.
+//! Properties of the released energy, and cases in which its optimiser is worse than the paper's.
 
 use fmp::Pose;
 use multiview::{EnergyKind, PairEstimate, PairStart, Settings};
@@ -20,7 +20,7 @@ fn parts(pose: &Pose) -> (u16, &[fmp::Placement]) {
     (pose.level, &pose.parts)
 }
 
-/// Whether the last answers of both views are those of four iterations before, but not of two.
+/// Whether the last poses of both views are those of four iterations before, but not of two.
 fn cycles(estimate: &PairEstimate) -> bool {
     let [.., a, b, c, d, e, f] = &estimate.iterations[..] else {
         return false;
@@ -31,7 +31,7 @@ fn cycles(estimate: &PairEstimate) -> bool {
 }
 
 #[test]
-fn the_released_optimiser_can_cycle_where_that_of_the_paper_converges() {
+fn the_released_optimiser_can_cycle_where_the_papers_converges() {
     let mut n_cycles = 0;
     for seed in 0..300 {
         let scene = Scene::new(seed, 2, &SIZES);
@@ -39,9 +39,9 @@ fn the_released_optimiser_can_cycle_where_that_of_the_paper_converges() {
         let settled = found
             .iterations
             .windows(2)
-            .position(|it| it.iter().all(|it| it.moved_px <= 0.1));
+            .position(|pair| pair.iter().all(|iteration| iteration.moved_px <= 0.1));
         assert_eq!(found.converged, settled.is_some(), "seed {seed}");
-        let expect = settled.map_or(60, |it| it + 2);
+        let expect = settled.map_or(60, |first| first + 2);
         assert_eq!(found.iterations.len(), expect, "seed {seed}");
         if cycles(&found) {
             n_cycles += 1;
@@ -68,10 +68,10 @@ fn a_part_that_is_off_in_the_support_adds_nothing_to_the_target() {
         };
         let found = scene.fuse(&settings, [0, 1], FROM_BEST);
         assert_eq!(found.active, [blind != 0; N_PARTS]);
-        // The view that a blind one supports answers as if it were alone.
+        // The view with the blind support gets the same result as alone.
         let alone = &scene.views[1 - blind].candidates[0];
         assert_eq!(parts(&found.poses[1 - blind]), parts(alone));
-        // The blind one is supported, unless no line meets its image.
+        // The blind view has a support, unless no line meets its image.
         let gained = found.poses[blind].score - scene.views[blind].candidates[0].score;
         assert!(gained >= 0.0, "{gained}");
         n_supported += usize::from(gained > 0.0);
@@ -81,28 +81,28 @@ fn a_part_that_is_off_in_the_support_adds_nothing_to_the_target() {
 
 proptest! {
     #[test]
-    fn every_score_is_that_of_the_description(seed: u64, exchanged: bool) {
+    fn every_score_agrees_with_the_description(seed: u64, exchanged: bool) {
         let scene = Scene::new(seed, 2, &SIZES);
         let settings = released(seed);
         let start = PairStart { exchanged, ..FROM_BEST };
         let found = scene.fuse(&settings, [0, 1], start);
-        let mut poses = [0, 1].map(|it| scene.views[it].candidates[0].clone());
-        for it in &found.iterations {
+        let mut poses = [0, 1].map(|view| scene.views[view].candidates[0].clone());
+        for iteration in &found.iterations {
             let mut before = poses.clone();
-            poses[it.target] = it.pose.clone();
-            let expect = oracle::released(&scene, &settings, it.target, &poses, exchanged);
-            prop_assert!((it.score - expect).abs() < 1e-4, "{} {expect}", it.score);
-            // No other pose known is better.
-            for other in &scene.views[it.target].candidates {
-                before[it.target] = other.clone();
-                let other = oracle::released(&scene, &settings, it.target, &before, exchanged);
-                prop_assert!(other <= it.score + 1e-4);
+            poses[iteration.target] = iteration.pose.clone();
+            let expect = oracle::released(&scene, &settings, iteration.target, &poses, exchanged);
+            prop_assert!((iteration.score - expect).abs() < 1e-4, "{} {expect}", iteration.score);
+            // None of the candidates is better.
+            for other in &scene.views[iteration.target].candidates {
+                before[iteration.target] = other.clone();
+                let other = oracle::released(&scene, &settings, iteration.target, &before, exchanged);
+                prop_assert!(other <= iteration.score + 1e-4);
             }
         }
     }
 
     #[test]
-    fn a_view_from_behind_is_understood_when_its_sides_are_exchanged(seed: u64) {
+    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_exchanged(seed: u64) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { beta: 0.0, ..released(seed) };
         let plain = scene.fuse(&settings, [0, 1], FROM_BEST);
@@ -127,7 +127,7 @@ proptest! {
     }
 }
 
-/// Switches of the first view where the two views expect these errors of every part.
+/// The switches of the first view for given expected errors of every part in the two views.
 fn switch_of_first(sigma_px: [f32; 2]) -> bool {
     let mut scene = Scene::new(7, 2, &SIZES);
     for (view, sigma) in scene.views.iter_mut().zip(sigma_px) {
@@ -143,10 +143,10 @@ fn switch_of_first(sigma_px: [f32; 2]) -> bool {
 }
 
 #[test]
-fn the_better_of_two_bad_views_is_rescued_if_it_is_clearly_better() {
+fn the_better_of_two_bad_views_is_switched_on_if_it_is_clearly_better() {
     assert!(!switch_of_first([8.5, 10.0]), "nearly as bad as the other");
     assert!(switch_of_first([8.5, 11.0]), "clearly better");
     assert!(!switch_of_first([11.0, 8.5]), "clearly worse");
-    assert!(!switch_of_first([8.5, 7.0]), "the other one is fine");
-    assert!(switch_of_first([7.0, 20.0]), "fine itself");
+    assert!(!switch_of_first([8.5, 7.0]), "the other view is usable");
+    assert!(switch_of_first([7.0, 20.0]), "usable itself");
 }

@@ -1,4 +1,4 @@
-//! The choice of candidates and exchanges, against every combination there is.
+//! The choice of candidates and exchanges, compared with all combinations.
 
 use multiview::{Settings, TypeTables, ViewInput, choose_start, rank_starts};
 use proptest::prelude::*;
@@ -9,17 +9,17 @@ use crate::planted::{Scene, View, settings};
 const SIZES: [[usize; 2]; 2] = [[6, 8], [4, 5]];
 
 fn chosen(scene: &Scene, settings: &Settings) -> multiview::Start {
-    let answers: Vec<ViewInput<'_>> = scene.views.iter().map(View::answer).collect();
+    let inputs: Vec<ViewInput<'_>> = scene.views.iter().map(View::input).collect();
     let tables =
         |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
-    choose_start(settings, &answers, &tables)
+    choose_start(settings, &inputs, &tables)
 }
 
 fn ranked(scene: &Scene, settings: &Settings) -> Vec<multiview::Start> {
-    let answers: Vec<ViewInput<'_>> = scene.views.iter().map(View::answer).collect();
+    let inputs: Vec<ViewInput<'_>> = scene.views.iter().map(View::input).collect();
     let tables =
         |a: usize, b: usize| -> Option<&TypeTables> { ((a, b) == (0, 1)).then_some(&scene.tables) };
-    rank_starts(settings, &answers, &tables)
+    rank_starts(settings, &inputs, &tables)
 }
 
 /// Sum of eq. 3 over all pairs.
@@ -28,7 +28,7 @@ fn energy(scene: &Scene, settings: &Settings, candidates: &[usize], exchanged: &
     let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
     pairs
         .map(|views| {
-            let poses = views.map(|it| &scene.views[it].candidates[candidates[it]]);
+            let poses = views.map(|view| &scene.views[view].candidates[candidates[view]]);
             let opposite = exchanged[views[0]] != exchanged[views[1]];
             oracle::energy(scene, settings, views, poses, opposite)
         })
@@ -49,7 +49,7 @@ proptest! {
         prop_assert_eq!(starts.len(), if facing { 4 } else { 1 });
         prop_assert!(starts.is_sorted_by(|a, b| a.energy >= b.energy));
         prop_assert!((starts[0].energy - chosen(&scene, &settings).energy).abs() < 1e-4);
-        let mut patterns: Vec<&Vec<bool>> = starts.iter().map(|it| &it.exchanged).collect();
+        let mut patterns: Vec<&Vec<bool>> = starts.iter().map(|start| &start.exchanged).collect();
         patterns.sort();
         patterns.dedup();
         prop_assert_eq!(patterns.len(), starts.len(), "every assumption once");
@@ -63,13 +63,13 @@ proptest! {
     }
 
     #[test]
-    fn the_start_is_the_best_of_all_combinations(seed: u64, facing: bool) {
+    fn the_start_is_the_best_combination(seed: u64, facing: bool) {
         let scene = Scene::new(seed, 3, &SIZES);
         let settings = Settings { facing, n_candidates: 3, ..settings(seed) };
         let start = chosen(&scene, &settings);
-        let told = energy(&scene, &settings, &start.candidates, &start.exchanged);
-        prop_assert!((start.energy - told).abs() < 1e-4);
-        prop_assert!(!start.exchanged[0], "the first view is what others are exchanged against");
+        let energy_of_start = energy(&scene, &settings, &start.candidates, &start.exchanged);
+        prop_assert!((start.energy - energy_of_start).abs() < 1e-4);
+        prop_assert!(!start.exchanged[0], "exchanges are relative to the first view");
         let n_exchanges = if facing { 4 } else { 1 };
         for index in 0..27 * n_exchanges {
             let candidates = [index % 3, index / 3 % 3, index / 9 % 3];
