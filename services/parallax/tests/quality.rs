@@ -221,7 +221,7 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     );
     let file = network(0.02).file();
     let stderr = said(&file[..file.len() / 2]);
-    assert!(stderr.contains("cut off or no ONNX file"), "{stderr}");
+    assert!(stderr.contains("truncated or not an ONNX file"), "{stderr}");
 }
 
 #[test]

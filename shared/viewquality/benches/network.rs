@@ -1,7 +1,8 @@
-//! One view's expected errors on one core: the tile of a person 400 pixels high out of a 1280 x 720 frame,
-//! and a network of 13 depthwise-separable blocks, width 0.5, on 160 x 64 pixels, with random weights.
+//! Time for one view's expected errors on one core: the tile of a person 400 pixels high from a
+//! 1280 x 720 frame, and a network of 13 depthwise-separable blocks, width 0.5, on 160 x 64 pixels,
+//! with random weights.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
 
@@ -124,7 +125,7 @@ impl Layers {
         (self.last, self.channels) = (out, channels);
     }
 
-    /// A number about 0, so large that sums of so many keep their size.
+    /// A random number around 0, scaled so that sums of `fan_in` terms keep their size.
     fn random(&mut self, fan_in: usize) -> f32 {
         self.seed = self
             .seed

@@ -1,4 +1,4 @@
-//! What a network's file says of itself: its ONNX `metadata_props`.
+//! The description of a network in its file: the ONNX `metadata_props`.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use crate::{EVIDENCE_VERSION, Normalisation, TileShape};
 
 /// Names of the entries.
 pub mod key {
-    /// Version of these entries: `1`. All others may be left out; see [`Card`](super::Card).
+    /// Version of these entries: `1`. All entries are optional; see [`Card`](super::Card).
     pub const VERSION: &str = "parallax.version";
     /// Height and width of the tile: `160x64`.
     pub const TILE: &str = "parallax.tile";
@@ -14,24 +14,24 @@ pub mod key {
     pub const MEAN: &str = "parallax.mean";
     /// Deviation of red, green and blue, above 0.
     pub const STD: &str = "parallax.std";
-    /// Version of the layout of the second input; left out by networks that look at the tile only.
+    /// Version of the layout of the second input; absent if the network only takes the tile.
     pub const EVIDENCE: &str = "parallax.evidence";
-    /// What the output counts in: `pixels`, `relative` or `log-relative`.
+    /// Unit of the output: `pixels`, `relative` or `log-relative`.
     pub const OUTPUT: &str = "parallax.output";
     /// Which network this is, for people.
     pub const IDENTITY: &str = "parallax.identity";
-    /// Thresholds of the switch, one per part; see [`Card::tau`](super::Card::tau).
+    /// Thresholds for switching parts off, one per part; see [`Card::tau`](super::Card::tau).
     pub const TAU: &str = "parallax.tau";
 }
 
 /// The only version of the entries.
 const VERSION: u32 = 1;
-/// Share of the tile's height that is 1 in the logarithm.
+/// Fraction of the tile's height that is the unit of the logarithm.
 const LOG_UNIT: f64 = 0.01;
 /// Largest side of a tile, pixels.
 pub(crate) const MAX_SIDE: usize = 1024;
 
-/// What the numbers of an output are.
+/// The unit of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Unit {
     /// Expected error `e`, pixels of the original image.
@@ -44,7 +44,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// As it stands in a file.
+    /// The name in a file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pixels => "pixels",
@@ -55,12 +55,13 @@ impl Unit {
 
     fn by_name(name: &str) -> Option<Self> {
         let all = [Self::Pixels, Self::Relative, Self::LogRelative];
-        all.into_iter().find(|it| it.name() == name)
+        all.into_iter().find(|unit| unit.name() == name)
     }
 
-    /// What a network should say of an error.
+    /// The training label for an error.
     ///
-    /// * `error`: distance from the truth, and `tile_height`: what the tile shows, in the same pixels.
+    /// * `error`: distance from the truth, and `tile_height`: height that the tile shows, in the
+    ///   same unit.
     pub fn label(self, error: f64, tile_height: f64) -> f64 {
         match self {
             Self::Pixels => error,
@@ -69,8 +70,8 @@ impl Unit {
         }
     }
 
-    /// The expected error that a network says, in the pixels of `tile_height`; the inverse of
-    /// [`Self::label`]. Below 0 there is no error: 0.
+    /// The expected error for an output, in the unit of `tile_height`; the inverse of
+    /// [`Self::label`]. Negative errors become 0.
     ///
     /// * Returns `None` unless it is finite.
     pub fn error(self, output: f32, tile_height: f64) -> Option<f32> {
@@ -85,21 +86,21 @@ impl Unit {
     }
 }
 
-/// What has to be known of a network besides its graph.
+/// The description of a network besides its graph.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Card {
-    /// The tile that it looks at; where it is left out, the size of the input.
+    /// The tile; by default the size of the input.
     pub tile: Option<TileShape>,
-    /// How colours are given to it; those of `ImageNet` where they are left out.
+    /// The normalisation of colours; by default that of `ImageNet`.
     pub colours: Normalisation,
-    /// Whether it takes [`evidence`](crate::evidence()) of this version; left out: it does not.
+    /// The version of the [`evidence`](crate::evidence()) that it takes; by default none.
     pub evidence: Option<u32>,
-    /// What its output counts in; pixels where it is left out.
+    /// The unit of its output; by default pixels.
     pub unit: Unit,
     /// Which network it is, for people; may be empty.
     pub identity: String,
-    /// Errors beyond which a part is switched off: pixels of the original image where the unit is
-    /// pixels, else shares of the tile's height (never logarithms). Empty where it is left out.
+    /// Errors above which a part is switched off: pixels of the original image if the unit is
+    /// pixels, else fractions of the tile's height (never logarithms). By default empty.
     pub tau: Vec<f32>,
 }
 
@@ -116,7 +117,7 @@ impl Default for Card {
     }
 }
 
-/// Why an entry was refused.
+/// Why an entry was rejected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CardError {
     /// An entry cannot be read.
@@ -124,12 +125,12 @@ pub enum CardError {
     Entry {
         /// Its name.
         key: &'static str,
-        /// What it says, the first characters.
+        /// The first characters of its value.
         got: String,
-        /// What would do.
+        /// The accepted values.
         expected: String,
     },
-    /// Nothing is known of the name: it is misspelt, or of a later version.
+    /// The name is unknown: it is misspelt, or belongs to a later version.
     #[error("`{key}` is not an entry of version {VERSION}")]
     Unknown {
         /// The name, the first characters.
@@ -138,10 +139,10 @@ pub enum CardError {
 }
 
 impl Card {
-    /// Reads entries; those whose names do not begin with `parallax.` are somebody else's.
+    /// Reads entries; those whose names do not begin with `parallax.` are ignored.
     ///
-    /// * `entries`: names and values of `metadata_props`; of two of a name the last counts.
-    /// * `n_parts`: parts of the model, for the number of thresholds.
+    /// * `entries`: names and values of `metadata_props`; of duplicate names the last one counts.
+    /// * `n_parts`: number of parts of the model, for the number of thresholds.
     ///
     /// # Errors
     ///
@@ -159,7 +160,7 @@ impl Card {
                 key::VERSION => version(key::VERSION, value, VERSION).map(drop)?,
                 key::TILE => card.tile = Some(tile(value)?),
                 key::MEAN => card.colours.mean = colour(key::MEAN, value, |_| true)?,
-                key::STD => card.colours.deviation = colour(key::STD, value, |it| it > 0.0)?,
+                key::STD => card.colours.deviation = colour(key::STD, value, |value| value > 0.0)?,
                 key::EVIDENCE => {
                     card.evidence = Some(version(key::EVIDENCE, value, EVIDENCE_VERSION)?);
                 }
@@ -179,7 +180,7 @@ impl Card {
         Ok(card)
     }
 
-    /// The entries to write into a file; [`Self::parse`] reads the same card from them.
+    /// The entries for a file; [`Self::parse`] reads the same card from them.
     pub fn entries(&self) -> BTreeMap<&'static str, String> {
         let join = |values: &[f32]| {
             let words: Vec<String> = values.iter().map(f32::to_string).collect();
@@ -206,7 +207,7 @@ impl Card {
         entries
     }
 
-    /// The thresholds in the pixels of `tile_height`; empty where there are none.
+    /// The thresholds in the unit of `tile_height`; empty if there are none.
     pub fn tau_px(&self, tile_height: f64) -> impl Iterator<Item = f32> + '_ {
         let scale = match self.unit {
             Unit::Pixels => 1.0,

@@ -1,24 +1,25 @@
-//! What the pose search knows of its answer, as the numbers of a network's second input.
+//! Properties of the single-view pose, as the numbers of a network's second input.
 
 use fmp::{Layout, LocalScore, Model, Pose, Springs};
 
 use crate::Tile;
 
-/// Version of the layout of [`evidence`]; a network says which it was trained with.
+/// Version of the layout of [`evidence`]; a network declares the version that it was trained with.
 pub const EVIDENCE_VERSION: u32 = 1;
 
-/// Types of a part that the layout has room for.
+/// Largest number of types of a part in the layout.
 pub const N_TYPES: usize = 6;
 
 /// Numbers of every part, in this order; the types follow.
 ///
 /// * `response`, `contrast`, `margin`: see [`LocalScore`].
-/// * `spring`: what the spring to the parent adds to the score, at most 0 or little above; 0 for the root.
-/// * `pair_bias`: what the pair of types of part and parent adds; 0 for the root.
-/// * `x`, `y`: where the part's centre is, from the tile's centre, heights of the tile.
-/// * `from_mirror`: distance to the part on the other side of the body, box sides; 0 if it is its own.
-/// * `from_second`: distance to the same part of the second candidate, box sides, at most [`FAR`], which
-///   also stands for no second candidate.
+/// * `spring`: score of the spring to the parent, at most 0 or slightly above; 0 for the root.
+/// * `pair_bias`: score of the pair of types of part and parent; 0 for the root.
+/// * `x`, `y`: position of the part's centre relative to the tile's centre, heights of the tile.
+/// * `from_mirror`: distance to the part on the other side of the body, box sides; 0 if it is its
+///   own mirror.
+/// * `from_second`: distance to the same part of the second candidate, box sides, at most [`FAR`],
+///   which is also the value without a second candidate.
 /// * `inside`: distance to the nearest border of the frame, box sides, from minus to plus [`FAR`];
 ///   negative outside.
 /// * `type_1` to `type_6`: 1 for the part's type, else 0.
@@ -38,11 +39,12 @@ pub const PART_NUMBERS: [&str; 10] = [
 /// Numbers of the pose as a whole; they come after those of the parts.
 ///
 /// * `score`: of the pose.
-/// * `lead`: the score less the second candidate's; [`FAR`] at most, and without one.
-/// * `candidates`: how many there are, up to 8, as a share of 8.
+/// * `lead`: the score minus that of the second candidate; at most [`FAR`], which is also the value
+///   without one.
+/// * `candidates`: number of candidates, up to 8, divided by 8.
 /// * `log_box_side`: natural logarithm of the root's box side, pixels of the frame.
-/// * `tile_height`: the tile's height as a share of the frame's.
-/// * `aspect`: width of the box of all parts per its height.
+/// * `tile_height`: the tile's height divided by the frame's.
+/// * `aspect`: width of the box of all parts divided by its height.
 /// * `responses`, `springs`: sums over the parts.
 pub const POSE_NUMBERS: [&str; 8] = [
     "score",
@@ -55,21 +57,21 @@ pub const POSE_NUMBERS: [&str; 8] = [
     "springs",
 ];
 
-/// Beyond this many box sides, or this score, a number says no more.
+/// Numbers are capped at this many box sides, or this score.
 pub const FAR: f32 = 10.0;
 
-/// Stands for a pair of types that the model rules out: minus infinity is no number for a network.
+/// Replaces minus infinity for a pair of types that the model rules out.
 const IMPOSSIBLE: f64 = -100.0;
 
 const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
 const MOST_CANDIDATES: usize = 8;
 
-/// How many numbers there are for a model of so many parts: 424 for 26.
+/// Number of values for a model with this number of parts: 424 for 26.
 pub fn n_evidence(n_parts: usize) -> usize {
     n_parts * PER_PART + POSE_NUMBERS.len()
 }
 
-/// What the number at an index is, for example `part 3 spring`; parts and types count from 1.
+/// Name of the value at an index, for example `part 3 spring`; parts and types are counted from 1.
 ///
 /// * Returns `None` beyond [`n_evidence`].
 pub fn evidence_name(index: usize, n_parts: usize) -> Option<String> {
@@ -85,22 +87,22 @@ pub fn evidence_name(index: usize, n_parts: usize) -> Option<String> {
     Some((*name).to_owned())
 }
 
-/// Why there are no numbers.
+/// Why the evidence could not be computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum EvidenceError {
-    /// There is nothing to speak of.
+    /// There is no candidate.
     #[error("there is no pose")]
     NoPose,
-    /// A part has more types than the layout.
-    #[error("part {part} has {got} types, a network knows {N_TYPES}")]
+    /// A part has more types than the layout has room for.
+    #[error("part {part} has {got} types, the evidence has room for {N_TYPES}")]
     Types {
         /// 1-based part.
         part: usize,
         /// Its types.
         got: usize,
     },
-    /// The local scores are not those of the pose.
-    #[error("there are {got} local scores of {expected} parts")]
+    /// The number of local scores differs from the number of parts of the pose.
+    #[error("there are {got} local scores for {expected} parts")]
     Scores {
         /// Scores given.
         got: usize,
@@ -109,8 +111,8 @@ pub enum EvidenceError {
     },
 }
 
-/// Writes what the pose search knows of its best candidate: [`n_evidence`] numbers, part by part
-/// [`PART_NUMBERS`] and the types, then [`POSE_NUMBERS`]. Raw numbers: to scale them is the network's.
+/// Writes the properties of the best candidate: [`n_evidence`] raw numbers, for every part
+/// [`PART_NUMBERS`] and the types, then [`POSE_NUMBERS`]. The network has to scale them.
 ///
 /// * `candidates`: of the frame, best first; the first is the pose.
 /// * `scores`: of the pose; see [`fmp::local_scores`].
@@ -154,16 +156,17 @@ pub fn evidence(
         let centre = centres[part];
         let [x, y] = tile.place(centre).map(|it| it as f32);
         let [spring, pair_bias] = edge(model, pose, part);
-        let from_mirror = mirror.map_or(0.0, |it| sides(distance(centre, centres[it[part]])));
+        let from_mirror =
+            mirror.map_or(0.0, |mirror| sides(distance(centre, centres[mirror[part]])));
         let from_second = second
             .as_ref()
-            .map_or(FAR, |it| sides(distance(centre, it[part])));
+            .map_or(FAR, |second| sides(distance(centre, second[part])));
         let to_border = [centre[0], centre[1], width - centre[0], height - centre[1]];
         let inside = sides(to_border.into_iter().fold(f64::INFINITY, f64::min));
         out.extend([score.response, score.contrast, score.margin]);
         out.extend([spring, pair_bias, x, y, from_mirror, from_second, inside]);
         let own = usize::from(pose.parts[part].mixture);
-        out.extend((0..N_TYPES).map(|it| f32::from(u8::from(it == own))));
+        out.extend((0..N_TYPES).map(|mixture| f32::from(u8::from(mixture == own))));
         responses += score.response;
         springs += spring;
     }
@@ -189,7 +192,7 @@ fn box_side(model: &Model, layout: &Layout, pose: &Pose, part: usize) -> f64 {
     y2 - y1 + 1.0
 }
 
-/// What the spring to the parent and the pair of types add to the score.
+/// Scores of the spring to the parent and of the pair of types.
 fn edge(model: &Model, pose: &Pose, part: usize) -> [f32; 2] {
     let Some(edge) = &model.spec().parts[part].edge else {
         return [0.0, 0.0];
@@ -203,10 +206,10 @@ fn edge(model: &Model, pose: &Pose, part: usize) -> [f32; 2] {
     let offset = |parent: u16, anchor: i32, child: u16| {
         f64::from(i32::from(parent) + anchor - i32::from(child))
     };
-    let cost = spring.map_or(0.0, |it| {
-        let dx = offset(parent.x, it.anchor[0], child.x);
-        let dy = offset(parent.y, it.anchor[1], child.y);
-        -(it.w[0] * dx * dx + it.w[1] * dx + it.w[2] * dy * dy + it.w[3] * dy)
+    let cost = spring.map_or(0.0, |spring| {
+        let dx = offset(parent.x, spring.anchor[0], child.x);
+        let dy = offset(parent.y, spring.anchor[1], child.y);
+        -(spring.w[0] * dx * dx + spring.w[1] * dx + spring.w[2] * dy * dy + spring.w[3] * dy)
     });
     [cost as f32, edge.bias[l][k].max(IMPOSSIBLE) as f32]
 }

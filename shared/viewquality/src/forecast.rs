@@ -1,11 +1,11 @@
-//! From a frame and its single-view pose to the expected error of every part, by a network.
+//! Predicts the expected error of every part from a frame and its single-view pose, with a network.
 
 use fmp::{Layout, LocalScore, Model, Pose};
 use kernels::Rgb8View;
 
 use crate::{EvidenceError, Network, NetworkError, Sampler, Tile, evidence};
 
-/// A network with the memory that it works in.
+/// A network with its work buffers.
 #[derive(Debug)]
 pub struct Forecaster {
     network: Network,
@@ -14,46 +14,48 @@ pub struct Forecaster {
     evidence: Vec<f32>,
 }
 
-/// What a view saw and found.
+/// The input of a forecast: a frame and its single-view result.
 #[derive(Debug, Clone, Copy)]
 pub struct ForecastInput<'a> {
     /// The frame.
     pub image: Rgb8View<'a>,
     /// The model of the person, and the pyramid of the frame.
     pub on: (&'a Model, &'a Layout),
-    /// What the pose search found, best first.
+    /// The candidates of the pose search, best first.
     pub candidates: &'a [Pose],
-    /// How well each part of the best fits; may be empty where the network takes no evidence.
+    /// Local scores of the parts of the best candidate; may be empty if the network takes no
+    /// evidence.
     pub scores: &'a [LocalScore],
     /// Pixels of the frame per pixel of the original image.
     pub frame_scale: f64,
 }
 
-/// What is expected of the best candidate of a frame.
+/// The prediction for the best candidate of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forecast {
-    /// What the network looked at.
+    /// The tile that the network used.
     pub tile: Tile,
     /// Expected error of every part, pixels of the frame.
     pub sigma_px: Vec<f32>,
-    /// Errors beyond which the network's file switches parts off, pixels of the frame; may be empty.
+    /// Errors above which parts are switched off according to the network's file, pixels of the
+    /// frame; may be empty.
     pub tau_px: Vec<f32>,
 }
 
-/// Why nothing can be said of a frame.
+/// Why there is no prediction for a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ForecastError {
-    /// The pose search's answer is not what the network was made for, or there is none.
+    /// There is no candidate, or the network was not made for such poses.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
     /// The pose has no size.
     #[error("the box of the parts is empty or not finite")]
     NoTile,
-    /// The network did not run.
+    /// The network could not be run.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// The network says what is no number of pixels.
-    #[error("the network says {got} of part {part}")]
+    /// The network's output is not a valid number of pixels.
+    #[error("the network's output for part {part} is {got}")]
     NotANumber {
         /// 1-based part.
         part: usize,
@@ -63,7 +65,7 @@ pub enum ForecastError {
 }
 
 impl Forecaster {
-    /// Begins to work with a network.
+    /// Creates a forecaster for a network.
     pub fn new(network: Network) -> Self {
         Self {
             tile: vec![0.0; network.tile_shape().n_values()],
@@ -87,33 +89,33 @@ impl Forecaster {
     /// # Panics
     ///
     /// If the image has no pixels, or a candidate does not lie on the layout.
-    pub fn run(&mut self, seen: &ForecastInput<'_>) -> Result<Forecast, ForecastError> {
-        let (model, layout) = seen.on;
-        let pose = seen.candidates.first().ok_or(EvidenceError::NoPose)?;
+    pub fn run(&mut self, input: &ForecastInput<'_>) -> Result<Forecast, ForecastError> {
+        let (model, layout) = input.on;
+        let pose = input.candidates.first().ok_or(EvidenceError::NoPose)?;
         let bounds = pose.bounding_box(model, layout);
         let tile = Tile::around(bounds, self.network.tile_shape()).ok_or(ForecastError::NoTile)?;
         let card = self.network.card();
         if self.network.takes_tile() {
             self.sampler
-                .sample(seen.image, &tile, &card.colours, &mut self.tile);
+                .sample(input.image, &tile, &card.colours, &mut self.tile);
         }
         if self.network.takes_evidence() {
             evidence(
-                seen.on,
-                seen.candidates,
-                seen.scores,
+                input.on,
+                input.candidates,
+                input.scores,
                 &tile,
                 &mut self.evidence,
             )?;
         }
         let output = self.network.run(&self.tile, &self.evidence)?;
-        let height = tile.height_px() / seen.frame_scale;
-        let in_frame = |px: f32| (f64::from(px) * seen.frame_scale) as f32;
+        let height = tile.height_px() / input.frame_scale;
+        let in_frame = |px: f32| (f64::from(px) * input.frame_scale) as f32;
         let sigma = output.iter().enumerate().map(|(part, &got)| {
             let error = card.unit.error(got, height).map(in_frame);
             let part = part + 1;
             error
-                .filter(|it| it.is_finite())
+                .filter(|sigma| sigma.is_finite())
                 .ok_or(ForecastError::NotANumber { part, got })
         });
         Ok(Forecast {
@@ -155,8 +157,8 @@ mod tests {
         .unwrap()
     }
 
-    /// A network that says the same of every tile of 4 x 3 pixels.
-    fn always(sigma: f32, unit: Unit, tau: f32) -> Forecaster {
+    /// A network with a constant output for every tile of 4 x 3 pixels.
+    fn constant(sigma: f32, unit: Unit, tau: f32) -> Forecaster {
         let mut net = onnx::Network::default();
         let sides = [1, 3, 4, 3].map(Side::Fixed);
         net.inputs.push(("tile".to_owned(), sides.to_vec()));
@@ -205,29 +207,29 @@ mod tests {
 
     #[test]
     fn pixels_are_those_of_the_original_image() {
-        let forecast = run(&mut always(8.0, Unit::Pixels, 6.0), 0.5).unwrap();
+        let forecast = run(&mut constant(8.0, Unit::Pixels, 6.0), 0.5).unwrap();
         close(&forecast.sigma_px, 4.0);
         close(&forecast.tau_px, 3.0);
     }
 
     #[test]
-    fn relative_errors_grow_with_the_tile_whatever_the_scale_of_the_frame() {
-        // 12 pixels wide, so 16 high by the shape of the tile, and a tenth.
+    fn relative_errors_scale_with_the_tile_at_every_frame_scale() {
+        // 12 pixels wide, so 16 high by the shape of the tile, plus a tenth.
         for frame_scale in [0.25, 1.0, 3.0] {
-            let forecast = run(&mut always(0.1, Unit::Relative, 0.2), frame_scale).unwrap();
+            let forecast = run(&mut constant(0.1, Unit::Relative, 0.2), frame_scale).unwrap();
             assert!((forecast.tile.height_px() - 17.6).abs() < 1e-9);
             close(&forecast.sigma_px, 1.76);
             close(&forecast.tau_px, 3.52);
         }
-        let mut network = always(2.0_f32.ln(), Unit::LogRelative, 0.2);
+        let mut network = constant(2.0_f32.ln(), Unit::LogRelative, 0.2);
         let forecast = run(&mut network, 0.25).unwrap();
         close(&forecast.sigma_px, 0.176);
         close(&forecast.tau_px, 3.52);
     }
 
     #[test]
-    fn what_is_no_number_is_no_prediction() {
-        let said = run(&mut always(f32::INFINITY, Unit::Pixels, 1.0), 1.0).unwrap_err();
-        assert_eq!(said.to_string(), "the network says inf of part 1");
+    fn an_infinite_output_is_rejected() {
+        let error = run(&mut constant(f32::INFINITY, Unit::Pixels, 1.0), 1.0).unwrap_err();
+        assert_eq!(error.to_string(), "the network's output for part 1 is inf");
     }
 }

@@ -1,9 +1,9 @@
-//! How far off every part of a view is expected to be: the paper's sigma (section 4.3).
+//! Expected errors of the parts of a view: the paper's sigma (section 4.3).
 //!
-//! A [`Network`] predicts it from the person's [`Tile`] and, if it wants them, the numbers of
-//! [`evidence()`]; what its file says of itself is its [`Card`]. [`Forecaster`] does all of it. [`Table`] holds predictions made elsewhere, and
-//! [`Predictor`] gives those of one view, frame by frame. [`Tau`] holds the thresholds beyond which a part
-//! is switched off.
+//! A [`Network`] predicts them from the person's [`Tile`] and, optionally, the [`evidence()`]; a
+//! [`Card`] is the description in its file. [`Forecaster`] runs all steps. [`Table`] holds
+//! predictions that were made elsewhere, and [`Predictor`] returns those of one view, frame by
+//! frame. [`Tau`] holds the thresholds above which a part is switched off.
 #![forbid(unsafe_code)]
 
 mod card;

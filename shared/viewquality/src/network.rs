@@ -1,6 +1,7 @@
-//! A network that predicts errors, read from an ONNX file and run by the `rten` library, or by ONNX Runtime.
+//! A network that predicts errors, read from an ONNX file and run by the `rten` library or by ONNX
+//! Runtime.
 
-mod frame;
+mod nesting;
 
 mod engine;
 #[cfg(feature = "ort")]
@@ -18,7 +19,7 @@ const TILE: &str = "tile";
 const EVIDENCE: &str = "evidence";
 const SIGMA: &str = "sigma";
 
-/// A network, known to take what there is and to give one number per part.
+/// A network with checked inputs and output.
 #[derive(Debug)]
 pub struct Network {
     engine: Box<dyn Engine>,
@@ -30,27 +31,27 @@ pub struct Network {
     fingerprint: u32,
 }
 
-/// Why a file is no network that predicts errors.
+/// Why a file was rejected as a network.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
-    /// The library cannot read it: no ONNX file, cut off, or of operations that it does not know.
-    #[error("the file is no network that can be run")]
+    /// The library cannot read it: not an ONNX file, truncated, or with unsupported operations.
+    #[error("the file is not a network that can be run")]
     Load(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// The library that is to run it cannot be used.
+    /// The library that should run it cannot be used.
     #[cfg(feature = "ort")]
     #[error("ONNX Runtime cannot be used")]
     Library(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// It says something of itself that cannot be.
+    /// An entry of its card is invalid.
     #[error(transparent)]
     Card(#[from] CardError),
-    /// It takes or gives something else.
+    /// It has other inputs or outputs.
     #[error("the network has the {what} {got}, expected {expected}")]
     Names {
         /// `inputs` or `outputs`.
         what: &'static str,
         /// Their names.
         got: String,
-        /// Those that would do.
+        /// The accepted names.
         expected: &'static str,
     },
     /// An input or the output has another shape.
@@ -60,36 +61,36 @@ pub enum NetworkError {
         name: &'static str,
         /// The shape found.
         got: String,
-        /// The shape that would do.
+        /// The expected shape.
         expected: String,
     },
-    /// The input and what the file says of it do not agree.
-    #[error("the network {takes} `evidence`, but its file {says} which version of it")]
+    /// The inputs and the card do not agree.
+    #[error("the network {takes} `evidence`, but its file {declares} its version")]
     EvidenceVersion {
-        /// Whether there is the input.
+        /// Whether it has the input.
         takes: &'static str,
-        /// Whether there is the entry.
-        says: &'static str,
+        /// Whether it has the entry.
+        declares: &'static str,
     },
-    /// It cannot be run on what there is.
+    /// The library could not run it.
     #[error("the network cannot be run")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Network {
-    /// Reads a network, and runs it once on zeros to see what it gives.
+    /// Reads a network, and runs it once on zeros to check its output.
     ///
-    /// Who gives the file is trusted: a network may ask for any amount of memory and time.
+    /// The file must come from a trusted source: a network may use any amount of memory and time.
     ///
-    /// * `file`: the bytes of an ONNX file, as `NETWORK.md` beside this crate describes it.
-    /// * `n_parts`: parts of the model.
+    /// * `file`: the bytes of an ONNX file, as described in `NETWORK.md` of this crate.
+    /// * `n_parts`: number of parts of the model.
     ///
     /// # Errors
     ///
     /// [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
         let fingerprint = checksum::fnv1a_32(&file);
-        frame::check(&file).map_err(|it| NetworkError::Load(Box::new(it)))?;
+        nesting::check(&file).map_err(|error| NetworkError::Load(Box::new(error)))?;
         let (engine, description) = Rten::load(file)?;
         Self::new(Box::new(engine), &description, fingerprint, n_parts)
     }
@@ -105,7 +106,7 @@ impl Network {
         file: &[u8],
         n_parts: usize,
     ) -> Result<Self, NetworkError> {
-        frame::check(file).map_err(|it| NetworkError::Load(Box::new(it)))?;
+        nesting::check(file).map_err(|error| NetworkError::Load(Box::new(error)))?;
         let (engine, description) = runtime.load_network(file)?;
         Self::new(
             Box::new(engine),
@@ -127,11 +128,11 @@ impl Network {
         let Description {
             inputs, outputs, ..
         } = description;
-        let takes = |wanted: &str| inputs.iter().find(|it| it.name == wanted);
+        let takes = |wanted: &str| inputs.iter().find(|input| input.name == wanted);
         let (tile, evidence) = (takes(TILE), takes(EVIDENCE));
         let n_known = [tile, evidence].into_iter().flatten().count();
         if n_known == 0 || n_known < inputs.len() {
-            let found: Vec<&str> = inputs.iter().map(|it| it.name.as_str()).collect();
+            let found: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
             return Err(names("inputs", &found));
         }
         if !outputs.iter().any(|it| it == SIGMA) {
@@ -139,19 +140,19 @@ impl Network {
             return Err(names("outputs", &found));
         }
         if evidence.is_some() != card.evidence.is_some() {
-            let [takes, says] = if evidence.is_some() {
-                ["takes", "does not say"]
+            let [takes, declares] = if evidence.is_some() {
+                ["takes", "does not declare"]
             } else {
-                ["does not take", "says"]
+                ["does not take", "declares"]
             };
-            return Err(NetworkError::EvidenceVersion { takes, says });
+            return Err(NetworkError::EvidenceVersion { takes, declares });
         }
         let shape = match tile {
-            Some(it) => tile_shape(&it.sides, &card)?,
+            Some(input) => tile_shape(&input.sides, &card)?,
             None => card.tile.unwrap_or(TileShape::SMALL),
         };
-        if let Some(it) = evidence {
-            check_evidence(&it.sides, n_parts)?;
+        if let Some(input) = evidence {
+            check_evidence(&input.sides, n_parts)?;
         }
         let network = Self {
             engine,
@@ -167,22 +168,23 @@ impl Network {
         Ok(network)
     }
 
-    /// What its file says of it.
+    /// The description in its file.
     pub fn card(&self) -> &Card {
         &self.card
     }
 
-    /// A number made of the bytes of its file (FNV-1a, 32 bits): another for another file.
+    /// A fingerprint of the bytes of its file (FNV-1a, 32 bits).
     pub fn fingerprint(&self) -> u32 {
         self.fingerprint
     }
 
-    /// The tile that it looks at; of a network that looks at none, the one its errors are relative to.
+    /// The shape of its tile; for a network without a tile, the shape that relative errors refer
+    /// to.
     pub fn tile_shape(&self) -> TileShape {
         self.shape
     }
 
-    /// Whether it looks at the tile.
+    /// Whether it takes the tile.
     pub fn takes_tile(&self) -> bool {
         self.takes_tile
     }
@@ -192,15 +194,15 @@ impl Network {
         self.takes_evidence
     }
 
-    /// Runs it on one thread; the output as it is, in its own [unit](crate::Unit).
+    /// Runs it on one thread; the output is in its own [unit](crate::Unit).
     ///
-    /// * `tile`: [`TileShape::n_values`] values; ignored by a network that does not look at it.
-    /// * `evidence`: [`n_evidence`] numbers; ignored by a network that does not take them.
+    /// * `tile`: [`TileShape::n_values`] values; ignored by a network without a tile.
+    /// * `evidence`: [`n_evidence`] numbers; ignored by a network without evidence.
     ///
     /// # Errors
     ///
-    /// [`NetworkError::Shape`] if a slice or the output has another length, [`NetworkError::Run`] if the
-    /// library says so.
+    /// [`NetworkError::Shape`] if a slice or the output has another length, [`NetworkError::Run`]
+    /// if the library fails.
     pub fn run(&self, tile: &[f32], evidence: &[f32]) -> Result<Vec<f32>, NetworkError> {
         let mut inputs = Vec::with_capacity(2);
         if self.takes_tile {
@@ -262,15 +264,15 @@ fn length(name: &'static str, values: &[f32], expected: usize) -> Result<(), Net
     Ok(())
 }
 
-/// How the sides of an input are written.
+/// Formats the sides of an input.
 fn written(sides: &[Side]) -> String {
     let words: Vec<String> = sides.iter().map(ToString::to_string).collect();
     format!("[{}]", words.join(", "))
 }
 
-/// Height and width of the tile: what the file says of itself, else what its input says.
+/// Height and width of the tile: those of the card, else those of the input.
 ///
-/// * `sides`: of the input; none where the file does not say.
+/// * `sides`: of the input; empty if the file does not declare them.
 fn tile_shape(sides: &[Side], card: &Card) -> Result<TileShape, NetworkError> {
     let expected = match card.tile {
         Some(TileShape { height, width }) => format!("[n, 3, {height}, {width}]"),

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use crate::Table;
 
-/// Which sequence of a table a deployment shows, and how its frames are counted there.
+/// The sequence of a table that belongs to a deployment, and the numbering of its frames.
 ///
-/// By default frame 0 is frame 0 and every frame of the table is one of the deployment.
+/// By default the frame numbers of the table are those of the deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Selection {
-    /// Subject in the table; empty where the table names none.
+    /// Subject in the table; empty if the table has no subjects.
     pub subject: String,
-    /// Action in the table; empty where the table names none.
+    /// Action in the table; empty if the table has no actions.
     pub action: String,
     /// Frame of the table that belongs to frame 0 of the deployment.
     pub frame_offset: i64,
@@ -31,7 +31,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// The table's frame for a frame of the deployment; `None` beyond the range of numbers.
+    /// The table's frame for a frame of the deployment; `None` if it exceeds the range of numbers.
     pub fn table_frame(&self, frame: u64) -> Option<i64> {
         let steps = i64::try_from(frame)
             .ok()?
@@ -40,28 +40,28 @@ impl Selection {
     }
 }
 
-/// The table knows nothing of the sequence that was asked for.
+/// The table has no rows for the requested sequence.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the table has no rows for subject `{subject}`, action `{action}`, view `{view}`; it has {known}"
 )]
 pub struct NoPredictions {
-    /// The subject that was asked for.
+    /// The requested subject.
     pub subject: String,
-    /// The action.
+    /// The requested action.
     pub action: String,
-    /// The view.
+    /// The requested view.
     pub view: String,
-    /// What the table has, the first few.
+    /// The first sequences of the table.
     pub known: String,
 }
 
-/// Gives the expected errors of one view.
+/// Returns the expected errors of one view.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Predictor {
-    /// Looks them up.
+    /// By lookup in a table.
     Table {
-        /// How frames are counted in the table.
+        /// The numbering of frames in the table.
         selection: Selection,
         /// By frame of the table; pixels, one per part.
         rows: BTreeMap<i64, Vec<f32>>,
@@ -69,11 +69,11 @@ pub enum Predictor {
 }
 
 impl Predictor {
-    /// Takes the rows of a view out of a table.
+    /// Takes the rows of a view from a table.
     ///
     /// # Errors
     ///
-    /// [`NoPredictions`], with what the table has instead, if there is not one row.
+    /// [`NoPredictions`] if there are no rows, with the sequences that the table has.
     pub fn from_table(
         table: &Table,
         selection: Selection,
@@ -111,7 +111,7 @@ fn known(table: &Table) -> String {
     let mut names: Vec<String> = table
         .names()
         .take(SHOWN + 1)
-        .map(|it| format!("`{it}`"))
+        .map(|name| format!("`{name}`"))
         .collect();
     if names.len() > SHOWN {
         names.truncate(SHOWN);
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_counted_as_the_selection_says() {
+    fn frames_are_numbered_by_offset_and_step() {
         let predictor = Predictor::from_table(&table(), selection(6, 2), "C1").unwrap();
         assert_eq!(predictor.sigma_px(0), Some(&[8.5][..]));
         assert_eq!(predictor.sigma_px(1), Some(&[1.0][..]));
@@ -146,12 +146,12 @@ mod tests {
     }
 
     #[test]
-    fn by_default_frames_are_counted_alike() {
+    fn by_default_frame_numbers_are_equal() {
         assert_eq!(Selection::default().table_frame(7), Some(7));
     }
 
     #[test]
-    fn frames_beyond_all_numbers_have_no_prediction() {
+    fn frames_beyond_the_range_of_numbers_have_no_prediction() {
         let predictor = Predictor::from_table(&table(), selection(i64::MAX, 2), "C1").unwrap();
         for frame in [1, u64::MAX, i64::MAX as u64] {
             assert_eq!(predictor.sigma_px(frame), None);
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sequence_that_is_not_there_is_told_with_what_is() {
+    fn a_missing_sequence_is_reported_with_those_that_exist() {
         let said = Predictor::from_table(&table(), selection(0, 1), "C2").unwrap_err();
         assert_eq!(
             said.to_string(),
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_list_of_sequences_is_cut() {
+    fn a_long_list_of_sequences_is_shortened() {
         let rows: Vec<String> = (0..20).map(|it| format!("S,A,1,view{it},2")).collect();
         let table = Table::parse(&rows.join("\n"), 1).unwrap();
         let said = Predictor::from_table(&table, selection(0, 1), "C1").unwrap_err();

@@ -12,7 +12,7 @@ pub struct Table {
     series: BTreeMap<Name, BTreeMap<i64, Vec<f32>>>,
 }
 
-/// What one sequence of one view is called in a table.
+/// Identifies one sequence of one view in a table.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Name {
     pub(crate) subject: String,
@@ -20,13 +20,13 @@ pub(crate) struct Name {
     pub(crate) view: String,
 }
 
-/// Why a text is no table.
+/// Why a text was rejected as a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// There are no rows.
     #[error("the table has no rows")]
     Empty,
-    /// The header names a column that no table has, or one twice.
+    /// The header has an unknown or duplicate column.
     #[error("line {line}, column {column}: `{got}` is {problem}; expected {KNOWN}")]
     Header {
         /// Line, from 1.
@@ -46,7 +46,7 @@ pub enum TableError {
         /// The column's name.
         column: String,
     },
-    /// A row has more or fewer fields than the table has columns.
+    /// The number of fields of a row differs from the number of columns.
     #[error("line {line}: {got} columns, expected {expected}")]
     Columns {
         /// Line, from 1.
@@ -56,7 +56,7 @@ pub enum TableError {
         /// Columns of the table.
         expected: usize,
     },
-    /// An expected error is not a number of pixels.
+    /// An expected error is not a valid number of pixels.
     #[error(
         "line {line}, column {column}: expected error of part {part} is `{got}`, expected a finite \
          number of pixels from 0"
@@ -68,7 +68,7 @@ pub enum TableError {
         column: usize,
         /// 1-based part.
         part: usize,
-        /// What stands there.
+        /// The field.
         got: String,
     },
     /// A frame is not a whole number.
@@ -78,10 +78,10 @@ pub enum TableError {
         line: u64,
         /// Column, from 1.
         column: usize,
-        /// What stands there.
+        /// The field.
         got: String,
     },
-    /// Two rows are about the same frame of the same view.
+    /// Two rows have the same frame of the same view.
     #[error("line {line}: frame {frame} of {what} was given before")]
     Duplicate {
         /// Line, from 1.
@@ -103,10 +103,11 @@ impl Table {
     /// Reads a table of expected errors, pixels of the frame.
     ///
     /// Columns, separated by commas:
-    /// * with a header: `frame`, `view` (or `camera`), `part_1` to `part_n`, and, where one table
-    ///   holds several sequences, `subject` and `action`; in any order. A table without `subject` or
-    ///   `action` has the empty name for it.
-    /// * without one, as the authors' files: subject, action, frame, view, then the parts in order.
+    /// * with a header: `frame`, `view` (or `camera`), `part_1` to `part_n`, and, if the table
+    ///   holds several sequences, `subject` and `action`; in any order. Without the columns
+    ///   `subject` or `action` the name is empty.
+    /// * without a header, as in the authors' files: subject, action, frame, view, then the parts
+    ///   in order.
     ///
     /// The first line is a header if one of its fields is `frame`.
     ///
@@ -121,7 +122,7 @@ impl Table {
             .from_reader(text.as_bytes());
         let mut records = reader.records().peekable();
         let columns = match records.peek() {
-            Some(Ok(first)) if first.iter().any(|it| it == "frame") => {
+            Some(Ok(first)) if first.iter().any(|field| field == "frame") => {
                 let columns = Columns::from_header(first, n_parts)?;
                 records.next();
                 columns
@@ -141,7 +142,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Number of parts that every row is about.
+    /// Number of parts in every row.
     pub fn n_parts(&self) -> usize {
         self.n_parts
     }
@@ -153,7 +154,7 @@ impl Table {
 
     /// Expected errors of a frame of a view, pixels, one per part.
     ///
-    /// * `subject`, `action`: empty in tables that do not name them.
+    /// * `subject`, `action`: empty for tables without these columns.
     pub fn get(&self, subject: &str, action: &str, frame: i64, view: &str) -> Option<&[f32]> {
         let rows = self.series(subject, action, view)?;
         rows.get(&frame).map(Vec::as_slice)
@@ -205,7 +206,7 @@ impl Table {
                 }
             }
         }
-        let field = |column: Option<usize>| column.map_or("", |it| &record[it]).to_owned();
+        let field = |column: Option<usize>| column.map_or("", |column| &record[column]).to_owned();
         let name = Name {
             subject: field(columns.subject),
             action: field(columns.action),
@@ -228,13 +229,13 @@ impl std::fmt::Display for Name {
         let given: Vec<&str> = names
             .into_iter()
             .map(String::as_str)
-            .filter(|it| !it.is_empty())
+            .filter(|name| !name.is_empty())
             .collect();
         f.write_str(&given.join(" "))
     }
 }
 
-/// Which column holds what.
+/// The index of every column.
 struct Columns {
     subject: Option<usize>,
     action: Option<usize>,
@@ -263,11 +264,11 @@ impl Columns {
             let known = match name {
                 "camera" => "view",
                 "subject" | "action" | "frame" | "view" => name,
-                _ if part_of(name).is_some_and(|it| it <= n_parts) => name,
+                _ if part_of(name).is_some_and(|part| part <= n_parts) => name,
                 _ => "",
             };
             let problem = match known {
-                "" => "not a column of a table of so many parts",
+                "" => "not a column for this number of parts",
                 _ if columns.contains_key(known) => "there twice",
                 _ => {
                     columns.insert(known.to_owned(), column);
@@ -301,10 +302,10 @@ impl Columns {
     }
 }
 
-/// The part that a column `part_n` is about, from 1.
+/// The 1-based part of a column `part_n`.
 fn part_of(name: &str) -> Option<usize> {
     let number = name.strip_prefix("part_")?;
-    let part = number.parse().ok().filter(|&it| it > 0)?;
+    let part = number.parse().ok().filter(|&part| part > 0)?;
     (format!("{part}") == number).then_some(part)
 }
 
@@ -320,7 +321,7 @@ mod tests {
 
     const RELEASED: &str = "S1,Box,6,C1,8.5,6.25\nS1,Box,7,C1,1,2\nS1,Box,6,C2,3,4\n";
 
-    fn said_of(text: &str) -> String {
+    fn outcome(text: &str) -> String {
         match Table::parse(text, 2) {
             Ok(table) => format!("fine: {}", table.n_rows()),
             Err(error) => error.to_string(),
@@ -328,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_the_authors_form() {
+    fn reads_the_authors_format() {
         let table = Table::parse(RELEASED, 2).unwrap();
         assert_eq!(table.get("S1", "Box", 6, "C1"), Some(&[8.5, 6.25][..]));
         assert_eq!(table.get("S1", "Box", 6, "C2"), Some(&[3.0, 4.0][..]));
@@ -338,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_may_put_the_columns_in_any_order() {
+    fn with_a_header_the_columns_may_be_in_any_order() {
         let text = "part_2,frame,camera,part_1\n6.25, 6 ,C1,8.5\n";
         let table = Table::parse(text, 2).unwrap();
         assert_eq!(table.get("", "", 6, "C1"), Some(&[8.5, 6.25][..]));
@@ -350,62 +351,62 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_no_expected_error() {
+    fn rejects_invalid_expected_errors() {
         for bad in ["NaN", "nan", "inf", "-0.5", "1e39", "", "x"] {
             let expected = format!(
                 "line 2, column 6: expected error of part 2 is `{bad}`, expected a finite number of \
                  pixels from 0"
             );
             assert_eq!(
-                said_of(&format!("S,A,1,C,1,2\nS,A,2,C,1,{bad}\n")),
+                outcome(&format!("S,A,1,C,1,2\nS,A,2,C,1,{bad}\n")),
                 expected
             );
         }
     }
 
     #[test]
-    fn names_the_row_that_has_too_few_columns_or_too_many() {
-        let said = said_of("S,A,1,C,1,2\nS,A,2,C,1\n");
-        assert_eq!(said, "line 2: 5 columns, expected 6");
-        let said = said_of("frame,view,part_1,part_2\n1,C,1,2,3\n");
-        assert_eq!(said, "line 2: 5 columns, expected 4");
+    fn reports_the_line_with_a_wrong_number_of_columns() {
+        let error = outcome("S,A,1,C,1,2\nS,A,2,C,1\n");
+        assert_eq!(error, "line 2: 5 columns, expected 6");
+        let error = outcome("frame,view,part_1,part_2\n1,C,1,2,3\n");
+        assert_eq!(error, "line 2: 5 columns, expected 4");
     }
 
     #[test]
-    fn a_frame_is_a_whole_number_and_given_once() {
-        let said = said_of("S,A,1.5,C,1,2\n");
-        assert_eq!(said, "line 1, column 3: frame `1.5` is not a whole number");
-        let said = said_of("S,A,1,C,1,2\n\nS,A,1,D,1,2\nS,A,1,C,3,4\n");
-        assert_eq!(said, "line 4: frame 1 of S A C was given before");
+    fn rejects_fractional_and_duplicate_frames() {
+        let error = outcome("S,A,1.5,C,1,2\n");
+        assert_eq!(error, "line 1, column 3: frame `1.5` is not a whole number");
+        let error = outcome("S,A,1,C,1,2\n\nS,A,1,D,1,2\nS,A,1,C,3,4\n");
+        assert_eq!(error, "line 4: frame 1 of S A C was given before");
     }
 
     #[test]
-    fn the_header_must_name_the_models_parts() {
+    fn the_header_must_have_a_column_for_every_part() {
         assert_eq!(
-            said_of("frame,view,part_1\n"),
+            outcome("frame,view,part_1\n"),
             format!("line 1: the header has no column `part_2`; expected {KNOWN}")
         );
         assert_eq!(
-            said_of("frame,part_1,part_2\n"),
+            outcome("frame,part_1,part_2\n"),
             format!("line 1: the header has no column `view`; expected {KNOWN}")
         );
         for bad in ["part_3", "part_0", "part_01", "sigma"] {
-            let problem = "not a column of a table of so many parts";
+            let problem = "not a column for this number of parts";
             assert_eq!(
-                said_of(&format!("frame,view,part_1,part_2,{bad}\n")),
+                outcome(&format!("frame,view,part_1,part_2,{bad}\n")),
                 format!("line 1, column 5: `{bad}` is {problem}; expected {KNOWN}")
             );
         }
         assert_eq!(
-            said_of("frame,view,camera\n"),
+            outcome("frame,view,camera\n"),
             format!("line 1, column 3: `camera` is there twice; expected {KNOWN}")
         );
     }
 
     #[test]
-    fn a_table_has_rows() {
+    fn a_table_without_rows_is_rejected() {
         for empty in ["", "\n\n", "frame,view,part_1,part_2\n"] {
-            assert_eq!(said_of(empty), "the table has no rows");
+            assert_eq!(outcome(empty), "the table has no rows");
         }
     }
 
@@ -414,12 +415,12 @@ mod tests {
         fn a_changed_table_never_panics(at in 0..RELEASED.len(), to in "[0-9a-z.,\"\\n-]{0,8}") {
             let mut text = RELEASED.to_owned();
             text.replace_range(at..(at + 3).min(RELEASED.len()), &to);
-            let _outcome = said_of(&text);
+            let _outcome = outcome(&text);
         }
 
         #[test]
         fn any_text_is_a_table_or_an_error(text: String) {
-            let _outcome = said_of(&text);
+            let _outcome = outcome(&text);
         }
     }
 }

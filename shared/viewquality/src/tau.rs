@@ -1,6 +1,6 @@
-//! Expected errors beyond which a part is switched off.
+//! Thresholds of the expected error above which a part is switched off.
 
-/// What the authors measured on a training set, pixels of its images, one number per part.
+/// The authors' measurements on a training set, pixels of its images, one number per part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainingErrors {
     /// Median error of the single-view pose.
@@ -27,7 +27,7 @@ impl TrainingErrors {
     /// UMPM (644x486), from the constants of the authors' program.
     ///
     /// The inaccuracy of part 16, 23.258, comes from a mistake in their data: that part was trained
-    /// with the errors of part 6. It is kept as published, so that their runs can be repeated.
+    /// with the errors of part 6. It is kept as published, so that their runs can be reproduced.
     pub const UMPM: Self = Self {
         median_px: [
             4.713, 4.372, 6.777, 7.732, 9.641, 12.699, 16.146, 6.152, 6.082, 6.121, 5.931, 5.747,
@@ -48,18 +48,18 @@ pub struct Tau {
     px: Vec<f32>,
 }
 
-/// Why a text is no list of thresholds.
+/// Why a text was rejected as a list of thresholds.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TauError {
-    /// Something is not a number of pixels.
+    /// A field is not a valid number of pixels.
     #[error("line {line}: `{got}` is not a threshold in pixels, expected a finite number from 0")]
     Number {
         /// Line, from 1.
         line: usize,
-        /// What stands there.
+        /// The field.
         got: String,
     },
-    /// There are more or fewer thresholds than parts.
+    /// The number of thresholds differs from the number of parts.
     #[error("there are {got} thresholds, expected {expected}: one per part")]
     Count {
         /// Thresholds found.
@@ -70,24 +70,25 @@ pub enum TauError {
 }
 
 impl Tau {
-    /// What the authors' program uses on HumanEva: median plus inaccuracy.
+    /// The thresholds of the authors' program for HumanEva: median plus inaccuracy.
     pub fn humaneva() -> Self {
         Self::median_and_inaccuracy(&TrainingErrors::HUMANEVA)
     }
 
-    /// What the authors' program uses on UMPM: median plus inaccuracy.
+    /// The thresholds of the authors' program for UMPM: median plus inaccuracy.
     pub fn umpm() -> Self {
         Self::median_and_inaccuracy(&TrainingErrors::UMPM)
     }
 
-    /// The rule as the paper states it: the median training error alone.
+    /// The paper's rule: the median training error alone.
     pub fn median_only(errors: &TrainingErrors) -> Self {
         Self {
             px: errors.median_px.to_vec(),
         }
     }
 
-    /// Median training error plus mean inaccuracy of its prediction, as in the authors' program.
+    /// The rule of the authors' program: median training error plus mean inaccuracy of its
+    /// prediction.
     pub fn median_and_inaccuracy(errors: &TrainingErrors) -> Self {
         let both = errors.median_px.iter().zip(&errors.inaccuracy_px);
         Self {
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_rule_is_stricter_for_every_part() {
+    fn the_papers_thresholds_are_lower_for_every_part() {
         for (errors, program) in [
             (TrainingErrors::HUMANEVA, Tau::humaneva()),
             (TrainingErrors::UMPM, Tau::umpm()),
@@ -163,17 +164,17 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_no_threshold() {
+    fn rejects_invalid_thresholds() {
         for bad in ["NaN", "inf", "-1", "1e39", "x"] {
             let expected = format!(
                 "line 2: `{bad}` is not a threshold in pixels, expected a finite number from 0"
             );
-            let said = Tau::parse(&format!("1\n2 {bad}"), 3)
+            let error = Tau::parse(&format!("1\n2 {bad}"), 3)
                 .unwrap_err()
                 .to_string();
-            assert_eq!(said, expected);
+            assert_eq!(error, expected);
         }
-        let said = Tau::parse("1 2", 3).unwrap_err().to_string();
-        assert_eq!(said, "there are 2 thresholds, expected 3: one per part");
+        let error = Tau::parse("1 2", 3).unwrap_err().to_string();
+        assert_eq!(error, "there are 2 thresholds, expected 3: one per part");
     }
 }

@@ -1,14 +1,14 @@
-//! The person's tile: the part of a frame that a network looks at.
+//! The person's tile: the part of a frame that a network takes as input.
 
 use kernels::Rgb8View;
 
-/// Height of the part of a frame that a tile shows, per height of the person's box.
+/// Height shown by a tile, relative to the height of the person's box.
 ///
-/// The box already reaches half a part beyond the outermost centres; the margin lets the network see
-/// what the limbs end at.
+/// The box already extends half a part beyond the outermost centres; the margin shows the network
+/// the surroundings of the limb ends.
 const MARGIN: f64 = 1.1;
 
-/// How many pixels a tile has.
+/// The size of a tile in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileShape {
     /// Height, pixels, at least 1.
@@ -18,12 +18,12 @@ pub struct TileShape {
 }
 
 impl TileShape {
-    /// Of the small network.
+    /// The tile of the small network.
     pub const SMALL: Self = Self {
         height: 160,
         width: 64,
     };
-    /// Of VGG-16: its five halvings leave 5 x 1.
+    /// The tile of VGG-16; its five halvings leave 5 x 1.
     pub const VGG16: Self = Self {
         height: 160,
         width: 48,
@@ -35,10 +35,11 @@ impl TileShape {
     }
 }
 
-/// Where a tile lies in its frame: upright, never distorted, of the same scale in both directions.
+/// The position of a tile in its frame: upright, not distorted, with the same scale in both
+/// directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tile {
-    /// How many pixels it has.
+    /// The size of the tile.
     pub shape: TileShape,
     /// Its centre in the frame, `[x, y]`, pixels; the centre of the top-left pixel is (0, 0).
     pub centre: [f64; 2],
@@ -69,32 +70,34 @@ impl Tile {
         })
     }
 
-    /// Height of what it shows, pixels of the frame: the size of the person by which relative errors
-    /// are relative.
+    /// Height that the tile shows, pixels of the frame: the size of the person to which relative
+    /// errors refer.
     pub fn height_px(&self) -> f64 {
         self.shape.height as f64 * self.scale
     }
 
-    /// Width of what it shows, pixels of the frame.
+    /// Width that the tile shows, pixels of the frame.
     pub fn width_px(&self) -> f64 {
         self.shape.width as f64 * self.scale
     }
 
-    /// What it shows, `[x1, y1, x2, y2]`, centres of the outermost pixels of the frame.
+    /// The rectangle that the tile shows, `[x1, y1, x2, y2]`, centres of the outermost pixels of
+    /// the frame.
     pub fn rectangle(&self) -> [f64; 4] {
         let [x, y] = self.centre;
         let [dx, dy] = [self.width_px(), self.height_px()].map(|side| (side - 1.0) / 2.0);
         [x - dx, y - dy, x + dx, y + dy]
     }
 
-    /// Where a point of the frame lies: 0 at the tile's centre, `[x, y]` in heights of the tile.
+    /// The position of a point of the frame relative to the tile's centre, `[x, y]` in heights of
+    /// the tile.
     pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.centre;
         [point[0] - x, point[1] - y].map(|it| it / self.height_px())
     }
 }
 
-/// How the colours of a tile are given to a network: `(v / 255 - mean) / deviation` per channel.
+/// The normalisation of colours for a network: `(v / 255 - mean) / deviation` per channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalisation {
     /// Mean of red, green and blue, from 0 to 1.
@@ -104,14 +107,14 @@ pub struct Normalisation {
 }
 
 impl Normalisation {
-    /// What networks that were trained on `ImageNet` expect, among them torchvision's.
+    /// For networks that were trained on `ImageNet`, such as torchvision's.
     pub const IMAGENET: Self = Self {
         mean: [0.485, 0.456, 0.406],
         deviation: [0.229, 0.224, 0.225],
     };
 }
 
-/// Resamples tiles; keeps its memory from one to the next.
+/// Resamples tiles; keeps its buffers between calls.
 #[derive(Debug, Clone, Default)]
 pub struct Sampler {
     taps: Vec<Taps>,
@@ -119,12 +122,12 @@ pub struct Sampler {
     band: Vec<f32>,
 }
 
-/// Which pixels of a row or column of the frame a pixel of the tile is a mean of.
+/// The pixels of a row or column of the frame whose weighted mean is a pixel of the tile.
 #[derive(Debug, Clone, Copy)]
 struct Taps {
-    /// The first of them; may lie outside, where the border is repeated.
+    /// The first of them; may lie outside of the frame, where the border is repeated.
     first: i64,
-    /// Where its weights begin, and how many there are.
+    /// Index of the first weight, and the number of weights.
     begin: usize,
     count: usize,
 }
@@ -132,11 +135,12 @@ struct Taps {
 impl Sampler {
     /// Resamples a tile once from its frame, as `3 x height x width` normalised values.
     ///
-    /// Every pixel is a weighted mean over both directions in turn. The weight of a pixel of the frame
-    /// falls linearly to 0 at `max(1, s)` pixels from where the tile's pixel lies (`s` is the scale):
-    /// bilinear interpolation where the tile is the finer grid, an average without aliasing where it
-    /// is the coarser. Beyond the frame its border is repeated. Sums run in f32 in ascending order,
-    /// columns first, so that the same frame and tile give the same bits everywhere.
+    /// Every pixel is a weighted mean, first over one direction, then over the other. The weight of
+    /// a pixel of the frame falls linearly to 0 at `max(1, s)` pixels from the position of the
+    /// tile's pixel (`s` is the scale): bilinear interpolation where the tile is the finer grid, an
+    /// average without aliasing where it is the coarser. Beyond the frame its border is repeated.
+    /// Sums are computed in f32 in ascending order, columns first, so that the same frame and tile
+    /// give the same bits everywhere.
     ///
     /// * `out`: [`TileShape::n_values`] values, overwritten; red, green, blue planes, row major.
     ///
@@ -155,8 +159,8 @@ impl Sampler {
         assert!(image.width() > 0 && image.height() > 0, "an image");
         self.taps.clear();
         self.weights.clear();
-        self.lay_taps(tile.centre[1], tile.scale, height);
-        self.lay_taps(tile.centre[0], tile.scale, width);
+        self.add_taps(tile.centre[1], tile.scale, height);
+        self.add_taps(tile.centre[0], tile.scale, width);
         let columns = self.columns(height, image.width());
         self.band.resize(3 * (columns[1] - columns[0]), 0.0);
         for row in 0..height {
@@ -172,8 +176,8 @@ impl Sampler {
         }
     }
 
-    /// The taps of one direction.
-    fn lay_taps(&mut self, centre: f64, scale: f64, n: usize) {
+    /// Computes the taps of one direction.
+    fn add_taps(&mut self, centre: f64, scale: f64, n: usize) {
         let reach = scale.max(1.0);
         for i in 0..n {
             let at = centre + (i as f64 - (n as f64 - 1.0) / 2.0) * scale;

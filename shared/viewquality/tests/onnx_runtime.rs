@@ -1,6 +1,6 @@
-//! ONNX Runtime in place of `rten`: the same words and the same numbers.
+//! ONNX Runtime instead of `rten`: the same errors and the same numbers.
 //!
-//! The library is the user's, so this runs where there is one (its build without CUDA):
+//! The user provides the library, so this test runs where there is one (its build without CUDA):
 //! `ONNX_RUNTIME=/usr/lib/libonnxruntime.so cargo test -p viewquality --features ort-here`
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,7 +12,7 @@ use viewquality::{Device, Network, NetworkError, OnnxRuntime, TileShape, n_evide
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.quality.onnx");
 const N_PARTS: usize = 26;
 
-/// Where the library lies is no setting of Parallax, and no two machines agree on it.
+/// The path is not a setting of Parallax, since it differs between machines.
 fn library() -> PathBuf {
     std::env::var_os("ONNX_RUNTIME").unwrap().into()
 }
@@ -22,7 +22,7 @@ fn runtime() -> OnnxRuntime {
 }
 
 #[test]
-fn a_library_that_is_not_there_is_named() {
+fn a_missing_library_is_named() {
     let error =
         OnnxRuntime::load(Path::new("/nowhere/libonnxruntime.so"), Device::Cpu).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
@@ -31,7 +31,7 @@ fn a_library_that_is_not_there_is_named() {
 }
 
 #[test]
-fn the_shipped_network_says_the_same() {
+fn the_shipped_network_gives_the_same_output() {
     let by_rten = Network::parse(SHIPPED.to_vec(), N_PARTS).unwrap();
     let network = Network::parse_with(&runtime(), SHIPPED, N_PARTS).unwrap();
     assert_eq!(network.card(), by_rten.card());
@@ -42,35 +42,35 @@ fn the_shipped_network_says_the_same() {
     let evidence: Vec<f32> = (0..n_evidence(N_PARTS))
         .map(|it| (it % 5) as f32 * 0.2)
         .collect();
-    let [said, expected] = [&network, &by_rten].map(|it| it.run(&tile, &evidence).unwrap());
-    for (said, expected) in said.iter().zip(&expected) {
-        assert!((said - expected).abs() < 1e-4, "{said}, {expected}");
+    let [got, expected] = [&network, &by_rten].map(|it| it.run(&tile, &evidence).unwrap());
+    for (got, expected) in got.iter().zip(&expected) {
+        assert!((got - expected).abs() < 1e-4, "{got}, {expected}");
     }
 }
 
 #[test]
-fn what_does_not_fit_is_refused_in_the_same_words() {
+fn invalid_networks_are_rejected_with_the_same_errors() {
     let runtime = runtime();
-    let said = |net: &onnx::Network, n_parts| {
+    let got = |net: &onnx::Network, n_parts| {
         let by_rten = Network::parse(net.file(), n_parts).unwrap_err().to_string();
-        let said = Network::parse_with(&runtime, &net.file(), n_parts).unwrap_err();
-        assert_eq!(said.to_string(), by_rten);
+        let got = Network::parse_with(&runtime, &net.file(), n_parts).unwrap_err();
+        assert_eq!(got.to_string(), by_rten);
         by_rten
     };
     let expected = "`sigma` of the network is f32 [1, 2], expected f32 [1, 26]";
-    assert_eq!(said(&of_colours(), 26), expected);
+    assert_eq!(got(&of_colours(), 26), expected);
     let mut net = of_colours();
     net.metadata
         .push(("parallax.tile".to_owned(), "160x64".to_owned()));
-    said(&net, 2);
+    got(&net, 2);
     let mut net = of_colours();
     net.inputs[0].0 = "image".to_owned();
     net.nodes[0].inputs[0] = "image".to_owned();
-    said(&net, 2);
+    got(&net, 2);
 }
 
 #[test]
-fn operations_that_nobody_knows_and_files_cut_off_are_refused() {
+fn unknown_operations_and_truncated_files_are_rejected() {
     let runtime = runtime();
     let mut net = of_colours();
     net.nodes[1].op = "Guess".to_owned();
@@ -85,7 +85,7 @@ fn operations_that_nobody_knows_and_files_cut_off_are_refused() {
 }
 
 #[test]
-fn a_device_that_the_library_cannot_use_is_refused() {
+fn an_unsupported_device_is_rejected() {
     let runtime = OnnxRuntime::load(&library(), Device::Cuda).unwrap();
     let error = Network::parse_with(&runtime, SHIPPED, N_PARTS).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();

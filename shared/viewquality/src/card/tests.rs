@@ -1,15 +1,15 @@
-//! Cards are read back as they were written, and what is no card is refused by name.
+//! Cards are read back as they were written, and invalid entries are rejected by name.
 
 use proptest::prelude::*;
 
 use super::*;
 
-fn said_of(name: &str, value: &str) -> String {
+fn rejection(name: &str, value: &str) -> String {
     Card::parse([(name, value)], 3).unwrap_err().to_string()
 }
 
 #[test]
-fn a_file_that_says_nothing_gives_pixels_from_colours_of_imagenet() {
+fn a_file_without_entries_gets_the_defaults() {
     let card = Card::parse([("producer", "somebody")], 26).unwrap();
     assert_eq!(card, Card::default());
     assert_eq!((card.unit, card.tile), (Unit::Pixels, None));
@@ -17,7 +17,7 @@ fn a_file_that_says_nothing_gives_pixels_from_colours_of_imagenet() {
 }
 
 #[test]
-fn a_logarithmic_output_of_one_is_a_share_of_the_tile() {
+fn a_logarithmic_output_is_relative_to_the_tile() {
     let px = Unit::LogRelative.error(2.0_f32.ln(), 400.0).unwrap();
     assert!((px - 4.0).abs() < 1e-5, "{px}: one hundredth of 400");
     assert_eq!(Unit::Relative.error(0.25, 400.0), Some(100.0));
@@ -25,7 +25,7 @@ fn a_logarithmic_output_of_one_is_a_share_of_the_tile() {
 }
 
 #[test]
-fn an_output_below_zero_is_no_error_and_one_that_is_no_number_none() {
+fn a_negative_output_is_zero_and_one_that_is_not_finite_is_rejected() {
     for unit in [Unit::Pixels, Unit::Relative, Unit::LogRelative] {
         assert_eq!(unit.error(-3.0, 100.0), Some(0.0));
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -36,7 +36,7 @@ fn an_output_below_zero_is_no_error_and_one_that_is_no_number_none() {
 }
 
 #[test]
-fn thresholds_grow_with_the_person_unless_they_are_pixels() {
+fn thresholds_scale_with_the_person_unless_they_are_in_pixels() {
     let mut card = Card {
         tau: vec![0.5, 0.25],
         ..Card::default()
@@ -48,32 +48,32 @@ fn thresholds_grow_with_the_person_unless_they_are_pixels() {
 }
 
 #[test]
-fn refuses_what_it_does_not_know_and_names_it() {
+fn rejects_unknown_entries_and_values_by_name() {
     assert_eq!(
-        said_of("parallax.version", "2"),
+        rejection("parallax.version", "2"),
         "`parallax.version` is `2`, expected 1"
     );
     assert_eq!(
-        said_of("parallax.evidence", "x"),
+        rejection("parallax.evidence", "x"),
         "`parallax.evidence` is `x`, expected 1"
     );
     assert_eq!(
-        said_of("parallax.sigma", "1"),
+        rejection("parallax.sigma", "1"),
         "`parallax.sigma` is not an entry of version 1"
     );
     assert_eq!(
-        said_of("parallax.output", "metres"),
+        rejection("parallax.output", "metres"),
         "`parallax.output` is `metres`, expected `pixels`, `relative` or `log-relative`"
     );
     for bad in ["160", "0x64", "160x2000", "-1x5", "160x64x3"] {
-        assert!(said_of("parallax.tile", bad).contains("as `160x64`"));
+        assert!(rejection("parallax.tile", bad).contains("as `160x64`"));
     }
     for bad in ["1 2", "1 2 3 4", "1 2 NaN", "a b c"] {
-        assert!(said_of("parallax.mean", bad).ends_with("expected three numbers"));
+        assert!(rejection("parallax.mean", bad).ends_with("expected three numbers"));
     }
-    assert!(said_of("parallax.std", "1 0 1").ends_with("three numbers above 0"));
+    assert!(rejection("parallax.std", "1 0 1").ends_with("three numbers above 0"));
     for bad in ["1 2", "1 2 -3", "1 2 inf"] {
-        assert!(said_of("parallax.tau", bad).ends_with("expected 3 finite numbers from 0"));
+        assert!(rejection("parallax.tau", bad).ends_with("expected 3 finite numbers from 0"));
     }
 }
 
@@ -106,14 +106,14 @@ fn any_card() -> impl Strategy<Value = Card> {
 
 proptest! {
     #[test]
-    fn a_card_is_read_as_it_was_written(card in any_card()) {
+    fn a_written_card_is_read_back(card in any_card()) {
         let entries = card.entries();
         let entries = entries.iter().map(|(name, value)| (*name, value.as_str()));
         prop_assert_eq!(Card::parse(entries, 3).unwrap(), card);
     }
 
     #[test]
-    fn an_error_is_read_back_from_its_label(error in 0.0_f64..1e3, height in 10.0_f64..1e3) {
+    fn an_error_is_recovered_from_its_label(error in 0.0_f64..1e3, height in 10.0_f64..1e3) {
         for unit in [Unit::Pixels, Unit::Relative, Unit::LogRelative] {
             let back = unit.error(unit.label(error, height) as f32, height).unwrap();
             prop_assert!((f64::from(back) - error).abs() < 1e-5 * (error + height));

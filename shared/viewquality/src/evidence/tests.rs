@@ -1,11 +1,11 @@
-//! The numbers are those of the pose, each where its name says.
+//! Every value of the evidence belongs to its name.
 
 use fmp::{Edge, Filter, ModelSpec, N_CHANNELS, PartSpec, Placement, Spring};
 
 use super::*;
 use crate::TileShape;
 
-/// A root, and two parts hung on it, each the other's mirror image.
+/// A root and two child parts that mirror each other.
 fn model(n_types: usize) -> Model {
     let filter = Filter {
         rows: 3,
@@ -86,7 +86,7 @@ fn numbers(candidates: &[Pose]) -> impl Fn(&str) -> f32 + use<> {
 }
 
 #[test]
-fn a_model_of_26_parts_has_424_numbers_each_with_its_own_name() {
+fn a_model_with_26_parts_has_424_values_with_distinct_names() {
     assert_eq!(n_evidence(26), 424);
     let names: std::collections::BTreeSet<String> =
         (0..424).map(|it| evidence_name(it, 26).unwrap()).collect();
@@ -96,12 +96,12 @@ fn a_model_of_26_parts_has_424_numbers_each_with_its_own_name() {
 }
 
 #[test]
-fn what_a_spring_adds_is_what_the_model_says_of_its_stretch() {
+fn spring_and_bias_scores_are_those_of_the_model() {
     let at = numbers(&[pose(2.0, [8, 9])]);
     // Parent (5, 4) + anchor (1, 2) - child (8, 9): (-2, -3).
     let expected = -(0.01 * 4.0 - 0.1 * 2.0 + 0.02 * 9.0 - 0.2 * 3.0);
     assert!((at("part 2 spring") - expected).abs() < 1e-6);
-    // The other hangs at (0, 0): stretched by the anchor alone.
+    // The other child is at (0, 0): displaced by the anchor alone.
     let other = -(0.01 + 0.1 + 0.02 * 4.0 + 0.2 * 2.0);
     assert!((at("springs") - at("part 2 spring") - other).abs() < 1e-6);
     assert_eq!(at("part 1 spring"), 0.0);
@@ -123,12 +123,12 @@ fn types_and_scores_are_those_of_the_pose() {
 }
 
 #[test]
-fn distances_are_counted_in_box_sides() {
+fn distances_are_measured_in_box_sides() {
     // The mirrored part is 3 columns and 4 rows away, 5 cells of 4 pixels, a box has 3.
     let at = numbers(&[pose(2.0, [8, 8])]);
     assert!((at("part 3 from_mirror") - 5.0 / 3.0).abs() < 1e-6);
     assert_eq!(at("part 3 from_mirror"), at("part 2 from_mirror"));
-    assert_eq!(at("part 1 from_mirror"), 0.0, "it is its own");
+    assert_eq!(at("part 1 from_mirror"), 0.0, "its own mirror");
     assert_eq!((at("part 2 from_second"), at("lead")), (FAR, FAR));
     let at = numbers(&[pose(2.0, [8, 8]), pose(1.5, [8, 5])]);
     assert!((at("part 2 from_second") - 1.0).abs() < 1e-6);
@@ -137,7 +137,7 @@ fn distances_are_counted_in_box_sides() {
 }
 
 #[test]
-fn a_part_outside_the_frame_is_inside_by_a_negative_number() {
+fn inside_is_negative_for_a_part_outside_the_frame() {
     // The padding is one cell: column 0 begins at -4 pixels, its box's centre is at 1.5.
     let at = numbers(&[pose(2.0, [0, 8])]);
     assert!((at("part 2 inside") - 1.5 / 12.0).abs() < 1e-6);
@@ -146,7 +146,7 @@ fn a_part_outside_the_frame_is_inside_by_a_negative_number() {
 }
 
 #[test]
-fn refuses_what_does_not_fit() {
+fn rejects_poses_that_do_not_fit() {
     let [few, many] = [model(2), model(7)];
     let layout = Layout::new(&few, 80, 60).unwrap();
     let tile = Tile::around([0.0, 0.0, 9.0, 9.0], TileShape::SMALL).unwrap();
@@ -158,10 +158,10 @@ fn refuses_what_does_not_fit() {
     assert_eq!(said(&few, &[], &SCORES), "there is no pose");
     assert_eq!(
         said(&few, &candidates, &SCORES[..1]),
-        "there are 1 local scores of 3 parts"
+        "there are 1 local scores for 3 parts"
     );
     assert_eq!(
         said(&many, &candidates, &SCORES),
-        "part 1 has 7 types, a network knows 6"
+        "part 1 has 7 types, the evidence has room for 6"
     );
 }

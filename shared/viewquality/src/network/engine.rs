@@ -1,23 +1,23 @@
-//! What a library that runs networks has to tell and to do.
+//! The interface of a library that runs networks.
 
 use core::fmt;
 
-/// What a file says of the network in it.
+/// The interface of a network, as declared in its file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Description {
     /// Names and values of its `metadata_props`.
     pub(super) metadata: Vec<(String, String)>,
-    /// What it takes.
-    pub(super) inputs: Vec<Port>,
-    /// Names of what it gives.
+    /// Its inputs.
+    pub(super) inputs: Vec<InputInfo>,
+    /// Names of its outputs.
     pub(super) outputs: Vec<String>,
 }
 
 /// An input.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Port {
+pub(super) struct InputInfo {
     pub(super) name: String,
-    /// Empty where the file does not say.
+    /// Empty if the file does not declare them.
     pub(super) sides: Vec<Side>,
 }
 
@@ -25,12 +25,12 @@ pub(super) struct Port {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Side {
     Fixed(usize),
-    /// Of any size; its name.
+    /// Any size; the name of the dimension.
     Named(String),
 }
 
 impl Side {
-    /// Whether it may have a size.
+    /// Whether it accepts a size.
     pub(super) fn may_be(&self, size: usize) -> bool {
         match self {
             Self::Fixed(n) => *n == size,
@@ -49,7 +49,7 @@ impl fmt::Display for Side {
     }
 }
 
-/// A tensor that goes in.
+/// An input tensor.
 #[derive(Debug, Clone)]
 pub(super) struct Input<'a> {
     pub(super) name: &'static str,
@@ -57,16 +57,16 @@ pub(super) struct Input<'a> {
     pub(super) values: &'a [f32],
 }
 
-/// A tensor that comes out: its shape and its values.
+/// An output tensor: its shape and its values.
 pub(super) type Output = (Vec<usize>, Vec<f32>);
 
-/// What a library says is wrong.
-pub(super) type Wrong = Box<dyn std::error::Error + Send + Sync>;
+/// An error of the library.
+pub(super) type EngineError = Box<dyn std::error::Error + Send + Sync>;
 
-/// A network in the hands of a library.
+/// A network that is loaded by a library.
 pub(super) trait Engine: fmt::Debug + Send + Sync {
     /// Runs it on one thread of the processor.
     ///
-    /// * Returns the output of that name, `None` unless it is of `f32`.
-    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, Wrong>;
+    /// * Returns the output with that name, `None` unless it is `f32`.
+    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, EngineError>;
 }

@@ -1,13 +1,13 @@
-//! Whether the bytes of a file are nested as those of an ONNX file must be.
+//! Checks that the messages in a file are nested as in an ONNX file.
 //!
-//! The library that reads the file trusts its lengths: one that points backwards is followed for ever,
-//! and one that is too large is allocated. So they are checked first. Numbers of fields are those of
-//! the published `onnx.proto`.
+//! The library that reads the file trusts its lengths: it loops for ever on one that points
+//! backwards, and allocates any size. So they are checked first. Field numbers are those of the
+//! published `onnx.proto`.
 
-/// Most messages within messages.
+/// Largest nesting depth.
 const MAX_DEPTH: usize = 32;
 
-/// A message of the format.
+/// A type of message in the format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Model,
@@ -19,12 +19,12 @@ pub(super) enum Kind {
     Type,
     TensorType,
     Shape,
-    /// One without messages inside: an operator set, an entry, a dimension.
+    /// A message without nested messages: an operator set, an entry, a dimension.
     Flat,
 }
 
 impl Kind {
-    /// What a field of this message is, if it is a message that the library reads.
+    /// The type of a field of this message, if it is a message that the library reads.
     fn child(self, field: u64) -> Option<Self> {
         Some(match (self, field) {
             (Self::Model, 7) | (Self::Attribute, 6 | 11) => Self::Graph,
@@ -41,41 +41,43 @@ impl Kind {
     }
 }
 
-/// Where the nesting breaks: the byte, from 0.
+/// The byte at which the nesting is wrong, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the file is cut off or no ONNX file: byte {at} belongs to nothing")]
-pub(super) struct Broken {
+#[error("the file is truncated or not an ONNX file: unexpected byte {at}")]
+pub(super) struct MalformedFile {
     at: usize,
 }
 
 /// Checks a whole file.
-pub(super) fn check(file: &[u8]) -> Result<(), Broken> {
+pub(super) fn check(file: &[u8]) -> Result<(), MalformedFile> {
     walk(Kind::Model, file, 0, 0)
 }
 
 /// Checks one message, which begins at byte `base` of the file.
-fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Broken> {
-    let broken = |at: usize| Broken { at: base + at };
+fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), MalformedFile> {
+    let malformed = |at: usize| MalformedFile { at: base + at };
     let mut at = 0;
     while at < bytes.len() {
         let begin = at;
-        let tag = varint(bytes, &mut at).ok_or(broken(begin))?;
+        let tag = varint(bytes, &mut at).ok_or(malformed(begin))?;
         let (field, wire) = (tag >> 3, tag & 7);
         if field == 0 {
-            return Err(broken(begin));
+            return Err(malformed(begin));
         }
         let length = match wire {
             0 => varint(bytes, &mut at).map(|_| 0),
             1 => Some(8),
-            2 => varint(bytes, &mut at).and_then(|it| usize::try_from(it).ok()),
+            2 => varint(bytes, &mut at).and_then(|length| usize::try_from(length).ok()),
             5 => Some(4),
             _ => None,
         };
-        let end = length.and_then(|it| at.checked_add(it));
-        let end = end.filter(|it| *it <= bytes.len()).ok_or(broken(begin))?;
+        let end = length.and_then(|length| at.checked_add(length));
+        let end = end
+            .filter(|end| *end <= bytes.len())
+            .ok_or(malformed(begin))?;
         if let (2, Some(child)) = (wire, kind.child(field)) {
             if depth == MAX_DEPTH {
-                return Err(broken(begin));
+                return Err(malformed(begin));
             }
             walk(child, &bytes[at..end], base + at, depth + 1)?;
         }
@@ -84,7 +86,7 @@ fn walk(kind: Kind, bytes: &[u8], base: usize, depth: usize) -> Result<(), Broke
     Ok(())
 }
 
-/// A number of seven bits a byte, lowest first; `None` if it does not end.
+/// Reads a number of seven bits per byte, lowest first; `None` if it does not end.
 fn varint(bytes: &[u8], at: &mut usize) -> Option<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {

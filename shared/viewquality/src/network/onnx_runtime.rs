@@ -1,4 +1,5 @@
-//! ONNX Runtime, a library that the user has: for networks that `rten` cannot run, and for GPUs.
+//! ONNX Runtime, a library that the user provides: for networks that `rten` cannot run, and for
+//! GPUs.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -8,13 +9,13 @@ use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
 use super::NetworkError;
-use super::engine::{Description, Engine, Input, Output, Port, Side, Wrong};
+use super::engine::{Description, Engine, EngineError, Input, InputInfo, Output, Side};
 use crate::Device;
 
-/// The library that this process has loaded: there can be one, and it stays.
+/// The library of this process: only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 
-/// The library, loaded, and what networks are to run on.
+/// The loaded library, and the device for networks.
 #[derive(Debug)]
 pub struct OnnxRuntime {
     environment: Environment,
@@ -35,7 +36,7 @@ impl OnnxRuntime {
             Some((file, environment)) if file == library => environment.clone(),
             Some((file, _)) => {
                 let [wanted, has] = [library, file].map(Path::display);
-                let message = format!("{wanted} is not the one that is in use already, {has}");
+                let message = format!("{wanted} cannot be loaded, {has} is already in use");
                 return Err(NetworkError::Library(message.into()));
             }
             None => {
@@ -56,43 +57,47 @@ impl OnnxRuntime {
         Ok((Loaded(Mutex::new(session)), description))
     }
 
-    fn session(&self, file: &[u8]) -> Result<Session, Wrong> {
+    fn session(&self, file: &[u8]) -> Result<Session, EngineError> {
         let builder = Session::builder(&self.environment)?;
-        let builder = builder.with_intra_threads(1).map_err(|it| plain(&it))?;
-        let builder = builder.with_inter_threads(1).map_err(|it| plain(&it))?;
+        let builder = builder
+            .with_intra_threads(1)
+            .map_err(|error| plain(&error))?;
+        let builder = builder
+            .with_inter_threads(1)
+            .map_err(|error| plain(&error))?;
         let mut builder = match self.device {
             Device::Cpu => builder,
             Device::Cuda => {
                 let cuda = ort::ep::CUDA::default().build().error_on_failure();
                 builder
                     .with_execution_providers([cuda])
-                    .map_err(|it| plain(&it))?
+                    .map_err(|error| plain(&error))?
             }
         };
         Ok(builder.commit_from_memory(file)?)
     }
 }
 
-fn begin(library: &Path) -> Result<Environment, Wrong> {
-    let builder = ort::init_from(library).map_err(|it| it.to_string())?;
+fn begin(library: &Path) -> Result<Environment, EngineError> {
+    let builder = ort::init_from(library).map_err(|error| error.to_string())?;
     Ok(builder.with_telemetry(false).build()?)
 }
 
-/// An error without what it would be tried again with.
-fn plain<T>(error: &ort::Error<T>) -> Wrong {
+/// The error without its recovery value.
+fn plain<T>(error: &ort::Error<T>) -> EngineError {
     error.to_string().into()
 }
 
-fn described(session: &Session) -> Result<Description, Wrong> {
+fn described(session: &Session) -> Result<Description, EngineError> {
     let metadata = session.metadata()?;
     let keys = metadata.custom_keys()?.into_iter();
     let entries = keys.filter_map(|key| {
         let value = metadata.custom(&key)?;
         Some((key, value))
     });
-    let port = |it: &ort::value::Outlet| Port {
-        name: it.name().to_owned(),
-        sides: sides(it.dtype()),
+    let port = |outlet: &ort::value::Outlet| InputInfo {
+        name: outlet.name().to_owned(),
+        sides: sides(outlet.dtype()),
     };
     Ok(Description {
         metadata: entries.collect(),
@@ -100,7 +105,7 @@ fn described(session: &Session) -> Result<Description, Wrong> {
         outputs: session
             .outputs()
             .iter()
-            .map(|it| it.name().to_owned())
+            .map(|outlet| outlet.name().to_owned())
             .collect(),
     })
 }
@@ -124,21 +129,21 @@ fn sides(of: &ValueType) -> Vec<Side> {
         .collect()
 }
 
-/// A network in the hands of the library, which runs it for one caller at a time.
+/// A network loaded by the library; it runs for one caller at a time.
 #[derive(Debug)]
 pub(super) struct Loaded(Mutex<Session>);
 
 impl Engine for Loaded {
-    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, Wrong> {
+    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, EngineError> {
         let mut given: Vec<(&str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
-        for it in inputs {
-            let tensor = TensorRef::from_array_view((it.shape.clone(), it.values))?;
-            given.push((it.name, tensor.into()));
+        for input in inputs {
+            let tensor = TensorRef::from_array_view((input.shape.clone(), input.values))?;
+            given.push((input.name, tensor.into()));
         }
         let mut session = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let outputs = session.run(given)?;
         let value = outputs.get(output);
-        let value = value.ok_or_else(|| format!("it gave no `{output}`"))?;
+        let value = value.ok_or_else(|| format!("the network has no output `{output}`"))?;
         let Ok((shape, values)) = value.try_extract_tensor::<f32>() else {
             return Ok(None);
         };

@@ -1,4 +1,4 @@
-//! Networks whose answers are known by hand give them, and what is no such network is refused.
+//! Networks with known outputs give them, and invalid networks are rejected.
 
 use onnx::Side;
 use proptest::prelude::*;
@@ -34,12 +34,12 @@ fn read(net: &onnx::Network) -> Result<Network, NetworkError> {
     Network::parse(net.file(), N_PARTS)
 }
 
-fn said_of(net: &onnx::Network) -> String {
+fn rejection(net: &onnx::Network) -> String {
     read(net).unwrap_err().to_string()
 }
 
 #[test]
-fn a_network_gives_the_numbers_known_by_hand() {
+fn a_network_gives_the_known_outputs() {
     let network = read(&of_colours()).unwrap();
     assert_eq!(network.tile_shape(), SHAPE);
     assert!(network.takes_tile() && !network.takes_evidence());
@@ -51,7 +51,7 @@ fn a_network_gives_the_numbers_known_by_hand() {
 }
 
 #[test]
-fn a_network_may_take_the_evidence_alone() {
+fn a_network_may_take_only_the_evidence() {
     let network = read(&of_evidence()).unwrap();
     assert!(!network.takes_tile() && network.takes_evidence());
     assert_eq!(network.tile_shape(), TileShape::SMALL);
@@ -79,7 +79,7 @@ fn a_network_may_take_both() {
 }
 
 #[test]
-fn what_the_file_says_of_itself_is_read() {
+fn the_card_of_a_file_is_read() {
     let mut net = of_colours();
     let card = Card {
         tile: Some(SHAPE),
@@ -94,17 +94,17 @@ fn what_the_file_says_of_itself_is_read() {
     net.metadata
         .push(("parallax.tau".to_owned(), "1".to_owned()));
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "`parallax.tau` is `1`, expected 2 finite numbers from 0"
     );
 }
 
 #[test]
-fn a_tile_of_no_fixed_size_has_the_one_that_the_file_names() {
+fn a_tile_without_fixed_size_has_the_size_in_the_card() {
     let mut net = of_colours();
     net.inputs[0].1[2..].copy_from_slice(&[Side::Named("h"), Side::Named("w")]);
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "`tile` of the network is [n, 3, h, w], expected [n, 3, H, W] of known height and width, or \
          `parallax.tile`"
     );
@@ -118,24 +118,24 @@ fn a_tile_of_no_fixed_size_has_the_one_that_the_file_names() {
 }
 
 #[test]
-fn refuses_shapes_with_what_was_found_and_expected() {
+fn rejects_wrong_shapes_with_the_shape_found_and_expected() {
     let mut net = of_colours();
     net.metadata
         .push(("parallax.tile".to_owned(), "160x64".to_owned()));
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "`tile` of the network is [n, 3, 4, 3], expected [n, 3, 160, 64]"
     );
     let mut net = of_colours();
     net.inputs[0].1[1] = Side::Fixed(1);
-    assert!(said_of(&net).starts_with("`tile` of the network is [n, 1, 4, 3], expected"));
+    assert!(rejection(&net).starts_with("`tile` of the network is [n, 1, 4, 3], expected"));
     let mut net = of_colours();
     net.inputs[0].1.pop();
-    assert!(said_of(&net).starts_with("`tile` of the network is [n, 3, 4], expected"));
+    assert!(rejection(&net).starts_with("`tile` of the network is [n, 3, 4], expected"));
     let mut net = of_evidence();
     net.inputs[0].1[1] = Side::Fixed(5);
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "`evidence` of the network is [1, 5], expected [n, 40]"
     );
     let said = Network::parse(of_colours().file(), 26).unwrap_err();
@@ -146,12 +146,12 @@ fn refuses_shapes_with_what_was_found_and_expected() {
 }
 
 #[test]
-fn refuses_other_inputs_and_outputs_by_name() {
+fn rejects_unknown_inputs_and_outputs_by_name() {
     let mut net = of_colours();
     net.inputs[0].0 = "image".to_owned();
     net.nodes[0].inputs[0] = "image".to_owned();
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "the network has the inputs `image`, expected `tile` f32 [n, 3, H, W], `evidence` f32 \
          [n, K], or both"
     );
@@ -159,29 +159,29 @@ fn refuses_other_inputs_and_outputs_by_name() {
     net.outputs[0].0 = "error".to_owned();
     net.nodes[2].output = "error".to_owned();
     assert_eq!(
-        said_of(&net),
+        rejection(&net),
         "the network has the outputs `error`, expected `sigma` f32 [n, parts]"
     );
 }
 
 #[test]
-fn evidence_is_taken_only_in_a_version_that_the_file_names() {
+fn evidence_requires_a_version_in_the_file() {
     let mut net = of_evidence();
     net.metadata.clear();
     assert_eq!(
-        said_of(&net),
-        "the network takes `evidence`, but its file does not say which version of it"
+        rejection(&net),
+        "the network takes `evidence`, but its file does not declare its version"
     );
     let mut net = of_colours();
     net.metadata = of_evidence().metadata;
     assert_eq!(
-        said_of(&net),
-        "the network does not take `evidence`, but its file says which version of it"
+        rejection(&net),
+        "the network does not take `evidence`, but its file declares its version"
     );
 }
 
 #[test]
-fn refuses_operations_that_are_not_known() {
+fn rejects_unknown_operations() {
     let mut net = of_colours();
     net.nodes[1].op = "Guess".to_owned();
     let error = read(&net).unwrap_err();
@@ -191,7 +191,7 @@ fn refuses_operations_that_are_not_known() {
 }
 
 #[test]
-fn refuses_files_that_are_cut_off_or_no_networks() {
+fn rejects_truncated_files_and_other_files() {
     let file = of_colours().file();
     for cut in [0, 1, 10, file.len() / 2, file.len() - 40] {
         assert!(
@@ -205,14 +205,14 @@ fn refuses_files_that_are_cut_off_or_no_networks() {
 }
 
 #[test]
-fn a_network_is_told_by_the_bytes_of_its_file() {
+fn the_fingerprint_depends_on_the_bytes_of_the_file() {
     let [first, second] = [of_colours(), of_evidence()].map(|it| read(&it).unwrap().fingerprint());
     assert_eq!(first, checksum::fnv1a_32(&of_colours().file()));
     assert_ne!(first, second);
 }
 
 #[test]
-fn refuses_to_run_on_less_than_a_tile() {
+fn a_tile_that_is_too_short_is_rejected() {
     let network = read(&of_colours()).unwrap();
     let said = network.run(&[0.0; 35], &[]).unwrap_err().to_string();
     assert_eq!(

@@ -1,16 +1,16 @@
-//! Tiles show what they should, and resampling is a mean whatever the scale.
+//! Tiles show the right part of the frame, and resampling is a weighted mean at every scale.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// Colours as they are, from 0 to 255.
+/// Colours unchanged, from 0 to 255.
 const PLAIN: Normalisation = Normalisation {
     mean: [0.0; 3],
     deviation: [1.0 / 255.0; 3],
 };
 
-/// The colours of whole pixels, which normalisation has rounded.
+/// Rounds away the error of the normalisation.
 fn colours(values: &[f32]) -> Vec<f32> {
     values.iter().map(|it| (it * 1e4).round() / 1e4).collect()
 }
@@ -29,7 +29,7 @@ fn ramp([width, height]: [usize; 2]) -> Vec<u8> {
 }
 
 #[test]
-fn a_tall_person_fills_the_height_and_a_wide_one_the_width() {
+fn a_tall_box_fills_the_height_and_a_wide_one_the_width() {
     let tall = Tile::around([10.0, 0.0, 19.0, 159.0], TileShape::SMALL).unwrap();
     assert!((tall.height_px() - 176.0).abs() < 1e-9 && (tall.scale - 1.1).abs() < 1e-9);
     assert_eq!(tall.centre, [14.5, 79.5]);
@@ -38,7 +38,7 @@ fn a_tall_person_fills_the_height_and_a_wide_one_the_width() {
 }
 
 #[test]
-fn there_is_no_tile_of_nothing() {
+fn an_empty_or_infinite_box_has_no_tile() {
     for bad in [
         [0.0, 0.0, -1.0, 5.0],
         [0.0, 0.0, 5.0, f64::NAN],
@@ -49,7 +49,7 @@ fn there_is_no_tile_of_nothing() {
 }
 
 #[test]
-fn at_scale_one_on_whole_pixels_it_is_a_crop() {
+fn at_scale_1_on_whole_pixels_a_tile_is_a_crop() {
     let shape = TileShape {
         height: 4,
         width: 2,
@@ -104,7 +104,7 @@ fn stripes_finer_than_the_tile_become_grey() {
 }
 
 #[test]
-fn a_place_is_counted_from_the_centre_in_heights() {
+fn positions_are_relative_to_the_centre_in_heights() {
     let tile = Tile {
         shape: TileShape::SMALL,
         centre: [100.0, 50.0],
@@ -116,7 +116,7 @@ fn a_place_is_counted_from_the_centre_in_heights() {
 }
 
 #[test]
-fn colours_are_given_as_the_network_wants_them() {
+fn colours_are_normalised() {
     let shape = TileShape {
         height: 1,
         width: 1,
@@ -136,7 +136,7 @@ fn colours_are_given_as_the_network_wants_them() {
     assert_eq!(out, [1.0, -2.0, 0.2]);
 }
 
-/// The same sums as one formula, in f64.
+/// The same sum as one formula, in f64.
 fn reference(size: [usize; 2], data: &[u8], tile: &Tile, [row, col, channel]: [usize; 3]) -> f64 {
     let reach = tile.scale.max(1.0);
     let TileShape { height, width } = tile.shape;
@@ -181,7 +181,7 @@ fn scene() -> impl Strategy<Value = ([usize; 2], Vec<u8>, Tile)> {
 
 proptest! {
     #[test]
-    fn resampling_is_the_weighted_mean_it_says((size, data, tile) in scene()) {
+    fn resampling_is_the_documented_weighted_mean((size, data, tile) in scene()) {
         let out = sampled(size, &data, &tile);
         let TileShape { height, width } = tile.shape;
         for (i, value) in out.iter().enumerate() {
@@ -192,7 +192,7 @@ proptest! {
     }
 
     #[test]
-    fn memory_kept_from_another_tile_changes_nothing((size, data, tile) in scene(), (other, bytes, first) in scene()) {
+    fn buffers_of_another_tile_have_no_effect((size, data, tile) in scene(), (other, bytes, first) in scene()) {
         let mut sampler = Sampler::default();
         let mut out = vec![f32::NAN; first.shape.n_values()];
         sampler.sample(Rgb8View::new(other[0], other[1], &bytes).unwrap(), &first, &PLAIN, &mut out);
