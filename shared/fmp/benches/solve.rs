@@ -2,7 +2,7 @@
 //! pixels in which one person stands out: by the view alone, and as one step of the alternation
 //! between two views, with and without shortcuts, with all terms changed and with one in five.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
 use std::sync::Arc;

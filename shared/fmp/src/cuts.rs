@@ -12,11 +12,11 @@ pub(crate) struct Cut {
 }
 
 /// The cuts of the levels `first`, `first + interval` and so on up to the last one of the scope,
-/// such that every cut is the half of the one before it.
+/// such that every cut is half of the one before it.
 ///
-/// A cut begins where a cell of its level begins, and ends there or with the image, so that its
-/// cells are cells of the whole image. Features depend on the pixels of two cells around them, less
-/// one pixel at least. Halving spoils up to two pixels along the border of a cut: another cell.
+/// A cut begins and ends at cell borders of its level, or with the image, so that its cells are
+/// cells of the whole image. Features depend on the pixels up to two cells away, less at least one
+/// pixel. Halving corrupts up to two pixels along the border of a cut, which takes another cell.
 pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     let end = usize::from(source.scope.levels().end);
     let levels = (first..end).step_by(source.interval);
@@ -46,7 +46,7 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
             y: of_axis(1),
         };
     }
-    // What halving makes of the first one.
+    // The sizes that halving the first cut gives.
     for octave in 1..cuts.len() {
         let half = |it: Range<usize>| it.start / 2..it.end.div_ceil(2);
         cuts[octave] = Cut {

@@ -108,10 +108,10 @@ impl Extractor {
     /// Writes the responses of all filters on the cells of a scope into `out`; nothing else is
     /// computed but what they are made of.
     ///
-    /// Features are those that [`Self::responses`] is made of, bit for bit (where the side of a cell
-    /// is not a power of two, but for the rounding of votes' shares). Responses lie within
-    /// twice the bound of [`FilterBank::correlate`] of each other: tiles begin elsewhere. With the
-    /// whole image as its region a scope gives the bits of [`Self::responses`] on its levels.
+    /// Features are bit-identical to those of [`Self::responses`] (except for the rounding of the
+    /// HOG shares where the side of a cell is not a power of two). Responses differ by at most
+    /// twice the bound of [`FilterBank::correlate`], because tiles begin elsewhere. With the whole
+    /// image as its region a scope gives the bits of [`Self::responses`] on its levels.
     ///
     /// * `out`: at least [`Layout::n_values`] values, `[level][filter][row][col]` without gaps.
     ///

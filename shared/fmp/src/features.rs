@@ -1,4 +1,4 @@
-//! The feature pyramid of one image, computed as it is asked for.
+//! The feature pyramid of one image, computed on demand.
 
 use std::sync::{Mutex, OnceLock};
 
@@ -11,7 +11,7 @@ use crate::cuts::{Cut, cuts};
 use crate::extract::lock;
 use crate::{Layout, N_CHANNELS, Scope};
 
-/// What the features are made of.
+/// The inputs of the features.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) isa: Isa,
@@ -44,12 +44,12 @@ impl Source<'_> {
     }
 }
 
-/// Features of all levels, with the buffers that they are made in.
+/// Features of all levels, with their buffers.
 ///
-/// The levels that come from one resized image by halving it again and again are a chain; chains
-/// have nothing to do with each other. Whoever first asks for a level of a chain computes the chain
-/// while others that ask for it wait, so responses begin where features are there, with no barrier
-/// in between. Buffers are kept from frame to frame.
+/// The levels that come from one resized image by repeated halving are a chain; chains are
+/// independent. The first thread that needs a level of a chain computes the chain while others that
+/// need it wait, so responses start as soon as their features exist, without a barrier. Buffers are
+/// reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Features {
     chains: Vec<Chain>,
@@ -65,14 +65,14 @@ struct Chain {
     spare: Mutex<Maps>,
 }
 
-/// Features of every level of a chain, in the one or the other precision.
+/// Features of every level of a chain, in either precision.
 #[derive(Debug, Default)]
 struct Maps {
     exact: Vec<Vec<f32>>,
     rounded: Vec<Bf16Map>,
 }
 
-/// What is needed while a chain is computed.
+/// The buffers for computing a chain.
 #[derive(Debug, Default)]
 struct Arena {
     image: Planes,
@@ -87,9 +87,9 @@ struct Arena {
 }
 
 impl Features {
-    /// Forgets the last image.
+    /// Discards the last image.
     ///
-    /// * `n_threads`: how many will ask for features at once.
+    /// * `n_threads`: number of threads that will request features.
     pub(crate) fn begin(&mut self, source: &Source<'_>, n_threads: usize) {
         let n_chains = source.interval.min(source.layout.levels.len());
         self.chains.resize_with(n_chains, Chain::default);
@@ -136,7 +136,7 @@ impl Features {
 }
 
 impl Arena {
-    /// Makes room for every chain, so that it does not matter which one comes here.
+    /// Reserves memory for every chain, so that any chain can use this arena.
     fn reserve(&mut self, source: &Source<'_>) {
         let [width, height] = source.layout.image_size;
         self.image.reserve(width, height);
@@ -209,7 +209,7 @@ impl Arena {
     }
 }
 
-/// Writes the features of a level's window, given the part of its image that `cut` says.
+/// Writes the features of a level's window, from the part `cut` of its image.
 fn describe(
     source: &Source<'_>,
     (level, cut): (usize, &Cut),

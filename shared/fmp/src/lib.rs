@@ -1,11 +1,11 @@
 //! Flexible mixtures of parts in one image (Yang & Ramanan 2013; the paper's section 3).
 //!
-//! Reading order: [`Model`] (what was trained), [`Layout`] (where the cells of the feature pyramid
-//! lie in the image), [`Responses`] (what every filter answers at every cell), then the solver,
-//! which finds the best tree of parts exactly, and [`Pose`], its answer; [`IncrementalSolver`] solves the same
-//! evidence under changing terms with less work. A [`Scope`] is a part of the pyramid that is searched
-//! instead of all of it, and [`Tracker`] decides which. Responses are single precision and the same
-//! bits on every machine, unless another [`Precision`] is asked for by name.
+//! Reading order: [`Model`], the trained model; [`Layout`], the positions of the cells of the
+//! feature pyramid in the image; [`Responses`], the score of every filter at every cell;
+//! [`Solver`], which finds the best tree of parts exactly; and [`Pose`], its result. An
+//! [`IncrementalSolver`] solves the same evidence under changing terms with less work. A [`Scope`]
+//! restricts the search to a part of the pyramid, and a [`Tracker`] chooses it. Responses are
+//! single precision and bit-identical on every machine, unless another [`Precision`] is requested.
 #![forbid(unsafe_code)]
 
 pub mod files;

@@ -1,17 +1,17 @@
-//! What the evidence says of every part of a pose where it lies.
+//! Local scores of the parts of a pose.
 
 use crate::{Model, Pose, Responses};
 
-/// How far around a part its surroundings reach, cells.
+/// Radius of a part's surroundings, cells.
 const REACH: usize = 4;
 
-/// How well one part of a pose fits where it lies, and how well other answers would.
+/// How well one part of a pose fits at its position, compared with other positions and types.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LocalScore {
     /// Response of the part's filter at its place.
     pub response: f32,
-    /// The response less the mean response of the same filter over the 9 x 9 cells around, as far as
-    /// they were searched: how much the part stands out.
+    /// The response minus the mean response of the same filter over the surrounding 9 x 9 cells, as
+    /// far as they were searched.
     pub contrast: f32,
     /// The response less the best response of the part's other types at the same place; 0 if it has one
     /// type only.

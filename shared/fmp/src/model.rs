@@ -1,4 +1,4 @@
-//! A trained flexible mixture of parts, checked once when it is made.
+//! A trained flexible mixture of parts, validated at construction.
 
 mod check;
 
@@ -26,7 +26,7 @@ pub struct Spring {
     pub anchor: [i32; 2],
 }
 
-/// Which spring a child hangs on.
+/// The springs of a child.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Springs {
     /// One spring per type of the child (the paper's models).
@@ -35,7 +35,7 @@ pub enum Springs {
     PerTypePair(Vec<Vec<Option<Spring>>>),
 }
 
-/// What ties a part to its parent.
+/// The connection of a part to its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edge {
     /// The parent's index; always smaller than the child's.
@@ -57,7 +57,7 @@ pub struct PartSpec {
     pub edge: Option<Edge>,
 }
 
-/// A model as it is read from a file: nothing is known to hold yet.
+/// A model as read from a file, not yet validated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
     /// Where the model comes from, for people.
@@ -78,7 +78,7 @@ pub struct ModelSpec {
     pub mirror: Option<Vec<usize>>,
 }
 
-/// Why a model was refused.
+/// Why a model was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A model finds at least one part.
@@ -100,19 +100,19 @@ pub enum ModelError {
         /// 1-based parent.
         parent: usize,
     },
-    /// A part names something that is not there.
+    /// An index of a part is out of range.
     #[error("part {part} names {what} {index}, but there are {count}")]
     Missing {
         /// 1-based part.
         part: usize,
-        /// What is named.
+        /// The kind of thing.
         what: &'static str,
         /// 1-based index.
         index: usize,
         /// How many there are.
         count: usize,
     },
-    /// An array has another size than the header or its neighbours say.
+    /// The size of an array does not match the header or other arrays.
     #[error("{what} of {whose} has {got} entries, expected {expected}")]
     Size {
         /// The array.
@@ -124,7 +124,7 @@ pub enum ModelError {
         /// Entries expected.
         expected: usize,
     },
-    /// A count is beyond what a model may have.
+    /// A count is out of range.
     #[error("{what} of {whose} is {got}, expected {min} to {max}")]
     Limit {
         /// The count.
@@ -146,7 +146,7 @@ pub enum ModelError {
         /// 1-based type of its parent.
         parent_type: usize,
     },
-    /// A pair of types may occur, but nothing says where.
+    /// A pair of types may occur, but has no spring.
     #[error(
         "part {part} has a bias but no spring for type {parent_type} of its parent and its type {own_type}"
     )]
@@ -168,7 +168,7 @@ pub enum ModelError {
         /// 1-based mirror part.
         other: usize,
     },
-    /// A number is not finite or absurdly large, or a spring does not pull.
+    /// A number is not finite or too large, or a spring is not stiff enough.
     #[error("{what} of {whose} is {value}, expected {expected}")]
     Value {
         /// The number.
@@ -177,7 +177,7 @@ pub enum ModelError {
         whose: String,
         /// Its value.
         value: f64,
-        /// What would do.
+        /// The accepted values.
         expected: &'static str,
     },
 }

@@ -12,9 +12,9 @@ pub enum Precision {
     #[default]
     F32,
     /// Features and weights rounded to bfloat16, sums in single precision, to within the bound of
-    /// [`kernels::Bf16Bank::correlate`]: faster, less exact, and only on machines that multiply tiles
-    /// (AMX). Scores move by some thousandths. What is computed so and what is not should not be
-    /// compared by score, nor fused.
+    /// [`kernels::Bf16Bank::correlate`]: faster, less exact, and only on machines with tile
+    /// products (AMX). Scores change by some thousandths, so do not compare or fuse them with
+    /// scores in single precision.
     Bf16,
 }
 

@@ -1,11 +1,11 @@
-//! The feature pyramid of one image by itself, for those who need features and not responses.
+//! The feature pyramid of one image alone, for uses without filter responses.
 
 use kernels::{FeatureMap, Isa, Rgb8View};
 
 use crate::features::{Features, Source};
 use crate::{Layout, Model, Scope};
 
-/// The features of an image, level by level; a level is computed when it is first asked for.
+/// The features of an image, level by level; a level is computed at first use.
 #[derive(Debug)]
 pub struct FeaturePyramid<'a> {
     image: Rgb8View<'a>,

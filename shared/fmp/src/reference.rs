@@ -1,8 +1,8 @@
-//! The whole single-view method in double precision, written to be read and compared.
+//! The whole single-view method in double precision, written for readability and comparison.
 //!
-//! It follows the reference programs stage by stage, down to the order of sums that decides ties.
-//! Some hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
-//! which give the same answers but for rounding; springs are per child type only.
+//! It follows the reference programs stage by stage, including the order of sums that decides ties.
+//! About a hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
+//! which give the same results except for rounding; springs are per child type only.
 
 use kernels::{
     HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce_by_taps, resize_by_taps,
@@ -51,18 +51,19 @@ pub fn responses(model: &Model, level: &LevelLayout, features: &[f64]) -> Vec<Ve
     model.spec().filters.iter().map(respond).collect()
 }
 
-/// What a child contributes to its parent, for one type of the parent; every map is `rows x cols`.
+/// The max-sum message of a child to its parent, for one type of the parent; every map is `rows x
+/// cols`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Message {
-    /// The best contribution.
+    /// The best score of the child's subtree.
     pub score: Vec<f64>,
-    /// The child that makes it.
+    /// The placement of the child with this score.
     pub child: Vec<Placement>,
 }
 
-/// The votes of a child for every type of its parent.
+/// The max-sum messages of a child for every type of its parent.
 ///
-/// * `scores`: of the child, one map per type, its own children's votes included.
+/// * `scores`: of the child, one map per type, with the messages of its own children added.
 ///
 /// # Panics
 ///
@@ -114,11 +115,11 @@ fn panic_on_pairs() -> ! {
 pub struct Solution {
     /// Score of the best tree at every cell of the root for every type of the root, bias included.
     pub root: Vec<Vec<f64>>,
-    /// Per part what it told its parent; empty for the root.
+    /// The messages of every part to its parent; empty for the root.
     pub messages: Vec<Vec<Message>>,
 }
 
-/// Passes all votes of one level from the leaves to the root.
+/// Passes all messages of one level from the leaves to the root.
 ///
 /// * `responses`: one map per filter.
 pub fn solve(model: &Model, responses: &[Vec<f64>], size: [usize; 2]) -> Solution {
@@ -177,7 +178,7 @@ impl Solution {
         best
     }
 
-    /// The tree that hangs on the root of the given type at the given cell.
+    /// The best tree with a root of the given type at the given cell.
     pub fn backtrack(
         &self,
         model: &Model,

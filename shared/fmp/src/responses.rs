@@ -1,8 +1,8 @@
-//! What every filter answers at every cell: the evidence of one image.
+//! The scores of every filter at every cell: the evidence of one image.
 
 use crate::{Bounds, Layout, Pose, Scope, Window};
 
-/// Responses of all filters on the levels that are offered.
+/// Responses of all filters on the offered levels.
 ///
 /// The array may lie in shared memory; nothing here copies it.
 #[derive(Debug, Clone, Copy)]
@@ -54,8 +54,8 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// The same, with what [`Solver::bounds`](crate::Solver::bounds) says of them: whoever needs the
-    /// bounds then takes these instead of computing them.
+    /// The same with the bounds of [`Solver::bounds`](crate::Solver::bounds), which are then not
+    /// computed again.
     ///
     /// # Panics
     ///

@@ -1,4 +1,4 @@
-//! Which cells of the pyramid are searched: some levels, and a rectangle of the image.
+//! The cells of the pyramid that are searched: some levels, and a rectangle of the image.
 
 use std::ops::Range;
 
@@ -13,9 +13,9 @@ pub struct Region {
     pub y: [u32; 2],
 }
 
-/// Some levels of a layout, and of each the cells about a region of the image.
+/// Some levels of a layout, and their cells in a region of the image.
 ///
-/// Placements keep their cells of the whole layout whatever the scope; only the arrays that hold
+/// Placements are counted in cells of the whole layout, whatever the scope; only the arrays with
 /// one value per cell are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scope {
@@ -116,9 +116,9 @@ impl Scope {
 }
 
 impl Layout {
-    /// Which cells of a level a scope has: those at which the largest filter's centre lies in the
-    /// region, and the next ones outside of it; where the region ends with the image, all that are
-    /// left. At least one cell.
+    /// The cells of a level in a scope: those at which the centre of the largest filter lies in the
+    /// region, and the next ones outside of it; where the region ends with the image, all remaining
+    /// cells. At least one cell.
     pub fn window(&self, scope: &Scope, level: usize) -> Window {
         let it = &self.levels[level];
         if scope.is_whole {

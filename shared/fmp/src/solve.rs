@@ -1,4 +1,5 @@
-//! The exact solution of the tree: votes from the leaves to the root, then back.
+//! The exact solution of the tree by max-sum message passing, from the leaves to the root, and the
+//! backtracking.
 
 mod bounds;
 mod distinct;
@@ -38,14 +39,14 @@ pub trait ExtraTerms: Sync {
     /// Score added to every placement of this type of the part.
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
-    /// An upper bound of what both terms together can add to any placement of the part: what lets
-    /// [`IncrementalSolver`] leave levels out, and poses on the others. Infinite where none is known.
+    /// An upper bound of the sum of both terms for any placement of the part, with which the
+    /// [`IncrementalSolver`] prunes levels and poses. Infinite if none is known.
     fn max_gain(&self, _part: usize) -> f32 {
         f32::INFINITY
     }
 
-    /// What the part's terms depend on, besides what stays the same during the life of an [`IncrementalSolver`]:
-    /// equal keys mean equal terms. `None` where they may always be others.
+    /// Identifies everything the part's terms depend on that can change during the life of an
+    /// [`IncrementalSolver`]: equal keys mean equal terms. `None`: the terms can always change.
     fn key(&self, _part: usize) -> Option<u64> {
         None
     }
@@ -62,20 +63,20 @@ pub struct CandidateSettings {
     pub max: usize,
 }
 
-/// Solves one tree on given evidence. Holds what can be prepared once per model, and the workspaces
-/// that are used again from solution to solution.
+/// Solves one tree on given evidence. Holds the prepared model and the workspaces, which are
+/// reused.
 ///
-/// The score of a part is `(response + position term) + type term`; the votes of its children are
-/// added to it in descending order of the children, each `((child + vertical) + horizontal) + bias`,
+/// The score of a part is `(response + position term) + type term`. The messages of its children
+/// are added in descending order of the children, each `((child + vertical) + horizontal) + bias`,
 /// and the root bias comes last, all in single precision.
 ///
-/// Inside a rayon pool the levels are spread over its threads, elsewhere the work stays on the
-/// caller's; the answers are the same.
+/// Inside a rayon pool the levels are distributed over its threads, elsewhere the work stays on the
+/// caller's thread; the results are the same.
 #[derive(Debug)]
 pub struct Solver {
     model: Arc<Model>,
     isa: Isa,
-    /// How every part votes; `None` for the root.
+    /// The message rule of every part; `None` for the root.
     rules: Vec<Option<MessageRule>>,
     /// Number of score planes before those of every part, and of all.
     first_planes: Vec<usize>,
@@ -132,10 +133,11 @@ impl Solver {
 
     /// The best pose over the offered levels, with the extra terms if there are any.
     ///
-    /// Exact among the poses all of whose parts lie on cells that have values. Ties of the root go to the lower level, then to the first cell in row-major order,
-    /// then to the lower type (the reference programs leave the first two open); ties of a child to
-    /// the lower type, then to the first column, then to the first row. `None` if no level is
-    /// offered, or no pose is possible.
+    /// Exact among the poses whose parts all lie on cells with values. Ties of the root go to the
+    /// lower level, then to the first cell in row-major order, then to the lower type (the
+    /// reference programs leave the first two open); ties of a child go to the lower type, then to
+    /// the first column, then to the first row. `None` if no level is offered, or no pose is
+    /// possible.
     ///
     /// # Panics
     ///
@@ -167,7 +169,7 @@ impl Solver {
             if evidence.levels().binary_search(&level).is_ok() {
                 let bytes = Problem::new(self, evidence, extra, level).bytes();
                 let put_back = |_: u16, it: Workspace| self.put_back(it);
-                search.look_at(level, f64::INFINITY, self.workspace(bytes), &put_back);
+                search.solve_level(level, f64::INFINITY, self.workspace(bytes), &put_back);
             }
         };
         if in_pool() {
@@ -196,7 +198,7 @@ impl Solver {
         sweeps.into_iter().next().unwrap_or_default()
     }
 
-    /// The score of a given pose, summed in the order in which the votes would be.
+    /// The score of a given pose, summed in the order of the messages.
     ///
     /// For a pose that this solver returned from the same evidence and terms, it is the pose's
     /// score bit for bit.
@@ -218,13 +220,14 @@ impl Solver {
         score
     }
 
-    /// What repeated solutions have taken so far.
+    /// Counters of the incremental solutions so far.
     pub fn statistics(&self) -> SolveStatistics {
         self.tally.sums()
     }
 
-    /// Levels on which votes have been cast so far, in solutions of any kind, those not yet done included: what moves
-    /// on as long as a long computation does. May be asked from another thread.
+    /// Number of levels on which messages have been computed so far, in solutions of any kind,
+    /// unfinished ones included: a sign of progress during long computations. May be read from
+    /// another thread.
     pub fn n_sweeps(&self) -> u64 {
         self.n_sweeps.load(Ordering::Relaxed)
     }
@@ -263,7 +266,7 @@ impl Solver {
         );
     }
 
-    /// Casts all votes on every one of `levels` that is offered, and asks `answer` about each.
+    /// Computes all messages on every offered level of `levels`, and calls `answer` for each.
     fn sweep_levels<T: Send>(
         &self,
         evidence: &Responses<'_>,
@@ -288,12 +291,12 @@ impl Solver {
     }
 }
 
-/// A search for the best root over levels, which may be looked at in any order, side by side.
+/// A search for the best root over levels, which may be solved in any order and in parallel.
 struct Search<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
     extra: Option<&'a dyn ExtraTerms>,
-    /// Where work is counted, if it is.
+    /// Counters of the work, if it is counted.
     tally: Option<&'a Tally>,
     /// The best root so far, and the workspace in which its tree can be followed.
     best: Mutex<Option<(Root, Workspace)>>,
@@ -321,7 +324,13 @@ impl Search<'_> {
     /// Solves a level.
     ///
     /// * `slack`: see [`Problem::with_slack`].
-    fn look_at(&self, level: u16, slack: f64, mut workspace: Workspace, put_back: &PutBack<'_>) {
+    fn solve_level(
+        &self,
+        level: u16,
+        slack: f64,
+        mut workspace: Workspace,
+        put_back: &PutBack<'_>,
+    ) {
         let problem = Problem::new(self.solver, self.evidence, self.extra, level);
         let problem = problem.with_slack(slack);
         let sweep = Sweep::run(&problem, &mut workspace);
@@ -361,7 +370,7 @@ impl Search<'_> {
     }
 }
 
-/// How the child of `edge` votes.
+/// The message rule of the child of `edge`.
 fn rule(edge: &Edge, n_parent_types: usize, n_types: usize) -> MessageRule {
     let spring = |it: &Spring| kernels::Spring {
         w: it.w,

@@ -1,13 +1,13 @@
-//! What of the next image is searched, given what was found in the last ones.
+//! Chooses the part of the next image that is searched, from the last poses.
 
 use crate::{Layout, Model, Pose, Region, Scope};
 
-/// When a frame is.
+/// Number and time of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameTime {
-    /// Its number, counted in frames that are to be answered.
+    /// Its number among the frames that are processed.
     pub frame: u64,
-    /// Its time in the footage, seconds; none where no frame rate is known.
+    /// Its time in the footage, seconds; `None` without a frame rate.
     pub seconds: Option<f64>,
 }
 
@@ -20,7 +20,7 @@ impl From<u64> for FrameTime {
     }
 }
 
-/// How closely the last pose is followed.
+/// Settings of the tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackSettings {
     /// Levels either side of the last pose's that are searched.
@@ -29,15 +29,15 @@ pub struct TrackSettings {
     pub margin: f64,
     /// A frame this many after the last full search is searched in full; 0 and 1: every frame.
     pub full_every: u64,
-    /// Largest step from one frame to the next that is followed; 1: no frame may be left out.
+    /// Largest step between frames across which a pose is tracked; 1: no frame may be skipped.
     pub max_gap: u64,
-    /// How far below the score of the last full search a score may be before there is another, of the
-    /// same frame.
+    /// How far a score may fall below that of the last full search before the same frame is
+    /// searched in full.
     pub max_drop: f32,
-    /// How far a pose may move in a second, as a share of its box's longer side: at low rates more
-    /// than `margin` is searched around it.
+    /// Largest movement of a pose per second, as a share of its box's longer side; at low frame
+    /// rates it exceeds `margin`.
     pub speed: f64,
-    /// Longest time from one frame to the next that is followed, seconds.
+    /// Longest time between frames across which a pose is tracked, seconds.
     pub max_gap_s: f64,
     /// A frame so long after the last full search is searched in full, seconds.
     pub full_every_s: f64,
@@ -51,7 +51,7 @@ impl Default for TrackSettings {
             full_every: 10,
             max_gap: 2,
             max_drop: 0.3,
-            // 3.4 m a second of somebody 1.7 m tall: hands and feet of who walks fast.
+            // 3.4 m a second for a person 1.7 m tall: hands and feet in fast walking.
             speed: 2.0,
             max_gap_s: 0.25,
             full_every_s: 0.5,
@@ -59,22 +59,23 @@ impl Default for TrackSettings {
     }
 }
 
-/// Follows the best pose from frame to frame: decides where the next one is looked for.
+/// Tracks the best pose from frame to frame and chooses where the next frame is searched.
 ///
-/// A full search is made of the first frame, and whenever nothing was found, frames were left out,
-/// the last full search is long ago (in frames, or in seconds where a frame rate is known), or frames
-/// are too far apart in time; see [`TrackSettings`]. Between them only what is near the last pose is looked
-/// at: a better pose elsewhere is seen at the next full search. A frame in which nothing was found
-/// there, or something whose score has fallen, is searched once more, in full ([`Self::needs_full_search`]).
+/// A full search is made of the first frame, and whenever no pose was found, frames were skipped,
+/// the last full search is too long ago (in frames, or in seconds if a frame rate is known), or
+/// frames are too far apart in time; see [`TrackSettings`]. Otherwise only the surroundings of the
+/// last pose are searched; a better pose elsewhere is found at the next full search. A frame
+/// without a pose, or with a score that has fallen, is searched again in full
+/// ([`Self::needs_full_search`]).
 ///
-/// Knows no clock and no image: the same frames and poses give the same decisions.
+/// Uses no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tracker {
     settings: Option<TrackSettings>,
     last: Option<Last>,
 }
 
-/// What was found in the last frame.
+/// The result of the last frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Last {
     at: FrameTime,
@@ -92,7 +93,7 @@ struct Full {
 }
 
 impl Tracker {
-    /// Begins; without settings every frame is searched in full.
+    /// Creates a tracker; without settings every frame is searched in full.
     pub fn new(settings: Option<TrackSettings>) -> Self {
         Self {
             settings,
@@ -100,23 +101,23 @@ impl Tracker {
         }
     }
 
-    /// What is to be searched of a frame.
+    /// The part of a frame that is to be searched.
     ///
     /// * `at`: when the frame is.
     pub fn scope(&self, layout: &Layout, at: impl Into<FrameTime>) -> Scope {
         let at = at.into();
         let near = || {
             let (settings, last) = (self.settings.as_ref()?, self.last.as_ref()?);
-            last.leads_to(settings, at)
+            last.allows_tracking_to(settings, at)
                 .then(|| last.near(settings, layout, at))?
         };
         near().unwrap_or_else(|| Scope::whole(layout))
     }
 
-    /// Whether what was found near the last pose is not to be believed, and the frame is to be searched
-    /// in full: nothing was found, or its score has fallen since the last full search.
+    /// Whether the result near the last pose is unreliable, so that the frame is to be searched in
+    /// full: no pose was found, or its score has fallen since the last full search.
     ///
-    /// * `scope`: as answered by [`Self::scope`].
+    /// * `scope`: as returned by [`Self::scope`].
     /// * `best`: the best pose found there, if there is one.
     pub fn needs_full_search(&self, layout: &Layout, scope: &Scope, best: Option<&Pose>) -> bool {
         let (Some(settings), Some(last)) = (&self.settings, &self.last) else {
@@ -126,10 +127,10 @@ impl Tracker {
         *scope != Scope::whole(layout) && best.is_none_or(|it| it.score < least)
     }
 
-    /// Takes note of what was found in a frame.
+    /// Updates the tracker with the result of a frame.
     ///
-    /// * `at`: as asked for.
-    /// * `scope`: what was searched at last: as answered by [`Self::scope`], or everything.
+    /// * `at`: as passed to [`Self::scope`].
+    /// * `scope`: what was searched last: as returned by [`Self::scope`], or everything.
     /// * `best`: the best pose, if there is one.
     pub fn update(
         &mut self,
@@ -157,8 +158,8 @@ impl Tracker {
 }
 
 impl Last {
-    /// Whether a frame may be looked at near this one's pose only.
-    fn leads_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
+    /// Whether a frame may be searched near this frame's pose only.
+    fn allows_tracking_to(&self, settings: &TrackSettings, at: FrameTime) -> bool {
         let step = at.frame.checked_sub(self.at.frame).filter(|it| *it > 0);
         let age = at.frame.saturating_sub(self.full.at.frame);
         let within = |from: FrameTime, most: f64| seconds(from, at).is_none_or(|it| it <= most);
@@ -169,7 +170,7 @@ impl Last {
             && is_recent(settings.full_every_s)
     }
 
-    /// What lies near this frame's pose, if any of it lies in the image.
+    /// The surroundings of this frame's pose, if any of it lies in the image.
     fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
         let moved = seconds(self.at, at).map_or(0.0, |it| settings.speed * it);
@@ -193,7 +194,7 @@ impl Last {
     }
 }
 
-/// From one moment to another, where both are known.
+/// The time between two frames, if both are known.
 fn seconds(from: FrameTime, to: FrameTime) -> Option<f64> {
     Some(to.seconds? - from.seconds?)
 }

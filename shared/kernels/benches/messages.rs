@@ -1,6 +1,7 @@
-//! One vote of a part with six types for a parent with six, as wide apart as trained springs let it:
-//! on the largest level of an image of 172 x 224 pixels, one octave below, and the same of 640 x 480.
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+//! Time of one max-sum message of a part with six types to a parent with six, with typical
+//! distances of trained springs: on the largest level of an image of 172 x 224 pixels, one octave
+//! below, and the same for 640 x 480.
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
 use std::time::Instant;

@@ -4,7 +4,7 @@
 //! sums take.
 //!
 //! `cargo bench -p kernels --bench responses [repetitions]`
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
 

@@ -1,5 +1,5 @@
-//! Responses of many filters where cells and weights are rounded to bfloat16: less exact, and many times
-//! as fast where the machine multiplies tiles.
+//! Responses of many filters with cells and weights rounded to bfloat16: less exact, and many times
+//! as fast on a machine with tile products.
 
 mod fast;
 mod reference;
@@ -68,7 +68,7 @@ impl Bf16Map {
     ///
     /// # Panics
     ///
-    /// If `map` has another number of values than its size says.
+    /// If the number of values of `map` does not match its size.
     pub fn round(&mut self, isa: Isa, map: FeatureMap<'_>) {
         let (cells, rest) = map.cells.as_chunks::<N_CHANNELS>();
         assert!(
@@ -104,7 +104,7 @@ impl Body for Round<'_> {
     }
 }
 
-/// A rounded feature map and the number of places that filters are tried at.
+/// A rounded feature map and the number of positions at which filters are evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Bf16Level<'a> {
     /// The features.
@@ -120,10 +120,10 @@ pub struct Bf16Bank {
     panels: Vec<Panel>,
 }
 
-/// Who computes.
+/// The implementation.
 #[derive(Debug, Clone, Copy)]
 enum Engine {
-    /// The matrix unit; other instructions put its sums where they belong.
+    /// The matrix unit; other instructions write its sums to their planes.
     Amx(Amx, Isa),
     /// Plain loops.
     Readable(Isa),
@@ -144,7 +144,7 @@ impl Bf16Bank {
     ///
     /// # Panics
     ///
-    /// If a template has no cells or another number of weights than its size says.
+    /// If a template has no cells, or the number of its weights does not match its size.
     pub fn new(amx: Amx, filters: &[Template<'_>]) -> Self {
         Self::pack(Engine::Amx(amx, Isa::best()), filters)
     }

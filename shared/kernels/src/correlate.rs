@@ -46,7 +46,7 @@ pub struct FeatureMap<'a> {
     pub cells: &'a [f32],
 }
 
-/// A feature map and the number of places that filters are tried at.
+/// A feature map and the number of positions at which filters are evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct Level<'a> {
     /// The features.
@@ -81,10 +81,10 @@ pub struct CorrelateWorkspace {
     row: Vec<Row>,
 }
 
-/// How the responses of a level are computed.
+/// The method by which the responses of a level are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    /// As the definition says.
+enum Method {
+    /// By the definition.
     Direct,
     /// In tiles, by an index into [`FORMS`].
     Tiles(usize),
@@ -95,13 +95,12 @@ impl FilterBank {
     ///
     /// # Panics
     ///
-    /// If a template has no cells or another number of weights than its size says.
+    /// If a template has no cells, or the number of its weights does not match its size.
     pub fn new(isa: Isa, filters: &[Template<'_>]) -> Self {
         Self::pack(isa, filters, true)
     }
 
-    /// As [`Self::new`], but all responses are sums as the definition says: slower, and there to
-    /// compare with.
+    /// As [`Self::new`], but all responses are computed by the definition: slower, for comparison.
     ///
     /// # Panics
     ///
@@ -170,10 +169,10 @@ impl FilterBank {
     ///
     /// to within `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`, the
     /// maximum over the cells less than 10 away from those under the filter and `c` from
-    /// [`Self::error_factor`]: filters of 3 to 6 cells a side are tried on a tile of the map at once
-    /// (Winograd), others and those on very small maps as the formula says. Which way is taken
-    /// depends on sizes only, and every response adds in the same order whatever else is asked for
-    /// and on whatever instruction set: the same bits always.
+    /// [`Self::error_factor`]: filters of 3 to 6 cells a side are evaluated on a tile of the map at
+    /// once (Winograd), others and those on very small maps by the definition. The method depends
+    /// on sizes only, and every response is summed in the same order whatever else is requested and
+    /// on every instruction set: the bits are always the same.
     ///
     /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
     /// * Allocates nothing once `workspace` was used or has [room](Self::reserve).
@@ -230,9 +229,9 @@ impl FilterBank {
     /// larger by a factor that follows from the matrices, once per axis.
     pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
         let filter = self.panels[panel].filter;
-        let (roundings, growth) = match self.panels[panel].way(size) {
-            Way::Direct => (filter[0] * filter[1] * N_CHANNELS + 1, 1.0),
-            Way::Tiles(form) => {
+        let (roundings, growth) = match self.panels[panel].method(size) {
+            Method::Direct => (filter[0] * filter[1] * N_CHANNELS + 1, 1.0),
+            Method::Tiles(form) => {
                 let points = Form::new(FORMS[form], filter).points;
                 let growth = filter.map(|side| points.amplification(side));
                 (points.roundings() + N_CHANNELS, growth[0] * growth[1])
@@ -263,16 +262,16 @@ impl Panel {
         }
     }
 
-    /// The cheapest way by the number of products, and what a tile costs beside.
-    fn way(&self, size: [usize; 2]) -> Way {
-        let mut best = (self.direct.len() * size[0] * size[1], Way::Direct);
+    /// The cheapest method by the number of products and the cost per tile.
+    fn method(&self, size: [usize; 2]) -> Method {
+        let mut best = (self.direct.len() * size[0] * size[1], Method::Direct);
         for (it, n_pairs) in FORMS.into_iter().enumerate() {
             if !self.tiles[it].is_empty() {
                 let form = Form::new(n_pairs, self.filter);
                 let [down, across] = form.tiles(size);
                 let cost = form.area() * (N_CHANNELS + TRANSFORMS) * down * across;
                 if cost < best.0 {
-                    best = (cost, Way::Tiles(it));
+                    best = (cost, Method::Tiles(it));
                 }
             }
         }
@@ -296,7 +295,7 @@ impl Panel {
     }
 }
 
-/// What both transforms of a value cost, in products; an estimate, only used to choose a way.
+/// Cost of both transforms of a value, in products; an estimate, only used to choose a method.
 const TRANSFORMS: usize = 10;
 
 struct Correlate<'a, I> {
@@ -318,13 +317,13 @@ impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
             for level in self.levels.clone() {
                 let place = (at, level.size);
                 at += self.n_filters * level.size[0] * level.size[1];
-                match panels[0].way(level.size) {
-                    Way::Direct => {
+                match panels[0].method(level.size) {
+                    Method::Direct => {
                         let out = &mut self.out[place.0..];
                         let row = &mut self.workspace.row;
                         direct(simd, (panels, first_filter), level, out, row);
                     }
-                    Way::Tiles(it) => {
+                    Method::Tiles(it) => {
                         let mut answer = Answer::new(&forms, it, (panels, first_filter), self.out);
                         let pending = &mut self.workspace.pending[it];
                         winograd::take(simd, pending, &mut answer, level.map, place);
@@ -339,7 +338,7 @@ impl<'a, I: Iterator<Item = Level<'a>> + Clone> Kernel for Correlate<'_, I> {
     }
 }
 
-/// All responses of a level as the definition says.
+/// All responses of a level, by the definition.
 #[inline(always)]
 fn direct<S: Simd>(
     simd: S,

@@ -1,4 +1,4 @@
-//! How plain loops become a function for every instruction set.
+//! Compiles plain loops into one function per instruction set.
 
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
@@ -9,7 +9,7 @@ use crate::simd::{Kernel, Simd};
 /// [`run`](Self::run) and everything it calls must be `#[inline(always)]`: a body takes on the
 /// instruction set of the function that it is inlined into.
 pub(crate) trait Body {
-    /// Does it.
+    /// Runs it.
     fn run(self);
 }
 
@@ -19,7 +19,7 @@ pub(crate) fn dispatch(isa: Isa, body: impl Body) {
     isa.run(Plain(body));
 }
 
-/// A kernel that names no registers.
+/// A kernel without explicit registers.
 struct Plain<B>(B);
 
 impl<B: Body> Kernel for Plain<B> {

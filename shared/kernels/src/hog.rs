@@ -30,8 +30,9 @@ const TEXTURE: f64 = 0.2357;
 
 /// Where a channel's value goes when the picture is seen in a mirror (left and right exchanged).
 ///
-/// An orientation of 20 k degrees becomes one of 180 - 20 k, and the blocks of 2 x 2 cells to the left of
-/// the cell, of which the texture channels speak, become those to its right. Its own inverse.
+/// An orientation of 20 k degrees becomes one of 180 - 20 k, and the blocks of 2 x 2 cells to the
+/// left of the cell, to which the texture channels belong, become those to its right. Its own
+/// inverse.
 pub const MIRRORED_CHANNEL: [usize; N_CHANNELS] = {
     let mut to = [0; N_CHANNELS];
     let mut o = 0;
@@ -139,7 +140,7 @@ pub fn hog(
 /// Where a pixel votes along one axis: the cell before it and the shares of that cell and the next.
 #[derive(Debug, Clone, Copy)]
 struct Vote {
-    /// Counted from 1: cell 0 is a ring outside of the image that nobody reads.
+    /// Counted from 1: cell 0 is a ring outside of the image that is not used.
     cell: usize,
     share: [f64; 2],
 }
@@ -216,7 +217,7 @@ mod tests {
 
         /// Two images after each other, so that nothing of the first may be left behind.
         #[test]
-        fn every_instruction_set_gives_the_bits_of_the_readable_form(
+        fn every_instruction_set_gives_the_bits_of_the_reference(
             images in [all_images(), all_images()],
             shape in shapes(),
             misaligned in 0..16_usize,
@@ -264,7 +265,7 @@ mod tests {
         }
 
         #[test]
-        fn turning_the_contrast_round_leaves_the_insensitive_channels(image in images()) {
+        fn inverting_the_contrast_keeps_the_insensitive_channels(image in images()) {
             let negative = image.data().iter().map(|it| 255.0 - it).collect();
             let negative = Planes::from_samples(image.width(), image.height(), negative);
             let (a, b) = (hog_f64(&negative, SHAPE), hog_f64(&image, SHAPE));

@@ -1,4 +1,4 @@
-//! An 8-bit colour image that somebody else owns.
+//! A view of an 8-bit colour image.
 
 /// Interleaved 8-bit RGB, row major, without padding between rows.
 ///

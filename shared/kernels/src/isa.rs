@@ -1,4 +1,4 @@
-//! Which instructions the machine has.
+//! The instruction sets of the machine.
 
 /// An instruction set that this machine is known to have.
 ///
@@ -9,7 +9,7 @@ pub struct Isa(pub(crate) Kind);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Whatever the target guarantees. Needs a fused multiply-add in hardware to be fast.
+    /// The baseline of the target. Needs a fused multiply-add in hardware to be fast.
     Portable,
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]

@@ -1,7 +1,8 @@
-//! Grids, images and the hot loops, each loop written twice: once to be read, once to be fast.
+//! Grids, images and the hot loops, each loop in two implementations: a readable reference and a
+//! fast one.
 //!
-//! Both give the same bits, on every instruction set. [`Bf16Bank`] is the one that is less exact than
-//! the others, and has to be asked for: with [`Amx`], or in plain loops to compare with.
+//! Both give the same bits on every instruction set. [`Bf16Bank`] is less exact and has to be
+//! requested: with [`Amx`], or in plain loops for comparison.
 #![expect(
     unsafe_code,
     reason = "SIMD dispatch, loads and stores; every block states why it is sound"

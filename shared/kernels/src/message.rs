@@ -1,9 +1,9 @@
-//! What a child tells its parent: the best it can contribute, for every place and type of the parent.
+//! Max-sum messages: the best score of a child's subtree for every position and type of the parent.
 //!
-//! The distance transform of Felzenszwalb & Huttenlocher 2012 under quadratic springs, the maximum
-//! over the child's types and the sum into the parent's scores, row by row in one sweep. The
-//! transform looks at every candidate in a window outside of which none can win, instead of walking
-//! a lower envelope: cells are independent then, so lanes are cells.
+//! A message is the generalised distance transform of Felzenszwalb & Huttenlocher 2012 under
+//! quadratic springs, the maximum over the child's types, and the sum into the parent's scores, row
+//! by row in one sweep. The transform evaluates every candidate in a window outside of which none
+//! can win, instead of following a lower envelope: cells are then independent, so lanes are cells.
 
 mod buffer;
 mod fast;
@@ -26,10 +26,10 @@ pub use trace::TracedChild;
 /// Scores are kept in rows of a multiple of this many cells.
 const ROW_ALIGN: usize = 16;
 
-/// Rows of a plane that are worked on together.
+/// Rows of a plane that are processed together.
 const BLOCK: usize = 8;
 
-/// Rows of minus infinity between planes, so that a block may look beside the grid.
+/// Rows of minus infinity between planes, so that a block may read beyond the grid.
 const MARGIN: usize = BLOCK - 1;
 
 /// The size of score planes, and how they lie in memory: `margin, plane, margin, plane, .., margin`.
@@ -76,24 +76,24 @@ impl Grid {
     }
 }
 
-/// The scores of a child, votes of its own children included.
+/// The scores of a child, with the messages of its own children added.
 #[derive(Debug, Clone, Copy)]
 pub struct ChildScores<'a> {
     /// Size of the planes.
     pub grid: Grid,
     /// One plane per type and the margin after the last one; no NaN.
     pub planes: &'a [f32],
-    /// Least and largest score of every plane.
+    /// Minimum and maximum score of every plane.
     pub ranges: &'a [ScoreRange],
 }
 
-/// How a child votes: which springs it may hang on, and what each pair of types is worth.
+/// The rule of a child's message: its springs, and the bias of each pair of types.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MessageRule {
     n_child_types: usize,
     /// `(child type, spring)`.
     springs: Vec<(usize, Spring)>,
-    /// For every parent type the springs it may choose from and their biases, by child type.
+    /// For every parent type the springs that it may use and their biases, by child type.
     choices: Vec<Vec<(usize, f32)>>,
 }
 
@@ -127,13 +127,13 @@ impl MessageRule {
         }
     }
 
-    /// Adds the child's vote to every cell of the parent's score planes:
+    /// Adds the child's message to every cell of the parent's score planes:
     ///
     /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
     /// where `s(p, v)` adds the vertical part of the spring first, then the horizontal one.
     ///
-    /// * `parent`: one plane per parent type, without the margin after the last one; `spans` gets
-    ///   the least and the largest score of each.
+    /// * `parent`: one plane per parent type, without the margin after the last one; the minimum
+    ///   and maximum score of each are written to `ranges`.
     ///
     /// # Panics
     ///

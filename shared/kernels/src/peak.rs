@@ -1,4 +1,4 @@
-//! What the machine could do at most, to hold the kernels against.
+//! Peak rates of the machine, for comparison with the kernels.
 
 use crate::dispatch::{Body, dispatch};
 use crate::isa::{Isa, Kind};
@@ -8,7 +8,7 @@ use crate::isa::{Isa, Kind};
 pub enum Peak {
     /// `sum = sum a + b` in single precision: the filters.
     MultiplyAdd,
-    /// `best = max(best, score + cost)` in single precision: the votes.
+    /// `best = max(best, score + cost)` in single precision: the messages.
     MaxPlus,
 }
 
@@ -72,7 +72,7 @@ struct MaxPlus<const LANES: usize, const FUSED: bool> {
 impl<const LANES: usize, const FUSED: bool> Body for MaxPlus<LANES, FUSED> {
     #[inline(always)]
     fn run(self) {
-        // As in the votes: the units that add are those that compare, the ones that multiply are free.
+        // As in the messages: the add units also compare, and the multiply units are free.
         let one = std::hint::black_box(1.0_f32);
         let larger = |best: f32, score: f32, cost: f32| {
             let score = if FUSED {

@@ -264,7 +264,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_instruction_set_resizes_as_the_readable_form_does(
+        fn every_instruction_set_resizes_as_the_reference(
             size in [1..sized(70, 25), 1..sized(50, 15)],
             share in [0.0..1.0_f64, 0.0..1.0_f64],
             misaligned in 0..16_usize,
@@ -318,7 +318,7 @@ mod tests {
         }
 
         #[test]
-        fn every_instruction_set_reduces_as_the_readable_form_does(
+        fn every_instruction_set_reduces_as_the_reference(
             size in [5..sized(70, 25), 5..sized(30, 15)],
             seed in any::<u64>(),
         ) {
@@ -352,7 +352,7 @@ mod tests {
 
     /// Rows so long that some samples are covered by less than a thousandth, others by a little more.
     #[test]
-    fn shares_about_a_thousandth_are_dropped_or_kept_as_in_the_readable_form() {
+    fn shares_about_a_thousandth_are_treated_as_in_the_reference() {
         let all = [(1030, 1029), (2003, 2001), (2001, 1009)];
         for (from, to) in all.into_iter().take(sized(3, 1)) {
             let bytes = noise(from as u64, 3 * from);

@@ -28,8 +28,8 @@ impl std::borrow::Borrow<[f32; ROW]> for Row {
 
 /// An instruction set: holding a value proves that the machine has it.
 ///
-/// Lanes never meet, but in [`Self::transposed`], and each operation rounds once as IEEE 754 says:
-/// the same calls give the same bits whatever the number of lanes.
+/// Lanes are independent, except in [`Self::transposed`], and each operation rounds once according
+/// to IEEE 754: the same calls give the same bits whatever the number of lanes.
 pub(crate) trait Simd: Copy {
     /// A register.
     type V: Copy;
@@ -53,12 +53,12 @@ pub(crate) trait Simd: Copy {
     /// Writes the first `LANES` values of `to`.
     fn store(self, value: Self::V, to: &mut [f32]);
     /// Writes all of `to` or its first `LANES` values, whichever is less.
-    fn store_some(self, value: Self::V, to: &mut [f32]);
-    /// Writes the lanes whose bit is set side by side; `to` has room for these and no others.
-    fn store_those(self, value: Self::V, lanes: u32, to: &mut [f32]);
-    /// Asks for the line of the cache that the first value lies in, which will be written soon: a hint.
+    fn store_partial(self, value: Self::V, to: &mut [f32]);
+    /// Writes the lanes whose bit is set, side by side; `to` has room for exactly these.
+    fn store_lanes(self, value: Self::V, lanes: u32, to: &mut [f32]);
+    /// Prefetches the cache line of the first value, which will be written soon.
     #[inline(always)]
-    fn expect(self, _there: &[f32]) {}
+    fn prefetch(self, _there: &[f32]) {}
     /// `a * b + c`, rounded once.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// `a + b`.
@@ -80,9 +80,9 @@ pub(crate) trait Simd: Copy {
     fn transposed(self, rows: &[Row], lane: usize) -> Self::Square;
 }
 
-/// Something to be done with whatever instructions the machine has.
+/// A computation for the instructions of the machine.
 pub(crate) trait Kernel {
-    /// Does it; must be `#[inline(always)]`, so that it is compiled for the set of `simd`.
+    /// Runs it; must be `#[inline(always)]`, so that it is compiled for the set of `simd`.
     fn run<S: Simd>(self, simd: S);
 }
 
@@ -119,7 +119,7 @@ mod tests {
                 for (i, value) in square.as_ref().iter().enumerate() {
                     for n in 0..S::LANES + 3 {
                         let mut to = vec![-1.0; n];
-                        simd.store_some(*value, &mut to);
+                        simd.store_partial(*value, &mut to);
                         let want = |y| {
                             if y < S::LANES {
                                 (y * ROW + lane + i) as f32
@@ -135,9 +135,9 @@ mod tests {
     }
 
     /// Stores every choice of lanes, or many of them.
-    struct Those;
+    struct LaneStores;
 
-    impl Kernel for Those {
+    impl Kernel for LaneStores {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) {
             let row: [f32; ROW] = std::array::from_fn(|it| it as f32);
@@ -147,12 +147,12 @@ mod tests {
                     .map(|it| it as f32)
                     .collect();
                 let mut to = vec![-1.0; want.len()];
-                simd.store_those(simd.load(&row), lanes, &mut to);
+                simd.store_lanes(simd.load(&row), lanes, &mut to);
                 assert_eq!(to, want, "{lanes:b}");
             }
             let all = u32::MAX >> (32 - S::LANES);
             let mut to = vec![-1.0; S::LANES];
-            simd.store_those(simd.load(&row), all, &mut to);
+            simd.store_lanes(simd.load(&row), all, &mut to);
             assert_eq!(to, row[..S::LANES]);
         }
     }
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn every_instruction_set_stores_chosen_lanes() {
         for isa in Isa::available() {
-            isa.run(Those);
+            isa.run(LaneStores);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The spring between a child and its parent, and how far it can be stretched to advantage.
+//! The spring between a child and its parent, and the window in which the best child can lie.
 
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ pub(crate) struct Axis {
 /// [`ScoreRange::spread`](crate::ScoreRange), rounding cannot make a candidate outside of it tie with the best inside.
 const SLACK: f64 = 1e-3;
 
-/// Where the children lie that can be best for a parent, on one axis.
+/// The window of the children that can be best for a parent, on one axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reach {
     n: usize,

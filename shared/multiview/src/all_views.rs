@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use fmp::{ExtraTerms, IncrementalSolver, Pose, Responses, Solver};
+use fmp::{ExtraTerms, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::optimise::{is_best, mean_movement, types};
@@ -94,8 +94,7 @@ pub fn estimate_all_views(
     };
     let inputs = inputs(input);
     let pairs = Pairs::new(&of_pair, &inputs, start.exchanged);
-    let candidate =
-        |(view, candidate): (&ViewInput<'_>, &usize)| view.candidates[*candidate].clone();
+    let candidate = |(view, idx): (&ViewInput<'_>, &usize)| view.candidates[*idx].clone();
     let poses: Vec<Pose> = input
         .views
         .iter()
@@ -109,8 +108,7 @@ pub fn estimate_all_views(
         .map(|(view, pose)| own_score(view, pose));
     let mut state = State::new(own.collect(), poses, &pairs);
     let order = order(input, &state.poses);
-    let mut incremental: Vec<IncrementalSolver<'_>> =
-        evidence.iter().map(|it| solver.incremental(it)).collect();
+    let mut solvers: Vec<_> = evidence.iter().map(|it| solver.incremental(it)).collect();
     let mut term_keys: Vec<TermKeys> = vec![TermKeys::default(); n_views];
     let (mut iterations, mut converged) = (Vec::new(), n_views < 2);
     let mut convergence = Convergence::of(n_views);
@@ -119,15 +117,10 @@ pub fn estimate_all_views(
         let supports = pairs.supports(target, &state.poses, &mut term_keys[target]);
         let guesses = input.views[target].candidates.iter();
         let guesses = guesses.chain([&state.poses[target]]);
-        let solution = incremental[target].best(&supports, guesses);
-        debug_assert!(is_best(
-            solver,
-            evidence[target],
-            &supports,
-            solution.as_ref()
-        ));
+        let best = solvers[target].best(&supports, guesses);
+        debug_assert!(is_best(solver, evidence[target], &supports, best.as_ref()));
         let before = state.poses[target].clone();
-        if let Some(pose) = solution {
+        if let Some(pose) = best {
             let own = own_score(target, &pose);
             state.take_if_better(target, own, pose, &pairs);
         }

@@ -1,4 +1,4 @@
-//! What computes, and how exactly.
+//! The instruction sets and precisions of the bench.
 
 use fmp::Precision;
 use kernels::Isa;
@@ -23,7 +23,7 @@ impl Arithmetic {
             .collect()
     }
 
-    /// What the column says.
+    /// The name in the table.
     pub(crate) fn name(self) -> &'static str {
         match self.precision {
             Precision::F32 => self.isa.name(),

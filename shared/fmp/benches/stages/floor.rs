@@ -1,4 +1,4 @@
-//! What every stage would take if it did nothing but its arithmetic, at the machine's peak.
+//! Lower limit of the time of every stage: its arithmetic alone, at the peak rate of the machine.
 
 use fmp::{LevelLayout, N_CHANNELS, Precision, Springs};
 use kernels::{Amx, Peak};
@@ -13,7 +13,7 @@ use crate::workload::Workload;
 /// The floors of all stages.
 pub(crate) struct Floors {
     pub(crate) ms: StageTimes,
-    /// What they were measured by.
+    /// The peak rates from which they were computed.
     pub(crate) peaks: Peaks,
 }
 
@@ -120,8 +120,8 @@ fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     levels.map(|it| (it.rows * it.cols) as f64 * filters).sum()
 }
 
-/// Candidates of both passes of every transform in the window outside of which none can win, and
-/// of the choice among the child's types.
+/// Candidates of both passes of every transform in the window outside of which none can win, and of
+/// the choice among the child's types.
 fn candidates(workload: &Workload, ranges: &Ranges) -> f64 {
     let window = |range: f64, quadratic: f64, side: usize| {
         (2.0 * (range / quadratic).sqrt() + 1.0).min(side as f64)

@@ -5,7 +5,7 @@
 //! 6 x 6 (HumanEva), and 640 x 480 with 6 x 6. Real models and images where `../shared` lies beside
 //! the clone, made-up ones elsewhere. `scripts/bench --help` explains the columns.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 mod arithmetic;
 mod clock;

@@ -1,4 +1,4 @@
-//! What the caller asks for.
+//! The command line options.
 
 use kernels::Isa;
 
@@ -20,7 +20,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// The text of the error says what is wrong.
+    /// The error is a text for the user.
     pub(crate) fn parse(mut args: impl Iterator<Item = String>) -> Result<Self, String> {
         let mut options = Self {
             commit: "unknown".to_owned(),

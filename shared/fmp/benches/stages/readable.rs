@@ -1,4 +1,4 @@
-//! What the readable reference takes, on one thread, and how wide the scores of the parts range.
+//! Time of the readable reference on one thread, and the ranges of the scores of the parts.
 
 use std::hint::black_box;
 
@@ -14,13 +14,13 @@ pub(crate) struct Readable {
     pub(crate) ranges: Ranges,
 }
 
-/// Largest less smallest score of every part and type, votes of the part's children included, on
-/// one level.
+/// Difference of the largest and smallest score of every part and type on one level, with the
+/// messages of the part's children added.
 pub(crate) type Ranges = Vec<Vec<f64>>;
 
 impl Readable {
-    /// Runs it once. Filters and votes run on one level, the first of the second octave, and are
-    /// scaled up by its share of the cells.
+    /// Runs it once. Filters and messages run on one level, the first of the second octave, and are
+    /// scaled by its share of the cells.
     pub(crate) fn measure(workload: &Workload) -> Self {
         let Workload { model, layout, .. } = workload;
         let clock = Clock::new(1, true);

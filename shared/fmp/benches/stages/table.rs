@@ -1,4 +1,4 @@
-//! The one table.
+//! The table of results.
 
 use std::fmt;
 use std::fs;
@@ -72,7 +72,7 @@ impl Row {
 
     pub(crate) fn compared(self, floors: &Floors, readable: &Readable) -> Self {
         let floor_ms = floors.ms.of(self.kind).map(|it| it / self.threads as f64);
-        // The reference knows no other views.
+        // The reference has no terms of other views.
         let readable = readable.ms.of(self.kind);
         let readable = readable.filter(|_| self.min_ms > 0.0 && self.kind != Stage::Iteration);
         Self {
@@ -146,7 +146,7 @@ impl Table {
         )
     }
 
-    /// The peaks, for those who doubt the floors.
+    /// The peak rates from which the floors were computed.
     pub(crate) fn foot(&self) -> String {
         let peak = |it: &Peaks| {
             let Peaks {

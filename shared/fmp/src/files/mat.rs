@@ -5,34 +5,34 @@ use mat5::{ContainerError, Numbers, Structs, Value};
 use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
 
-/// Why a MATLAB file is not a model.
+/// Why a MATLAB file was rejected as a model.
 #[derive(Debug, thiserror::Error)]
 pub enum MatError {
     /// Not a MATLAB file that can be read.
     #[error("not a readable MATLAB level 5 file")]
     Container(#[from] ContainerError),
-    /// Something is not there.
+    /// A field is missing.
     #[error("`{field}` is missing")]
     Missing {
         /// Its path in the file.
         field: String,
     },
-    /// Something is of another kind.
+    /// A field has another type.
     #[error("`{field}` is not {expected}")]
     Kind {
         /// Its path in the file.
         field: String,
-        /// Of which kind it should be.
+        /// The expected type.
         expected: &'static str,
     },
-    /// An array has other sizes than the rest of the model asks for.
+    /// The size of an array does not match the rest of the model.
     #[error("`{field}` is {}, expected {}", times(.got), times(.expected))]
     Size {
         /// Its path in the file.
         field: String,
         /// Its sizes.
         got: Vec<usize>,
-        /// Sizes that would do.
+        /// The accepted sizes.
         expected: Vec<usize>,
     },
     /// A number is out of range.
@@ -42,10 +42,10 @@ pub enum MatError {
         field: String,
         /// The number.
         value: f64,
-        /// What would do.
+        /// The accepted values.
         expected: String,
     },
-    /// An index names nothing.
+    /// An index is out of range.
     #[error("the components name what is not there")]
     Index(#[from] ModelError),
 }

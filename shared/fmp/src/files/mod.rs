@@ -20,7 +20,7 @@ pub use tokens::TextPosition;
 
 use crate::{Model, ModelError, ModelSpec};
 
-/// Why no model came out of a file.
+/// Why a model file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelFileError {
     /// There is no such file.
@@ -33,14 +33,14 @@ pub enum ModelFileError {
         /// The file.
         path: PathBuf,
     },
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("cannot {doing} the model file {}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// `read` or `write`.
         doing: &'static str,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The file holds nothing.
@@ -49,7 +49,7 @@ pub enum ModelFileError {
         /// The file.
         path: PathBuf,
     },
-    /// The file begins like none of the formats.
+    /// The beginning matches none of the formats.
     #[error(
         "{} is not a model: it begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
          (Yang & Ramanan) or `partsNbr` (the authors' text)",
@@ -61,43 +61,43 @@ pub enum ModelFileError {
         /// Its first characters.
         beginning: String,
     },
-    /// The authors' text format, but wrong.
+    /// A file in the authors' text format with an error.
     #[error("the model file {} cannot be read", path.display())]
     Text {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         source: text::TextError,
     },
-    /// A MATLAB file, but not a model.
+    /// A MATLAB file that is not a valid model.
     #[error("the model file {} cannot be read", path.display())]
     Mat {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         source: mat::MatError,
     },
-    /// A file of Parallax, but damaged; or none could be made.
+    /// A damaged Parallax file, or a model that could not be encoded.
     #[error("{} is not a sound model file", path.display())]
     Own {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         source: own::OwnError,
     },
-    /// The file can be read, but its model makes no sense.
+    /// The file can be read, but its model is invalid.
     #[error("the model in {} was refused", path.display())]
     Model {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         source: ModelError,
     },
 }
 
-/// Reads a model file of any of the formats, told by its first bytes.
+/// Reads a model file of any of the formats, recognised by its first bytes.
 ///
-/// A released model takes the file's name without its ending for its own.
+/// A released model is named after the file, without its extension.
 ///
 /// # Errors
 ///
@@ -122,8 +122,8 @@ pub fn read(path: &Path) -> Result<Model, ModelFileError> {
 
 /// Writes a model as Parallax's own file.
 ///
-/// The file is complete or is not there: it is written beside its place, flushed to the disk, and
-/// put into its place in one step.
+/// The write is atomic: a temporary file beside the target is written, flushed to the disk, and
+/// renamed.
 ///
 /// # Errors
 ///
@@ -176,7 +176,7 @@ fn beginning(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    fn said_of(name: &str, bytes: &[u8]) -> String {
+    fn outcome(name: &str, bytes: &[u8]) -> String {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(name);
         fs::write(&path, bytes).unwrap();
@@ -189,26 +189,26 @@ mod tests {
     }
 
     #[test]
-    fn every_format_is_told_by_its_beginning() {
+    fn every_format_is_recognised_by_its_beginning() {
         let spec = planted::three_parts();
         let text = planted::as_text(&spec);
-        assert_eq!(said_of("he.dat", text.as_bytes()), "fine: he");
+        assert_eq!(outcome("he.dat", text.as_bytes()), "fine: he");
         let mat = testkit::mat::file("model", &planted::mat::model(&spec), true);
-        assert_eq!(said_of("parse.final.txt", &mat), "fine: parse.final");
+        assert_eq!(outcome("parse.final.txt", &mat), "fine: parse.final");
         let own = own::encode(&Model::new(spec).unwrap()).unwrap();
-        assert_eq!(said_of("other.mat", &own), "fine: unnamed");
+        assert_eq!(outcome("other.mat", &own), "fine: unnamed");
     }
 
     #[test]
-    fn what_is_no_model_is_refused_by_name() {
+    fn other_files_are_rejected_by_name() {
         let expected = "dir/m is not a model: it begins with \".PNG.\", expected `PLXMODEL` (Parallax), \
                         `MATLAB 5.0` (Yang & Ramanan) or `partsNbr` (the authors' text)";
-        assert_eq!(said_of("m", b"\x89PNG\n"), expected);
-        assert_eq!(said_of("m", b""), "the model file dir/m is empty (0 bytes)");
+        assert_eq!(outcome("m", b"\x89PNG\n"), expected);
+        assert_eq!(outcome("m", b""), "the model file dir/m is empty (0 bytes)");
     }
 
     #[test]
-    fn an_absent_model_says_where_models_come_from() {
+    fn the_error_for_a_missing_model_tells_where_models_come_from() {
         let error = read(Path::new("no/such.plx")).unwrap_err();
         assert!(matches!(error, ModelFileError::Absent { .. }));
         assert!(
@@ -225,26 +225,26 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_is_no_model() {
+    fn a_folder_is_rejected() {
         let dir = tempfile::tempdir().unwrap();
         let error = read(dir.path()).unwrap_err();
         assert!(matches!(error, ModelFileError::Io { doing: "read", .. }));
     }
 
     #[test]
-    fn a_model_that_makes_no_sense_is_refused() {
+    fn an_invalid_model_is_rejected() {
         let mut spec = planted::three_parts();
         spec.interval = 65;
         let expected = "the model in dir/m was refused";
-        assert_eq!(said_of("m", planted::as_text(&spec).as_bytes()), expected);
+        assert_eq!(outcome("m", planted::as_text(&spec).as_bytes()), expected);
     }
 
     #[test]
-    fn damage_is_told_with_the_name_of_the_file() {
+    fn damage_is_reported_with_the_name_of_the_file() {
         let expected = "the model file dir/m cannot be read";
-        assert_eq!(said_of("m", b"partsNbr 1 typ"), expected);
-        assert_eq!(said_of("m", b"MATLAB 5.0"), expected);
-        assert_eq!(said_of("m", b"PLXMODEL"), "dir/m is not a sound model file");
+        assert_eq!(outcome("m", b"partsNbr 1 typ"), expected);
+        assert_eq!(outcome("m", b"MATLAB 5.0"), expected);
+        assert_eq!(outcome("m", b"PLXMODEL"), "dir/m is not a sound model file");
     }
 
     #[test]
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_leaves_nothing() {
+    fn a_failed_write_leaves_no_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("m.plx");
         fs::create_dir(&path).unwrap();

@@ -4,10 +4,10 @@ use super::released::{Released, ReleasedPart, SpringIds, filter_from_planes};
 use super::tokens::{TextPosition, Tokens, shortened};
 use crate::{Filter, Model, ModelError, ModelSpec, N_CHANNELS, Spring};
 
-/// Why a text is not a model.
+/// Why a text was rejected as a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TextError {
-    /// Another word stands where a key word belongs.
+    /// Another token where a keyword is expected.
     #[error("{place}: expected `{field}`, got `{got}`")]
     Keyword {
         /// The key word.
@@ -37,7 +37,7 @@ pub enum TextError {
         /// What stands there.
         got: String,
     },
-    /// Two places of the file disagree.
+    /// Two places of the file contradict each other.
     #[error("{place}: `{field}` says {what} = {got}, expected {expected}")]
     Disagrees {
         /// The field that was being read.
@@ -46,9 +46,9 @@ pub enum TextError {
         place: TextPosition,
         /// Which number of the field.
         what: &'static str,
-        /// What it says.
+        /// The number.
         got: usize,
-        /// What other fields say.
+        /// The number according to other fields.
         expected: usize,
     },
     /// A count is beyond what a model may have.
@@ -85,7 +85,7 @@ pub enum TextError {
         /// What stands there.
         got: String,
     },
-    /// An index names nothing.
+    /// An index is out of range.
     #[error("the components name what is not there")]
     Index(#[from] ModelError),
 }

@@ -1,11 +1,11 @@
-//! Whitespace-separated tokens of a text, one at a time, that know where they stand.
+//! Iterates over the whitespace-separated tokens of a text, with their positions.
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::text::TextError;
 
-/// Where a token stands in a text.
+/// The position of a token in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextPosition {
     /// Line, from 1.
@@ -37,17 +37,17 @@ impl<'a> Tokens<'a> {
         tokens
     }
 
-    /// Where the next token stands.
+    /// The position of the next token.
     pub(super) fn place(&self) -> TextPosition {
         self.place
     }
 
-    /// The next token, left where it is.
+    /// The next token, without consuming it.
     pub(super) fn peek(&self) -> Option<&'a str> {
         self.rest.split_whitespace().next()
     }
 
-    /// Steps over the next token if it is this key word.
+    /// Consumes the next token if it is this keyword.
     pub(super) fn skip(&mut self, word: &str) -> bool {
         let found = self.peek() == Some(word);
         if found {
@@ -56,7 +56,7 @@ impl<'a> Tokens<'a> {
         found
     }
 
-    /// Steps over a key word that has to be there.
+    /// Consumes a required keyword.
     pub(super) fn keyword(&mut self, field: &'static str) -> Result<(), TextError> {
         let place = self.place();
         match self.peek() {
@@ -70,7 +70,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// The next token as a number; `kind` says which numbers would do.
+    /// The next token as a number; `kind` describes the expected numbers.
     pub(super) fn number<T: FromStr>(
         &mut self,
         field: &'static str,
@@ -94,12 +94,13 @@ impl<'a> Tokens<'a> {
         Ok(value)
     }
 
-    /// Most tokens that can still come: what may be reserved on a count's word.
+    /// Upper bound of the number of remaining tokens: limits what is reserved for a count in the
+    /// file.
     pub(super) fn at_most(&self) -> usize {
         self.rest.len().div_ceil(2)
     }
 
-    /// Steps over `bytes` of the next token, which is all of it, and the white space behind it.
+    /// Consumes `bytes` of the next token, which is all of it, and the following white space.
     fn advance(&mut self, bytes: usize) {
         let behind = &self.rest[bytes..];
         self.rest = behind.trim_start();

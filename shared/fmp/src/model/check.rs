@@ -1,9 +1,9 @@
-//! What must hold of a model before anything computes with it.
+//! Checks of a model before it is used.
 
 use super::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 use crate::N_CHANNELS;
 
-/// Checks everything that the rest of the crate relies on.
+/// Checks everything that the rest of the crate assumes.
 pub(super) fn check(spec: &ModelSpec) -> Result<(), ModelError> {
     if spec.parts.is_empty() {
         return Err(ModelError::NoParts);
@@ -261,8 +261,8 @@ mod tests {
     /// One number put into a good model.
     type ChangeTo = fn(&mut ModelSpec, f64);
 
-    /// Makes one change to a good model and gives what is said of it.
-    fn said_of(change: impl FnOnce(&mut ModelSpec)) -> String {
+    /// Makes one change to a valid model and returns the error.
+    fn outcome(change: impl FnOnce(&mut ModelSpec)) -> String {
         let mut spec = planted::three_parts();
         change(&mut spec);
         match Model::new(spec) {
@@ -284,13 +284,13 @@ mod tests {
 
     #[test]
     fn the_planted_models_are_accepted() {
-        assert_eq!(said_of(|_| ()), "fine");
+        assert_eq!(outcome(|_| ()), "fine");
         Model::new(planted::per_pair()).unwrap();
     }
 
     #[test]
     fn refuses_a_model_without_parts() {
-        assert_eq!(said_of(|it| it.parts.clear()), "the model has no parts");
+        assert_eq!(outcome(|it| it.parts.clear()), "the model has no parts");
     }
 
     #[test]
@@ -332,42 +332,42 @@ mod tests {
             }),
         ];
         for (expected, change) in cases {
-            assert_eq!(said_of(change), expected);
+            assert_eq!(outcome(change), expected);
         }
     }
 
     #[test]
     fn only_part_1_is_the_root() {
         assert_eq!(
-            said_of(|it| it.parts[0].edge = it.parts[1].edge.clone()),
+            outcome(|it| it.parts[0].edge = it.parts[1].edge.clone()),
             "part 1 has a parent: part 1 and only part 1 is the root"
         );
         assert_eq!(
-            said_of(|it| it.parts[2].edge = None),
+            outcome(|it| it.parts[2].edge = None),
             "part 3 has no parent: part 1 and only part 1 is the root"
         );
     }
 
     #[test]
-    fn a_cycle_is_no_tree() {
+    fn a_cycle_is_rejected() {
         let refused = "part 2 names part 3 as its parent: the tree has a cycle or is out of order";
-        assert_eq!(said_of(|it| edge(it, 1).parent = 2), refused);
+        assert_eq!(outcome(|it| edge(it, 1).parent = 2), refused);
         let refused = "part 3 names part 3 as its parent: the tree has a cycle or is out of order";
-        assert_eq!(said_of(|it| edge(it, 2).parent = 2), refused);
+        assert_eq!(outcome(|it| edge(it, 2).parent = 2), refused);
     }
 
     #[test]
-    fn refuses_names_of_what_is_not_there() {
+    fn rejects_indices_out_of_range() {
         assert_eq!(
-            said_of(|it| it.parts[1].filter_of_type[1] = 6),
+            outcome(|it| it.parts[1].filter_of_type[1] = 6),
             "part 2 names filter 7, but there are 6"
         );
         assert_eq!(
-            said_of(|it| edge(it, 1).parent = 3),
+            outcome(|it| edge(it, 1).parent = 3),
             "part 2 names part 4, but there are 3"
         );
         assert_eq!(
-            said_of(|it| it.mirror = Some(vec![0, 1, usize::MAX])),
+            outcome(|it| it.mirror = Some(vec![0, 1, usize::MAX])),
             format!(
                 "part 3 names as its mirror part {}, but there are 3",
                 usize::MAX
@@ -401,7 +401,7 @@ mod tests {
             }),
         ];
         for (expected, change) in cases {
-            assert_eq!(said_of(change), expected);
+            assert_eq!(outcome(change), expected);
         }
     }
 
@@ -421,23 +421,23 @@ mod tests {
             ];
             for (what, change) in changes {
                 let expected = format!("{what} is {bad}, expected -1e9 to 1e9");
-                assert_eq!(said_of(|it| change(it, bad)), expected);
+                assert_eq!(outcome(|it| change(it, bad)), expected);
             }
         }
     }
 
     #[test]
-    fn springs_must_pull() {
+    fn spring_stiffness_must_be_positive() {
         for bad in [0.0, -0.01, f64::NAN, f64::INFINITY, 1e-300] {
             for axis in [0, 2] {
                 assert_eq!(
-                    said_of(|it| spring(it).w[axis] = bad),
+                    outcome(|it| spring(it).w[axis] = bad),
                     format!("stiffness of a spring of part 2 is {bad}, expected 1e-9 to 1e9")
                 );
             }
         }
         assert_eq!(
-            said_of(|it| spring(it).anchor[1] = -1001),
+            outcome(|it| spring(it).anchor[1] = -1001),
             "anchor of a spring of part 2 is -1001, expected -1000 to 1000 cells"
         );
     }
@@ -445,9 +445,9 @@ mod tests {
     #[test]
     fn every_type_of_the_parent_goes_with_some_type_of_the_child() {
         let never = f64::NEG_INFINITY;
-        assert_eq!(said_of(|it| edge(it, 1).bias[1] = vec![never, 0.5]), "fine");
+        assert_eq!(outcome(|it| edge(it, 1).bias[1] = vec![never, 0.5]), "fine");
         assert_eq!(
-            said_of(|it| edge(it, 1).bias[1] = vec![never, never]),
+            outcome(|it| edge(it, 1).bias[1] = vec![never, never]),
             "no type of part 2 goes with type 2 of its parent"
         );
     }
@@ -464,16 +464,16 @@ mod tests {
     #[test]
     fn the_mirror_exchanges_parts_in_pairs_and_keeps_the_tree() {
         assert_eq!(
-            said_of(|it| it.mirror = Some(vec![1, 2, 0])),
+            outcome(|it| it.mirror = Some(vec![1, 2, 0])),
             "part 1 mirrors part 2, but not the other way round or not on the same tree"
         );
         assert_eq!(
-            said_of(|it| it.mirror = Some(vec![2, 1, 0])),
+            outcome(|it| it.mirror = Some(vec![2, 1, 0])),
             "part 1 mirrors part 3, but not the other way round or not on the same tree"
         );
-        assert_eq!(said_of(|it| it.mirror = Some(vec![0, 1, 2])), "fine");
+        assert_eq!(outcome(|it| it.mirror = Some(vec![0, 1, 2])), "fine");
         // Three arms in a ring: the tree stays, but nothing is exchanged in pairs.
-        let ring = said_of(|it| {
+        let ring = outcome(|it| {
             it.parts.push(it.parts[2].clone());
             it.mirror = Some(vec![0, 2, 3, 1]);
         });

@@ -1,4 +1,4 @@
-//! What every level can offer at most: the start of exact pruning.
+//! Upper bounds of the scores on every level, for exact pruning.
 
 use super::sweep::Sweep;
 use super::{ExtraTerms, Solver};
@@ -6,22 +6,22 @@ use crate::{Responses, Spring, Springs};
 
 /// For every level of a layout the score of its best pose without the terms of other views.
 ///
-/// With terms that add at most a known gain, a level whose bound stays below the score of some pose
-/// cannot hold the best one, and need not be looked at.
+/// With terms that add at most a known gain, a level whose bound is below the score of some pose
+/// cannot hold the best one and is skipped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds(Vec<Bound>);
 
-/// What one level can offer at most.
+/// The bounds of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bound {
-    /// Score of the best pose, without the terms of other views; infinite where it is not known.
+    /// Score of the best pose without the terms of other views; infinite if unknown.
     pub best: f32,
-    /// More than any sum on the way to a score can be, terms of other views not counted.
+    /// Upper bound of all partial sums of a score, without the terms of other views.
     pub size: f32,
 }
 
 impl Bound {
-    /// Of a level of which nothing is known.
+    /// For a level without information.
     pub const UNKNOWN: Self = Self {
         best: f32::INFINITY,
         size: 0.0,
@@ -29,7 +29,7 @@ impl Bound {
 }
 
 impl Bound {
-    /// Of a level on which the votes have been cast without terms.
+    /// For a level on which the messages have been computed without terms.
     ///
     /// * `edges`: see [`Solver::most_of_edges`].
     pub(super) fn of(sweep: &Sweep<'_>, edges: f64) -> Self {
@@ -41,7 +41,7 @@ impl Bound {
 }
 
 impl Bounds {
-    /// The bounds of some levels; nothing is known of the others.
+    /// The bounds of some levels; the others are unknown.
     pub(super) fn of_some(evidence: &Responses<'_>, found: Vec<(u16, Bound)>) -> Self {
         let mut bounds = vec![Bound::UNKNOWN; evidence.layout().levels.len()];
         for (level, bound) in found {
@@ -50,9 +50,9 @@ impl Bounds {
         Self(bounds)
     }
 
-    /// Bounds that were found elsewhere, one per level of the layout, offered or not.
+    /// Bounds that were computed elsewhere, one per level of the layout, offered or not.
     ///
-    /// Bounds that are too low make wrong answers, and do no other harm.
+    /// Bounds that are too low give wrong results, but are otherwise harmless.
     pub fn new(of_levels: Vec<Bound>) -> Self {
         Self(of_levels)
     }
@@ -67,15 +67,16 @@ impl Bounds {
         self.0.len()
     }
 
-    /// The most that a pose on a level can score under terms that add at most `gain` (the sum over
-    /// the parts, and that of its absolute values), unless it scores less than `lowest`. Not finite:
-    /// nothing is known.
+    /// Upper bound of the score of a pose on a level under terms that add at most `gain` (the sum
+    /// over the parts, and that of its absolute values), for poses that score at least `lowest`.
+    /// Not finite if unknown.
     ///
     /// Rounding is monotone, so a computed score never exceeds the one computed with every term at
-    /// its bound. That one and the sum made here differ by rounding alone: the way to a score has
-    /// eight sums per part, each of which, if the score is not below `lowest`, lies between `lowest`
-    /// less all that can be added to it and all that can be added; both ways of summing are off by
-    /// at most half an ulp of that per sum. The factor below is four times as large.
+    /// its bound. That one differs from the sum computed here by rounding alone. A score takes
+    /// eight sums per part. If the score is not below `lowest`, each partial sum lies between
+    /// `lowest` minus all that can be added to it and all that can be added; both orders of
+    /// summation are off by at most half an ulp of that per sum. The factor below is four times as
+    /// large.
     pub(super) fn upper(
         &self,
         level: u16,
@@ -103,15 +104,15 @@ pub(super) struct Upper {
 }
 
 impl Upper {
-    /// Whether nothing on the level scores as much as `lowest`; a bound that is no number says nothing.
+    /// Whether no pose on the level scores as much as `lowest`; false for a bound that is NaN.
     pub(super) fn is_below(&self, lowest: f32) -> bool {
         self.most < f64::from(lowest)
     }
 
-    /// What a pose can lose against the bound without scoring less than `lowest`.
+    /// The most that a pose can lose against the bound without scoring less than `lowest`.
     ///
-    /// The bound of a pose one of whose terms has a given value is [`Self::most`], less that term's
-    /// bound, plus the value; the value itself may be as large as what is lost, and adds as much
+    /// The bound of a pose one of whose terms has a given value is [`Self::most`], minus that
+    /// term's bound, plus the value. The value itself can be as large as the loss, and adds as much
     /// rounding again.
     pub(super) fn slack(&self, lowest: f32) -> f64 {
         self.most - f64::from(lowest) + self.rounding
@@ -132,7 +133,7 @@ impl Solver {
         Bounds::of_some(evidence, found)
     }
 
-    /// All that springs and biases can add to a score.
+    /// The maximum that springs and biases can add to a score.
     pub(super) fn most_of_edges(&self) -> f64 {
         let parts = self.model.spec().parts.iter();
         let of_edge = parts.filter_map(|it| it.edge.as_ref()).map(|edge| {

@@ -1,10 +1,11 @@
-//! The best few poses that are different people, or different ideas of one.
+//! The best few distinct poses.
 
 use super::bounds::{Bound, Bounds};
 use super::{Root, Solver};
 use crate::{Pose, Responses};
 
-/// Roots that are backtracked at once when a level is asked for the first time; then twice as many.
+/// Number of roots that are backtracked together at the first request for a level; doubled each
+/// time.
 const BATCH: usize = 16;
 
 impl Solver {
@@ -23,7 +24,7 @@ impl Solver {
         self.distinct_and_bounds(evidence, n, min_separation).0
     }
 
-    /// [`Self::distinct`] and, by the way, [`Self::bounds`].
+    /// [`Self::distinct`] and [`Self::bounds`] in one pass.
     ///
     /// # Panics
     ///

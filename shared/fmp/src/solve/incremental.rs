@@ -1,4 +1,4 @@
-//! The same evidence solved again and again, under terms that change little from time to time.
+//! Solves the same evidence repeatedly, under terms that change little.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,17 +11,18 @@ use super::{Bounds, ExtraTerms, Search, Solver};
 use crate::extract::{in_pool, lock};
 use crate::{Pose, Responses};
 
-/// Most memory of score planes that is kept from one solution to the next, bytes.
-const ROOM: usize = 64 << 20;
+/// Limit of the score planes that are kept between solutions, bytes.
+const MAX_KEPT_BYTES: usize = 64 << 20;
 
-/// Solves one view's evidence repeatedly, as the other views' terms change.
+/// Incremental solver: solves one view's evidence repeatedly, as the other views' terms change.
 ///
-/// The answers are those of [`Solver::best`], bit for bit, from less work: levels that cannot hold the
-/// best pose are left out ([`Bounds`], [`ExtraTerms::max_gain`]); on the others no term is taken to be worse
-/// than what rules a pose out already, so that votes come from near; and the scores of those sub-trees
-/// stay whose terms have not changed since the last time ([`ExtraTerms::key`]).
+/// The results are bit-identical to those of [`Solver::best`], with less work. Levels that cannot
+/// hold the best pose are skipped ([`Bounds`], [`ExtraTerms::max_gain`]). On the others a term is
+/// never taken to be worse than what already rules a pose out, which keeps the windows of the
+/// transforms small. And the scores of subtrees are kept whose terms have not changed since the
+/// last solution ([`ExtraTerms::key`]).
 ///
-/// Keeps up to 64 MiB of score planes, those of the most promising levels, and gives them back to the
+/// Keeps up to 64 MiB of score planes, those of the most promising levels, and returns them to the
 /// solver when it is dropped.
 #[derive(Debug)]
 pub struct IncrementalSolver<'a> {
@@ -32,14 +33,14 @@ pub struct IncrementalSolver<'a> {
     kept: Vec<Mutex<Option<Workspace>>>,
     /// By level: whether its planes are to be kept.
     keep: Vec<bool>,
-    /// Levels to be looked at and the most that each can score, best first.
+    /// The levels to be solved with their upper bounds, best first.
     order: Vec<(Upper, u16)>,
     /// Score of the best guess.
     lowest: f32,
 }
 
 impl Solver {
-    /// Begins to solve `evidence` repeatedly.
+    /// Starts to solve `evidence` repeatedly.
     ///
     /// # Panics
     ///
@@ -64,8 +65,9 @@ impl IncrementalSolver<'_> {
     ///
     /// Without [`Responses::with_bounds`] the first call computes them.
     ///
-    /// * `guesses`: poses that may be nearly as good as the best, such as the last answer. They only
-    ///   save work: levels that cannot reach the best of them are left out, and its own comes first.
+    /// * `guesses`: poses that may be nearly as good as the best, such as the last result. They
+    ///   only save work: levels that cannot reach the best guess are skipped, and its level is
+    ///   solved first.
     #[expect(
         single_use_lifetimes,
         reason = "anonymous lifetimes in `impl Trait` are unstable"
@@ -96,11 +98,12 @@ impl IncrementalSolver<'_> {
             let lowest = search.score().max(this.lowest);
             if !upper.is_below(lowest) {
                 let slack = upper.slack(lowest);
-                search.look_at(level, slack, this.workspace(level), &put_back);
+                search.solve_level(level, slack, this.workspace(level), &put_back);
             }
         };
         if in_pool() {
-            // In order, whichever thread is free: the sooner a good pose is known, the less is left.
+            // In order, by any idle thread: the earlier a good pose is found, the more levels are
+            // skipped.
             let next = AtomicUsize::new(0);
             let threads = 0..rayon::current_num_threads().min(self.order.len());
             threads.into_par_iter().with_max_len(1).for_each(|_| {
@@ -114,12 +117,12 @@ impl IncrementalSolver<'_> {
         search.finish(&put_back)
     }
 
-    /// Number of levels that the last solution could not rule out before it looked at any.
+    /// Number of levels that the bounds could not rule out at the start of the last solution.
     pub fn n_levels(&self) -> usize {
         self.order.len()
     }
 
-    /// Finds the levels that may hold the best pose, and those of them whose planes will be kept.
+    /// Selects the levels that may hold the best pose, and those whose planes will be kept.
     #[expect(
         single_use_lifetimes,
         reason = "anonymous lifetimes in `impl Trait` are unstable"
@@ -155,7 +158,7 @@ impl IncrementalSolver<'_> {
             later(a.1).cmp(&later(b.1)).then(by_bound)
         });
         self.keep.fill(false);
-        let mut room = ROOM;
+        let mut room = MAX_KEPT_BYTES;
         for &(_, level) in &self.order {
             let bytes = Problem::new(solver, evidence, None, level).bytes();
             if bytes <= room {

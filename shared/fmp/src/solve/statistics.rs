@@ -1,29 +1,29 @@
-//! How much of the full work repeated solutions took: what their shortcuts are worth.
+//! Counters of the incremental solver: how much of the full work it does.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Sums over all solutions of all [`IncrementalSolver`](crate::IncrementalSolver) of a solver, since it was made.
+/// Sums over all solutions of all [`IncrementalSolver`](crate::IncrementalSolver)s of a solver.
 ///
-/// A vote is that of one part for one cell of its parent. With several threads the figures depend on
-/// which of them is faster; the answers do not.
+/// An entry is one value of a max-sum message: of one part for one cell of its parent. With several
+/// threads the counters depend on timing; the results do not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SolveStatistics {
-    /// Solutions asked for.
+    /// Number of solutions.
     pub solutions: u64,
     /// Levels that were offered.
     pub levels_offered: u64,
     /// Levels that bounds could not rule out.
     pub levels_solved: u64,
-    /// Votes on all levels that were offered.
+    /// Message entries on all offered levels.
     pub entries_offered: u64,
-    /// Votes on the levels that bounds could not rule out.
+    /// Message entries on the levels that bounds could not rule out.
     pub entries_solved: u64,
-    /// Votes that were cast, since they were not known from the solution before.
+    /// Message entries that were computed, because they could not be kept from the solution before.
     pub entries_computed: u64,
 }
 
 impl SolveStatistics {
-    /// What was added since an earlier look.
+    /// The difference from earlier counters.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl SolveStatistics {
     }
 }
 
-/// [`SolveStatistics`], counted by several threads.
+/// [`SolveStatistics`] with atomic counters.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     solutions: AtomicU64,

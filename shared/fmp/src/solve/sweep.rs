@@ -1,4 +1,4 @@
-//! All votes on one level, from the leaves to the root, and the way back.
+//! All max-sum messages on one level, from the leaves to the root, and the backtracking.
 
 use std::sync::atomic::Ordering;
 
@@ -7,34 +7,34 @@ use kernels::{ChildScores, Grid, MessageWorkspace, OwnScores, ScoreBuffer, Score
 use super::{ExtraTerms, Root, Solver};
 use crate::{Placement, Pose, Responses, Window};
 
-/// Score planes of one level, used again from level to level.
+/// Score planes of one level, reused from level to level.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    /// One plane per part and type, part by part, and the margin after the last one; their
-    /// children's votes are added.
+    /// One plane per part and type, part by part, with the messages of the children added, and the
+    /// margin after the last one.
     planes: ScoreBuffer,
     /// One per plane.
     ranges: Vec<ScoreRange>,
-    /// The level whose planes these are, if they may serve again.
+    /// The level of the planes, if they may be reused.
     level: Option<u16>,
     /// The slack under which they were computed.
     slack: f64,
-    /// What every part's terms depended on.
+    /// The keys of every part's terms.
     keys: Vec<Option<u64>>,
-    /// Whether a part's planes of before can stay: all terms of its sub-tree are those of before.
+    /// Whether a part's planes can be kept: all terms of its subtree are unchanged.
     stays: Vec<bool>,
     /// Whether the part's own score has been written.
     begun: Vec<bool>,
-    /// Sum over the parts of the largest score that each has by itself.
+    /// Sum over the parts of the largest own score of each.
     own: f64,
-    /// Votes that have been cast in the last sweep.
+    /// Number of message entries that the last sweep computed.
     n_computed: usize,
     /// A part's position term, `rows x cols`.
     term: Vec<f32>,
     messages: MessageWorkspace,
 }
 
-/// A level on which all votes have been cast.
+/// A level on which all messages have been computed.
 #[derive(Debug)]
 pub(super) struct Sweep<'a> {
     solver: &'a Solver,
@@ -45,7 +45,7 @@ pub(super) struct Sweep<'a> {
     workspace: &'a Workspace,
 }
 
-/// What there is to solve on a level.
+/// The problem to solve on a level.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     solver: &'a Solver,
@@ -87,12 +87,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same, where only poses are looked for that lose less than `slack` against the bound of
-    /// the level; scores of others may come out as any that is too low as well.
+    /// The same, searching only for poses that lose less than `slack` against the bound of the
+    /// level; other poses may get a score that is too low.
     ///
-    /// Then no term needs to be as bad as it is: a pose of which one term loses more than `slack`
-    /// alone is still ruled out if the term is taken to lose just that. Scores that differ less ask
-    /// for votes from less far.
+    /// No term then has to be as low as it is: a pose with one term that loses more than `slack` is
+    /// still ruled out if that term is taken to lose just `slack`. Smaller differences of scores
+    /// make the windows of the transforms smaller.
     pub(super) fn with_slack(self, slack: f64) -> Self {
         Self { slack, ..self }
     }
@@ -146,7 +146,7 @@ impl<'a> Problem<'a> {
         worst.is_finite().then_some(worst)
     }
 
-    /// Votes that a sweep casts if it knows none.
+    /// Number of message entries of a full sweep.
     pub(super) fn n_entries(&self) -> usize {
         (self.solver.model.n_parts() - 1) * self.n_cells()
     }
@@ -163,7 +163,7 @@ impl<'a> Problem<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    /// Casts all votes, but for those that the workspace still holds.
+    /// Computes all messages, except those that the workspace still holds.
     pub(super) fn run(problem: &Problem<'a>, workspace: &'a mut Workspace) -> Self {
         let (solver, grid) = (problem.solver, problem.grid);
         solver.n_sweeps.fetch_add(1, Ordering::Relaxed);
@@ -193,7 +193,7 @@ impl<'a> Sweep<'a> {
         Self::of(problem, workspace)
     }
 
-    /// Looks at a level on which the votes have been cast.
+    /// Reads a level on which the messages have been computed.
     pub(super) fn of(problem: &Problem<'a>, workspace: &'a Workspace) -> Self {
         Self {
             solver: problem.solver,
@@ -208,7 +208,7 @@ impl<'a> Sweep<'a> {
         self.level
     }
 
-    /// Votes that were cast.
+    /// Number of message entries that were computed.
     pub(super) fn n_computed(&self) -> usize {
         self.workspace.n_computed
     }
@@ -220,7 +220,7 @@ impl<'a> Sweep<'a> {
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Sum over the parts of the largest score that each has by itself, if all are new.
+    /// Sum over the parts of the largest own score of each, if all are new.
     pub(super) fn own(&self) -> f64 {
         self.workspace.own
     }
@@ -255,7 +255,7 @@ impl<'a> Sweep<'a> {
         })
     }
 
-    /// The tree that hangs on `root`.
+    /// The best tree with the given root.
     pub(super) fn backtrack(&self, root: Root) -> Option<Pose> {
         let model = &*self.solver.model;
         let mut parts = Vec::with_capacity(model.n_parts());
@@ -297,7 +297,7 @@ impl Workspace {
         self.planes.bytes()
     }
 
-    /// Makes sure that nothing of before serves again.
+    /// Discards the contents, so that nothing is reused.
     pub(super) fn forget(&mut self) {
         self.level = None;
     }
@@ -316,7 +316,7 @@ impl Workspace {
         self.keys.resize(n_parts, None);
         self.stays.clear();
         let same_level = self.level.replace(problem.level) == Some(problem.level);
-        // Planes that allow for more serve as well.
+        // Planes computed with a larger slack can be reused.
         let same_level = same_level && problem.slack <= self.slack;
         if !same_level {
             self.slack = problem.slack;

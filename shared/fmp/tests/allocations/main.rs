@@ -1,7 +1,7 @@
-//! From the second frame on nothing but the answers takes memory, on whatever thread.
+//! From the second frame on, only the results allocate memory, on any thread.
 //!
-//! A program without the harness, whose own thread allocates too: the counter counts all threads,
-//! because those of a pool do most of the work.
+//! A program without the test harness, because the harness's own thread allocates and the counter
+//! covers all threads: those of a pool do most of the work.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 #[path = "../single_view/common.rs"]
@@ -24,7 +24,7 @@ fn allocations(call: impl FnOnce()) -> usize {
     change.allocations + change.reallocations
 }
 
-/// Frames after the first take memory for their answers only.
+/// Frames after the first allocate memory for their results only.
 fn main() {
     let mut some = Vec::new();
     let counted = allocations(|| some = std::hint::black_box(vec![1_u8; 100]));

@@ -1,4 +1,4 @@
-//! Models planted into made-up images: the whole way from pixels to the pose.
+//! Models made from artificial images: the whole path from pixels to the pose.
 
 use std::sync::Arc;
 
@@ -120,7 +120,7 @@ const SIZE: [usize; 2] = [120, 140];
 const AT: [usize; 2] = [32, 40];
 
 #[test]
-fn a_planted_figure_is_found_where_it_was_planted() {
+fn a_figure_is_found_at_its_position() {
     let data = picture(SIZE, AT);
     let model = planted(SIZE, AT, &data);
     let found = find(&model, SIZE, &data);
@@ -175,7 +175,7 @@ fn a_smaller_figure_is_found_on_a_higher_level() {
 }
 
 #[test]
-fn the_shipped_path_gives_the_answer_of_the_reference() {
+fn extractor_and_solver_give_the_result_of_the_reference() {
     let data = picture(SIZE, AT);
     let model = planted(SIZE, AT, &data);
     let found = find(&model, SIZE, &data);

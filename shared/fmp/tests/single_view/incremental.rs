@@ -1,4 +1,4 @@
-//! Evidence solved again: every shortcut against the full solution.
+//! The incremental solver: every shortcut compared with the full solution.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::other_view::OtherViews;
 
 const SIZES: [[usize; 2]; 5] = [[9, 20], [17, 7], [4, 35], [6, 6], [1, 1]];
 
-/// What the terms are at one time: of few seeds, so that they stay or come back.
+/// Sequences of terms made from few seeds, so that terms stay the same or return.
 fn times(n_parts: usize) -> impl Strategy<Value = Vec<(OtherViews, Guess)>> {
     let scale = prop_oneof![Just(0.0_f32), Just(0.25), Just(1.0), Just(1000.0)];
     let gain = prop_oneof![Just(-1.0_f32), Just(0.0), Just(0.125)];
@@ -48,7 +48,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn solving_again_changes_nothing(
+    fn the_incremental_solver_gives_the_results_of_the_full_one(
         seed in any::<u64>(),
         n_levels in 1..=SIZES.len(),
         offset in prop_oneof![Just(0.0_f32), Just(-40.0), Just(1e5)],
@@ -91,9 +91,9 @@ proptest! {
 }
 
 proptest! {
-    /// The best pose loses on one part all that a pose may lose.
+    /// The best pose loses on one part as much as a pose may lose.
     #[test]
-    fn a_term_may_take_all_there_is_to_lose(
+    fn a_term_may_lose_all_of_the_slack(
         seed in any::<u64>(),
         offset in prop_oneof![Just(0.0_f32), -1e4..1e4_f32],
         part in 0..6_usize,
@@ -137,9 +137,9 @@ impl ExtraTerms for OnOnePart {
 }
 
 proptest! {
-    /// They come from another process: what they say is done, and no more than that.
+    /// Bounds come from another process, and may be wrong.
     #[test]
-    fn bounds_that_lie_do_no_harm(
+    fn wrong_bounds_do_not_panic(
         seed in any::<u64>(),
         lies in vec((any::<f32>(), any::<f32>()), SIZES.len()),
         times in times(6),

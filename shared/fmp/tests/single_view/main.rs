@@ -1,4 +1,4 @@
-//! The public face of the detector, on made-up evidence and on planted images.
+//! The public interface of the detector, on random evidence and on synthetic images.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -42,7 +42,7 @@ pub(crate) struct OtherViews {
 impl ExtraTerms for OtherViews {
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool {
         let mut terms = vec![0.0; score.len()];
-        // `OtherView` says that even parts have a term under even seeds.
+        // In `OtherView` even parts have a term under even seeds.
         let other = OtherView(2 * self.seeds[part]);
         let has_one = other.add_position(2 * part, level, first, &mut terms);
         for (score, term) in score.iter_mut().zip(terms) {

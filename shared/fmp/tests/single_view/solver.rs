@@ -75,7 +75,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
     #[test]
-    fn the_best_pose_is_the_best_of_all(seed in any::<u64>(), n_parts in 1..4_usize, fused: bool) {
+    fn the_best_pose_has_the_highest_score_of_all_poses(seed in any::<u64>(), n_parts in 1..4_usize, fused: bool) {
         let mut noise = Noise(seed);
         let model = tree(&mut noise, n_parts);
         let sizes = [[2, 3], [3, 1]];
@@ -233,7 +233,7 @@ fn only_levels_that_are_offered_and_asked_for_are_searched() {
 }
 
 #[test]
-fn who_watches_a_solver_sees_every_level_that_it_looks_at() {
+fn the_sweep_counter_counts_every_solved_level() {
     let mut noise = Noise(7);
     let model = tree(&mut noise, 3);
     let evidence = Evidence::new(&mut noise, &model, &[[8, 9], [6, 5]]);
@@ -246,7 +246,7 @@ fn who_watches_a_solver_sees_every_level_that_it_looks_at() {
     seen.push(solver.n_sweeps());
     assert_eq!(seen, [0, 2, 4]);
     let evidence = evidence.with_bounds(&bounds);
-    // Without a guess at least one level has to be looked at.
+    // Without a guess at least one level has to be solved.
     solver.incremental(&evidence).best(&OtherView(7), None);
     assert!(solver.n_sweeps() > 4);
 }

@@ -1,4 +1,4 @@
-//! Where the next pose is looked for.
+//! Where the next pose is searched.
 
 use fmp::{FrameTime, Layout, Model, Placement, Pose, Scope, TrackSettings, Tracker};
 
@@ -100,7 +100,7 @@ fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     assert_eq!(full, [true, false, true, true, false]);
 }
 
-/// At one frame a second somebody is elsewhere by the next: what lies near the last pose is another's, or nothing.
+/// At one frame a second the person can be elsewhere in the next frame.
 #[test]
 fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
     assert_eq!(Scene::full_at(1.0), (0..10).collect::<Vec<_>>());
@@ -111,7 +111,7 @@ fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
 }
 
 #[test]
-fn the_longer_ago_the_last_pose_is_the_farther_around_it_is_searched() {
+fn the_search_margin_grows_with_the_time_since_the_last_pose() {
     let mut scene = Scene::new(Some(TRACK));
     let at = |seconds: f64| FrameTime {
         frame: 1,
@@ -151,7 +151,7 @@ fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
 }
 
 #[test]
-fn a_score_that_has_fallen_since_the_last_full_search_asks_for_another_of_the_same_frame() {
+fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
     // Little by little counts as well; what the full search finds is the new measure.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
@@ -184,7 +184,7 @@ fn levels_and_a_margin_around_the_last_pose_are_searched() {
 }
 
 #[test]
-fn the_search_ends_with_the_image_and_with_the_levels() {
+fn the_scope_is_limited_by_the_image_and_the_levels() {
     let track = TrackSettings {
         levels: 100,
         margin: 9.0,
@@ -196,7 +196,7 @@ fn the_search_ends_with_the_image_and_with_the_levels() {
 }
 
 #[test]
-fn a_pose_beside_the_image_is_not_followed() {
+fn a_pose_outside_of_the_image_is_not_tracked() {
     let mut scene = Scene::new(Some(TRACK));
     let scope = Scope::whole(&scene.layout);
     let mut beside = pose(1.0);

@@ -1,4 +1,5 @@
-//! AMX on Linux. The compiler has no stable name for its instructions, so they stand here as they are.
+//! AMX on Linux. The compiler has no stable intrinsics for it, so the instructions are written in
+//! assembly.
 
 use std::arch::asm;
 use std::arch::x86_64::{__cpuid_count, _xgetbv};
@@ -11,10 +12,10 @@ use crate::isa::{Isa, Kind};
 /// Products of tiles in a round of [`Tiles::exercise`].
 pub(super) const PRODUCTS_OF_ROUND: usize = 64;
 
-/// Bits of leaf 7 of the processor's description.
+/// Bits of CPUID leaf 7.
 const AMX_BF16: u32 = 1 << 22;
 const AMX_TILE: u32 = 1 << 24;
-/// Bits of the register that says whose registers the system saves: tile shapes and tiles.
+/// Bits of `XCR0`, the register state that the system saves: tile shapes and tiles.
 const TILE_STATE: u64 = 0b11 << 17;
 /// System call, its request for a permission, and the state that it is for (Linux,
 /// `Documentation/arch/x86/xstate.rst`).
@@ -94,7 +95,7 @@ pub(crate) struct Tiles {
 }
 
 impl Tiles {
-    /// Takes the tiles; nobody else on this thread may have them.
+    /// Takes the tiles; no other code of this thread may use them.
     pub(crate) fn new(_: Amx) -> Self {
         // SAFETY: `Amx` proves that the processor has the instruction and that the process may use it,
         // and the 64 bytes that it reads are a valid description.
@@ -105,7 +106,10 @@ impl Tiles {
     }
 
     /// Products of tiles that are held already.
-    #[expect(clippy::unused_self, reason = "who has it has tiles with shapes")]
+    #[expect(
+        clippy::unused_self,
+        reason = "the value proves that the tiles are configured"
+    )]
     pub(super) fn exercise(&self, rounds: usize) {
         let products = rounds * PRODUCTS_OF_ROUND / 4;
         if products == 0 {
@@ -138,7 +142,10 @@ impl Tiles {
     /// # Panics
     ///
     /// If cells or weights end too early.
-    #[expect(clippy::unused_self, reason = "who has it has tiles with shapes")]
+    #[expect(
+        clippy::unused_self,
+        reason = "the value proves that the tiles are configured"
+    )]
     pub(crate) fn sums(&self, job: &Sums<'_>, out: &mut Block) {
         let [rows, cols] = job.filter;
         assert!(rows > 0 && cols > 0, "a filter has cells");
@@ -203,7 +210,7 @@ impl Tiles {
 
 impl Drop for Tiles {
     fn drop(&mut self) {
-        // SAFETY: whoever holds `Tiles` has had an `Amx`.
+        // SAFETY: a `Tiles` is only created from an `Amx`.
         unsafe { asm!("tilerelease", options(nostack, nomem)) };
     }
 }

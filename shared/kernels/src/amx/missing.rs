@@ -1,4 +1,4 @@
-//! Systems on which nobody has tried: there is no AMX.
+//! Systems without support for AMX.
 
 use super::{Amx, NoAmx};
 use crate::bf16::{Block, Sums};
@@ -9,12 +9,12 @@ pub(super) fn permitted() -> Result<(), NoAmx> {
     Err(NoAmx::System)
 }
 
-/// Cannot be had, since there is no [`Amx`].
+/// Cannot be created, since there is no [`Amx`].
 pub(crate) struct Tiles(std::convert::Infallible);
 
 impl Tiles {
     pub(crate) fn new(_: Amx) -> Self {
-        unreachable!("nobody has an `Amx` here")
+        unreachable!("there is no `Amx` on this system")
     }
 
     pub(super) fn exercise(&self, _: usize) {

@@ -69,7 +69,7 @@ impl Kernel for Answer<'_> {
                     };
                     let there = Placements::of(first..end.min(first + BLOCK), self.map.cols, cols);
                     let to = (maps + there.at, rows * cols, panel.filters.len());
-                    expect(simd, there.inside, to, self.out);
+                    prefetch(simd, there.inside, to, self.out);
                     self.tiles.sums(&job, &mut sums);
                     put(simd, &sums, there.inside, to, self.out);
                 }
@@ -112,7 +112,7 @@ impl Placements {
 
 /// Has the lines of the cache brought that the sums of a block will be written to, while these are computed.
 #[inline(always)]
-fn expect<S: Simd>(
+fn prefetch<S: Simd>(
     simd: S,
     inside: u32,
     (at, plane, n_filters): (usize, usize, usize),
@@ -126,7 +126,7 @@ fn expect<S: Simd>(
         let there = &out[at + map * plane..][..n];
         // Two lines or three: 32 values at most.
         for it in [0, n / 2, n - 1] {
-            simd.expect(&there[it..]);
+            simd.prefetch(&there[it..]);
         }
     }
 }
@@ -153,7 +153,7 @@ fn put<S: Simd>(
             for (it, column) in columns.as_ref().iter().enumerate() {
                 if lane + it < n_filters {
                     let to = &mut out[at + (lane + it) * plane..][..n];
-                    simd.store_those(*column, inside, to);
+                    simd.store_lanes(*column, inside, to);
                 }
             }
         }

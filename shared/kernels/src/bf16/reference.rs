@@ -1,4 +1,4 @@
-//! What the matrix unit does, as it is read, to the bit.
+//! Readable, bit-exact emulation of the matrix unit.
 
 use super::{Bf16Level, Bf16Map, Panel};
 use crate::N_CHANNELS;

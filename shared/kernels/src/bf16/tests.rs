@@ -100,8 +100,8 @@ impl Problem {
     }
 }
 
-/// The machine's own, or none, which is said.
-#[expect(clippy::print_stdout, reason = "what was not checked is said")]
+/// The machine's own, or none, which is printed.
+#[expect(clippy::print_stdout, reason = "the test prints what was not checked")]
 fn amx() -> Option<Amx> {
     let amx = Amx::detect();
     if let Err(why) = amx {
@@ -142,7 +142,7 @@ proptest! {
     }
 
     #[test]
-    fn responses_are_as_exact_as_they_are_said_to_be(
+    fn responses_keep_the_documented_error_bound(
         size in [1..sized(9, 3), 1..sized(12, 4)],
         (filter, _) in filters(),
         spread in prop::sample::select(vec![0, 8]),
@@ -154,7 +154,7 @@ proptest! {
     }
 
     #[test]
-    fn a_value_becomes_the_nearest_with_eight_bits(bits: u32) {
+    fn values_are_rounded_to_the_nearest_with_eight_bits(bits: u32) {
         let value = f32::from_bits(bits);
         prop_assume!(value.is_finite());
         let [low, high] = [bits >> 16, (bits >> 16) + 1];
@@ -200,7 +200,7 @@ fn share_of_bound(problem: &Problem) -> f64 {
 
 /// A bound for the worst case is far from what noise does, but not farther than this.
 #[test]
-fn the_bound_is_not_out_of_all_proportion() {
+fn the_error_bound_is_not_far_too_large() {
     let [one, many] = [[1, 1], [5, 5]].map(|filter| {
         let problem = Problem::new(&[(filter, sized(8, 2))], &[[sized(24, 3); 2]], 7);
         share_of_bound(&problem)
@@ -210,7 +210,7 @@ fn the_bound_is_not_out_of_all_proportion() {
 
 /// Weights and cells that tell the order of the sum: any other gives another value.
 #[test]
-fn even_and_odd_channels_add_up_apart() {
+fn even_and_odd_channels_are_summed_separately() {
     let mut weights = vec![0.0; N_CHANNELS];
     let mut cells = vec![0.0; N_CHANNELS];
     let large = 2.0_f64.powi(24);
@@ -231,7 +231,7 @@ fn even_and_odd_channels_add_up_apart() {
 }
 
 #[test]
-fn it_does_not_matter_what_is_asked_for_together() {
+fn responses_do_not_depend_on_what_is_computed_together() {
     let sizes = [[7, 9], [1, 1], [21, 30], [2, 50]];
     let filters = [([5, 5], sized(70, 2)), ([6, 4], sized(3, 1))];
     let problem = Problem::new(&filters, &sizes[..sized(4, 2)], 3);

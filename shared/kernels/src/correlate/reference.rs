@@ -2,7 +2,7 @@
 
 use super::Template;
 #[cfg(test)]
-use super::{FORMS, Level, Way, winograd::Form};
+use super::{FORMS, Level, Method, winograd::Form};
 use crate::N_CHANNELS;
 
 /// The response map of one filter in double precision.
@@ -35,10 +35,10 @@ pub fn correlate_f64(
 
 /// The response map of one filter, the given way.
 #[cfg(test)]
-pub(super) fn correlate(way: Way, filter: Template<'_>, level: Level<'_>) -> Vec<f32> {
+pub(super) fn correlate(way: Method, filter: Template<'_>, level: Level<'_>) -> Vec<f32> {
     match way {
-        Way::Direct => direct(filter, level),
-        Way::Tiles(it) => tiled(
+        Method::Direct => direct(filter, level),
+        Method::Tiles(it) => tiled(
             &Form::new(FORMS[it], [filter.rows, filter.cols]),
             filter,
             level,

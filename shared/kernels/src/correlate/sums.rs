@@ -102,7 +102,7 @@ pub(super) fn put<S: Simd>(simd: S, cells: &[Row], n: usize, to: Stretch, out: &
             for (it, column) in columns.as_ref().iter().enumerate() {
                 if lane + it < to.n_filters {
                     let at = to.at + (lane + it) * to.plane + x;
-                    simd.store_some(*column, &mut out[at..at + width]);
+                    simd.store_partial(*column, &mut out[at..at + width]);
                 }
             }
         }

@@ -101,14 +101,14 @@ impl Problem {
         .collect()
     }
 
-    fn way(filter: [usize; 2], size: [usize; 2]) -> Way {
-        Panel::new(0, filter, true).way(size)
+    fn method(filter: [usize; 2], size: [usize; 2]) -> Method {
+        Panel::new(0, filter, true).method(size)
     }
 
     fn reference(&self) -> Vec<Vec<f32>> {
         let of = |level: Level<'_>| {
             let all = self.templates().into_iter();
-            let all = all.map(|it| (Self::way([it.rows, it.cols], level.size), it));
+            let all = all.map(|it| (Self::method([it.rows, it.cols], level.size), it));
             all.map(|(way, it)| reference::correlate(way, it, level))
                 .collect::<Vec<_>>()
         };
@@ -195,7 +195,7 @@ proptest! {
 
     /// Also where large terms cancel, which is where a tile is worst.
     #[test]
-    fn responses_are_as_exact_as_they_are_said_to_be(
+    fn responses_keep_the_documented_error_bound(
         size in [1..sized(30, 9), 1..sized(30, 9)],
         (filter, _) in filters(),
         seed in any::<u64>(),
@@ -214,7 +214,7 @@ proptest! {
 
 /// Tiles of other levels and panels never change a response.
 #[test]
-fn it_does_not_matter_what_is_asked_for_together() {
+fn responses_do_not_depend_on_what_is_computed_together() {
     let sizes = [[7, 9], [1, 1], [21, 30], [40, 13], [2, 50]];
     let filters = [
         ([sized(5, 3); 2], sized(70, 1)),
@@ -237,7 +237,7 @@ fn it_does_not_matter_what_is_asked_for_together() {
 
 /// A bound for the worst case is far from what noise does, but not farther than this.
 #[test]
-fn the_bound_is_not_out_of_all_proportion() {
+fn the_error_bound_is_not_far_too_large() {
     for side in [1, 4, 5, 6].into_iter().take(sized(4, 2)) {
         let filter = [side; 2];
         let problem = Problem::new(&[(filter, sized(8, 1))], &[[sized(24, 9); 2]], 7);
@@ -274,15 +274,15 @@ fn a_single_weight_copies_its_channel() {
     }
 }
 
-/// The sizes at which each way is taken, so that a change of the rule shows.
+/// The sizes at which each method is chosen, so that a change of the rule is noticed.
 #[test]
-fn the_way_depends_on_sizes_only() {
-    assert_eq!(Problem::way([2, 5], [100, 100]), Way::Direct);
-    assert_eq!(Problem::way([7, 7], [100, 100]), Way::Direct);
-    assert_eq!(Problem::way([5, 5], [1, 1]), Way::Direct);
-    assert_eq!(Problem::way([5, 5], [8, 8]), Way::Tiles(0));
-    assert_eq!(Problem::way([5, 5], [12, 12]), Way::Tiles(1));
-    assert_eq!(Problem::way([6, 6], [100, 100]), Way::Tiles(1));
+fn the_method_depends_on_sizes_only() {
+    assert_eq!(Problem::method([2, 5], [100, 100]), Method::Direct);
+    assert_eq!(Problem::method([7, 7], [100, 100]), Method::Direct);
+    assert_eq!(Problem::method([5, 5], [1, 1]), Method::Direct);
+    assert_eq!(Problem::method([5, 5], [8, 8]), Method::Tiles(0));
+    assert_eq!(Problem::method([5, 5], [12, 12]), Method::Tiles(1));
+    assert_eq!(Problem::method([6, 6], [100, 100]), Method::Tiles(1));
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Lanes are cells of the parent; every lane looks at its candidates in the order of their offsets.
+//! Lanes are cells of the parent; every lane evaluates its candidates in the order of their
+//! offsets.
 
 use std::hint::black_box;
 
@@ -8,7 +9,7 @@ use super::transform::Transform;
 use super::{BLOCK, ChildScores, Grid, MessageRule, ROW_ALIGN};
 use crate::simd::{Kernel, Simd};
 
-/// Buffers of [`MessageRule::add_message`], used again from call to call.
+/// Buffers of [`MessageRule::add_message`], reused from call to call.
 #[derive(Debug, Default)]
 pub struct MessageWorkspace {
     transforms: Vec<Transform>,
@@ -16,15 +17,15 @@ pub struct MessageWorkspace {
     middle: ScoreBuffer,
     /// A block of rows of every transform.
     transformed: ScoreBuffer,
-    /// Of every plane of the parent.
+    /// For every plane of the parent.
     running: Vec<RunningRange>,
 }
 
-/// All votes of a child.
+/// The kernel of [`MessageRule::add_message`].
 pub(super) struct AddMessage<'a> {
     pub(super) rule: &'a MessageRule,
     pub(super) child: ChildScores<'a>,
-    /// The parent's planes and what becomes of their spans.
+    /// The parent's planes and their score ranges.
     pub(super) parent: (&'a mut [f32], &'a mut [ScoreRange]),
     pub(super) workspace: &'a mut MessageWorkspace,
 }
@@ -60,7 +61,7 @@ impl Kernel for AddMessage<'_> {
 }
 
 impl MessageWorkspace {
-    /// Candidates that the last [`MessageRule::add_message`] on a grid of this size looked at.
+    /// Candidates that the last [`MessageRule::add_message`] on a grid of this size evaluated.
     pub fn n_candidates(&self, rule: &MessageRule, grid: Grid) -> usize {
         let transforms = self.transforms.iter().take(rule.springs.len());
         let of_spring = transforms.map(|it| {
@@ -95,7 +96,7 @@ impl MessageWorkspace {
 }
 
 /// Length of a row between the passes: a run tries all offsets at which one of its cells has a
-/// candidate, so the others look at most one run past the ends of the row.
+/// candidate, so the others read at most one run beyond the ends of the row.
 fn middle_stride(grid: Grid) -> usize {
     grid.stride() + 2 * ROW_ALIGN
 }
@@ -111,7 +112,7 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Casts the votes for the block, computing `R` rows of which the last may not exist.
+    /// Computes the message for the block: `R` rows, of which the last may not exist.
     #[inline(always)]
     fn add_message<S: Simd, const R: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! What a part scores by itself, laid out for the votes.
+//! The own scores of a part, in the layout for messages.
 
 use std::hint::black_box;
 
@@ -7,7 +7,8 @@ use super::{Grid, MARGIN, ROW_ALIGN};
 use crate::isa::Isa;
 use crate::simd::{Kernel, Simd};
 
-/// The scores of one type of a part before its children vote: `(response + term) + constant`.
+/// The scores of one type of a part before the messages of its children are added: `(response +
+/// term) + constant`.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnScores<'a> {
     /// Response of the filter, `rows x cols`.

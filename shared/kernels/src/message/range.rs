@@ -1,36 +1,36 @@
-//! The least and the largest score of a plane, kept while it is written.
+//! The minimum and maximum score of a plane, updated while it is written.
 
 use super::ROW_ALIGN;
 use crate::simd::Simd;
 
-/// The least and the largest score of a plane.
+/// The minimum and maximum score of a plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoreRange {
-    /// The least one.
+    /// The minimum.
     pub min: f32,
-    /// The largest one.
+    /// The maximum.
     pub max: f32,
 }
 
 impl ScoreRange {
-    /// Of no scores.
+    /// The range of no scores.
     pub const NONE: Self = Self {
         min: f32::INFINITY,
         max: f32::NEG_INFINITY,
     };
 
-    /// Largest difference between two scores, and a little more.
+    /// The maximum difference between two scores, and a little more.
     ///
-    /// The excess, 1e-5 of the scores themselves, is larger than what rounding to single precision
-    /// can add to or take from a difference. Infinite if some are minus infinity, NaN if all are:
-    /// both ask for the whole plane to be searched.
+    /// The excess, 1e-5 of the scores themselves, is larger than the effect of rounding to single
+    /// precision on a difference. Infinite if some scores are minus infinity, NaN if all are: in
+    /// both cases the whole plane is searched.
     #[inline(always)]
     pub(crate) fn spread(self) -> f32 {
         (self.max - self.min) + 1e-5 * (self.max.abs() + self.min.abs())
     }
 }
 
-/// Least and largest score seen, lane by lane.
+/// Minimum and maximum score so far, lane by lane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RunningRange {
     min: [f32; ROW_ALIGN],
@@ -38,7 +38,7 @@ pub(super) struct RunningRange {
 }
 
 impl RunningRange {
-    /// Nothing has been seen.
+    /// No scores yet.
     pub(super) const NONE: Self = Self {
         min: [f32::INFINITY; ROW_ALIGN],
         max: [f32::NEG_INFINITY; ROW_ALIGN],
@@ -55,7 +55,7 @@ impl RunningRange {
         simd.store(max, &mut self.max);
     }
 
-    /// Adds the scores of the first `n` lanes, the others holding minus infinity.
+    /// Includes the scores of the first `n` lanes; the others hold minus infinity.
     #[inline(always)]
     pub(super) fn include<S: Simd>(
         simd: S,

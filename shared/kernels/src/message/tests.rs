@@ -1,4 +1,4 @@
-//! Laws of the votes, on small grids of few distinct scores so that ties are common.
+//! Properties of the messages, on small grids with few distinct scores so that ties are common.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -29,7 +29,7 @@ impl Case {
         }
     }
 
-    /// The parent's planes and their spans after the votes.
+    /// The parent's planes and their ranges after the message.
     fn add_message(
         &self,
         isa: Isa,
@@ -183,7 +183,7 @@ proptest! {
     }
 
     #[test]
-    fn a_workspace_remembers_nothing(a in cases(1..9, 1..sized(40, 9)), b in cases(1..9, 1..sized(40, 9))) {
+    fn a_workspace_has_no_effect_on_later_messages(a in cases(1..9, 1..sized(40, 9)), b in cases(1..9, 1..sized(40, 9))) {
         let mut used = MessageWorkspace::default();
         a.add_message(Isa::best(), &mut used);
         let fresh = b.add_message(Isa::best(), &mut MessageWorkspace::default()).0;
@@ -191,7 +191,7 @@ proptest! {
     }
 
     #[test]
-    fn a_trace_finds_what_was_cast_and_the_first_of_equals(case in cases(1..sized(12, 5), 1..sized(20, 6))) {
+    fn a_trace_finds_the_first_child_with_the_value_of_the_message(case in cases(1..sized(12, 5), 1..sized(20, 6))) {
         let after = case.add_message(Isa::best(), &mut MessageWorkspace::default()).0;
         let (grid, ranges) = (case.grid, case.ranges());
         for l in 0..case.rule.choices.len() {

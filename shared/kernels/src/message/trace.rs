@@ -3,10 +3,10 @@
 use super::{ChildScores, Grid, MessageRule};
 use crate::spring::Spring;
 
-/// The child that a vote came from.
+/// The child that a message entry came from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracedChild {
-    /// Value of the vote.
+    /// Value of the entry.
     pub score: f32,
     /// The child's type.
     pub child_type: usize,
@@ -17,10 +17,11 @@ pub struct TracedChild {
 }
 
 impl MessageRule {
-    /// The child that the vote at one cell of the parent came from.
+    /// The child that the message entry at one cell of the parent came from.
     ///
-    /// Evaluates the same expressions as [`add_message`](Self::add_message), so `score` is what that added, bit for
-    /// bit. Ties go to the first choice, then to the first column, then to the first row, as in the
+    /// Evaluates the same expressions as [`add_message`](Self::add_message), so `score` is what
+    /// that added, bit for bit. Ties go to the first choice, then to the first column, then to the
+    /// first row, as in the reference programs. `None` if every child is impossible.
     /// reference programs. `None` if every child is impossible.
     ///
     /// * `child`: as for [`add_message`](Self::add_message).
@@ -60,9 +61,11 @@ impl MessageRule {
         best
     }
 
-    /// The value of a vote in which the child is given, or minus infinity if the types never meet.
+    /// The value of a message entry for a given child, or minus infinity if the pair of types is
+    /// not allowed.
     ///
-    /// The same expression as in [`add_message`](Self::add_message): `((score + vertical) + horizontal) + bias`.
+    /// The same expression as in [`add_message`](Self::add_message): `((score + vertical) +
+    /// horizontal) + bias`.
     ///
     /// * `child_score`: of the child at `child`, `[row, column]`.
     /// * `types`: the parent's and the child's.

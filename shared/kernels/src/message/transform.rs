@@ -1,16 +1,16 @@
-//! One distance transform on one grid: which candidates it tries, and what the spring says to them.
+//! One generalised distance transform on one grid: its candidates and the scores of the spring.
 
 use std::ops::Range;
 
 use super::{BLOCK, Grid, ROW_ALIGN};
 use crate::spring::{Axis, Spring};
 
-/// What is fixed before the first candidate of a transform is tried.
+/// The precomputed data of a transform.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Transform {
     /// The child's plane.
     pub(super) plane: usize,
-    /// All of the plane is minus infinity.
+    /// Whether all of the plane is minus infinity.
     pub(super) impossible: bool,
     /// The vertical pass, by blocks of [`BLOCK`] rows.
     pub(super) down: Pass,

@@ -46,13 +46,13 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn store_some(self, value: Four, to: &mut [f32]) {
-        copy_some(&value, to);
+    fn store_partial(self, value: Four, to: &mut [f32]) {
+        copy_partial(&value, to);
     }
 
     #[inline(always)]
-    fn store_those(self, value: Four, lanes: u32, to: &mut [f32]) {
-        copy_those(&value, lanes, to);
+    fn store_lanes(self, value: Four, lanes: u32, to: &mut [f32]) {
+        copy_lanes(&value, lanes, to);
     }
 
     #[inline(always)]
@@ -99,7 +99,7 @@ impl Simd for Portable {
 
 /// Copies as much as fits of a register of eight or four, without a call for the odd lengths.
 #[inline(always)]
-pub(super) fn copy_some(value: &[f32], to: &mut [f32]) {
+pub(super) fn copy_partial(value: &[f32], to: &mut [f32]) {
     if to.len() >= value.len() {
         to[..value.len()].copy_from_slice(value);
         return;
@@ -115,7 +115,7 @@ pub(super) fn copy_some(value: &[f32], to: &mut [f32]) {
 
 /// Copies the lanes of a register whose bit is set.
 #[inline(always)]
-pub(super) fn copy_those(value: &[f32], lanes: u32, to: &mut [f32]) {
+pub(super) fn copy_lanes(value: &[f32], lanes: u32, to: &mut [f32]) {
     assert_eq!(to.len(), lanes.count_ones() as usize, "room for every lane");
     let chosen = value.iter().enumerate();
     let chosen = chosen.filter(|(lane, _)| lanes >> lane & 1 == 1);

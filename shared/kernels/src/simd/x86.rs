@@ -11,7 +11,7 @@ use std::arch::x86_64::{
     _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
 };
 
-use super::portable::{copy_some, copy_those};
+use super::portable::{copy_lanes, copy_partial};
 use super::{Kernel, Row, Simd};
 
 /// AVX2 and FMA. The private field keeps others from making one without them.
@@ -69,20 +69,20 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn store_some(self, value: __m256, to: &mut [f32]) {
+    fn store_partial(self, value: __m256, to: &mut [f32]) {
         if to.len() >= 8 {
             return self.store(value, to);
         }
         let mut all = [0.0; 8];
         self.store(value, &mut all);
-        copy_some(&all, to);
+        copy_partial(&all, to);
     }
 
     #[inline(always)]
-    fn store_those(self, value: __m256, lanes: u32, to: &mut [f32]) {
+    fn store_lanes(self, value: __m256, lanes: u32, to: &mut [f32]) {
         let mut all = [0.0; 8];
         self.store(value, &mut all);
-        copy_those(&all, lanes, to);
+        copy_lanes(&all, lanes, to);
     }
 
     #[inline(always)]
@@ -178,7 +178,7 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn store_some(self, value: __m512, to: &mut [f32]) {
+    fn store_partial(self, value: __m512, to: &mut [f32]) {
         if to.len() >= 16 {
             return self.store(value, to);
         }
@@ -189,18 +189,18 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn store_those(self, value: __m512, lanes: u32, to: &mut [f32]) {
+    fn store_lanes(self, value: __m512, lanes: u32, to: &mut [f32]) {
         assert_eq!(to.len(), lanes.count_ones() as usize, "room for every lane");
         if to.len() >= 16 {
             return self.store(value, to);
         }
         // SAFETY: `self` only exists where AVX-512 F was detected.
         let chosen = unsafe { _mm512_maskz_compress_ps(lanes as u16, value) };
-        self.store_some(chosen, to);
+        self.store_partial(chosen, to);
     }
 
     #[inline(always)]
-    fn expect(self, there: &[f32]) {
+    fn prefetch(self, there: &[f32]) {
         // SAFETY: a hint about an address, which reads and writes nothing.
         unsafe { _mm_prefetch::<_MM_HINT_ET0>(there.as_ptr().cast()) };
     }

@@ -1,4 +1,4 @@
-//! Laws and edges of the reader of MATLAB models.
+//! Properties and edge cases of the reader of MATLAB models.
 
 use std::error::Error as _;
 
@@ -12,8 +12,8 @@ use crate::files::planted::{per_pair, three_parts};
 /// One change to a good file.
 type Change = fn(&mut Mat);
 
-/// Makes one change to a field of a good model and gives what is said of it.
-fn said_of(spec: &ModelSpec, field: &str, change: impl FnOnce(&mut Mat)) -> String {
+/// Makes one change to a field of a valid model and returns the error.
+fn outcome(spec: &ModelSpec, field: &str, change: impl FnOnce(&mut Mat)) -> String {
     let Mat::Structs(names, mut values) = model(spec) else {
         unreachable!("a model is a struct");
     };
@@ -74,7 +74,7 @@ fn a_part_with_one_type_reads_alike_in_both_releases() {
 }
 
 #[test]
-fn a_parent_with_one_type_may_never_go_with_one_of_its_child() {
+fn a_parent_with_one_type_may_exclude_a_type_of_its_child() {
     let mut spec = per_pair();
     spec.parts[0].filter_of_type.truncate(1);
     for part in &mut spec.parts[1..] {
@@ -91,14 +91,14 @@ fn a_parent_with_one_type_may_never_go_with_one_of_its_child() {
 #[test]
 fn an_array_whose_sizes_and_values_disagree_is_refused() {
     let expected = "not a readable MATLAB level 5 file: an array of [1, 2] holds 3 values";
-    let said = said_of(&three_parts(), "maxsize", |it| {
+    let said = outcome(&three_parts(), "maxsize", |it| {
         *it = Mat::Numbers(vec![1, 2], vec![2.0; 3]);
     });
     assert_eq!(said, expected);
 }
 
 #[test]
-fn names_the_field_that_is_wrong() {
+fn errors_name_the_field() {
     let spec = three_parts();
     let cases: [(&str, &str, Change); 9] = [
         (
@@ -144,12 +144,12 @@ fn names_the_field_that_is_wrong() {
         ),
     ];
     for (field, expected, change) in cases {
-        assert_eq!(said_of(&spec, field, change), expected);
+        assert_eq!(outcome(&spec, field, change), expected);
     }
 }
 
 #[test]
-fn names_the_part_that_is_wrong() {
+fn errors_name_the_part() {
     let cases: [(&str, Change); 7] = [
         (
             "`model.components{1}(2).parent` holds 9, expected 0 to 3",
@@ -179,12 +179,12 @@ fn names_the_part_that_is_wrong() {
         }),
     ];
     for (expected, change) in cases {
-        assert_eq!(said_of(&three_parts(), "components", change), expected);
+        assert_eq!(outcome(&three_parts(), "components", change), expected);
     }
 }
 
 #[test]
-fn says_what_is_missing() {
+fn missing_fields_are_named() {
     let said = |bytes: &[u8]| parse(bytes).unwrap_err().to_string();
     assert_eq!(
         said(&file("other", &model(&three_parts()), false)),
@@ -199,7 +199,7 @@ fn says_what_is_missing() {
 }
 
 #[test]
-fn says_why_a_container_cannot_be_read() {
+fn errors_of_the_container_are_reported() {
     let said = |bytes: &[u8]| match parse(bytes).unwrap_err() {
         MatError::Container(error) => error.to_string(),
         other => other.to_string(),
@@ -228,7 +228,7 @@ fn says_why_a_container_cannot_be_read() {
 }
 
 #[test]
-fn a_bomb_of_zeros_is_refused() {
+fn a_decompression_bomb_is_rejected() {
     let bytes = compressed_file(&vec![0; (64 << 20) + 1]);
     assert!(bytes.len() < 1 << 18);
     assert!(matches!(
@@ -241,7 +241,7 @@ fn a_bomb_of_zeros_is_refused() {
 }
 
 #[test]
-fn cells_within_cells_end_somewhere() {
+fn the_nesting_of_cells_is_limited() {
     let deep = (0..100).fold(number(1.0), |it, _| Mat::Cell(vec![it]));
     assert!(matches!(
         parse(&file("model", &deep, false)),

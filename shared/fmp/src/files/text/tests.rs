@@ -1,4 +1,4 @@
-//! Laws and edges of the reader of the text format.
+//! Properties and edge cases of the reader of the text format.
 
 use proptest::prelude::*;
 
@@ -9,7 +9,7 @@ fn text() -> String {
     planted::as_text(&planted::three_parts())
 }
 
-fn said_of(text: &str) -> String {
+fn outcome(text: &str) -> String {
     match parse(text) {
         Ok(_) => "fine".to_owned(),
         Err(TextError::Index(error)) => error.to_string(),
@@ -39,8 +39,8 @@ fn the_length_and_the_objective_may_be_absent() {
     let text = text();
     let [start, end] = ["len ", "thresh "].map(|it| text.find(it).unwrap());
     let without = text[..start].to_owned() + &text[end..];
-    assert_eq!(said_of(&without), "fine");
-    assert_eq!(said_of(&text[..text.find("obj").unwrap()]), "fine");
+    assert_eq!(outcome(&without), "fine");
+    assert_eq!(outcome(&text[..text.find("obj").unwrap()]), "fine");
 }
 
 #[test]
@@ -90,12 +90,12 @@ fn a_header_that_disagrees_with_its_arrays_is_refused() {
     for (from, to, expected) in cases {
         let text = text();
         assert!(text.contains(from), "{from}");
-        assert_eq!(said_of(&text.replace(from, to)), expected);
+        assert_eq!(outcome(&text.replace(from, to)), expected);
     }
 }
 
 #[test]
-fn names_the_line_and_the_field_of_what_cannot_be_read() {
+fn errors_name_the_line_and_the_field() {
     let cases = [
         (
             "typesNbr",
@@ -146,16 +146,16 @@ fn names_the_line_and_the_field_of_what_cannot_be_read() {
     for (from, to, expected) in cases {
         let text = text();
         assert!(text.contains(from), "{from}");
-        assert_eq!(said_of(&text.replace(from, to)), expected);
+        assert_eq!(outcome(&text.replace(from, to)), expected);
     }
     assert_eq!(
-        said_of(""),
+        outcome(""),
         "line 1 (token 1): the file ends within `partsNbr`"
     );
     let text = text();
     let half = text.find("bias_i 9 1 1 1 2").unwrap() + 16;
     let expected = "line 5 (token 26): the file ends within `bias_i`";
-    assert_eq!(said_of(&text[..half]), expected);
+    assert_eq!(outcome(&text[..half]), expected);
 }
 
 #[test]
@@ -166,11 +166,11 @@ fn refuses_parts_at_another_level_than_their_parent() {
     let octave = line.trim_end().strip_suffix("0 0").unwrap().to_owned() + "1 0 ";
     let expected =
         "line 12 (token 863): `defs_anchor` puts spring 3 1 octaves from its parent, expected 0";
-    assert_eq!(said_of(&text.replace(line, &octave)), expected);
+    assert_eq!(outcome(&text.replace(line, &octave)), expected);
 }
 
 #[test]
-fn names_that_point_nowhere_are_refused() {
+fn indices_out_of_range_are_rejected() {
     let cases = [
         (
             "components_filterid 3 2 1 1 3 5",
@@ -191,7 +191,7 @@ fn names_that_point_nowhere_are_refused() {
     for (from, to, expected) in cases {
         let text = text();
         assert!(text.contains(from), "{from}");
-        assert_eq!(said_of(&text.replace(from, to)), expected);
+        assert_eq!(outcome(&text.replace(from, to)), expected);
     }
 }
 
