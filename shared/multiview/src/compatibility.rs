@@ -113,8 +113,7 @@ impl Compatibility {
         Ok(table)
     }
 
-    /// Computes `p(type in first view, type in second view)` from the conditionals of both
-    /// directions.
+    /// Computes `p(type in first view, type in second view)` from both conditionals.
     ///
     /// With `R = p(b | a)` and `Q = p(a | b)` the marginal `p(a)` satisfies `p(a) = p(a) R Q`: it
     /// is the stationary distribution of the chain that goes from a type of the first view to one
