@@ -9,7 +9,7 @@ use fmp::{
 use geometry::{Camera, Intrinsics, Lens, LensModel};
 use multiview::ViewPlan;
 use nalgebra::{Isometry3, Point3, Vector3};
-use pipeline::Answer;
+use pipeline::ViewResult;
 use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 
 const N_TYPES: usize = 2;
@@ -19,7 +19,7 @@ const N_LEVELS: usize = 3;
 pub(crate) struct Scene {
     pub(crate) model: Arc<Model>,
     pub(crate) plans: Vec<Arc<ViewPlan>>,
-    pub(crate) answers: Vec<Option<Answer>>,
+    pub(crate) answers: Vec<Option<ViewResult>>,
     layout: Arc<Layout>,
     levels: Vec<u16>,
     values: Vec<Vec<f32>>,
@@ -43,7 +43,7 @@ impl Scene {
         let answers = values.iter().map(|values| {
             let evidence = Responses::new(&layout, values, &levels);
             let (candidates, _) = solver.distinct_and_bounds(&evidence, 4, 1.0);
-            Some(Answer {
+            Some(ViewResult {
                 candidates,
                 sigma_px: Some(vec![5.0; N_PARTS]),
                 tau_px: Some(vec![8.0; N_PARTS]),
