@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use metrics::{Reading, ReadingError};
-use runtime::{Failure, Keys, Namespace, Onlooker, OrFail as _, Sighting, Stop, now_nanos};
+use runtime::{Failure, Keys, Namespace, ObservedProcess, Observer, OrFail as _, Stop, now_nanos};
 
 use crate::plan::SERVICES;
 
@@ -79,7 +79,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    fn new(name: &str, supervisor: u32, seen: &[Sighting<'_>], now: u64) -> Self {
+    fn new(name: &str, supervisor: u32, seen: &[ObservedProcess<'_>], now: u64) -> Self {
         let mut members: Vec<Member> = seen.iter().map(|it| Member::new(it, now)).collect();
         members.sort_by_key(|it| place(&it.process));
         Self {
@@ -107,9 +107,9 @@ impl Board {
 }
 
 impl Member {
-    fn new(seen: &Sighting<'_>, now: u64) -> Self {
-        let read = seen.said.map(Reading::from_message);
-        let age_nanos = seen.said.map_or(0, |it| now.saturating_sub(it.at_nanos));
+    fn new(seen: &ObservedProcess<'_>, now: u64) -> Self {
+        let read = seen.metrics.map(Reading::from_message);
+        let age_nanos = seen.metrics.map_or(0, |it| now.saturating_sub(it.at_nanos));
         let (reading, problem) = match read {
             None => (None, None),
             Some(Ok(reading)) => (Some(reading), None),
@@ -146,7 +146,7 @@ fn place(process: &str) -> (usize, usize, String) {
 #[derive(Debug)]
 pub(crate) struct Live {
     name: String,
-    onlooker: Onlooker,
+    observer: Observer,
 }
 
 impl Live {
@@ -154,14 +154,14 @@ impl Live {
     pub(crate) fn open(namespace: &Namespace) -> Result<Self, Failure> {
         Ok(Self {
             name: namespace.name().to_owned(),
-            onlooker: Onlooker::open(namespace)?,
+            observer: Observer::open(namespace)?,
         })
     }
 
     /// What is to be seen now.
     pub(crate) fn look(&mut self) -> Result<Board, Failure> {
-        let supervisor = self.onlooker.supervisor();
-        let seen = self.onlooker.look()?;
+        let supervisor = self.observer.supervisor();
+        let seen = self.observer.observe()?;
         Ok(Board::new(&self.name, supervisor, &seen, now_nanos()))
     }
 
@@ -179,7 +179,7 @@ impl Live {
 
     /// Whether the deployment ends, and this has to be dropped.
     pub(crate) fn is_over(&self) -> bool {
-        self.onlooker.is_over()
+        self.observer.is_over()
     }
 
     /// Waits for a key, at most until it is time to look again; answers early if the deployment ends.
@@ -254,7 +254,11 @@ pub(crate) mod tests {
     /// A board at 11 s: two that run, one that is dead, one that begins.
     pub(crate) fn board() -> Board {
         let (pose, record) = (said(17, Some(0)), said(18, None));
-        let sighting = |process, pid, said| Sighting { process, pid, said };
+        let sighting = |process, pid, metrics| ObservedProcess {
+            process,
+            pid,
+            metrics,
+        };
         let seen = [
             sighting("capture-10", None, None),
             sighting("capture-9", Some(4), None),
@@ -264,9 +268,17 @@ pub(crate) mod tests {
         Board::new("walk", 3, &seen, 11 * SECOND)
     }
 
-    fn standing(pid: Option<u32>, said: Option<&messages::Metrics>, now: u64) -> Standing {
+    fn standing(pid: Option<u32>, metrics: Option<&messages::Metrics>, now: u64) -> Standing {
         let process = "pose-0";
-        Member::new(&Sighting { process, pid, said }, now).standing
+        Member::new(
+            &ObservedProcess {
+                process,
+                pid,
+                metrics,
+            },
+            now,
+        )
+        .standing
     }
 
     #[test]
@@ -310,10 +322,10 @@ pub(crate) mod tests {
         let mut it = said(17, None);
         it.n_rows = 1000;
         let process = "pose-0";
-        let sighting = Sighting {
+        let sighting = ObservedProcess {
             process,
             pid: Some(17),
-            said: Some(&it),
+            metrics: Some(&it),
         };
         let member = Member::new(&sighting, 11 * SECOND);
         assert_eq!(

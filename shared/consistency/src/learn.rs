@@ -33,16 +33,16 @@ impl Default for Settings {
     }
 }
 
-/// The best pose of one view, and the truth.
+/// The best pose of one view together with the ground truth.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sighting {
+pub struct ViewObservation {
     /// Type of every part.
     pub types: Vec<u8>,
     /// Centres of all parts, pixels; parts as the model names them.
     pub centres: Vec<[f64; 2]>,
     /// Error of every part, tenths of the person's size.
     pub errors: Vec<f32>,
-    /// Whether the truth says that left and right are exchanged: the person is seen from behind.
+    /// Whether left and right are exchanged according to the ground truth: the person is seen from behind.
     pub exchanged: bool,
     /// Size of the person, pixels.
     pub size: f64,
@@ -53,8 +53,8 @@ pub struct Sighting {
 /// Two views of one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<'a> {
-    /// Their sightings.
-    pub views: [&'a Sighting; 2],
+    /// What was observed in each.
+    pub views: [&'a ViewObservation; 2],
     /// The angle from the first to the second as seen from the person (`multiview::angle_between`), radians.
     pub angle: Option<f64>,
     /// What the two cameras are called, where their pair is to be learned by name too.
@@ -99,10 +99,10 @@ impl Learner {
         }
     }
 
-    /// Takes one view in.
+    /// Adds one view.
     ///
     /// * `set`: of its joints.
-    pub fn see(&mut self, view: &Sighting, set: &'static JointSet) {
+    pub fn add_view(&mut self, view: &ViewObservation, set: &'static JointSet) {
         self.from.views += 1;
         for (all, error) in self.errors.iter_mut().zip(&view.errors) {
             all.push(*error);
@@ -125,8 +125,8 @@ impl Learner {
         }
     }
 
-    /// Takes two views of one instant in.
-    pub fn see_pair(&mut self, pair: &Pair<'_>) {
+    /// Adds two views of one instant.
+    pub fn add_pair(&mut self, pair: &Pair<'_>) {
         let [first, second] = pair.views;
         let exchanged = first.exchanged != second.exchanged;
         for part in 0..self.shape.n_types.len() {
@@ -166,7 +166,7 @@ impl Learner {
     }
 
     /// A type says something where its part and the parent, which it is about, are right.
-    fn is_right(&self, view: &Sighting, part: usize) -> bool {
+    fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right = |it: usize| {
             view.errors

@@ -15,8 +15,8 @@ fn shape() -> Shape {
 }
 
 /// A person whose parts are all of type `types(part)`, found where they are but for `error` tenths.
-fn sighting(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> Sighting {
-    Sighting {
+fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
+    ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
         centres: (0..N_PARTS)
             .map(|it| [it as f64, 10.0 * it as f64])
@@ -41,11 +41,11 @@ fn learned(learner: &Learner) -> Learned {
 }
 
 /// Sees two views at an angle, `n` times.
-fn see(learner: &mut Learner, views: [&Sighting; 2], degrees: f64, n: usize) {
+fn see(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, n: usize) {
     for _ in 0..n {
-        learner.see(views[0], &PARSE14);
-        learner.see(views[1], &PARSE14);
-        learner.see_pair(&Pair {
+        learner.add_view(views[0], &PARSE14);
+        learner.add_view(views[1], &PARSE14);
+        learner.add_pair(&Pair {
             views,
             angle: Some(degrees.to_radians()),
             cameras: Some(["left", "right"]),
@@ -64,7 +64,10 @@ fn at(of: &Learned, degrees: f64, part: usize, types: [usize; 2]) -> f64 {
 #[test]
 fn types_that_come_together_are_likely_together_at_their_angle_and_back() {
     let mut learner = learner();
-    let (first, second) = (sighting(|_| 0, 0.1, false), sighting(|_| 2, 0.1, false));
+    let (first, second) = (
+        observation(|_| 0, 0.1, false),
+        observation(|_| 2, 0.1, false),
+    );
     see(&mut learner, [&first, &second], 50.0, 100);
     let learned = learned(&learner);
     assert!(at(&learned, 50.0, 4, [0, 2]) > 0.8);
@@ -75,8 +78,8 @@ fn types_that_come_together_are_likely_together_at_their_angle_and_back() {
 #[test]
 fn the_order_of_two_views_does_not_matter() {
     let views = [
-        sighting(|it| (it % 3) as u8, 0.1, false),
-        sighting(|it| (it % 2) as u8, 0.1, true),
+        observation(|it| (it % 3) as u8, 0.1, false),
+        observation(|it| (it % 2) as u8, 0.1, true),
     ];
     let [mut one, mut other] = [learner(), learner()];
     see(&mut one, [&views[0], &views[1]], 70.0, 30);
@@ -89,7 +92,7 @@ fn views_from_behind_have_tables_of_their_own() {
     let mut learner = learner();
     // The right arm is of type 1, the left one of type 2, in either picture's own words.
     let side = |it: usize| if it < 14 { 1 } else { 2 };
-    let (front, back) = (sighting(side, 0.1, false), sighting(side, 0.1, true));
+    let (front, back) = (observation(side, 0.1, false), observation(side, 0.1, true));
     see(&mut learner, [&front, &back], 175.0, 100);
     let learned = learned(&learner);
     let joint = learned.by_angle(Appearance::Joint);
@@ -104,7 +107,10 @@ fn views_from_behind_have_tables_of_their_own() {
 #[test]
 fn what_is_far_from_the_truth_teaches_no_types_but_counts_for_tau() {
     let mut learner = learner();
-    let (good, bad) = (sighting(|_| 0, 0.1, false), sighting(|_| 1, 3.0, false));
+    let (good, bad) = (
+        observation(|_| 0, 0.1, false),
+        observation(|_| 1, 3.0, false),
+    );
     see(&mut learner, [&good, &good], 50.0, 2);
     see(&mut learner, [&bad, &good], 50.0, 3);
     let learned = learned(&learner);
@@ -116,7 +122,7 @@ fn what_is_far_from_the_truth_teaches_no_types_but_counts_for_tau() {
 #[test]
 fn nobody_near_the_truth_teaches_nothing() {
     let mut learner = learner();
-    let bad = sighting(|_| 1, 3.0, false);
+    let bad = observation(|_| 1, 3.0, false);
     see(&mut learner, [&bad, &bad], 50.0, 3);
     let said = learner.learned(String::new(), Weights::default(), None, None);
     assert_eq!(said.unwrap_err(), LearnError::Nothing { views: 6 });
@@ -125,7 +131,10 @@ fn nobody_near_the_truth_teaches_nothing() {
 #[test]
 fn tables_of_a_named_rig_follow_the_cameras() {
     let mut learner = learner();
-    let (first, second) = (sighting(|_| 0, 0.1, false), sighting(|_| 2, 0.1, false));
+    let (first, second) = (
+        observation(|_| 0, 0.1, false),
+        observation(|_| 2, 0.1, false),
+    );
     see(&mut learner, [&first, &second], 50.0, 100);
     let learned = learned(&learner);
     let tables = learned.of_rig("hall", &["right", "other", "left"], Appearance::Joint);
@@ -143,7 +152,10 @@ fn tables_of_a_named_rig_follow_the_cameras() {
 #[test]
 fn types_never_seen_together_have_no_lift_where_nothing_is_known() {
     let mut learner = learner();
-    let (first, second) = (sighting(|_| 0, 0.1, false), sighting(|_| 2, 0.1, false));
+    let (first, second) = (
+        observation(|_| 0, 0.1, false),
+        observation(|_| 2, 0.1, false),
+    );
     see(&mut learner, [&first, &second], 50.0, 100);
     let tables = learned(&learner).by_angle(Appearance::Lift);
     assert!(
@@ -158,7 +170,7 @@ fn types_never_seen_together_have_no_lift_where_nothing_is_known() {
 #[test]
 fn tables_know_people_alike_and_not_others() {
     let [mut own, mut alike, mut other] = [learner(), learner(), learner()];
-    let person = |it: u8| sighting(move |_| it, 0.1, false);
+    let person = |it: u8| observation(move |_| it, 0.1, false);
     for [a, b] in [[0, 2], [1, 1], [2, 0]] {
         see(&mut own, [&person(a), &person(b)], 50.0, 40);
         see(&mut alike, [&person(a), &person(b)], 50.0, 10);
@@ -191,8 +203,8 @@ proptest! {
 fn example() -> Learned {
     let mut learner = learner();
     let views = [
-        sighting(|it| (it % 3) as u8, 0.1, false),
-        sighting(|_| 1, 0.2, true),
+        observation(|it| (it % 3) as u8, 0.1, false),
+        observation(|_| 1, 0.2, true),
     ];
     see(&mut learner, [&views[0], &views[1]], 100.0, 3);
     learned(&learner)

@@ -1,6 +1,6 @@
 //! One frame solved by every version, from single-view solutions and evidence that all share.
 
-mod sight;
+mod learn;
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use pipeline::{
 use rayon::prelude::*;
 use skeleton::{JointMap, PARSE14};
 
-use crate::{Combining, Found, Terms, Version};
+use crate::{Combining, FrameResult, Terms, Version};
 
 /// Everything but the cameras.
 #[derive(Debug, Clone)]
@@ -56,22 +56,22 @@ impl Trial {
     }
 }
 
-/// What a view saw, and found alone.
+/// One view of an instant: its frame and its single-view poses.
 #[derive(Debug, Clone, Copy)]
-pub struct Look<'a> {
+pub struct SingleView<'a> {
     /// The view.
     pub view: usize,
     /// Its frame.
     pub image: Rgb8View<'a>,
     /// Its pyramid, and the model.
     pub plan: &'a ViewPlan,
-    /// What was found; there is at least one candidate.
+    /// The single-view candidates, at least one.
     pub found: &'a ViewEstimate,
     /// Centres of the 26 parts of the best pose, pixels of the frame.
     pub centres: &'a [[f64; 2]],
 }
 
-/// What error is expected of every part of a view.
+/// The expected error of every part of a view.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Expectation {
     /// In the unit of the thresholds.
@@ -80,8 +80,8 @@ pub struct Expectation {
     pub tau: Option<Vec<f32>>,
 }
 
-/// Says what error is expected of every part of a view.
-pub type Expected<'a> = dyn Fn(&Look<'_>) -> Option<Expectation> + Sync + 'a;
+/// Predicts the expected error of every part of a view.
+pub type ErrorPredictor<'a> = dyn Fn(&SingleView<'_>) -> Option<Expectation> + Sync + 'a;
 
 /// The versions, ready for the frames of one rig.
 #[derive(Debug)]
@@ -96,8 +96,8 @@ pub struct Bench {
     footage_from_frame: Vec<[[f64; 3]; 2]>,
 }
 
-/// What the views say about a frame.
-struct Seen<'a> {
+/// The evidence of all views for one frame.
+struct Evidence<'a> {
     answers: Vec<Option<ViewResult>>,
     evidence: Vec<Option<Responses<'a>>>,
 }
@@ -159,8 +159,8 @@ impl Bench {
     pub fn solve(
         &mut self,
         images: &[Option<Rgb8View<'_>>],
-        expected: &Expected<'_>,
-    ) -> Vec<Found> {
+        expected: &ErrorPredictor<'_>,
+    ) -> Vec<FrameResult> {
         assert_eq!(images.len(), self.views.len(), "one image per view");
         let mut responses = std::mem::take(&mut self.responses);
         let seen = self.look(images, &mut responses);
@@ -193,20 +193,20 @@ impl Bench {
         images: &[Option<Rgb8View<'_>>],
         found: &'a [Option<ViewEstimate>],
         responses: &'a [Vec<f32>],
-        expected: &Expected<'_>,
-    ) -> Seen<'a> {
+        expected: &ErrorPredictor<'_>,
+    ) -> Evidence<'a> {
         let answer = |view: usize| {
             let it = found[view].as_ref()?;
             let plan = &self.plans[view];
             let centres = plan.centres(it.candidates.first()?);
-            let look = Look {
+            let single = SingleView {
                 view,
                 image: images[view]?,
                 plan,
                 found: it,
                 centres: &centres,
             };
-            let expected = expected(&look);
+            let expected = expected(&single);
             Some(ViewResult {
                 candidates: it.candidates.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
@@ -219,13 +219,13 @@ impl Bench {
             let evidence = Responses::within(layout, &responses[view], &it.levels, it.scope);
             Some(evidence.with_bounds(&it.bounds))
         };
-        Seen {
+        Evidence {
             answers: (0..self.views.len()).map(answer).collect(),
             evidence: (0..self.views.len()).map(evidence).collect(),
         }
     }
 
-    fn version(&self, nth: usize, version: Version, seen: &Seen<'_>) -> Found {
+    fn version(&self, nth: usize, version: Version, seen: &Evidence<'_>) -> FrameResult {
         let step = &self.fuse[nth];
         let answers: Vec<Option<ViewResult>> = seen
             .answers
@@ -276,7 +276,7 @@ impl Bench {
         &self,
         step: &FuseStep,
         answers: &[Option<ViewResult>],
-        seen: &Seen<'_>,
+        seen: &Evidence<'_>,
     ) -> Vec<PairResult> {
         let start = step.start(answers);
         let solve = |pair: [usize; 2]| {
@@ -287,7 +287,7 @@ impl Bench {
         pairs.filter_map(solve).collect()
     }
 
-    fn found(&self, skeleton: &Skeleton, effort: Effort) -> Found {
+    fn found(&self, skeleton: &Skeleton, effort: Effort) -> FrameResult {
         let joints = skeleton.joints.iter();
         let joints = joints.map(|it| it.as_ref().ok().map(|it| it.in_world.into()));
         let view = |(view, it): (usize, &Option<pipeline::FusedView>)| {
@@ -300,7 +300,7 @@ impl Bench {
             };
             Some(joints.into_iter().map(in_footage).collect())
         };
-        Found {
+        FrameResult {
             joints: joints.collect(),
             views: skeleton.views.iter().enumerate().map(view).collect(),
             iterations: effort.iterations,

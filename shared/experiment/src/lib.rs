@@ -25,14 +25,14 @@ mod latex;
 mod pictures;
 mod published;
 
-pub use bench::{Bench, Expectation, Expected, Look, Setup, Trial};
+pub use bench::{Bench, ErrorPredictor, Expectation, Setup, SingleView, Trial};
 pub use film::{Film, FilmError, FilmSettings};
 pub use latex::{latex, number, overall, pictures_latex};
 pub use pictures::{Intervals, Judged, Pictures, Table};
 pub use predicted::{Judgement, Predicted, judge};
 pub use published::published;
-pub use record::{Found, Header, Record, RecordError, read_records};
-pub use score::{FrameScore, Joints, score, seen};
+pub use record::{FrameResult, Header, Record, RecordError, read_records};
+pub use score::{FrameScore, Joints, projected, score};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
 pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};
 pub use version::{Combining, Terms, Version, VersionError};

@@ -41,7 +41,7 @@ pub struct Record {
     /// Number, as the data set counts.
     pub frame: u64,
     /// What each version found.
-    pub found: Vec<Found>,
+    pub found: Vec<FrameResult>,
     /// For each view what a network expected of it, and the truth; empty without a network.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predicted: Vec<Option<Predicted>>,
@@ -50,7 +50,7 @@ pub struct Record {
 /// What one version found in one frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Found {
+pub struct FrameResult {
     /// Joints of the sequence's joint set, metres; `None` where one could not be triangulated.
     pub joints: Vec<Option<Point>>,
     /// For each view the 14 joints of `skeleton::PARSE14`, pixels of the footage, left and right those of
@@ -132,7 +132,7 @@ mod tests {
     fn record(frame: u64) -> Record {
         Record {
             frame,
-            found: vec![Found {
+            found: vec![FrameResult {
                 joints: vec![Some([0.1 * frame as f64, 1.0 / 3.0, -2.0]), None],
                 views: vec![None, Some(vec![[3.25, 1e-9]])],
                 iterations: vec![4, 5],

@@ -5,7 +5,7 @@ use geometry::Camera;
 use nalgebra::Point3;
 use sequences::{Frame, Sequence};
 
-use crate::{Found, parse14};
+use crate::{FrameResult, parse14};
 
 /// How far off one version was in one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -35,7 +35,7 @@ pub type Joints = [[f64; 2]; 14];
 /// Compares what was found with the truth.
 ///
 /// * `frame`: of the sequence, the one that was solved.
-pub fn score(sequence: &Sequence, frame: &Frame, found: &Found) -> FrameScore {
+pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameScore {
     let truth = &frame.joints;
     let segments = segments(sequence.joints).map_or_else(Vec::new, Vec::from);
     let aligned_m = aligned(&found.joints, truth);
@@ -44,7 +44,7 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &Found) -> FrameScore {
     let views = sequence.rig.cameras().iter().zip(&sequence.views);
     let views = views.enumerate().map(|(nth, (camera, view))| {
         let offset = view.source_offset_px.unwrap_or_default().map(f64::from);
-        let truth = seen(camera, offset, &in_space)?;
+        let truth = projected(camera, offset, &in_space)?;
         let found = found.views.get(nth).and_then(Option::as_ref);
         let found = found.and_then(|it| Joints::try_from(it.as_slice()).ok());
         Some((found, truth))
@@ -65,11 +65,11 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &Found) -> FrameScore {
 ///
 /// * `offset`: the calibrated pixel of the image's top-left pixel.
 /// * `joints`: of `skeleton::PARSE14`, metres.
-pub fn seen(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) -> Option<Joints> {
-    let mut seen = [[0.0; 2]; 14];
-    for (seen, joint) in seen.iter_mut().zip(joints) {
+pub fn projected(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) -> Option<Joints> {
+    let mut pixels = [[0.0; 2]; 14];
+    for (pixel, joint) in pixels.iter_mut().zip(joints) {
         let at = camera.project(&Point3::from((*joint)?))?;
-        *seen = [at.x - offset[0], at.y - offset[1]];
+        *pixel = [at.x - offset[0], at.y - offset[1]];
     }
-    Some(seen)
+    Some(pixels)
 }

@@ -5,7 +5,7 @@ mod forward;
 use burn_tensor::{Device, Tensor, TensorData};
 use fastrand::Rng;
 
-use self::forward::{Forward, Seen};
+use self::forward::{BatchStatistics, Forward};
 use crate::network::{self, Shape};
 use crate::onnx::width_of;
 use crate::parameters::{Inputs, Parameter, Role};
@@ -182,8 +182,8 @@ impl Learner {
     }
 
     /// Moves the running statistics of the layers that learn.
-    fn remember(&mut self, seen: Vec<Seen>) {
-        for Seen { at, mean, variance } in seen {
+    fn remember(&mut self, seen: Vec<BatchStatistics>) {
+        for BatchStatistics { at, mean, variance } in seen {
             if at < self.frozen {
                 continue;
             }

@@ -14,7 +14,7 @@ use crate::parameters::{self, Inputs, Parameter};
 use crate::sample::Sample;
 use crate::settings::Settings;
 use crate::store::{Samples, StoreError, unwrap, wrap};
-use crate::vary::{Seen, plain, varied};
+use crate::vary::{NetworkSample, plain, varied};
 
 const CHECKPOINT: [u8; 8] = *b"PLXQUALI";
 
@@ -195,7 +195,7 @@ impl<'a> Trainer<'a> {
                 let vary = (&self.settings.vary, self.inputs.evidence_mean.as_slice());
                 varied(it, (self.tile, self.with_tile()), vary, &mut dice)
             };
-            let seen: Vec<Seen> = samples.iter().map(seen).collect();
+            let seen: Vec<NetworkSample> = samples.iter().map(seen).collect();
             let (batch, truth) = self.batch(&seen);
             let step = self.step(nth, step as f32 / n_steps as f32);
             sum += learner.learn(&batch, &truth, step, &mut dice) * samples.len() as f32;
@@ -259,8 +259,8 @@ impl<'a> Trainer<'a> {
         )
     }
 
-    /// What the best network says of samples, in its own unit, and what it was given.
-    pub fn said(&self, samples: &[&Sample]) -> Vec<(Seen, Vec<f32>)> {
+    /// The inputs of samples and what the best network predicts for them, in the network's unit.
+    pub fn predictions(&self, samples: &[&Sample]) -> Vec<(NetworkSample, Vec<f32>)> {
         let said = self.predict(&self.best_learner(), samples);
         let seen = samples
             .iter()
@@ -302,7 +302,7 @@ impl<'a> Trainer<'a> {
         }
     }
 
-    fn batch(&self, seen: &[Seen]) -> (Batch, Vec<f32>) {
+    fn batch(&self, seen: &[NetworkSample]) -> (Batch, Vec<f32>) {
         let evidence = if self.settings.network.sees_evidence() {
             seen.iter()
                 .flat_map(|it| it.evidence.iter().copied())
@@ -311,7 +311,7 @@ impl<'a> Trainer<'a> {
             Vec::new()
         };
         let unit: viewquality::Unit = self.settings.unit.into();
-        let label = |it: &Seen| -> Vec<f32> {
+        let label = |it: &NetworkSample| -> Vec<f32> {
             let height = f64::from(it.height_px);
             let label = |px: &f32| unit.label(f64::from(*px), height) as f32;
             it.errors_px.iter().map(label).collect()
@@ -328,7 +328,7 @@ impl<'a> Trainer<'a> {
     fn predict(&self, learner: &Learner, samples: &[&Sample]) -> Vec<Vec<f32>> {
         let mut all = Vec::new();
         for samples in samples.chunks(self.settings.batch) {
-            let seen: Vec<Seen> = samples
+            let seen: Vec<NetworkSample> = samples
                 .iter()
                 .map(|it| plain(it, self.tile, self.with_tile()))
                 .collect();

@@ -11,7 +11,7 @@ use crate::settings::Vary;
 
 /// A sample as a network sees it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct NetworkSample {
     /// Planes of the tile, `3 x height x width`, colours from 0 to 1 normalised.
     pub tile: Vec<f32>,
     /// See [`viewquality::evidence()`].
@@ -41,8 +41,8 @@ const AS_IT_IS: Place = Place {
 /// A sample as it is.
 ///
 /// * `with_tile`: whether the network sees tiles.
-pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> Seen {
-    Seen {
+pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample {
+    NetworkSample {
         tile: if with_tile {
             normalised(&pixels(sample, tile, AS_IT_IS), tile)
         } else {
@@ -63,7 +63,7 @@ pub fn varied(
     (tile, with_tile): (TileShape, bool),
     (vary, unknown): (&Vary, &[f32]),
     dice: &mut Rng,
-) -> Seen {
+) -> NetworkSample {
     let mut around = |most: f32| most * (2.0 * dice.f32() - 1.0);
     let reach = vary.shift * tile.height as f32;
     let place = Place {
@@ -92,7 +92,7 @@ pub fn varied(
     };
     let errors =
         (0..N_PARTS).map(|it| sample.errors_px[if place.mirrored { MIRROR[it] } else { it }]);
-    Seen {
+    NetworkSample {
         tile: tile_values,
         evidence: moved(&sample.evidence, tile, place, unknown),
         height_px: sample.height_px * place.scale,

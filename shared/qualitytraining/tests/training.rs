@@ -76,7 +76,7 @@ fn check_file(network: Kind, n: usize, within: f32) {
     assert_eq!(file.takes_tile(), network.tile().is_some());
     assert_eq!(file.takes_evidence(), network.sees_evidence());
     let some: Vec<&Sample> = samples.all.iter().take(5).collect();
-    for (seen, said) in trainer.said(&some) {
+    for (seen, said) in trainer.predictions(&some) {
         let other = file.run(&seen.tile, &seen.evidence).unwrap();
         for (said, other) in said.iter().zip(other) {
             assert!(

@@ -20,9 +20,9 @@ use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub(crate) const LOCK_FILE: &str = "lock";
-/// Tells those who only look at a deployment that it ends.
+/// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
-/// How long they are given to leave.
+/// How long observers are given to leave.
 const LEAVING_LIMIT: Duration = Duration::from_secs(1);
 /// How long the processes of a killed supervisor are given to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
@@ -131,13 +131,13 @@ impl DeploymentLock {
         &self.namespace
     }
 
-    /// Where nobody looks, nobody is waited for.
-    fn ask_onlookers_to_leave(&self) {
+    /// Returns at once if there is no observer.
+    fn wait_for_observers_to_leave(&self) {
         if alive(&self.config).is_empty() {
             return;
         }
         if let Err(error) = fs::write(self.namespace.root().join(ENDING_FILE), "") {
-            tracing::debug!(%error, "cannot ask those who look to leave");
+            tracing::debug!(%error, "cannot ask observers to leave");
         }
         let begin = Instant::now();
         while !alive(&self.config).is_empty() && begin.elapsed() < LEAVING_LIMIT {
@@ -148,7 +148,7 @@ impl DeploymentLock {
 
 impl Drop for DeploymentLock {
     fn drop(&mut self) {
-        self.ask_onlookers_to_leave();
+        self.wait_for_observers_to_leave();
         let alive = alive(&self.config);
         if !alive.is_empty() {
             tracing::warn!(?alive, "processes are left: so are their files");

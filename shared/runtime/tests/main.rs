@@ -6,7 +6,7 @@ mod common;
 mod deployment;
 mod few_chunks;
 mod lock;
-mod onlooker;
+mod observer;
 mod ports;
 mod spin;
 mod zero_copy;

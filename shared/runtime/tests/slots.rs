@@ -80,7 +80,7 @@ fn deployment() -> (Deployment, Bus) {
     let limits = Limits::new(1, 1, 1);
     let plan = TopicPlan::messages::<ViewQuality>(TOPIC.to_owned(), Delivery::Realtime, limits);
     let deployment = Deployment::new(&[plan]);
-    let bus = deployment.bus("onlooker");
+    let bus = deployment.bus("observer");
     (deployment, bus)
 }
 

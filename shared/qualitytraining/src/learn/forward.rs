@@ -39,9 +39,9 @@ impl Value {
     }
 }
 
-/// What a batch normalisation saw: mean and variance of every channel, and which parameters they belong to.
+/// Mean and variance of every channel at a batch normalisation, and the parameters they belong to.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(super) struct BatchStatistics {
     /// The parameter that holds the running mean; the variance follows it.
     pub(super) at: usize,
     pub(super) mean: Tensor<1>,
@@ -63,7 +63,7 @@ pub(super) struct Forward<'a> {
     pub(super) dice: Option<&'a mut Rng>,
     /// Number of the next parameter.
     pub(super) next: usize,
-    pub(super) seen: Vec<Seen>,
+    pub(super) seen: Vec<BatchStatistics>,
 }
 
 impl Forward<'_> {
@@ -93,7 +93,7 @@ impl Forward<'_> {
             let off = flat - mean.clone();
             let variance = (off.clone() * off).mean_dim(2).mean_dim(0);
             let (mean, variance) = (mean.reshape([channels]), variance.reshape([channels]));
-            self.seen.push(Seen {
+            self.seen.push(BatchStatistics {
                 at,
                 mean: mean.clone().detach(),
                 variance: variance.clone().detach(),

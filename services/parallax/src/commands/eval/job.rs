@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use consistency::Learned;
 use experiment::{
-    Bench, Expectation, Film, FilmError, FilmSettings, Header, Look, Predicted, Record, Setup,
-    Trial, Version, parse14, part_errors, read_records, seen, tenth_of,
+    Bench, Expectation, Film, FilmError, FilmSettings, Header, Predicted, Record, Setup,
+    SingleView, Trial, Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use fmp::Model;
 use fuse::Config;
@@ -160,7 +160,7 @@ impl Job {
     fn forecast(
         &self,
         forecaster: &Mutex<Forecaster>,
-        look: &Look<'_>,
+        look: &SingleView<'_>,
         joints: Option<&Vec<[f64; 2]>>,
         frame_scale: f64,
     ) -> Option<(Expectation, Option<Predicted>)> {
@@ -288,7 +288,7 @@ impl Job {
     ) -> Option<Vec<Option<Vec<[f64; 2]>>>> {
         let joints = parse14(sequence.joints, &frame.joints);
         let in_frame = |camera: &geometry::Camera| {
-            let joints = seen(camera, [0.0; 2], &joints)?;
+            let joints = projected(camera, [0.0; 2], &joints)?;
             Some(joints.to_vec())
         };
         let is_needed = self.oracle || self.forecaster.is_some();

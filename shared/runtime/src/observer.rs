@@ -1,4 +1,4 @@
-//! Looking at a deployment that runs, from a process that is no part of it.
+//! Observing a running deployment from a process that is not part of it.
 
 use std::fs;
 use std::io;
@@ -11,9 +11,9 @@ use crate::lock::{ENDING_FILE, LOCK_FILE, living};
 use crate::remains::supervisor;
 use crate::{Bus, BusError, ExitKind, Fault, Namespace, PortError, ReceiveError, Stop, Subscriber};
 
-/// A deployment cannot be looked at.
+/// A deployment cannot be observed.
 #[derive(Debug, thiserror::Error)]
-pub enum OnlookerError {
+pub enum ObserverError {
     /// It does not run, or is about to end.
     #[error("deployment {name:?} does not run")]
     NotRunning {
@@ -23,7 +23,7 @@ pub enum OnlookerError {
     /// Its shared memory cannot be reached.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// What it consists of cannot be found out.
+    /// Its processes cannot be listed.
     #[error(
         "cannot list the topics of deployment {name:?}: {}",
         crate::words::said(source)
@@ -34,18 +34,18 @@ pub enum OnlookerError {
         /// Why.
         source: ServiceListError,
     },
-    /// Its processes cannot be listened to; as a rule because too many listen already.
+    /// A metrics topic cannot be subscribed to; usually because there are too many observers already.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// What they say cannot be taken in.
+    /// Metrics cannot be received.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
-    /// This process cannot be told to stop.
+    /// The stop request cannot be set up.
     #[error("cannot prepare to stop")]
     Stop(#[source] io::Error),
 }
 
-impl Fault for OnlookerError {
+impl Fault for ObserverError {
     fn kind(&self) -> ExitKind {
         match self {
             Self::NotRunning { .. } => ExitKind::Usage,
@@ -62,75 +62,77 @@ impl Fault for OnlookerError {
     }
 }
 
-/// What is seen of one process.
+/// The state of one process.
 #[derive(Debug, Clone, Copy)]
-pub struct Sighting<'a> {
+pub struct ObservedProcess<'a> {
     /// Its name.
     pub process: &'a str,
     /// Its process id, while it lives.
     pub pid: Option<u32>,
-    /// What it has said last, in this life or an earlier one. It comes from another process: check it.
-    pub said: Option<&'a Metrics>,
+    /// Its last metrics message, possibly from before a restart. It comes from another process: check it.
+    pub metrics: Option<&'a Metrics>,
 }
 
-/// Looks at a deployment that runs: which processes it consists of, which of them live, and what they
-/// say of their times and counts. Nobody waits for an onlooker, and the deployment ends without it; it
-/// has to leave then ([`Self::is_over`]), within a second.
+/// Observes a running deployment: which processes it has, which of them are alive, and their metrics. The
+/// deployment does not wait for an observer: it ends without it. The observer has to leave within a second
+/// after that ([`Self::is_over`]).
 #[derive(Debug)]
-pub struct Onlooker {
-    seats: Vec<Seat>,
+pub struct Observer {
+    processes: Vec<Watched>,
     supervisor: u32,
-    // Dropped last: its ports are the seats'.
+    // Dropped last: the subscribers use its ports.
     bus: Bus,
 }
 
 #[derive(Debug)]
-struct Seat {
+struct Watched {
     process: String,
-    ears: Subscriber<Metrics>,
+    subscriber: Subscriber<Metrics>,
     pid: Option<u32>,
-    said: Option<Metrics>,
+    metrics: Option<Metrics>,
 }
 
-impl Onlooker {
-    /// Begins to look.
+impl Observer {
+    /// Starts to observe.
     ///
     /// # Errors
     ///
-    /// [`OnlookerError`].
-    pub fn open(namespace: &Namespace) -> Result<Self, OnlookerError> {
-        let not_running = || OnlookerError::NotRunning {
+    /// [`ObserverError`].
+    pub fn open(namespace: &Namespace) -> Result<Self, ObserverError> {
+        let not_running = || ObserverError::NotRunning {
             name: namespace.name().to_owned(),
         };
-        // Before anything is opened: opening would make what is not there.
-        let supervisor = supervisor_of(namespace).ok_or_else(not_running)?;
-        let stop = Stop::new().map_err(OnlookerError::Stop)?;
-        let name = format!("onlooker-{}", std::process::id());
+        // Checked before anything is opened, since opening creates the files.
+        let supervisor = running_supervisor(namespace).ok_or_else(not_running)?;
+        let stop = Stop::new().map_err(ObserverError::Stop)?;
+        let name = format!("observer-{}", std::process::id());
         let bus = Bus::open(namespace, &name, &stop)?;
         let mut processes = processes(namespace)?;
         processes.sort();
         let mut waiter = bus.waiter();
-        let seats = processes
+        let processes = processes
             .into_iter()
             .map(|process| {
-                let ears = bus.subscriber(&topic::metrics(&process), &mut waiter)?;
-                Ok(Seat {
+                let subscriber = bus.subscriber(&topic::metrics(&process), &mut waiter)?;
+                Ok(Watched {
                     process,
-                    ears,
+                    subscriber,
                     pid: None,
-                    said: None,
+                    metrics: None,
                 })
             })
             .collect::<Result<_, PortError>>();
-        let seats = match seats {
-            // It has ended meanwhile, and its topics with it.
-            Err(PortError::NoSuchTopic { .. }) if supervisor_of(namespace) != Some(supervisor) => {
+        let processes = match processes {
+            // The deployment has ended in the meantime.
+            Err(PortError::NoSuchTopic { .. })
+                if running_supervisor(namespace) != Some(supervisor) =>
+            {
                 return Err(not_running());
             }
-            seats => seats?,
+            opened => opened?,
         };
         Ok(Self {
-            seats,
+            processes,
             supervisor,
             bus,
         })
@@ -141,37 +143,40 @@ impl Onlooker {
         self.supervisor
     }
 
-    /// Looks again.
+    /// Reads the current state.
     ///
     /// # Errors
     ///
-    /// [`OnlookerError::Bus`], [`OnlookerError::Receive`].
-    pub fn look(&mut self) -> Result<Vec<Sighting<'_>>, OnlookerError> {
+    /// [`ObserverError::Bus`], [`ObserverError::Receive`].
+    pub fn observe(&mut self) -> Result<Vec<ObservedProcess<'_>>, ObserverError> {
         let config = self.bus.namespace().config().map_err(BusError::from)?;
         let living = living(&config);
-        for seat in &mut self.seats {
-            let its = living.iter().flatten().find(|it| it.0 == seat.process);
-            seat.pid = its.map(|it| it.1);
-            if let Some(said) = seat.ears.latest()? {
-                seat.said = Some(said);
+        for watched in &mut self.processes {
+            let node = living
+                .iter()
+                .flatten()
+                .find(|(name, _)| *name == watched.process);
+            watched.pid = node.map(|(_, pid)| *pid);
+            if let Some(metrics) = watched.subscriber.latest()? {
+                watched.metrics = Some(metrics);
             }
         }
-        let sightings = self.seats.iter().map(|it| Sighting {
-            process: &it.process,
-            pid: it.pid,
-            said: it.said.as_ref(),
+        let observed = self.processes.iter().map(|watched| ObservedProcess {
+            process: &watched.process,
+            pid: watched.pid,
+            metrics: watched.metrics.as_ref(),
         });
-        Ok(sightings.collect())
+        Ok(observed.collect())
     }
 
-    /// Whether the deployment ends, and this has to be dropped.
+    /// Whether the deployment is ending, so that this observer has to be dropped.
     pub fn is_over(&self) -> bool {
-        supervisor_of(self.bus.namespace()) != Some(self.supervisor)
+        running_supervisor(self.bus.namespace()) != Some(self.supervisor)
     }
 }
 
-/// Who runs a deployment that does not end yet.
-fn supervisor_of(namespace: &Namespace) -> Option<u32> {
+/// The supervisor of a deployment, unless it is ending.
+fn running_supervisor(namespace: &Namespace) -> Option<u32> {
     let root = namespace.root();
     if root.join(ENDING_FILE).exists() {
         return None;
@@ -180,8 +185,8 @@ fn supervisor_of(namespace: &Namespace) -> Option<u32> {
     supervisor(&root.join(LOCK_FILE), &locks)
 }
 
-/// The names of all processes that a deployment should have: those it has topics for.
-fn processes(namespace: &Namespace) -> Result<Vec<String>, OnlookerError> {
+/// The names of all processes of a deployment, read off its metrics topics.
+fn processes(namespace: &Namespace) -> Result<Vec<String>, ObserverError> {
     let config = namespace.config().map_err(BusError::from)?;
     let mut processes = Vec::new();
     let listed = ipc::Service::list(&config, |service| {
@@ -189,7 +194,7 @@ fn processes(namespace: &Namespace) -> Result<Vec<String>, OnlookerError> {
         processes.extend(topic::process_of_metrics(name).map(str::to_owned));
         CallbackProgression::Continue
     });
-    listed.map_err(|source| OnlookerError::List {
+    listed.map_err(|source| ObserverError::List {
         name: namespace.name().to_owned(),
         source,
     })?;

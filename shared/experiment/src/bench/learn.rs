@@ -1,6 +1,6 @@
 //! Single views against the truth: what the terms between views are learned from.
 
-use consistency::{Learner, Pair, Sighting};
+use consistency::{Learner, Pair, ViewObservation};
 use evaluation::Point;
 use kernels::Rgb8View;
 use multiview::{ViewInput, angle_between};
@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use sequences::Sequence;
 
 use super::Bench;
-use crate::{parse14, part_errors_and_facing, seen, size};
+use crate::{parse14, part_errors_and_facing, projected, size};
 
 impl Bench {
     /// Solves every view of an instant alone, and lets learners see them.
@@ -30,7 +30,7 @@ impl Bench {
         let mut responses = std::mem::take(&mut self.responses);
         let found = self.look(images, &mut responses);
         self.responses = responses;
-        let answer = |view: usize| {
+        let view_answer = |view: usize| {
             let found = found[view].as_ref()?;
             (!found.candidates.is_empty()).then_some(ViewInput {
                 plan: &self.plans[view],
@@ -39,14 +39,15 @@ impl Bench {
                 tau_px: None,
             })
         };
-        let sight = |view: usize| {
-            let answer = answer(view)?;
-            Some((answer, sighting(&answer, sequence, joints)?))
+        let observe = |view: usize| {
+            let answer = view_answer(view)?;
+            Some((answer, observation(&answer, sequence, joints)?))
         };
-        let views: Vec<Option<(ViewInput<'_>, Sighting)>> = (0..found.len()).map(sight).collect();
+        let views: Vec<Option<(ViewInput<'_>, ViewObservation)>> =
+            (0..found.len()).map(observe).collect();
         for learner in &mut *learners {
-            let sightings = views.iter().flatten();
-            sightings.for_each(|it| learner.see(&it.1, sequence.joints));
+            let observations = views.iter().flatten();
+            observations.for_each(|it| learner.add_view(&it.1, sequence.joints));
             learner.end_instant();
         }
         for [first, second] in pipeline::all_pairs(views.len()) {
@@ -58,28 +59,28 @@ impl Bench {
                     cameras: by_name.then_some(names),
                 };
                 for learner in &mut *learners {
-                    learner.see_pair(&pair);
+                    learner.add_pair(&pair);
                 }
             }
         }
     }
 }
 
-fn sighting(
+fn observation(
     answer: &ViewInput<'_>,
     sequence: &Sequence,
     joints: &[Option<Point>],
-) -> Option<Sighting> {
+) -> Option<ViewObservation> {
     let best = answer.candidates.first()?;
     let camera = answer.plan.camera();
     let centres = answer.plan.centres(best);
-    let truth = seen(camera, [0.0; 2], &parse14(sequence.joints, joints))?;
+    let truth = projected(camera, [0.0; 2], &parse14(sequence.joints, joints))?;
     let (errors, exchanged) = part_errors_and_facing(&centres, &truth, true)?;
     let project = |joint: &Option<Point>| {
         let at = camera.project(&Point3::from((*joint)?))?;
         Some([at.x, at.y])
     };
-    Some(Sighting {
+    Some(ViewObservation {
         types: best.parts.iter().map(|it| it.mixture).collect(),
         centres,
         errors,
