@@ -1,8 +1,8 @@
-//! There and back between two processes that sleep until they are woken: one message of 64 bytes,
-//! one image of 172 x 224 (115 584 bytes) and the response maps of all levels of an image
-//! (40 megabytes), in place; and the same maps copied once each way, as a socket would at best.
+//! Round trip between two processes that sleep until they are woken: one message of 64 bytes, one image of
+//! 172 x 224 (115 584 bytes) and the response maps of all levels of an image (40 megabytes), in place; and
+//! the same maps copied once each way, as with a socket at best.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::ffi::OsString;
 use std::hint::black_box;
@@ -25,8 +25,8 @@ const WORKLOADS: [(&str, usize, usize); 4] = [
 
 fn main() {
     let args: Vec<OsString> = std::env::args_os().collect();
-    if let [_, word, base, len, copies] = args.as_slice()
-        && word == "echo"
+    if let [_, role, base, len, copies] = args.as_slice()
+        && role == "echo"
     {
         let number = |text: &OsString| text.to_str().unwrap().parse().unwrap();
         return echo(&PathBuf::from(base), number(len), number(copies) == 1);
@@ -121,7 +121,7 @@ fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
     publisher.wait_for_subscribers(1, Duration::from_mins(1));
     let mut own = vec![0.0; len];
     let mut micros: Vec<f64> = Vec::new();
-    // The first ones wait for the other process to begin.
+    // // The first ones wait for the other process to start.
     while micros.len() < rounds + 50 {
         let begin = Instant::now();
         write(&publisher, len, copies.then_some(&own));

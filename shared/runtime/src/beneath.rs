@@ -1,5 +1,5 @@
-//! Files and directories by the descriptor of the directory that holds them. A path may lead elsewhere the next time;
-//! a descriptor does not. Nothing here follows a symbolic link.
+//! Access to files and directories relative to the descriptor of their parent directory. Between two uses of
+//! a path another file may be put there; a descriptor stays the same. Nothing here follows a symbolic link.
 
 use std::ffi::{CStr, CString};
 use std::fs::File;
@@ -11,10 +11,10 @@ use std::path::Path;
 use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, Stat, openat, statat, unlinkat};
 use rustix::io::Errno;
 
-/// How deep directories are removed: those of iceoryx2 lie two deep.
+/// How deep directories are removed: iceoryx2 nests two levels.
 const DEEPEST: usize = 8;
 
-/// Opens a directory by its path, the last part of which is no symbolic link.
+/// Opens a directory by its path. Its last component must not be a symbolic link.
 pub(crate) fn open_directory(path: &Path) -> Result<OwnedFd, Errno> {
     directory_in(CWD, path.as_os_str().as_bytes())
 }
@@ -25,15 +25,15 @@ pub(crate) fn directory_in(directory: impl AsFd, name: &[u8]) -> Result<OwnedFd,
     openat(directory, name, flags, Mode::empty())
 }
 
-/// Opens a file of a directory to read and write, and makes it, for its owner only, if it is not there.
+/// Opens a file in a directory for reading and writing; creates it, for its owner only, if it does not exist.
 pub(crate) fn file_in(directory: impl AsFd, name: &str) -> Result<File, Errno> {
     let flags = OFlags::RDWR | OFlags::CREATE | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     openat(directory, name, flags, Mode::RUSR | Mode::WUSR).map(File::from)
 }
 
-/// What a file of a directory holds, at most so many bytes.
+/// Reads a file in a directory, at most `most` bytes.
 pub(crate) fn read_in(directory: impl AsFd, name: &str, most: u64) -> io::Result<Vec<u8>> {
-    // What is not a file must not make anybody wait.
+    // // Opening a pipe or a device must not block.
     let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let file = openat(directory, name, flags, Mode::empty())?;
     let mut bytes = Vec::new();
@@ -41,8 +41,8 @@ pub(crate) fn read_in(directory: impl AsFd, name: &str, most: u64) -> io::Result
     Ok(bytes)
 }
 
-/// What is known about a name in a directory; of a symbolic link about itself.
-pub(crate) fn look(directory: impl AsFd, name: &CStr) -> Result<Stat, Errno> {
+/// The metadata of a name in a directory; for a symbolic link its own.
+pub(crate) fn stat_in(directory: impl AsFd, name: &CStr) -> Result<Stat, Errno> {
     statat(directory, name, AtFlags::SYMLINK_NOFOLLOW)
 }
 
@@ -58,13 +58,13 @@ pub(crate) fn names(directory: impl AsFd) -> Result<Vec<CString>, Errno> {
     Ok(names)
 }
 
-/// Removes a name from a directory, with all that is below it if it is a directory. It may be gone already.
+/// Removes a name from a directory, recursively if it is a directory. A missing name is not an error.
 pub(crate) fn remove(directory: impl AsFd, name: &CStr) -> Result<(), Errno> {
     remove_below(directory, name, DEEPEST)
 }
 
 fn remove_below(directory: impl AsFd, name: &CStr, deep: usize) -> Result<(), Errno> {
-    let is_directory = match look(&directory, name) {
+    let is_directory = match stat_in(&directory, name) {
         Err(Errno::NOENT) => return Ok(()),
         found => FileType::from_raw_mode(found?.st_mode) == FileType::Directory,
     };
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_are_removed_and_what_they_lead_to_stays() {
+    fn links_are_removed_and_their_targets_kept() {
         let base = tempfile::tempdir().unwrap();
         let (home, ours) = (base.path().join("home"), base.path().join("ours"));
         fs::create_dir_all(home.join("photos")).unwrap();
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_is_no_directory() {
+    fn a_link_is_not_opened_as_a_directory() {
         let base = tempfile::tempdir().unwrap();
         symlink("/tmp", base.path().join("link")).unwrap();
         let opened = open_directory(&base.path().join("link"));

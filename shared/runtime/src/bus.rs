@@ -25,7 +25,7 @@ use crate::{
     Copies, Namespace, NamespaceError, PrivacyError, Progress, Stop, free_shared_memory, private,
 };
 
-/// How long a sender waits for a receiver without room, unless told otherwise.
+/// How long a sender waits for a receiver without room, unless set otherwise.
 const PATIENCE: Duration = Duration::from_mins(2);
 
 /// The deployment's shared memory cannot be reached, or a topic not be created.
@@ -40,14 +40,13 @@ pub enum BusError {
         #[source]
         source: io::Error,
     },
-    /// The deployment is another user's.
+    /// The deployment belongs to another user.
     #[error(transparent)]
     Privacy(#[from] PrivacyError),
-    /// The namespace does not suit iceoryx2.
+    /// iceoryx2 does not accept the namespace.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
-    /// There is no room for the queues of a process. Without it the system would kill the process when it
-    /// first wrote to them.
+    /// There is no room for the queues of a process. The system would kill it when it first wrote to them.
     #[error(
         "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
         .needed_bytes / 1000, .free_bytes / 1000
@@ -83,7 +82,7 @@ pub enum BusError {
     /// The wake-up of a topic cannot be created.
     #[error(
         "cannot create wake-up of topic {topic:?}: {}",
-        crate::words::said(source)
+        crate::words::spaced(source)
     )]
     CreateWakeUp {
         /// Name of the topic.
@@ -99,14 +98,14 @@ pub enum BusError {
     },
 }
 
-/// Keeps a topic in being while no process uses it.
+/// Keeps a topic alive while no process uses it.
 #[derive(Debug)]
 pub struct Topic {
     _messages: Box<dyn Debug>,
     _wake_ups: Vec<EventFactory<ipc::Service>>,
 }
 
-/// A process's connection to the shared memory of its deployment: makes ports.
+/// A process's connection to the shared memory of its deployment. It creates ports.
 #[derive(Debug)]
 pub struct Bus {
     node: Arc<Node<ipc::Service>>,
@@ -166,9 +165,8 @@ impl Bus {
         self
     }
 
-    /// Sets whether waiters of this bus look for messages without pause instead of sleeping until one
-    /// comes: the receiver takes a core for itself, and a message arrives in a microsecond or two. They
-    /// sleep if it is not set.
+    /// Sets whether waiters of this bus poll without pause instead of sleeping until a message arrives. The
+    /// receiver then occupies a core, and a message arrives in a microsecond or two. The default is to sleep.
     #[must_use]
     pub fn with_spin(mut self, spins: bool) -> Self {
         self.spins = spins;
@@ -185,9 +183,9 @@ impl Bus {
         &self.process
     }
 
-    /// What another thread needs to make ports of its own.
-    pub(crate) fn seed(&self) -> Seed {
-        Seed {
+    /// What another thread needs to create its own ports.
+    pub(crate) fn parts(&self) -> BusParts {
+        BusParts {
             node: Arc::clone(&self.node),
             namespace: self.namespace.clone(),
             process: self.process.clone(),
@@ -205,7 +203,7 @@ impl Bus {
         &self.progress
     }
 
-    /// Bytes that the ports of this bus have copied; those of the signs of life are none of them.
+    /// Bytes that the ports of this bus have copied, without the heartbeats.
     pub fn copies(&self) -> &Copies {
         &self.copies
     }
@@ -218,10 +216,10 @@ impl Bus {
         self.patience
     }
 
-    /// Creates topics, which exist as long as the answer is kept or a port is open on them.
+    /// Creates topics, which exist as long as the returned handles are kept or a port is open on them.
     ///
-    /// The supervisor does this once, before it starts processes; ports only open what is there.
-    /// So the quality of service has one source, and topics outlive the processes that use them.
+    /// The supervisor does this once, before it starts processes; ports only open existing topics. So the
+    /// quality of service is defined in one place, and topics outlive the processes that use them.
     ///
     /// # Errors
     ///
@@ -261,17 +259,17 @@ impl Bus {
     }
 }
 
-/// A [`Bus`] on its way to another thread.
-pub(crate) struct Seed {
+/// The parts of a [`Bus`] that can move to another thread.
+pub(crate) struct BusParts {
     node: Arc<Node<ipc::Service>>,
     namespace: Namespace,
     process: String,
     stop: Stop,
 }
 
-impl Seed {
-    /// The bus, with counters of its own: what the thread does is no progress of the main loop.
-    pub(crate) fn grow(self) -> Bus {
+impl BusParts {
+    /// The bus, with its own counters: work of the other thread is no progress of the main loop.
+    pub(crate) fn into_bus(self) -> Bus {
         Bus {
             node: self.node,
             namespace: self.namespace,
@@ -296,7 +294,7 @@ fn check_room(process: &str, free_bytes: u64) -> Result<(), BusError> {
     })
 }
 
-/// Makes the directory of a deployment and points iceoryx2 to it.
+/// Creates the directory of a deployment and configures iceoryx2 to use it.
 pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
     adopt_transport_log();
     let config = namespace.config()?;
@@ -314,7 +312,7 @@ pub(crate) fn prepare(namespace: &Namespace) -> Result<Config, BusError> {
         files::replace(&path, namespace.config_text().as_bytes()).map_err(directory)?;
     }
     // The clean-up of dead nodes falls back to the process's global configuration where a node died
-    // before it had written its own (iceoryx2 0.10, node/mod.rs), so that must say the same.
+    // before it had written its own (iceoryx2 0.10, node/mod.rs), so that one must be the same.
     if let Ok(file) = FilePath::new(path.as_os_str().as_encoded_bytes())
         && let Err(error) = Config::setup_global_config_from_file(&file)
     {

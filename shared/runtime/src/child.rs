@@ -27,15 +27,15 @@ pub struct Child {
     process: std::process::Child,
     pidfd: OwnedFd,
     output: Option<PipeReader>,
-    /// What came since the last end of a line.
+    /// Output since the last end of a line.
     partial: Vec<u8>,
-    /// Whether it has ended, and nothing more will come.
+    /// Whether the output has ended.
     ended: bool,
 }
 
 impl Child {
-    /// Starts a process with its output in a pipe and without input, out of reach of the terminal's
-    /// signals.
+    /// Starts a process with its output in a pipe and without input, in a process group of its own, which the
+    /// terminal does not signal.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ impl Child {
         Self::with_input(executable, args, Stdio::null())
     }
 
-    /// The same with something to read in its standard input: a file without a name, which nobody can remove.
+    /// The same with data on its standard input: a file without a name, which cannot be removed.
     ///
     /// # Errors
     ///
@@ -122,16 +122,16 @@ impl Child {
             .collect())
     }
 
-    /// How it ended, if it has. Processes that it started and left behind are ended then.
+    /// How it ended, if it has. Its remaining children are killed then.
     ///
     /// # Errors
     ///
-    /// The system has forgotten it.
+    /// The process does not exist any more.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
         let mut fds = [PollFd::from_borrowed_fd(self.pidfd.as_fd(), PollFlags::IN)];
         let ended = poll(&mut fds, Some(&Timespec::default()))? > 0;
         if ended {
-            // Before it is reaped, for as long as its id is certainly not another's.
+            // // Before it is reaped, while its id cannot belong to another process.
             self.kill();
         }
         let status = self.process.try_wait()?;
@@ -139,21 +139,21 @@ impl Child {
         Ok(status)
     }
 
-    /// Whether it stands still because a signal stopped it (SIGSTOP, SIGTSTP), and not for want of a
-    /// processor; `false` where the system does not say (`/proc` is Linux's).
+    /// Whether a signal has stopped it (SIGSTOP, SIGTSTP), as opposed to it waiting for a processor; `false`
+    /// where the system does not report it (`/proc` is Linux's).
     pub fn is_stopped(&self) -> bool {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.pid()));
-        stat.is_ok_and(|it| state_in(&it) == Some('T'))
+        stat.is_ok_and(|stat| state_in(&stat) == Some('T'))
     }
 
-    /// Asks it to end.
+    /// Sends it a stop request (SIGTERM).
     pub fn terminate(&self) {
         if let Err(error) = kill_process(Pid::from_child(&self.process), Signal::TERM) {
             tracing::debug!(%error, pid = self.pid(), "cannot signal");
         }
     }
 
-    /// Ends it, and whatever it has started.
+    /// Kills it and its children.
     pub fn kill(&self) {
         if let Err(error) = kill_process_group(Pid::from_child(&self.process), Signal::KILL) {
             tracing::debug!(%error, pid = self.pid(), "cannot kill");
@@ -167,19 +167,19 @@ fn state_in(stat: &str) -> Option<char> {
     rest.trim_start().chars().next()
 }
 
-/// Ends a process at once, as a crash would (SIGKILL): for faults that are made on purpose.
+/// Kills a process (SIGKILL), as a crash would: for fault injection.
 ///
-/// Call it where the process cannot have been reaped yet, for example from what a supervisor tells between its
-/// `Started` and its `Died`: a number that is free again may be another's.
+/// Call it while the process cannot have been reaped yet, for example between the supervisor's events
+/// `Started` and `Died`: a released process id may belong to another process.
 ///
 /// # Errors
 ///
-/// There is no such process, or it belongs to somebody else.
+/// There is no such process, or it belongs to another user.
 pub fn kill(pid: u32) -> io::Result<()> {
     signal(pid, Signal::KILL)
 }
 
-/// Lets a process stand still (SIGSTOP), as a hang would: for faults that are made on purpose.
+/// Stops a process (SIGSTOP), as a hang would: for fault injection.
 ///
 /// Call it where [`kill`] may be called.
 ///
@@ -190,7 +190,7 @@ pub fn freeze(pid: u32) -> io::Result<()> {
     signal(pid, Signal::STOP)
 }
 
-/// Lets a process that [`freeze`] stopped go on (SIGCONT).
+/// Continues a process that [`freeze`] stopped (SIGCONT).
 ///
 /// Call it where [`kill`] may be called.
 ///
@@ -222,7 +222,7 @@ impl Drop for Child {
 ///
 /// # Errors
 ///
-/// The system cannot wait for that many children.
+/// The system call fails.
 pub fn wait_for_any(children: &[&Child], stop: Option<&Stop>, timeout: Duration) -> io::Result<()> {
     let mut fds = Vec::new();
     for child in children {
@@ -254,7 +254,7 @@ mod tests {
 
     use super::{Child, freeze, kill, state_in, thaw, wait_for_any};
 
-    /// What takes longer will never happen.
+    /// What takes longer counts as never.
     const WATCHDOG: Duration = Duration::from_mins(1);
 
     fn shell(script: &str) -> Child {
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn hears_both_outputs_line_by_line_to_the_last() {
+    fn lines_of_both_outputs_are_read_to_the_end() {
         let mut child = shell("echo one; echo two >&2; printf three");
         let (lines, status) = run(&mut child);
         assert_eq!(lines, ["one", "two", "three"]);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_child_is_given_is_its_input_from_the_beginning_to_the_end() {
+    fn given_data_is_the_whole_standard_input_of_a_child() {
         let args = ["-c", "cat; echo over"].map(OsString::from);
         for _ in 0..2 {
             let mut child = Child::start_given(Path::new("/bin/sh"), &args, b"one\n2\n").unwrap();
@@ -291,14 +291,14 @@ mod tests {
     }
 
     #[test]
-    fn does_not_answer_with_half_a_line() {
+    fn incomplete_lines_are_not_returned() {
         let mut child = shell("printf half; exec sleep 600");
         wait_for_any(&[&child], None, Duration::from_secs(10)).unwrap();
         assert_eq!(child.read_lines().unwrap(), Vec::<String>::new());
     }
 
     #[test]
-    fn tells_a_signal_from_an_exit() {
+    fn a_signal_is_distinguished_from_an_exit() {
         use std::os::unix::process::ExitStatusExt as _;
         let (_, status) = run(&mut shell("exit 4"));
         assert_eq!(status.code(), Some(4));
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_is_killed_by_its_number_and_a_number_that_is_none_is_refused() {
+    fn a_process_is_killed_by_its_id_and_an_invalid_id_is_refused() {
         use std::os::unix::process::ExitStatusExt as _;
         let mut child = shell("exec sleep 600");
         kill(child.pid()).unwrap();
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_child_leaves_behind_ends_with_it() {
+    fn grandchildren_are_killed_with_their_parent() {
         let mut child = shell("sleep 600 & echo $!; kill -9 $$");
         let (lines, status) = run(&mut child);
         assert!(!status.success());
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_child_that_is_dropped_is_gone() {
+    fn a_dropped_child_is_killed() {
         let child = shell("exec sleep 600");
         let proc = format!("/proc/{}", child.pid());
         assert!(Path::new(&proc).exists());
@@ -353,16 +353,16 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_was_stopped_goes_on_when_it_is_told_to() {
+    fn a_stopped_process_can_be_continued() {
         let child = shell("exec sleep 600");
         freeze(child.pid()).unwrap();
         until("it goes on", || child.is_stopped());
         thaw(child.pid()).unwrap();
-        until("it stands still", || !child.is_stopped());
+        until("it is still stopped", || !child.is_stopped());
     }
 
     #[test]
-    fn the_state_of_a_process_follows_its_name_whatever_that_is() {
+    fn the_state_follows_the_process_name_in_parentheses() {
         assert_eq!(state_in("7 (a b) T 1 7"), Some('T'));
         assert_eq!(state_in("7 (x) T y) S 1 7"), Some('S'));
         assert_eq!(state_in("7 (x"), None);
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_stands_still_can_still_be_killed() {
+    fn a_stopped_process_can_be_killed() {
         use std::os::unix::process::ExitStatusExt as _;
         let mut child = shell("exec sleep 600");
         assert!(!child.is_stopped());

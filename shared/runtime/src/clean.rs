@@ -9,39 +9,39 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
 
 use crate::Bus;
 
-/// How long another supervisor is given that cleans up the same: that of a run which is ending.
+/// How long to wait for another supervisor that cleans up the same: that of a run which is ending.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// The mode of a file that its owner may write.
 const OWNER_WRITES: u32 = 0o200;
 
-/// Removes what dead processes left in shared memory: their slots in topics, their queues, and the
-/// hold that a dead subscriber has on a sender that waits for it.
+/// Releases what dead processes hold in shared memory: their slots in topics, their queues, and the buffer of
+/// a dead subscriber that blocks a sender.
 ///
-/// Nobody does this by itself, so the supervisor does: at every death, and from time to time. It is the only one
-/// that does: iceoryx2 0.10 takes a port's tag away before it frees the port's place in its topic, and leaves the place
-/// taken for ever if the tag was gone, be it that the one who cleaned up before was killed between the two, or that
-/// two did it at once. Who was to take the place could then never begin.
+/// Only the supervisor cleans up: at every death, and from time to time. iceoryx2 0.10 removes a port's tag
+/// before it frees the port's slot in its topic, and never frees the slot if the tag is missing. That happens
+/// if a cleaning process is killed between the two steps, or if two processes clean up at once. The process
+/// that needs the slot could then never start.
 #[derive(Debug, Default)]
 pub struct Cleaner {
-    /// Nodes that were dead and stayed so.
+    /// Dead nodes that could not be removed.
     stubborn: BTreeSet<u128>,
 }
 
 impl Cleaner {
-    /// Cleans up, and answers how many dead processes are gone for good.
+    /// Cleans up, and returns how many dead processes were removed.
     ///
     /// A process killed while it registers a port leaves a file that iceoryx2 0.10 overlooks, so that its
-    /// node cannot be removed. Where clean-up has failed twice such files are removed first; those that
-    /// were finished stay, for they say what the process held.
+    /// node cannot be removed. Where clean-up has failed twice such files are removed first. Complete files
+    /// stay, since they record what the process held.
     pub fn clean(&mut self, bus: &Bus) -> usize {
-        // What iceoryx2 counts as cleaned may stay: it is looked at again.
+        // // iceoryx2 may count a node as cleaned that is still there: check again.
         let before = dead(bus);
         bus.node().blocking_cleanup_dead_nodes(PATIENCE);
         let mut after = dead(bus);
-        let again: Vec<u128> = after.intersection(&self.stubborn).copied().collect();
-        if !again.is_empty() {
-            for id in again {
+        let remaining: Vec<u128> = after.intersection(&self.stubborn).copied().collect();
+        if !remaining.is_empty() {
+            for id in remaining {
                 remove_unfinished(bus, id);
             }
             bus.node().blocking_cleanup_dead_nodes(PATIENCE);
@@ -67,24 +67,24 @@ fn dead(bus: &Bus) -> BTreeSet<u128> {
     dead
 }
 
-/// Removes what a dead node had begun to write of itself and not finished. iceoryx2 lets a file be written
-/// by its owner until it is complete, and registers the node or port of a tag only then: behind an unfinished tag there
-/// is nothing to give back. A finished one is the only trace of a slot; without it the slot is lost for good.
+/// Removes the files that a dead node has not finished writing. iceoryx2 keeps a file writable for its owner
+/// until it is complete, and registers the node or port of a tag only then: an incomplete tag holds no slot.
+/// A complete one is the only record of a slot; without it the slot is lost for good.
 fn remove_unfinished(bus: &Bus, node: u128) {
     let directory = bus.namespace().root().join("nodes").join(node.to_string());
     let Ok(entries) = fs::read_dir(&directory) else {
         return;
     };
     for entry in entries.flatten() {
-        let is_unfinished = |it: fs::Metadata| it.is_file() && it.mode() & OWNER_WRITES != 0;
+        let is_unfinished = |data: fs::Metadata| data.is_file() && data.mode() & OWNER_WRITES != 0;
         if !entry.metadata().is_ok_and(is_unfinished) {
             continue;
         }
         let path = entry.path();
         match fs::remove_file(&path) {
-            Ok(()) => tracing::debug!(?path, "removed what a dead process had not finished"),
+            Ok(()) => tracing::debug!(?path, "removed an incomplete file of a dead process"),
             Err(error) => {
-                tracing::debug!(%error, ?path, "cannot remove what a dead process had not finished");
+                tracing::debug!(%error, ?path, "cannot remove an incomplete file of a dead process");
             }
         }
     }

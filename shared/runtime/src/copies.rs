@@ -5,9 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Counts bytes that ports copied into or out of shared memory; clones share the count.
 ///
-/// Messages of fixed size are copied, both ways. Arrays (pixels, evidence) are written and read where they lie:
-/// of them only what [`copy_of`](crate::SliceSubscriber::copy_of) hands out counts, which is what the recorder
-/// draws on.
+/// Messages of fixed size are copied when sent and when received. Arrays (pixels, evidence) are written and
+/// read in place: only those returned by [`copy_of`](crate::SliceSubscriber::copy_of) count.
 #[derive(Debug, Clone, Default)]
 pub struct Copies {
     bytes: Arc<AtomicU64>,

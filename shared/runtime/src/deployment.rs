@@ -1,4 +1,4 @@
-//! All topics of a deployment, what they take, and whether there is room for them.
+//! All topics of a deployment, their memory, and whether there is room for it.
 
 use std::io;
 
@@ -10,50 +10,50 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
 
-/// Small messages that wait for one subscriber when the latest wins.
+/// Queue of small messages of one subscriber with realtime delivery.
 const SMALL_BUFFER_REALTIME: usize = 4;
-/// Small messages that wait for one subscriber when nothing may be lost.
+/// Queue of small messages of one subscriber with lossless delivery.
 const SMALL_BUFFER_LOSSLESS: usize = 16;
-/// Images or response maps that wait for one subscriber.
+/// Queue of images or response maps of one subscriber.
 const LARGE_BUFFER: usize = 1;
 /// Subscribers of small topics beyond those of the deployment: the command line tools.
 const SPARE: usize = 2;
-/// Those who look at times and counts at the same time, besides the supervisor.
+/// Observers at the same time, besides the supervisor.
 const ONLOOKERS: usize = 4;
-/// Files that every process has open, whatever its topics.
+/// Open files of every process, besides those of its topics.
 const DESCRIPTORS: u64 = 40;
-/// Files that a topic takes in the process that keeps it in being: 6.6 were measured.
+/// Open files per topic in the process that keeps it alive: 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
-/// Queues and management of one process, bytes: ten times what is measured.
+/// Queues and management of one process, bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
-/// What decides the topics of a deployment.
+/// The parameters that determine the topics of a deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeploymentPlan {
     /// What happens when a receiver is slower than its sender.
     pub delivery: Delivery,
     /// The views.
     pub views: Vec<ViewPlan>,
-    /// Processes that fuse.
+    /// Number of fusion processes.
     pub n_workers: usize,
-    /// Processes that write results.
+    /// Number of processes that write results.
     pub n_recorders: usize,
-    /// Response maps of one view that one process may hold at the same time.
+    /// Response maps of one view that one process may borrow at the same time.
     pub held: usize,
-    /// The same of images.
+    /// Images that one process may borrow at the same time.
     pub held_frames: usize,
     /// The names of all processes.
     pub processes: Vec<String>,
 }
 
-/// What decides the topics of one view.
+/// The parameters that determine the topics of one view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ViewPlan {
     /// Largest image, bytes.
     pub frame_bytes: usize,
     /// Longest response maps, values.
     pub evidence_values: usize,
-    /// Fusing processes that read this view.
+    /// Fusion processes that read this view.
     pub n_workers: usize,
 }
 
@@ -66,22 +66,22 @@ pub enum PreflightError {
         .needed_bytes.div_ceil(1_000_000), .free_bytes / 1_000_000
     )]
     TooLarge {
-        /// What all pools take.
+        /// Memory of all pools.
         needed_bytes: u64,
-        /// What is free.
+        /// Free memory.
         free_bytes: u64,
-        /// The topic that takes most, with its size.
+        /// The largest topic, with its size.
         largest: String,
     },
-    /// A process could not open all that it has to.
+    /// A process needs more open files than its limit.
     #[error("deployment needs {needed} open files in one process, the limit is {limit} open files")]
     Descriptors {
-        /// What the process that opens most takes.
+        /// Open files of the process that needs most.
         needed: u64,
-        /// What it may open.
+        /// The limit.
         limit: u64,
     },
-    /// The file system of shared memory cannot be asked.
+    /// The file system of shared memory cannot be queried.
     #[error("cannot tell how much of /dev/shm is free")]
     Unknown(#[source] io::Error),
 }
@@ -127,8 +127,8 @@ impl DeploymentPlan {
                 Limits::new(view.n_workers.max(1), LARGE_BUFFER, self.held),
                 view.evidence_values,
             );
-            // One to be written while others are read: they are by far the largest messages, and
-            // one that waits would cost as much memory again to save no time.
+            // // One chunk to write while others are read. These are by far the largest messages: a queued
+            // one would cost as much memory again without saving time.
             topics.push(evidence.with_few_chunks(1 + self.held));
             // Poses and expected errors: quality, triangulate, fusion and the recorders.
             let small = self.small(2 + self.n_workers + self.n_recorders);
@@ -144,7 +144,7 @@ impl DeploymentPlan {
             ));
         }
         for worker in 0..self.n_workers {
-            // All views at once send a message for every view but one, in one go.
+            // // Fusion of all views at once sends a message for every view but one at a time.
             let small = self.small(1 + self.n_recorders);
             let buffer = small.buffer.max(self.views.len());
             topics.push(TopicPlan::messages::<PairPose>(
@@ -171,7 +171,7 @@ impl DeploymentPlan {
     }
 }
 
-/// The topics of a process's signs of life and of its times and counts: they never wait and wake nobody.
+/// The topics of a process's heartbeats and metrics: realtime delivery, without wake-up.
 pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     let health = TopicPlan::messages::<Health>(
         topic::health(process),
@@ -186,8 +186,8 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     [health.without_wake_up(), metrics.without_wake_up()]
 }
 
-/// Checks that the pools of all topics fit into what is free of `/dev/shm`, and that the process that has
-/// all topics open, the supervisor, may open so many files.
+/// Checks that the pools of all topics fit into the free part of `/dev/shm`, and that the supervisor, which
+/// has all topics open, may open so many files.
 ///
 /// # Errors
 ///
@@ -259,19 +259,19 @@ mod tests {
     }
 
     #[test]
-    fn counts_chunks_as_subscribers_times_held_and_waiting_and_the_loaned_one() {
+    fn chunks_are_subscribers_times_queued_and_borrowed_plus_one_loan() {
         let topics = plan().topics();
         let evidence = topics
             .iter()
             .find(|it| it.topic() == "evidence/v3/0")
             .unwrap();
-        // 2 workers x (1 waiting + 2 held) + 1 being written, of 40 MB and the headers.
+        // // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
         let chunk = 40_000_000 + 1152;
         assert_eq!(evidence.pool_bytes(), 7 * chunk);
     }
 
     #[test]
-    fn where_a_sender_may_wait_evidence_takes_one_chunk_more_than_is_held() {
+    fn with_lossless_delivery_evidence_takes_one_chunk_more_than_borrowed() {
         let plan = DeploymentPlan {
             delivery: Delivery::Lossless,
             ..plan()
@@ -320,13 +320,14 @@ mod tests {
     fn too_few_open_files_are_refused_with_the_numbers() {
         check_descriptors(10, 110).unwrap();
         let error = check_descriptors(10, 109).unwrap_err();
-        let said = "deployment needs 110 open files in one process, the limit is 109 open files";
-        assert_eq!(error.to_string(), said);
+        let expected =
+            "deployment needs 110 open files in one process, the limit is 109 open files";
+        assert_eq!(error.to_string(), expected);
         assert!(error.hint().unwrap().contains("ulimit -n 110"));
     }
 
     #[test]
-    fn exactly_enough_is_enough() {
+    fn exactly_enough_memory_is_accepted() {
         let topics = plan().topics();
         let PreflightError::TooLarge { needed_bytes, .. } = check_room(&topics, 0).unwrap_err()
         else {

@@ -1,4 +1,4 @@
-//! How a process ends badly: what happened, why, what to try, and its exit status.
+//! Failures that end a process: what happened, why, what to try, and the exit status.
 
 use core::error::Error;
 use core::fmt;
@@ -35,7 +35,7 @@ pub enum ExitKind {
     Input,
     /// A calibration cannot be used.
     Calibration,
-    /// A limit that was asked for was missed.
+    /// A requested limit was missed.
     Limit,
     /// The run ended, but degraded.
     Degraded,
@@ -77,7 +77,7 @@ impl ExitKind {
             .find(|kind| i32::from(kind.status()) == status)
     }
 
-    /// Whether the process would fail again in the same way: the fault is in what it was given.
+    /// Whether the process would fail again in the same way, because its input is wrong.
     pub fn is_permanent(self) -> bool {
         matches!(
             self,
@@ -113,7 +113,7 @@ impl Failure {
         self
     }
 
-    /// Adds something else that the user may try, or know.
+    /// Adds another hint for the user.
     #[must_use]
     pub fn with_another_hint(self, hint: impl Into<String>) -> Self {
         let hint = hint.into();
@@ -153,7 +153,7 @@ impl Failure {
     /// Reports to standard error and turns into the exit status.
     pub fn exit(&self) -> ExitCode {
         if self.report(&mut io::stderr().lock()).is_err() {
-            // There is nobody left to tell.
+            // // The failure cannot be reported.
         }
         ExitCode::from(self.kind.status())
     }
@@ -192,7 +192,7 @@ impl<E: Fault> From<E> for Failure {
 const ROOM: &str =
     "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
 
-/// Where there was no room for a segment: how much was wanted, how much there is, and what to try.
+/// If there was no room for a segment: the wanted size, the free size, and what to try.
 fn no_room() -> Option<String> {
     let kilobytes = |bytes: u64| bytes.div_ceil(1000);
     Some(match crate::reserve::refused()? {
@@ -270,7 +270,7 @@ mod tests {
     struct Outer(#[source] std::io::Error);
 
     #[test]
-    fn a_report_tells_what_why_and_what_to_try() {
+    fn a_report_shows_error_cause_and_hints() {
         let failure = Failure::new(
             ExitKind::Input,
             Outer(std::io::Error::other("no such disk")),
@@ -296,9 +296,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_the_input_stays_wrong() {
+    fn faults_of_the_input_are_permanent() {
         let permanent = ExitKind::ALL.map(|kind| (kind.status(), kind.is_permanent()));
-        let statuses = permanent.iter().filter(|it| it.1).map(|it| it.0);
+        let statuses = permanent
+            .iter()
+            .filter(|(_, is_permanent)| *is_permanent)
+            .map(|(status, _)| *status);
         assert_eq!(statuses.collect::<Vec<_>>(), [2, 3, 4, 5]);
     }
 }

@@ -1,5 +1,5 @@
-//! What a process does first: its files are its user's alone, a file that may not grow is an error and not a signal,
-//! and memory that is taken away ends it with a message.
+//! Set-up of every process: files are private to the user, exceeding the limit on the size of a file is an
+//! error instead of a signal, and missing shared memory ends the process with a message.
 #![expect(
     unsafe_code,
     reason = "handlers of signals that say where memory was missing have no safe binding"
@@ -16,7 +16,7 @@ use rustix::process::umask;
 
 use crate::ExitKind;
 
-/// What nobody else may do with what a process makes, whatever its umask was.
+/// The umask of the process: no access for group and others.
 const OTHERS: Mode = Mode::RWXG.union(Mode::RWXO);
 const NO_MEMORY: &[u8] = b"error: shared memory of the deployment is gone or damaged (SIGBUS)\n  \
     hint: something else has cut off, filled or changed files in /dev/shm while they were in use; \
@@ -27,19 +27,18 @@ const WRONG_MEMORY: &[u8] = b"error: a process has used memory that is not there
 
 /// Prepares the process. Call it first, from the main thread.
 ///
-/// * What it makes is for its user alone (umask 077): results show people.
-/// * A limit on the size of files (`ulimit -f`) makes writing fail with `EFBIG`, in place of a signal that ends the
-///   process (SIGXFSZ).
-/// * SIGBUS and SIGSEGV end it with a message and exit status 1. The queues of the transport lie in files, and who may
-///   write these, the same user, can cut them off or write nonsense to them; not all of that can be found
-///   before it is used.
+/// * New files are private to the user (umask 077): results show people.
+/// * Exceeding the limit on the size of files (`ulimit -f`) makes writing fail with `EFBIG`, instead of a
+///   signal that ends the process (SIGXFSZ).
+/// * SIGBUS and SIGSEGV end it with a message and exit status 1. The queues of the transport are in files
+///   that the same user may truncate or corrupt; not all of that can be detected before use.
 ///
 /// # Errors
 ///
-/// The system refuses a handler.
+/// A signal handler cannot be installed.
 pub fn guard_process() -> io::Result<()> {
     umask(umask(OTHERS) | OTHERS);
-    // SAFETY: to ignore a signal has no precondition.
+    // // SAFETY: ignoring a signal has no precondition.
     let before = unsafe { libc::signal(SIGXFSZ, SIG_IGN) };
     if before == libc::SIG_ERR {
         return Err(io::Error::last_os_error());
@@ -54,9 +53,10 @@ fn handle(signal: c_int) -> io::Result<()> {
     // SAFETY: all zeros is a value of this structure of numbers, flags and an address.
     let mut action: sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     action.sa_sigaction = end as *const () as usize;
-    // The stack may be what is at its end; the standard library gives every thread another for this.
+    // // The stack may have overflowed; the standard library gives every thread an alternative one for
+    // handlers.
     action.sa_flags = SA_SIGINFO | SA_ONSTACK;
-    // SAFETY: the structure is whole, and the handler does nothing that is not allowed in one.
+    // // SAFETY: the structure is initialised, and the handler is async-signal-safe.
     let outcome = unsafe { sigaction(signal, &raw const action, core::ptr::null_mut()) };
     if outcome == 0 {
         Ok(())
@@ -65,16 +65,16 @@ fn handle(signal: c_int) -> io::Result<()> {
     }
 }
 
-/// Says what happened and ends the process: two system calls.
+/// Writes the message and ends the process: two system calls.
 extern "C" fn end(signal: c_int, _info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
     let text = if signal == SIGBUS {
         NO_MEMORY
     } else {
         WRONG_MEMORY
     };
-    // SAFETY: the descriptor is that of standard error for as long as the process lives.
+    // // SAFETY: standard error stays open for the life of the process.
     let stderr = unsafe { BorrowedFd::borrow_raw(libc::STDERR_FILENO) };
-    // There is nobody left to tell of a failure.
+    // // A failure cannot be reported.
     rustix::io::write(stderr, text).ok();
     signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
 }

@@ -1,4 +1,4 @@
-//! Signs of life, sent by a thread of their own.
+//! Heartbeats and metrics, sent by a thread of their own.
 
 use core::time::Duration;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -11,28 +11,28 @@ use rustix::time::{ClockId, clock_gettime};
 
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory, now_nanos};
 
-/// Pause between two signs of life.
+/// Period of the heartbeats.
 pub const HEARTBEAT: Duration = Duration::from_millis(150);
-/// Signs of life from one message of times and counts to the next: about a second.
-const SIGNS_PER_METRICS: u32 = 7;
+/// Heartbeats from one metrics message to the next: about a second.
+const HEARTBEATS_PER_METRICS: u32 = 7;
 
-/// Signs of life cannot be sent.
+/// Heartbeats cannot be sent.
 #[derive(Debug, thiserror::Error)]
 pub enum HealthError {
-    /// The topic is not there.
+    /// The topic cannot be opened.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The thread cannot be started.
-    #[error("cannot start the thread that sends signs of life")]
+    #[error("cannot start the thread that sends heartbeats")]
     Thread(#[source] std::io::Error),
 }
 
 impl crate::Fault for HealthError {}
 
-/// What a process has done, published several times a second until this is dropped.
+/// The counters and times of a process, published several times a second until this is dropped.
 ///
-/// A thread of its own sends, so that a process which is stopped (SIGSTOP) falls silent, while one
-/// whose main loop hangs goes on sending a [`Progress`] that stands still.
+/// A separate thread sends them. So a process that is stopped (SIGSTOP) sends nothing, while one whose main
+/// loop hangs continues to send, with a [`Progress`] that does not change.
 #[derive(Debug)]
 pub struct Health {
     counts: Arc<Counts>,
@@ -58,7 +58,7 @@ struct Counts {
 }
 
 impl Health {
-    /// Begins to send.
+    /// Starts to send.
     ///
     /// # Errors
     ///
@@ -79,24 +79,24 @@ impl Health {
             began_at_nanos: now_nanos(),
             meter: Mutex::default(),
         });
-        // Ports stay in the thread that makes them, so it has to make its own.
-        let (answer, answered) = mpsc::sync_channel(1);
-        let seed = bus.seed();
+        // // Ports cannot move to another thread, so the thread creates its own.
+        let (result_sender, result_receiver) = mpsc::sync_channel(1);
+        let parts = bus.parts();
         let process = launch.process.clone();
         let shared = Arc::clone(&counts);
         let thread = thread::Builder::new()
             .name("health".to_owned())
             .spawn(move || {
-                let bus = seed.grow();
+                let bus = parts.into_bus();
                 match Sender::open(&bus, &process, &shared) {
                     Ok(sender) => {
-                        if answer.send(Ok(())).is_ok() {
+                        if result_sender.send(Ok(())).is_ok() {
                             sender.send_until_ended();
                         }
                     }
                     Err(error) => {
-                        if answer.send(Err(error)).is_err() {
-                            tracing::debug!("nobody waits for the signs of life");
+                        if result_sender.send(Err(error)).is_err() {
+                            tracing::debug!("the start of the heartbeats is not awaited any more");
                         }
                     }
                 }
@@ -106,7 +106,7 @@ impl Health {
             counts,
             thread: Some(thread),
         };
-        match answered.recv() {
+        match result_receiver.recv() {
             Ok(result) => result?,
             Err(error) => {
                 return Err(HealthError::Thread(std::io::Error::other(error)));
@@ -115,13 +115,13 @@ impl Health {
         Ok(health)
     }
 
-    /// Counts messages taken in.
+    /// /// Counts received messages.
     pub fn received(&self, n: u64) {
         self.counts.n_received.fetch_add(n, Ordering::Relaxed);
     }
 
-    /// Counts a message sent out, which is a turn of the main loop: who always finds more to do never waits.
-    /// The first is told at once, so that it is soon known that the process works.
+    /// Counts a sent message, and an iteration of the main loop: a process that is always busy never waits.
+    /// The first one triggers a heartbeat at once, so that the supervisor soon knows that the process works.
     pub fn sent(&self, frame: u64) {
         self.counts.last_frame.store(frame, Ordering::Relaxed);
         self.counts.progress.tick();
@@ -134,7 +134,7 @@ impl Health {
         }
     }
 
-    /// Has the caller of [`Self::sent`] compute for ever on purpose, once it has sent something of a later frame.
+    /// Makes [`Self::sent`] loop forever on purpose, once a message of a later frame has been sent.
     pub fn spin_after(&self, frame: u64) {
         self.counts.spins_after.store(frame, Ordering::Relaxed);
     }
@@ -142,12 +142,12 @@ impl Health {
     /// Counts messages or frames that were lost.
     pub fn dropped(&self, cause: Cause, n: u64) {
         if n > 0 {
-            self.counts.meter(|it| it.dropped(cause, n));
+            self.counts.meter(|meter| meter.dropped(cause, n));
         }
     }
 
-    /// Counts a message that was refused, and logs why: the first of every cause, and then every time
-    /// there are twice as many.
+    /// Counts a message that was refused, and logs why: the first of every cause, and then each time the
+    /// count has doubled.
     pub fn refuse(&self, cause: Refusal, topic: &str, why: &dyn core::fmt::Display) {
         self.dropped(Cause::Malformed, 1);
         let n = 1 + self.counts.refused[cause as usize].fetch_add(1, Ordering::Relaxed);
@@ -156,41 +156,41 @@ impl Health {
         }
     }
 
-    /// Notes how a frame went through the process.
+    /// Records the times of a frame in the process.
     pub fn passed(&self, passage: &Passage) {
-        self.counts.meter(|it| it.passed(passage));
+        self.counts.meter(|meter| meter.passed(passage));
     }
 
-    /// Notes a duration, nanoseconds.
+    /// /// Records a duration, nanoseconds.
     ///
     /// * `view`: of which view, if of one.
     pub fn spent(&self, span: Span, view: Option<usize>, nanos: u64) {
-        self.counts.meter(|it| it.spent(span, view, nanos));
+        self.counts.meter(|meter| meter.spent(span, view, nanos));
     }
 
-    /// Notes how many frames or results wait in the process.
+    /// Records how many frames or results wait in the process.
     pub fn queued(&self, n: usize) {
-        self.counts.meter(|it| it.queued(n));
+        self.counts.meter(|meter| meter.queued(n));
     }
 
-    /// Counts evidence that was sent out.
+    /// Counts evidence that was sent.
     pub fn sent_evidence(&self, bytes: u64) {
-        self.counts.meter(|it| it.sent_evidence(bytes));
+        self.counts.meter(|meter| meter.sent_evidence(bytes));
     }
 
-    /// Says whose view the process works for.
+    /// Sets the view that the process works for.
     ///
     /// * `name`: the camera's.
     pub fn belongs_to(&self, view: usize, name: &str) {
-        self.counts.meter(|it| it.belongs_to(view, name));
+        self.counts.meter(|meter| meter.belongs_to(view, name));
     }
 
-    /// Says how much work there is, if that is known.
+    /// Sets the total number of frames, if it is known.
     pub fn set_total(&self, frames: u64) {
         self.counts.n_total.store(frames, Ordering::Relaxed);
     }
 
-    /// Says that the end of the footage has been seen and passed on.
+    /// Records that the end of stream has been received and sent on.
     pub fn finished(&self) {
         self.counts.finished.store(1, Ordering::Relaxed);
     }
@@ -202,16 +202,16 @@ impl Drop for Health {
         if let Some(thread) = self.thread.take() {
             thread.thread().unpark();
             if thread.join().is_err() {
-                tracing::debug!("the thread that sends signs of life has panicked");
+                tracing::debug!("the thread that sends heartbeats has panicked");
             }
         }
     }
 }
 
-/// The thread that sends.
+/// /// The ports of the sending thread.
 struct Sender<'a> {
     counts: &'a Counts,
-    signs: Publisher<HealthMessage>,
+    heartbeats: Publisher<HealthMessage>,
     metrics: Publisher<Metrics>,
 }
 
@@ -219,30 +219,30 @@ impl<'a> Sender<'a> {
     fn open(bus: &Bus, process: &str, counts: &'a Counts) -> Result<Self, PortError> {
         Ok(Self {
             counts,
-            signs: bus.publisher(&topic::health(process))?,
+            heartbeats: bus.publisher(&topic::health(process))?,
             metrics: bus.publisher(&topic::metrics(process))?,
         })
     }
 
-    /// The last messages go out after the end, so that the final counts are seen. Who begins to look is
-    /// told at once.
+    /// The last messages are sent after the end, so that the final counts are reported. A new observer gets
+    /// metrics at once.
     fn send_until_ended(&self) {
         let mut rates = Rates::new(self.counts.began_at_nanos);
-        let (mut n_signs, mut n_looking) = (0_u32, 0);
+        let (mut n_heartbeats, mut n_observers) = (0_u32, 0);
         loop {
             let ended = self.counts.ended.load(Ordering::Acquire);
-            if let Err(error) = self.signs.send(&self.counts.message()) {
-                tracing::debug!(%error, "cannot send a sign of life");
+            if let Err(error) = self.heartbeats.send(&self.counts.message()) {
+                tracing::debug!(%error, "cannot send a heartbeat");
             }
             let n_now = self.metrics.n_connected();
-            if ended || n_signs.is_multiple_of(SIGNS_PER_METRICS) || n_now > n_looking {
+            if ended || n_heartbeats.is_multiple_of(HEARTBEATS_PER_METRICS) || n_now > n_observers {
                 let mut message = self.counts.metrics();
                 rates.fill(&mut message);
                 if let Err(error) = self.metrics.send(&message) {
-                    tracing::debug!(%error, "cannot send times and counts");
+                    tracing::debug!(%error, "cannot send metrics");
                 }
             }
-            (n_signs, n_looking) = (n_signs.wrapping_add(1), n_now);
+            (n_heartbeats, n_observers) = (n_heartbeats.wrapping_add(1), n_now);
             if ended {
                 return;
             }
@@ -253,12 +253,12 @@ impl<'a> Sender<'a> {
 
 impl Counts {
     fn message(&self) -> HealthMessage {
-        let computing = self.meter(|it| {
-            (0..it.n_rows())
-                .filter_map(|row| it.row(row))
-                .find(|it| it.span == Span::COMPUTING)
+        let computing = self.meter(|meter| {
+            (0..meter.n_rows())
+                .filter_map(|index| meter.row(index))
+                .find(|row| row.span == Span::COMPUTING)
         });
-        let micros = |nanos: Option<u64>| nanos.map_or(0, |it| it / 1000);
+        let micros = |nanos: Option<u64>| nanos.map_or(0, |nanos| nanos / 1000);
         HealthMessage {
             session: self.session,
             pid: std::process::id(),
@@ -267,19 +267,23 @@ impl Counts {
             at_nanos: now_nanos(),
             n_received: self.n_received.load(Ordering::Relaxed),
             n_sent: self.n_sent.load(Ordering::Relaxed),
-            n_dropped: self.meter(|it| it.n_dropped()),
+            n_dropped: self.meter(|meter| meter.n_dropped()),
             last_frame: self.last_frame.load(Ordering::Relaxed),
-            p50_micros: micros(computing.map(|it| it.p50_nanos)),
-            p99_micros: micros(computing.map(|it| it.p99_nanos)),
+            p50_micros: micros(computing.map(|row| row.p50_nanos)),
+            p99_micros: micros(computing.map(|row| row.p99_nanos)),
             peak_memory_bytes: memory::peak_memory().unwrap_or(0),
             finished: self.finished.load(Ordering::Relaxed),
             cpu_millis: cpu_millis(),
             n_total: self.n_total.load(Ordering::Relaxed),
-            refused: self.refused.each_ref().map(|it| it.load(Ordering::Relaxed)),
+            refused: self
+                .refused
+                .each_ref()
+                .map(|count| count.load(Ordering::Relaxed)),
         }
     }
 
-    /// All but the rates. The main loop waits for one row at most, not for all of them.
+    /// The metrics without the rates. The meter is locked row by row, so that the main loop waits for one row
+    /// at most.
     fn metrics(&self) -> Metrics {
         let [memory_bytes, peak_memory_bytes] = memory::memory_now().unwrap_or_default();
         let mut message = Metrics {
@@ -293,10 +297,10 @@ impl Counts {
             memory_bytes,
             peak_memory_bytes,
             finished: self.finished.load(Ordering::Relaxed),
-            ..self.meter(|it| it.head())
+            ..self.meter(|meter| meter.head())
         };
         for (row, index) in message.rows.iter_mut().zip(0_u32..) {
-            let Some(now) = self.meter(|it| it.row(index as usize)) else {
+            let Some(now) = self.meter(|meter| meter.row(index as usize)) else {
                 break;
             };
             *row = now;
@@ -321,6 +325,6 @@ fn spin() -> ! {
 fn cpu_millis() -> u32 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;
-    // What is cut off is of no interest: differences are formed.
+    // // The high bits do not matter: only differences are used.
     (millis & i64::from(u32::MAX)) as u32
 }

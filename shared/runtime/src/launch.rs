@@ -1,4 +1,4 @@
-//! What a supervisor tells the processes it starts, as command line arguments.
+//! The command line arguments that a supervisor passes to its processes.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -7,10 +7,10 @@ use tracing::Level;
 
 use crate::{Delivery, ExitKind, Fault, Namespace, NamespaceError, Scheduling};
 
-/// The arguments of a service are not those that a supervisor gives.
+/// The arguments of a service are not those of a supervisor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LaunchError {
-    /// A flag is not there.
+    /// A flag is missing.
     #[error("service needs {flag}; services are started by `parallax run`")]
     Missing {
         /// The flag.
@@ -21,9 +21,9 @@ pub enum LaunchError {
     Value {
         /// The flag.
         flag: &'static str,
-        /// What was given.
+        /// The given value.
         value: String,
-        /// What would do.
+        /// The expected kind of value.
         expected: &'static str,
     },
     /// The namespace is wrong.
@@ -37,24 +37,24 @@ impl Fault for LaunchError {
     }
 }
 
-/// What a process has to know about the deployment it is part of.
+/// What a process needs to know about its deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Launch {
-    /// Where its shared memory lives.
+    /// The location of its shared memory.
     pub namespace: Namespace,
     /// Its unique name in the deployment, for example `pose-2`.
     pub process: String,
-    /// The run; goes into the stamp of every message.
+    /// The session, which goes into the stamp of every message.
     pub session: u64,
     /// How often the process has been restarted; goes into the stamp of every message.
     pub epoch: u32,
     /// What happens when a receiver is slower than its sender.
     pub delivery: Delivery,
-    /// The process that started it, and without which it ends.
+    /// The process id of the supervisor; the process ends when that one ends.
     pub supervisor: Option<u32>,
     /// The least important events that are logged.
     pub log: Level,
-    /// What it asks of the system's scheduler.
+    /// Its requests to the system's scheduler.
     pub scheduling: Scheduling,
 }
 
@@ -103,7 +103,7 @@ impl Launch {
         args
     }
 
-    /// Takes its own arguments out of a command line and answers with the rest, in order.
+    /// Takes its own arguments out of a command line and returns the rest, in order.
     ///
     /// # Errors
     ///
@@ -222,14 +222,14 @@ mod tests {
     }
 
     #[test]
-    fn arguments_come_back_as_they_went() {
+    fn arguments_survive_a_round_trip() {
         let (read, rest) = Launch::from_args(launch().to_args()).unwrap();
         assert_eq!(read, launch());
         assert_eq!(rest, Vec::<OsString>::new());
     }
 
     #[test]
-    fn other_arguments_are_left_in_order() {
+    fn other_arguments_are_returned_in_order() {
         let mut args: Vec<OsString> = vec!["--view".into(), "2".into()];
         args.extend(launch().to_args());
         args.push("--last".into());
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_value_is_named() {
+    fn an_invalid_value_is_named() {
         let mut args = launch().to_args();
         args.extend(["--epoch".into(), "often".into()]);
         let error = Launch::from_args(args).unwrap_err();

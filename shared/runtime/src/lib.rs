@@ -1,4 +1,4 @@
-//! Ports, wake-up, stopping, health and logging: the only crate that talks to iceoryx2 and to the
+//! Ports, wake-ups, stop requests, heartbeats and logging: the only crate that calls iceoryx2 and the
 //! operating system.
 
 mod deployment;

@@ -1,4 +1,4 @@
-//! One run of a deployment at a time, beginning and ending with nothing left behind.
+//! The lock of a deployment: one run at a time, which starts and ends with no files left behind.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -23,12 +23,12 @@ pub(crate) const LOCK_FILE: &str = "lock";
 /// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
 /// How long observers are given to leave.
-const LEAVING_LIMIT: Duration = Duration::from_secs(1);
+const OBSERVER_LIMIT: Duration = Duration::from_secs(1);
 /// How long the processes of a killed supervisor are given to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
 const DYING_PAUSE: Duration = Duration::from_millis(20);
 
-/// The deployment is not free.
+/// The deployment cannot be locked.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another supervisor runs it.
@@ -78,8 +78,8 @@ impl Fault for LockError {
     }
 }
 
-/// The right to run a deployment. When it is dropped, nothing of the deployment is left in its
-/// directory and in `/dev/shm`, unless a process of it is still alive.
+/// The lock of a deployment. Dropping it removes all files of the deployment from its directory and from
+/// `/dev/shm`, unless one of its processes is still alive.
 #[derive(Debug)]
 pub struct DeploymentLock {
     namespace: Namespace,
@@ -89,14 +89,14 @@ pub struct DeploymentLock {
 }
 
 impl Namespace {
-    /// Takes the right to run this deployment, and removes what a killed run left behind.
+    /// Locks this deployment, and removes the files that a killed run left behind.
     ///
     /// # Errors
     ///
     /// [`LockError`].
     pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
         let (root, file) = lock_file(self)?;
-        // The run before may have taken its mark away since.
+        // // The previous run may have removed its marker file in the meantime.
         root.mark(self).map_err(BusError::from)?;
         private::shared_memory(self).map_err(BusError::from)?;
         let config = self.config().map_err(BusError::from)?;
@@ -140,7 +140,7 @@ impl DeploymentLock {
             tracing::debug!(%error, "cannot ask observers to leave");
         }
         let begin = Instant::now();
-        while !alive(&self.config).is_empty() && begin.elapsed() < LEAVING_LIMIT {
+        while !alive(&self.config).is_empty() && begin.elapsed() < OBSERVER_LIMIT {
             sleep(DYING_PAUSE);
         }
     }
@@ -151,7 +151,7 @@ impl Drop for DeploymentLock {
         self.wait_for_observers_to_leave();
         let alive = alive(&self.config);
         if !alive.is_empty() {
-            tracing::warn!(?alive, "processes are left: so are their files");
+            tracing::warn!(?alive, "processes are still alive, so their files are kept");
             return;
         }
         let root = &self.root;
@@ -191,7 +191,7 @@ fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
             Err(error) => return Err(failed(error.into())),
         }
         let own = file.metadata().map_err(failed)?.ino();
-        if beneath::look(&root, c"lock").is_ok_and(|there| there.st_ino == own) {
+        if beneath::stat_in(&root, c"lock").is_ok_and(|stat| stat.st_ino == own) {
             file.set_len(0).map_err(failed)?;
             file.rewind().map_err(failed)?;
             write!(file, "{}", std::process::id()).map_err(failed)?;
@@ -202,23 +202,24 @@ fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
 
 /// Names and process ids of the processes that are registered and alive.
 pub(crate) fn alive(config: &Config) -> Vec<String> {
-    let text = |it: Option<(String, u32)>| match it {
+    let text = |node: Option<(String, u32)>| match node {
         Some((name, pid)) => format!("{name} ({pid})"),
-        None => "a process that begins".to_owned(),
+        None => "a process that is starting".to_owned(),
     };
     living(config).into_iter().map(text).collect()
 }
 
-/// The same, apart; none for a process that has not written its name yet.
+/// The same as name and process id; none for a process that has not written its name yet.
 pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
     let mut living = Vec::new();
     let listed = Node::<ipc::Service>::list(config, |state| {
         if let NodeState::Alive(node) = state {
-            living.push(
-                node.details()
-                    .as_ref()
-                    .map(|it| (it.name().to_string(), it.process_id().value() as u32)),
-            );
+            living.push(node.details().as_ref().map(|details| {
+                (
+                    details.name().to_string(),
+                    details.process_id().value() as u32,
+                )
+            }));
         }
         CallbackProgression::Continue
     });
@@ -228,7 +229,7 @@ pub(crate) fn living(config: &Config) -> Vec<Option<(String, u32)>> {
     living
 }
 
-/// Removes everything but the lock and the mark. Nothing may be alive.
+/// Removes everything but the lock file and the marker file. No process may be alive.
 fn wipe(namespace: &Namespace, root: &Root) -> Result<(), LockError> {
     root.empty().map_err(unusable(namespace))?;
     private::remove_shared_memory(namespace).map_err(BusError::from)?;

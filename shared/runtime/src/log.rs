@@ -1,4 +1,4 @@
-//! Events on standard error, one line each, with the time and the name of the process.
+//! Log lines on standard error, with the time and the name of the process.
 
 use core::fmt;
 use std::io;
@@ -11,12 +11,12 @@ use tracing_subscriber::fmt::time::{FormatTime as _, SystemTime};
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::registry::LookupSpan;
 
-/// Sends the events of this process, and those of iceoryx2, to standard error.
+/// Logs the events of this process and of iceoryx2 to standard error.
 ///
-/// A second call changes nothing.
+/// A second call has no effect.
 ///
-/// * `process`: goes into every line.
-/// * `level`: the least important events that are shown.
+/// * `process`: its name, part of every line.
+/// * `level`: the least severe events that are logged.
 pub fn init_logging(process: &str, level: Level) {
     let set = tracing_subscriber::fmt()
         .with_max_level(level)
@@ -37,9 +37,9 @@ pub fn init_logging(process: &str, level: Level) {
     }
 }
 
-/// Has iceoryx2 log through `tracing` instead of to standard error.
+/// Makes iceoryx2 log through `tracing` instead of to standard error.
 pub(crate) fn adopt_transport_log() {
-    // False if it has been done before.
+    // // False if it is set already.
     set_logger(&FromTransport);
 }
 
@@ -66,8 +66,7 @@ where
     }
 }
 
-/// iceoryx2's own log, whose errors are failures that this crate reports as well: kept for those who
-/// ask for details.
+/// The log of iceoryx2. This crate reports its errors as well, so they are logged as details only.
 struct FromTransport;
 
 impl iceoryx2_log::Log for FromTransport {

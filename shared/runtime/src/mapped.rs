@@ -1,25 +1,25 @@
-//! Where in shared memory something lies, which is the same for all processes that see it.
+//! The location of data in shared memory, which is the same for all processes that map it.
 
 use std::io;
 use std::path::PathBuf;
 
-/// Where in shared memory something lies: two processes that name the same place see the same bytes, not copies.
+/// A location in shared memory: two processes with the same location see the same bytes, not copies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mapped {
     /// The file that is mapped.
     pub file: PathBuf,
     /// Number of the file in its file system.
     pub inode: u64,
-    /// Where in the file, bytes.
+    /// Offset in the file, bytes.
     pub offset: u64,
-    /// Whether this process may write there.
+    /// Whether this process may write to it.
     pub is_writable: bool,
 }
 
-/// Where in shared memory an array lies as a whole; none if it lies in the process's own memory.
+/// The location of an array in shared memory; none if it is in the process's own memory.
 ///
-/// It reads the memory map of the process (`/proc/self/maps`): for tests and for looking closely, not for every
-/// message.
+/// It reads the memory map of the process (`/proc/self/maps`): meant for tests and diagnosis, too slow for
+/// every message.
 ///
 /// # Errors
 ///
@@ -33,12 +33,12 @@ pub fn mapped_at<T>(array: &[T]) -> io::Result<Option<Mapped>> {
 
 fn find(maps: &str, begin: usize, end: usize) -> Option<Mapped> {
     let mut mappings = maps.lines().filter_map(Mapping::parse);
-    let it = mappings.find(|it| it.address <= begin && end <= it.address + it.len)?;
-    it.shared.then(|| Mapped {
-        file: PathBuf::from(it.path),
-        inode: it.inode,
-        offset: it.offset + (begin - it.address) as u64,
-        is_writable: it.writable,
+    let mapping = mappings.find(|it| it.address <= begin && end <= it.address + it.len)?;
+    mapping.shared.then(|| Mapped {
+        file: PathBuf::from(mapping.path),
+        inode: mapping.inode,
+        offset: mapping.offset + (begin - mapping.address) as u64,
+        is_writable: mapping.writable,
     })
 }
 
@@ -47,7 +47,7 @@ fn find(maps: &str, begin: usize, end: usize) -> Option<Mapped> {
 pub(crate) struct Mapping<'a> {
     pub(crate) address: usize,
     pub(crate) len: usize,
-    /// Whether what this process writes reaches the file.
+    /// Whether it is shared with the file.
     pub(crate) shared: bool,
     pub(crate) writable: bool,
     pub(crate) offset: u64,
@@ -91,7 +91,7 @@ mod tests {
 ";
 
     #[test]
-    fn reads_a_line_of_the_memory_map() {
+    fn a_line_of_the_memory_map_is_parsed() {
         let expected = Mapping {
             address: 0x7f00_0000_0000,
             len: 0x3000,
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_counts_from_the_begin_of_the_file() {
+    fn the_offset_counts_from_the_start_of_the_file() {
         let place = find(MAPS, 0x7f00_0000_1040, 0x7f00_0000_3000).unwrap();
         assert_eq!((place.inode, place.offset), (42, 0x3040));
         assert!(place.is_writable);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_shared_or_reaches_beyond_has_no_place() {
+    fn private_or_partly_mapped_memory_has_no_location() {
         for (begin, end) in [
             (0x7f00_0000_2fff, 0x7f00_0000_3001),
             (0x7f00_0000_8000, 0x7f00_0000_8001),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_of_the_process_itself_has_no_place() {
+    fn private_memory_of_the_process_has_no_location() {
         let own: Vec<u8> = (0..100).collect();
         assert_eq!(mapped_at(&own).unwrap(), None);
     }

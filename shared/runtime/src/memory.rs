@@ -1,4 +1,4 @@
-//! Shared memory that is really there before it is written to.
+//! Allocating shared memory before it is written to.
 #![expect(
     unsafe_code,
     reason = "madvise has no safe binding, and recycled shared memory no safe view"
@@ -23,7 +23,7 @@ use crate::reserve::{self, Refused};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// The memory of a pool is not there.
+/// The memory of a pool cannot be allocated.
 #[derive(Debug, thiserror::Error)]
 pub enum MemoryError {
     /// The file system of shared memory is full.
@@ -35,10 +35,10 @@ pub enum MemoryError {
         path: PathBuf,
         /// Its size.
         needed_bytes: u64,
-        /// What is left.
+        /// Free bytes.
         free_bytes: u64,
     },
-    /// No file of this process may be as large.
+    /// It exceeds the limit on the size of a file.
     #[error("{path:?} needs {needed_bytes} bytes of shared memory, a file may have {limit_bytes}")]
     Limited {
         /// The pool.
@@ -66,47 +66,46 @@ pub enum MemoryError {
 ///
 /// # Errors
 ///
-/// There is none.
+/// The file system cannot be queried.
 pub fn free_shared_memory() -> io::Result<u64> {
     free_space(Path::new(SHARED_MEMORY))
 }
 
-/// Bytes that are free in the file system of a file or folder that is there.
+/// Bytes that are free in the file system of an existing file or folder.
 ///
 /// # Errors
 ///
-/// There is nothing of that name.
+/// The path does not exist.
 pub fn free_space(path: &Path) -> io::Result<u64> {
     let status = statvfs(path)?;
     Ok(status.f_bavail * status.f_frsize)
 }
 
-/// Most bytes of physical memory that this process has ever held (`VmHWM`); `None` where the system does
-/// not say.
+/// Peak physical memory of this process, bytes (`VmHWM`); `None` where the system does not report it.
 pub fn peak_memory() -> Option<u64> {
-    memory_now().map(|it| it[1])
+    memory_now().map(|[_, peak]| peak)
 }
 
-/// Bytes of physical memory that this process holds now (`VmRSS`) and has ever held (`VmHWM`); `None`
-/// where the system does not say.
+/// Current (`VmRSS`) and peak (`VmHWM`) physical memory of this process, bytes; `None` where the system does
+/// not report it.
 pub(crate) fn memory_now() -> Option<[u64; 2]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let bytes = |key: &str| -> Option<u64> {
-        let line = status.lines().find_map(|it| it.strip_prefix(key))?;
+        let line = status.lines().find_map(|line| line.strip_prefix(key))?;
         let kib: u64 = line.split_whitespace().next()?.parse().ok()?;
         Some(kib * 1024)
     };
     Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
 }
 
-/// Allocates every page of the pool of one publisher, and maps those of its first chunks, which are
-/// the ones it uses again and again as long as they do.
+/// Allocates every page of a publisher's pool, and maps those of its first chunks, which it reuses as long as
+/// they suffice.
 ///
-/// A page that was never touched costs a fault and its zeroing when it is first written (a frame of
-/// 6 megabytes 20 ms instead of 0.4 ms), and if the file system is full by then the kernel kills the
-/// process with SIGBUS. Both are paid or reported here instead.
+/// The first write to a page costs a page fault and its zeroing (20 ms instead of 0.4 ms for a frame of 6
+/// megabytes), and if the file system is full by then the kernel kills the process with SIGBUS. Here the cost
+/// is paid in advance and the failure is reported.
 ///
-/// * `port`: the number that iceoryx2 gave the publisher; its pool carries it in its name.
+/// * `port`: the number of the publisher in iceoryx2, which is part of its pool's file name.
 /// * `mapped`: how many chunks of how many are mapped.
 pub(crate) fn populate(
     (prefix, port): (&str, u128),
@@ -121,7 +120,7 @@ pub(crate) fn populate(
             && mapping.path.starts_with(&begin)
             && Path::new(mapping.path)
                 .extension()
-                .is_some_and(|it| it == "data")
+                .is_some_and(|extension| extension == "data")
             && mapping.path.contains(&name);
         if own {
             reserve(&mapping)?;
@@ -131,7 +130,7 @@ pub(crate) fn populate(
     Ok(())
 }
 
-/// Why the pool of a publisher was not made, if that was for want of memory.
+/// Why the pool of a publisher was not created, if memory was the reason.
 ///
 /// * `prefix`: of the files of the deployment.
 pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
@@ -150,7 +149,7 @@ pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
     })
 }
 
-/// Views a loaned array as what it already holds, instead of writing megabytes of zeros to it.
+/// Treats a loaned array as initialised, instead of writing megabytes of zeros to it.
 pub(crate) fn assume_written<E: Element, H: Header>(
     sample: SampleMutUninit<ipc::Service, [MaybeUninit<E>], H>,
 ) -> SampleMut<ipc::Service, [E], H> {
@@ -160,8 +159,7 @@ pub(crate) fn assume_written<E: Element, H: Header>(
 }
 
 impl Mapping<'_> {
-    /// Enters the first pages, a share of all, into the page table. A kernel before 5.14 cannot, and
-    /// does no harm.
+    /// Maps the first pages, a share of all. A kernel before 5.14 does not support this, which does no harm.
     fn touch(&self, [share, of]: [usize; 2]) {
         let len = if share < of {
             self.len / of * share
@@ -169,8 +167,8 @@ impl Mapping<'_> {
             self.len
         };
         let address = core::ptr::with_exposed_provenance_mut(self.address);
-        // SAFETY: the range is the begin of a shared mapping that iceoryx2 made in this process a moment ago and
-        // keeps for the life of the publisher that the caller holds; MADV_POPULATE_WRITE changes no
+        // // SAFETY: the range is the start of a shared mapping that iceoryx2 made in this process a moment
+        // ago and keeps for the life of the publisher that the caller holds; MADV_POPULATE_WRITE changes no
         // byte of it.
         let result = unsafe { madvise(address, len, Advice::LinuxPopulateWrite) };
         if let Err(error) = result {

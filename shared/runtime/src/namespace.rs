@@ -1,4 +1,4 @@
-//! Where the shared memory and files of one deployment live, so that two of them never meet.
+//! The location of a deployment's shared memory and files, which keeps deployments apart.
 
 use std::path::{Path, PathBuf};
 
@@ -18,22 +18,22 @@ const NAME_LEN_MAX: usize = 32;
 /// A deployment name or a directory that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NamespaceError {
-    /// The name would not do as the name of a directory.
+    /// The name is not usable as a directory name.
     #[error(
         "deployment name {name:?} must be 1 to 32 characters of a-z, A-Z, 0-9, '-', '_', '.' and not begin with '.'"
     )]
     Name {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
-    /// Unix sockets have short paths.
+    /// The path is too long for Unix sockets.
     #[error("working directory {root:?} has {len} bytes, sockets below it allow {max}")]
     RootTooLong {
         /// The directory.
         root: PathBuf,
         /// Its length in bytes.
         len: usize,
-        /// What is allowed.
+        /// The limit in bytes.
         max: usize,
     },
     /// The path is not absolute, or not text that iceoryx2 accepts as a path.
@@ -46,9 +46,9 @@ pub enum NamespaceError {
 
 /// The name of a deployment, with the directory and the prefix that keep it apart from others.
 ///
-/// Files lie in `root`, shared memory under `/dev/shm/<prefix>*`. Both follow from the user, the
-/// name and the directory alone, so every process of a deployment computes the same, and what a
-/// killed run left behind is found again. Creating a `Namespace` touches nothing.
+/// Files are in `root`, shared memory is under `/dev/shm/<prefix>*`. Both depend only on the user, the name
+/// and the directory, so every process of a deployment computes the same, and the files of a killed run are
+/// found again. Creating a `Namespace` creates no file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Namespace {
     name: String,
@@ -60,8 +60,7 @@ pub struct Namespace {
 impl Namespace {
     /// The namespace of `deployment` in `/dev/shm/px-<user id>`.
     ///
-    /// A port creates several small files, which costs 10 ms on a disk and nothing to speak of in
-    /// memory, where the messages are in any case.
+    /// A port creates several small files, which takes 10 ms on a disk and very little in memory.
     ///
     /// # Errors
     ///
@@ -126,7 +125,7 @@ impl Namespace {
         &self.name
     }
 
-    /// What all its files in `/dev/shm` begin with.
+    /// The prefix of all its files in `/dev/shm`.
     pub fn prefix(&self) -> &str {
         &self.prefix
     }
@@ -136,13 +135,12 @@ impl Namespace {
         &self.root
     }
 
-    /// The directory that the root lies in.
+    /// The parent directory of the root.
     pub fn base(&self) -> &Path {
         &self.base
     }
 
-    /// The file that points iceoryx2, and its command line tools when run in the root, to this
-    /// deployment.
+    /// The configuration file for iceoryx2, and for its command line tools when run in the root.
     pub fn config_file(&self) -> PathBuf {
         self.root.join("config").join("iceoryx2.toml")
     }
@@ -156,7 +154,7 @@ impl Namespace {
         )
     }
 
-    /// What iceoryx2 has to know.
+    /// The configuration of iceoryx2.
     ///
     /// # Errors
     ///
@@ -173,7 +171,7 @@ impl Namespace {
             .ok()
             .ok_or_else(refused)?;
         config.global.set_root_path(&root);
-        // The supervisor cleans up when a process dies, and nobody else ([`crate::Cleaner`]).
+        // // Only the supervisor cleans up after dead processes ([`crate::Cleaner`]).
         config.global.service.cleanup_dead_nodes_on_open = false;
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
@@ -192,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_begins_or_ends_leaves_the_dead_to_the_supervisor() {
+    fn starting_or_ending_processes_do_not_clean_up_dead_ones() {
         let config = Namespace::new("alone").unwrap().config().unwrap();
         let (node, service) = (&config.global.node, &config.global.service);
         assert!(!node.cleanup_dead_nodes_on_creation);

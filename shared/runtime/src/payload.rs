@@ -1,4 +1,4 @@
-//! What may be sent: plain data without pointers.
+//! Types that may be sent: plain data without pointers.
 
 use core::fmt::Debug;
 
@@ -9,14 +9,14 @@ pub trait Message: Copy + Debug + ZeroCopySend + 'static {}
 
 impl<T: Copy + Debug + ZeroCopySend + 'static> Message for T {}
 
-/// A [`Message`] that travels in front of an array.
+/// A [`Message`] that is sent in front of an array.
 pub trait Header: Message + Default {}
 
 impl<T: Message + Default> Header for T {}
 
-/// An element of an array that is written where it will be read.
+/// An element of an array that is sent in place.
 ///
-/// Sealed: every bit pattern must be a value, because a recycled chunk shows what was in it before.
+/// Sealed: every bit pattern must be valid, because a reused chunk contains old data.
 pub trait Element: Message + sealed::EveryBitPattern {}
 
 impl Element for u8 {}

@@ -1,4 +1,4 @@
-//! How far a process has come, kept in a file beside the deployment's sockets: it outlives the process.
+//! Progress of a process in a file beside the deployment's sockets, so that it survives the process.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -7,10 +7,10 @@ use std::path::PathBuf;
 
 use crate::Bus;
 
-/// Digits of the largest number.
+/// Digits of the largest `u64`.
 const WIDTH: usize = 20;
 
-/// A few numbers that a process notes, and that its next life reads.
+/// A few numbers that a process saves, and reads back after a restart.
 #[derive(Debug)]
 pub struct Place {
     path: PathBuf,
@@ -18,7 +18,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A place in a file, which is made when something is noted.
+    /// Keeps the numbers in a file, which is created when something is saved.
     pub fn new(path: PathBuf) -> Self {
         Self { path, file: None }
     }
@@ -29,20 +29,20 @@ impl Place {
         Self::new(bus.namespace().root().join(file))
     }
 
-    /// What was noted last, by this life or an earlier one; `None` if nothing was.
+    /// The numbers that were saved last, possibly before a restart; `None` if there are none.
     pub fn noted<const N: usize>(&self) -> Option<[u64; N]> {
         let text = fs::read_to_string(&self.path).ok()?;
         let numbers: Result<Vec<u64>, _> = text.split_whitespace().map(str::parse).collect();
         numbers.ok()?.try_into().ok()
     }
 
-    /// Notes numbers, always as many.
+    /// Saves numbers; always the same count.
     ///
-    /// One write in place of the old ones, so that who is killed leaves the old ones or the new ones.
+    /// A single write replaces the old ones, so that a killed process leaves either the old or the new ones.
     ///
     /// # Errors
     ///
-    /// The file cannot be written; then the next life finds what was noted before.
+    /// The file cannot be written; after a restart the numbers saved before are read.
     pub fn note<const N: usize>(&mut self, numbers: [u64; N]) -> io::Result<()> {
         let mut line = Vec::with_capacity(N * (WIDTH + 1));
         for number in numbers {
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_noted_last_is_read_by_the_next_life() {
+    fn the_last_saved_numbers_are_read_after_a_restart() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.place");
         let mut place = Place::new(path.clone());
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nothing_can_be_written_nothing_is_noted() {
+    fn nothing_is_saved_if_the_file_cannot_be_written() {
         let folder = tempfile::tempdir().unwrap();
         let mut place = Place::new(folder.path().join("nowhere").join("a"));
         place.note([1]).unwrap_err();

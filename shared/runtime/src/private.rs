@@ -1,4 +1,5 @@
-//! One user owns a deployment: its directory is nobody else's, shut, and says what it is.
+//! A deployment belongs to one user: its directory is owned by the user, closed to others, and carries a
+//! marker file.
 
 use std::ffi::CString;
 use std::fs::{self, DirBuilder};
@@ -14,30 +15,30 @@ use rustix::process::getuid;
 use crate::lock::{LOCK_FILE, SHARED_MEMORY};
 use crate::{Namespace, beneath};
 
-/// A directory that its owner may enter, and nobody else.
+/// Mode of a directory that only its owner may enter.
 const DIRECTORY: Mode = Mode::RWXU;
-/// A file that its owner may read and write, and nobody else.
+/// Mode of a file that only its owner may read and write.
 const FILE: Mode = Mode::RUSR.union(Mode::WUSR);
-/// What nobody else may do.
+/// The permission bits of group and others.
 const OTHERS: u32 = 0o077;
-/// Others may write.
+/// The write bits of group and others.
 const OTHERS_WRITE: u32 = 0o022;
-/// What is in a directory only its owner may remove.
+/// The sticky bit: only its owner may remove a file of the directory.
 const STICKY: u32 = 0o1000;
-/// The file that says whose a directory is.
+/// The marker file, which names the deployment that a directory belongs to.
 const MARK_FILE: &str = "parallax-deployment";
 
-/// What a deployment uses is another user's, or cannot be shut.
+/// A file or directory of a deployment belongs to another user, or cannot be closed to others.
 #[derive(Debug, thiserror::Error)]
 pub enum PrivacyError {
-    /// It is another user's.
+    /// It belongs to another user.
     #[error("{path:?} belongs to {owner}, this process runs as {user}")]
     Foreign {
         /// The file or directory.
         path: PathBuf,
         /// Whose it is, with the number.
         owner: String,
-        /// Who would use it.
+        /// The user that this process runs as.
         user: String,
     },
     /// It is a symbolic link, which is never followed.
@@ -47,7 +48,7 @@ pub enum PrivacyError {
         path: PathBuf,
         /// Whose it is, with the number.
         owner: String,
-        /// Where it leads.
+        /// Its target.
         target: PathBuf,
     },
     /// It is not a directory.
@@ -56,7 +57,7 @@ pub enum PrivacyError {
         /// What is there.
         path: PathBuf,
     },
-    /// Others may put something else in the place of what is in it.
+    /// Others may replace its entries.
     #[error("{path:?} of {owner} may be written by anybody (mode {mode:o})")]
     Open {
         /// The directory.
@@ -66,7 +67,7 @@ pub enum PrivacyError {
         /// Its mode.
         mode: u32,
     },
-    /// It holds files, and none that says that they are a deployment's.
+    /// It holds files, but not the marker file of a deployment.
     #[error(
         "{path:?} is no directory of a deployment (files in it: {n_files}; none is its {MARK_FILE:?})"
     )]
@@ -76,7 +77,7 @@ pub enum PrivacyError {
         /// Files and directories in it.
         n_files: usize,
     },
-    /// It cannot be looked at, made, or shut.
+    /// It cannot be read, created, or closed to others.
     #[error("cannot make {path:?} one's own")]
     File {
         /// The file or directory.
@@ -111,8 +112,8 @@ impl PrivacyError {
     }
 }
 
-/// The directory of a deployment, open: this user's, shut to others, and marked as what it is. Whatever becomes of
-/// its path, what is removed lies in it.
+/// The open directory of a deployment: owned by this user, closed to others, and with a marker file. Files
+/// are removed by its descriptor, so that replacing its path has no effect.
 #[derive(Debug)]
 pub(crate) struct Root {
     base: OwnedFd,
@@ -126,11 +127,11 @@ impl AsFd for Root {
 }
 
 impl Root {
-    /// Makes the directory of a deployment if it is not there, and checks that it is this user's and nobody
-    /// else may enter it. Whatever the umask is, its mode is 0700 afterwards.
+    /// Creates the directory of a deployment if it does not exist, and checks that it belongs to this user.
+    /// Its mode is 0700 afterwards, whatever the umask.
     ///
-    /// The directory above it must be this user's or the system's, and others must not be able to replace what
-    /// is in it.
+    /// The parent directory must belong to this user or root, and others must not be able to replace its
+    /// entries.
     pub(crate) fn open(namespace: &Namespace) -> Result<Self, PrivacyError> {
         let path = namespace.root();
         loop {
@@ -144,32 +145,32 @@ impl Root {
             if found.st_uid != getuid().as_raw() {
                 return Err(foreign(path, found.st_uid));
             }
-            let it = Self { base, root };
-            match it.claim(namespace) {
+            let directory = Self { base, root };
+            match directory.claim(namespace) {
                 Err(PrivacyError::File { source, .. })
                     if source.kind() == io::ErrorKind::NotFound => {}
                 claimed => {
                     claimed?;
-                    shut(&it.root, &found, path)?;
-                    return Ok(it);
+                    shut(&directory.root, &found, path)?;
+                    return Ok(directory);
                 }
             }
         }
     }
 
-    /// Marks the directory, if it is marked already or holds nothing of anybody's.
+    /// Writes the marker file, if it is there already or the directory is empty.
     fn claim(&self, namespace: &Namespace) -> Result<(), PrivacyError> {
         if is_marked(&self.root, namespace) {
             return Ok(());
         }
         let names = beneath::names(&self.root).map_err(failed(namespace.root()))?;
-        let is_known = |it: &&CString| {
+        let is_known = |name: &&CString| {
             [LOCK_FILE, MARK_FILE]
                 .map(str::as_bytes)
-                .contains(&it.as_bytes())
+                .contains(&name.as_bytes())
         };
         let n_files = names.len() - names.iter().filter(is_known).count();
-        // Another run may have marked it in between, which it does before all else.
+        // // Another run may have written the marker file in the meantime: it does so first.
         if n_files > 0 && !is_marked(&self.root, namespace) {
             return Err(PrivacyError::Unmarked {
                 path: namespace.root().to_owned(),
@@ -179,7 +180,7 @@ impl Root {
         self.mark(namespace)
     }
 
-    /// Says in the directory what it is.
+    /// Writes the marker file.
     pub(crate) fn mark(&self, namespace: &Namespace) -> Result<(), PrivacyError> {
         let path = namespace.root().join(MARK_FILE);
         let text = mark_of(namespace);
@@ -189,7 +190,7 @@ impl Root {
         written.map_err(|source| PrivacyError::File { path, source })
     }
 
-    /// Removes all that is in the directory but for the lock and the mark.
+    /// Removes everything in the directory but the lock file and the marker file.
     pub(crate) fn empty(&self) -> io::Result<()> {
         for name in beneath::names(&self.root)? {
             if ![LOCK_FILE, MARK_FILE]
@@ -202,9 +203,10 @@ impl Root {
         Ok(())
     }
 
-    /// Removes the mark, the lock, which is held, and the directory, unless the next run has begun in it.
+    /// Removes the marker file, the lock file (which is held) and the directory, unless the next run has
+    /// started in it.
     ///
-    /// The lock goes after all else, so that nobody else can have begun below it.
+    /// The lock file is removed last, so that no other run can start before that.
     pub(crate) fn remove(&self, namespace: &Namespace) -> io::Result<()> {
         for name in [MARK_FILE, LOCK_FILE] {
             match unlinkat(&self.root, name, AtFlags::empty()) {
@@ -226,7 +228,7 @@ fn open_or_make(base: &OwnedFd, name: &str) -> Result<OwnedFd, Errno> {
         return opened;
     }
     match mkdirat(base, name, DIRECTORY) {
-        // The umask may have taken from the owner what he needs in the next step.
+        // // The umask may have removed owner permissions that the next step needs.
         Ok(()) => chmodat(base, name, DIRECTORY, AtFlags::empty())?,
         Err(Errno::EXIST) => {}
         Err(error) => return Err(error),
@@ -234,11 +236,11 @@ fn open_or_make(base: &OwnedFd, name: &str) -> Result<OwnedFd, Errno> {
     beneath::directory_in(base, name.as_bytes())
 }
 
-/// Whether a directory says that it is that of a deployment.
+/// Whether a directory has the marker file of a deployment.
 pub(crate) fn is_marked(directory: impl AsFd, namespace: &Namespace) -> bool {
     let expected = mark_of(namespace);
     let most = expected.len() as u64 + 1;
-    beneath::read_in(directory, MARK_FILE, most).is_ok_and(|it| it == expected.as_bytes())
+    beneath::read_in(directory, MARK_FILE, most).is_ok_and(|content| content == expected.as_bytes())
 }
 
 fn mark_of(namespace: &Namespace) -> String {
@@ -246,7 +248,7 @@ fn mark_of(namespace: &Namespace) -> String {
     format!("This directory is that of the deployment {name} of parallax, which removes it.\n")
 }
 
-/// Opens the directory that those of deployments lie in; none if there is none.
+/// Opens the parent directory of all deployments; none if it does not exist.
 pub(crate) fn open_base(path: &Path) -> Result<Option<OwnedFd>, PrivacyError> {
     let base = match beneath::open_directory(path) {
         Err(Errno::NOENT) => return Ok(None),
@@ -273,7 +275,7 @@ pub(crate) fn open_base(path: &Path) -> Result<Option<OwnedFd>, PrivacyError> {
     Ok(Some(base))
 }
 
-/// The same, which is made if there is none.
+/// The same, but creates it if it does not exist.
 fn make_base(path: &Path) -> Result<OwnedFd, PrivacyError> {
     loop {
         if let Some(base) = open_base(path)? {
@@ -290,9 +292,9 @@ fn make_base(path: &Path) -> Result<OwnedFd, PrivacyError> {
     }
 }
 
-/// Why a directory could not be opened: what is there instead, or whose it is.
+/// The error for a directory that could not be opened: what is there instead, or its owner.
 fn unopened(path: &Path, error: Errno) -> PrivacyError {
-    let owner = fs::symlink_metadata(path).map(|it| std::os::unix::fs::MetadataExt::uid(&it));
+    let owner = fs::symlink_metadata(path).map(|data| std::os::unix::fs::MetadataExt::uid(&data));
     match (owner, error) {
         (Ok(owner), Errno::NOTDIR | Errno::LOOP) => match fs::read_link(path) {
             Ok(target) => PrivacyError::Link {
@@ -309,20 +311,20 @@ fn unopened(path: &Path, error: Errno) -> PrivacyError {
     }
 }
 
-/// Checks that nothing in shared memory that carries the name of a deployment is another user's, and
-/// takes from others what the transport leaves them: its management file, which anybody may write.
+/// Checks that no shared memory file with the prefix of a deployment belongs to another user, and closes them
+/// to others: iceoryx2 leaves its management file writable for everybody.
 pub(crate) fn shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         let is_file = FileType::from_raw_mode(found.st_mode) == FileType::RegularFile;
         if is_file && found.st_mode & OTHERS != 0 {
-            // It is a file of this user's in a directory where only he may replace it.
+            // // The file belongs to this user, and only this user may replace it there.
             return chmodat(memory, name, FILE, AtFlags::empty());
         }
         Ok(())
     })
 }
 
-/// Removes what carries the name of a deployment from shared memory; what is no file stays.
+/// Removes the shared memory files with the prefix of a deployment; other kinds of entries are kept.
 pub(crate) fn remove_shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         if FileType::from_raw_mode(found.st_mode) == FileType::RegularFile {
@@ -332,14 +334,13 @@ pub(crate) fn remove_shared_memory(namespace: &Namespace) -> Result<(), PrivacyE
     })
 }
 
-/// Does something with all that carries the name of a deployment in shared memory, all of which must be this
-/// user's.
+/// Calls `act` for every shared memory file with the prefix of a deployment. All must belong to this user.
 fn each_segment(
     namespace: &Namespace,
     act: impl Fn(&OwnedFd, &std::ffi::CStr, &Stat) -> Result<(), Errno>,
 ) -> Result<(), PrivacyError> {
     let directory = Path::new(SHARED_MEMORY);
-    // The system's own, wherever it lies.
+    // // `/dev/shm` belongs to the system and may be a symbolic link.
     let memory = OwnedFd::from(
         fs::File::open(directory).map_err(|source| PrivacyError::File {
             path: directory.to_owned(),
@@ -351,13 +352,15 @@ fn each_segment(
             continue;
         }
         let path = directory.join(name.to_string_lossy().as_ref());
-        let done = match beneath::look(&memory, &name) {
-            Ok(it) if it.st_uid != getuid().as_raw() => return Err(foreign(&path, it.st_uid)),
-            Ok(it) => act(&memory, &name, &it),
+        let done = match beneath::stat_in(&memory, &name) {
+            Ok(stat) if stat.st_uid != getuid().as_raw() => {
+                return Err(foreign(&path, stat.st_uid));
+            }
+            Ok(stat) => act(&memory, &name, &stat),
             Err(error) => Err(error),
         };
         match done {
-            // It was another process's, which has ended.
+            // // Removed by another process that has ended.
             Ok(()) | Err(Errno::NOENT) => {}
             Err(error) => return Err(failed(&path)(error)),
         }
@@ -365,7 +368,7 @@ fn each_segment(
     Ok(())
 }
 
-/// Takes from others what they may do with a directory.
+/// Closes a directory to others.
 fn shut(directory: &OwnedFd, found: &Stat, path: &Path) -> Result<(), PrivacyError> {
     if found.st_mode & 0o7777 == DIRECTORY.bits() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! The life of a service process, from its first line to its exit status.
+//! Runs a service process, from start-up to its exit status.
 
 use core::time::Duration;
 use std::any::Any;
@@ -11,7 +11,7 @@ use rustix::process::{
 
 use crate::{Bus, Delivery, ExitKind, Failure, Health, Launch, Progress, Stop, init_logging};
 
-/// What a service is given: its ports' source, its stop signal and its counters.
+/// What a service works with: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
 pub struct Service {
     bus: Bus,
@@ -25,22 +25,22 @@ impl Service {
         &self.bus
     }
 
-    /// Tells when to end.
+    /// The stop request.
     pub fn stop(&self) -> &Stop {
         self.bus.stop()
     }
 
-    /// Takes note of what the service has done.
+    /// The counters and times that the heartbeats report.
     pub fn health(&self) -> &Health {
         &self.health
     }
 
-    /// To be moved during computations that may take seconds.
+    /// The counter to advance during computations that may take seconds.
     pub fn progress(&self) -> &Progress {
         self.bus.progress()
     }
 
-    /// The run; goes into the stamp of every message.
+    /// The session, which goes into the stamp of every message.
     pub fn session(&self) -> u64 {
         self.launch.session
     }
@@ -60,11 +60,11 @@ impl Service {
         self.launch.delivery
     }
 
-    /// How long to wait for receivers before the first message. All processes of a deployment begin
-    /// at the same time and take as long as they take; one that was restarted finds the others there. Where nothing
-    /// may be lost, who comes later misses what was said before: receivers are waited for as long as for room.
+    /// How long to wait for receivers before the first message. All processes of a deployment start at the
+    /// same time but take different times; a restarted process finds the others running. With lossless
+    /// delivery a late receiver would miss earlier messages, so receivers are waited for as long as for room.
     ///
-    /// * `deadline`: how long anybody is waited for later on.
+    /// * `deadline`: the patience later on.
     pub fn patience_at_start(&self, deadline: Duration) -> Duration {
         match (self.launch.epoch, self.launch.delivery) {
             (0, Delivery::Lossless) => deadline.max(self.bus.patience()),
@@ -74,24 +74,23 @@ impl Service {
     }
 }
 
-/// How long the processes of a deployment may take to find each other when it begins.
+/// How long the processes of a deployment may take to find each other at start-up.
 const BEGINNING: Duration = Duration::from_secs(10);
 
 const DEFECT: &str = "this is a defect of the program, unless something else has changed its files in /dev/shm: \
     please report it";
 
-/// Runs a service in this process and answers with its exit status.
+/// Runs a service in this process and returns its exit status.
 ///
-/// The process ends with its supervisor, and a panic ends it with a logged line instead of going
-/// any further. Call it from the main thread, once.
+/// The process ends when its supervisor ends. A panic is logged and ends the process. Call it from the main
+/// thread, once.
 ///
-/// How a service ends well: when it has passed on the end of the footage it calls
-/// [`Health::finished`], and then, several times a second, sends the end again until it is told to
-/// stop. So a receiver that had to be restarted hears of the end as well; the supervisor stops all
-/// once all have finished.
+/// The regular end of a service: after it has sent the end of stream it calls [`Health::finished`]. Then it
+/// sends the end of stream again for every new receiver until the stop request, so that a restarted receiver
+/// gets it as well. The supervisor stops all processes once all have finished.
 ///
-/// * `body`: the service. It returns soon after [`Service::stop`] is requested, and gives a
-///   [`Failure`] whose kind tells the supervisor whether to try again ([`ExitKind::is_permanent`]).
+/// * `body`: the service. It returns soon after [`Service::stop`] is requested. The kind of its [`Failure`]
+///   tells the supervisor whether to try again ([`ExitKind::is_permanent`]).
 pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> ExitCode {
     init_logging(&launch.process, launch.log);
     log_panics();
@@ -109,9 +108,9 @@ pub fn run_service(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Fai
     }
 }
 
-/// Runs a command in this process and answers with its exit status. A panic ends it with an error like any other.
+/// Runs a command in this process and returns its exit status. A panic is reported like any other error.
 ///
-/// * `body`: the command, and its exit status if it did what was asked.
+/// * `body`: the command, which returns its exit status on success.
 pub fn run_command(body: impl FnOnce() -> Result<ExitCode, Failure>) -> ExitCode {
     match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(code)) => code,
@@ -128,7 +127,7 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
         end_with(supervisor)?;
     }
     raise_file_limit();
-    // Before there are other threads, which begin as this one then is.
+    // // Before other threads start, since they inherit the scheduling of this one.
     for denied in launch.scheduling.apply() {
         tracing::warn!(hint = denied.hint(), "{denied}; going on without");
     }
@@ -150,11 +149,11 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
     result
 }
 
-/// Has the kernel end this process when its supervisor dies.
+/// Makes the kernel kill this process when its supervisor dies.
 fn end_with(supervisor: u32) -> Result<(), Failure> {
     let set = set_parent_process_death_signal(Some(Signal::KILL));
     set.map_err(|error| Failure::new(ExitKind::Run, error))?;
-    // It may have died before the line above.
+    // // The supervisor may have died before the call above.
     let parent = getppid().map_or(0, |pid| Pid::as_raw(Some(pid)));
     if parent == supervisor as i32 {
         Ok(())
@@ -166,7 +165,7 @@ fn end_with(supervisor: u32) -> Result<(), Failure> {
     }
 }
 
-/// Allows as many files as the system lets it: a topic takes up to 16 (spec of iceoryx2 0.10).
+/// Raises the limit on open files as far as the system allows: a topic takes up to 16 (iceoryx2 0.10).
 pub fn raise_file_limit() {
     let limit = getrlimit(Resource::Nofile);
     let raised = Rlimit {
@@ -178,7 +177,7 @@ pub fn raise_file_limit() {
     }
 }
 
-/// Logs a panic in one line, wherever it happens.
+/// Logs panics of all threads in one line.
 fn log_panics() {
     std::panic::set_hook(Box::new(|info| {
         let at = info.location().map(ToString::to_string).unwrap_or_default();

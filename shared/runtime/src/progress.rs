@@ -1,14 +1,14 @@
-//! A counter that moves as long as a process does.
+//! A counter that increases as long as a process makes progress.
 
 use core::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Counts turns of a process's main loop; clones share the count.
+/// Counts iterations of a process's main loop; clones share the count.
 ///
-/// Waiting for messages, waiting for a slow receiver and sending count by themselves. A computation that may
-/// take seconds calls [`tick`](Self::tick) in between, or is [followed](Self::follow) where it counts its steps
-/// itself; else the supervisor will think that it hangs.
+/// Waiting for messages, waiting for a slow receiver and sending are counted automatically. A computation
+/// that may take seconds calls [`tick`](Self::tick) in between, or is [followed](Self::follow) if it counts
+/// its own steps; otherwise the supervisor takes it for hanging.
 #[derive(Clone, Default)]
 pub struct Progress {
     count: Arc<AtomicU64>,
@@ -18,22 +18,22 @@ pub struct Progress {
 type Steps = Box<dyn Fn() -> u64 + Send + Sync>;
 
 impl Progress {
-    /// Counts one turn.
+    /// /// Counts one iteration.
     pub fn tick(&self) {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Counts every step of a computation as a turn.
+    /// Counts every step of a computation as an iteration.
     ///
-    /// * `n_steps`: how many there have been; asked from another thread, once per sign of life.
-    /// * Returns whether it will be asked: one computation is followed, the first.
+    /// * `n_steps`: the steps so far; called from another thread, once per heartbeat.
+    /// * Returns whether it will be called: only the first computation is followed.
     pub fn follow(&self, n_steps: impl Fn() -> u64 + Send + Sync + 'static) -> bool {
         self.steps.set(Box::new(n_steps)).is_ok()
     }
 
-    /// How many there have been.
+    /// Iterations and steps so far.
     pub fn count(&self) -> u64 {
-        let n_steps = self.steps.get().map_or(0, |it| it());
+        let n_steps = self.steps.get().map_or(0, |n_steps| n_steps());
         self.count.load(Ordering::Relaxed).wrapping_add(n_steps)
     }
 }
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_steps_of_a_computation_are_turns_too() {
+    fn steps_of_a_followed_computation_count_as_iterations() {
         let (progress, steps) = (Progress::default(), Arc::new(AtomicU64::new(5)));
         progress.tick();
         let counted = Arc::clone(&steps);
@@ -58,7 +58,7 @@ mod tests {
         assert_eq!(seen_elsewhere.count(), 6);
         steps.fetch_add(2, Ordering::Relaxed);
         assert_eq!(seen_elsewhere.count(), 8);
-        assert!(!progress.follow(|| 1000), "one is followed");
+        assert!(!progress.follow(|| 1000), "only one is followed");
         assert_eq!(seen_elsewhere.count(), 8);
     }
 }

@@ -20,9 +20,9 @@ use crate::service::{self, Messages, PortError};
 use crate::topic::Delivery;
 use crate::{Copies, Progress, Stop};
 
-/// Longest pause between two looks at the subscribers of a topic.
+/// Longest pause between two checks of a topic's subscribers.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);
-/// Pause between two looks for memory that receivers have given back.
+/// Pause between two checks for memory that receivers have released.
 const CHUNK_PAUSE: Duration = Duration::from_micros(500);
 
 /// A message could not be delivered.
@@ -37,23 +37,23 @@ pub enum SendError {
         #[source]
         source: IoxLoanError,
     },
-    /// The array is longer than the topic was made for.
+    /// The array is longer than the topic allows.
     #[error("topic {topic:?} carries at most {max_len} elements, got {len}")]
     TooLong {
         /// Name of the topic.
         topic: Arc<str>,
-        /// What was asked for, elements.
+        /// Requested length, elements.
         len: usize,
-        /// What fits.
+        /// /// Largest length, elements.
         max_len: usize,
     },
-    /// The process was asked to stop while it waited for a slow receiver.
+    /// Stop was requested while the sender waited for a slow receiver.
     #[error("stopped while a receiver of topic {topic:?} had no room")]
     Stopped {
         /// Name of the topic.
         topic: Arc<str>,
     },
-    /// A receiver made no room for too long.
+    /// A receiver had no room for too long.
     #[error("a receiver of topic {topic:?} had no room for {} s", .waited.as_secs())]
     Stuck {
         /// Name of the topic.
@@ -73,7 +73,7 @@ pub enum SendError {
 }
 
 impl SendError {
-    /// Whether the process was merely asked to stop.
+    /// Whether the only reason is a stop request.
     pub fn is_stopped(&self) -> bool {
         matches!(self, Self::Stopped { .. })
     }
@@ -86,7 +86,7 @@ pub struct Publisher<T: Message> {
 }
 
 impl<T: Message> Publisher<T> {
-    /// Sends a copy and wakes the receivers. With [`Delivery::Lossless`] it waits for room.
+    /// Sends a copy and notifies the receivers. With [`Delivery::Lossless`] it waits for room.
     ///
     /// Returns how many subscribers got it.
     ///
@@ -115,22 +115,22 @@ impl<T: Message> Publisher<T> {
     }
 }
 
-/// Sends arrays that are written where they will be read.
+/// Sends arrays in place, without copying.
 #[derive(Debug)]
 pub struct SlicePublisher<E: Element, H: Header> {
     port: Port<E, H>,
 }
 
 impl<E: Element, H: Header> SlicePublisher<E, H> {
-    /// Takes memory for an array of `len` elements. With [`Delivery::Lossless`] it waits until a
-    /// receiver gives some back, if need be.
+    /// Loans memory for an array of `len` elements. With [`Delivery::Lossless`] it waits for a receiver to
+    /// release some, if necessary.
     ///
     /// Its content is what an earlier message left there: write every element before sending.
     ///
     /// # Errors
     ///
     /// [`SendError::TooLong`]; [`SendError::Loan`] if an earlier loan is still held;
-    /// [`SendError::Stopped`], [`SendError::Stuck`] if it waited in vain.
+    /// [`SendError::Stopped`], [`SendError::Stuck`] if no memory was released.
     pub fn loan(&self, len: usize) -> Result<Loan<'_, E, H>, SendError> {
         let port = &self.port;
         let begin = Instant::now();
@@ -159,17 +159,16 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
         self.port.n_connected()
     }
 
-    /// Waits until `n` subscribers are there, and with [`Delivery::Lossless`] until they have said
-    /// that they hear this publisher: before that, what does not fit into their buffers is lost.
+    /// Waits for `n` subscribers, and with [`Delivery::Lossless`] until they have acknowledged this
+    /// publisher: before that, messages that do not fit into their buffers are lost.
     ///
-    /// Returns how many there are, which is less than `n` after `limit` or when the process is asked
-    /// to stop.
+    /// Returns how many there are; fewer than `n` after `limit` or a stop request.
     pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
         self.port.wait_for_subscribers(n, limit)
     }
 }
 
-/// An array in shared memory that nobody else sees yet; dropping it gives the memory back.
+/// A loan: an array in shared memory that has not been sent yet. Dropping it releases the memory.
 #[derive(Debug)]
 pub struct Loan<'a, E: Element, H: Header> {
     sample: SampleMut<ipc::Service, [E], H>,
@@ -182,12 +181,12 @@ impl<E: Element, H: Header> Loan<'_, E, H> {
         self.sample.payload_mut()
     }
 
-    /// What travels with it; at first its default.
+    /// The header; initially its default.
     pub fn header_mut(&mut self) -> &mut H {
         self.sample.user_header_mut()
     }
 
-    /// Sends the array and wakes the receivers. With [`Delivery::Lossless`] it waits for room.
+    /// Sends the array and notifies the receivers. With [`Delivery::Lossless`] it waits for room.
     ///
     /// Returns how many subscribers got it.
     ///
@@ -206,19 +205,19 @@ struct Port<E: Message, H: Header> {
     delivery: Delivery,
     publisher: IoxPublisher<ipc::Service, [E], H>,
     notifier: Option<Notifier<ipc::Service>>,
-    /// Hears the acknowledgements of subscribers.
+    /// Receives the acknowledgements of subscribers.
     ready: Option<Listener<ipc::Service>>,
     n_ready: Cell<usize>,
     messages: Messages<E, H>,
     stop: Stop,
     progress: Progress,
     copies: Copies,
-    /// How long a slow receiver is waited for.
+    /// How long to wait for a slow receiver.
     patience: Duration,
 }
 
 impl Bus {
-    /// Makes the sending end of a topic of messages.
+    /// Creates a publisher of a topic of messages.
     ///
     /// # Errors
     ///
@@ -229,7 +228,7 @@ impl Bus {
         })
     }
 
-    /// Makes the sending end of a topic of arrays, and reserves all its memory.
+    /// Creates a publisher of a topic of arrays, and reserves all its memory.
     ///
     /// # Errors
     ///
@@ -248,7 +247,7 @@ impl<E: Message, H: Header> Port<E, H> {
     fn open(bus: &Bus, topic: &str) -> Result<Self, PortError> {
         let messages = service::open_messages::<E, H>(bus.node(), topic)?;
         let extras = service::extras(&messages);
-        // The listener comes first: whoever sees the publisher must find it.
+        // // The listener is created first: subscribers that see the publisher must find it.
         let ready = match extras.delivery {
             Delivery::Realtime => None,
             Delivery::Lossless => Some(bus.listener(&service::ready_name(topic))?),
@@ -299,7 +298,7 @@ impl<E: Message, H: Header> Port<E, H> {
         })
     }
 
-    /// Makes a pause, unless that was done for too long.
+    /// Pauses, or fails if the wait has been too long.
     fn wait_for_a_chunk(&self, begin: Instant) -> Result<(), SendError> {
         let (topic, waited) = (Arc::clone(&self.topic), begin.elapsed());
         if self.stop.is_requested() {
@@ -309,9 +308,9 @@ impl<E: Message, H: Header> Port<E, H> {
             return Err(SendError::Stuck { topic, waited });
         }
         self.progress.tick();
-        // What a receiver that is gone has held is given back when it is noticed to be gone.
+        // // Chunks held by a dead receiver are released when the connections are updated.
         if let Err(error) = self.publisher.update_connections() {
-            tracing::debug!(topic = %self.topic, ?error, "cannot look for receivers");
+            tracing::debug!(topic = %self.topic, ?error, "cannot update the connections");
         }
         std::thread::sleep(CHUNK_PAUSE);
         Ok(())
@@ -335,12 +334,12 @@ impl<E: Message, H: Header> Port<E, H> {
         if let Some(notifier) = &self.notifier
             && let Err(error) = notifier.notify()
         {
-            // Receivers look at their buffers from time to time in any case.
+            // // Receivers check their buffers from time to time in any case.
             tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
         }
         let topic = || Arc::clone(&self.topic);
         sent.map_err(|source| match source {
-            // A signal ends what iceoryx2 waits for, too, which it calls an internal error.
+            // // A signal also interrupts a wait inside iceoryx2, which reports an internal error.
             _ if self.stop.is_requested() => SendError::Stopped { topic: topic() },
             IoxSendError::UnableToDeliver => SendError::Stuck {
                 topic: topic(),
@@ -360,11 +359,11 @@ impl<E: Message, H: Header> Port<E, H> {
     fn n_ready(&self) -> usize {
         match (&self.ready, self.delivery) {
             (Some(ready), Delivery::Lossless) => {
-                let heard = ready.try_wait(|event| {
+                let drained = ready.try_wait(|event| {
                     self.n_ready.set(self.n_ready.get() + event.count as usize);
                 });
-                if let Err(error) = heard {
-                    tracing::debug!(topic = %self.topic, ?error, "cannot hear acknowledgements");
+                if let Err(error) = drained {
+                    tracing::debug!(topic = %self.topic, ?error, "cannot receive acknowledgements");
                 }
                 self.n_ready.get().min(self.n_connected())
             }
@@ -380,7 +379,7 @@ impl<E: Message, H: Header> Port<E, H> {
                 return ready;
             }
             self.progress.tick();
-            // Wakes subscribers that were there first, so that they connect.
+            // // Wakes earlier subscribers, so that they connect.
             if let Some(notifier) = &self.notifier
                 && let Err(error) = notifier.notify()
             {
@@ -391,7 +390,7 @@ impl<E: Message, H: Header> Port<E, H> {
     }
 }
 
-/// What to do while a receiver has no room: wait, but not for ever, and not against the user's will.
+/// What to do while a receiver has no room: wait, until the patience is over or stop is requested.
 fn patience(
     bus: &Bus,
 ) -> impl Fn(&iceoryx2::port::BackpressureInfo) -> BackpressureAction + Send + 'static {

@@ -1,4 +1,4 @@
-//! The deployments that are there: those that run, and what dead ones left behind.
+//! Finding deployments: those that run, and the files that dead ones left behind.
 
 use std::fs::{self, Metadata};
 use std::io;
@@ -11,36 +11,35 @@ use rustix::io::Errno;
 use crate::lock::{LOCK_FILE, SHARED_MEMORY, alive, entries};
 use crate::{BusError, LockError, Namespace, beneath, private};
 
-/// A deployment that runs, or that has left something behind.
+/// A deployment that runs, or that has left files behind.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remains {
-    /// Where it lives.
+    /// Its location.
     pub namespace: Namespace,
-    /// Whether its directory says that it is a deployment's. What does not is never removed.
+    /// Whether its directory has the marker file. Other directories are never removed.
     pub is_marked: bool,
-    /// The process that runs it; none if it is dead.
+    /// The process id of its supervisor; none if it does not run.
     pub supervisor: Option<u32>,
     /// Names and process ids of its processes.
     pub processes: Vec<String>,
-    /// Its files, those in shared memory included.
+    /// /// Number of its files, including shared memory.
     pub n_files: u64,
     /// The memory they take, bytes.
     pub bytes: u64,
 }
 
 impl Remains {
-    /// Removes what a dead deployment left behind.
+    /// Removes the files that a dead deployment left behind.
     ///
     /// # Errors
     ///
-    /// [`LockError::AlreadyRunning`] if it is not dead, [`LockError::StillAlive`] if only its
-    /// supervisor is.
+    /// [`LockError::AlreadyRunning`] if it runs, [`LockError::StillAlive`] if only its supervisor is dead.
     pub fn remove(&self) -> Result<(), LockError> {
         self.namespace.acquire().map(drop)
     }
 }
 
-/// The deployments below a directory, by name. Nothing is touched.
+/// The deployments below a directory, by name. Nothing is changed.
 ///
 /// * `base`: as given to [`Namespace::below`]; that of [`Namespace::new`] is
 ///   [`Namespace::usual_base`].
@@ -59,27 +58,27 @@ pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
         source: error.into(),
     };
     for name in beneath::names(&opened).map_err(unreadable)? {
-        // What has another kind of name is nobody's deployment.
+        // // Other names cannot be those of a deployment.
         let namespace = name.to_str().ok();
-        let namespace = namespace.and_then(|it| Namespace::below(it, base).ok());
-        // Nor is a link to a directory.
+        let namespace = namespace.and_then(|name| Namespace::below(name, base).ok());
+        // // A link to a directory is no deployment either.
         let directory = beneath::directory_in(&opened, name.as_bytes());
         if let Some((namespace, directory)) = namespace.zip(directory.ok()) {
             let is_marked = private::is_marked(&directory, &namespace);
-            found.push(look_at(namespace, is_marked, &locks)?);
+            found.push(inspect(namespace, is_marked, &locks)?);
         }
     }
     found.sort_by(|a, b| a.namespace.name().cmp(b.namespace.name()));
     Ok(found)
 }
 
-fn look_at(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains, LockError> {
+fn inspect(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains, LockError> {
     let config = namespace.config().map_err(BusError::from)?;
     let mut size = (0, 0);
     measure(namespace.root(), &mut size);
     for path in entries(Path::new(SHARED_MEMORY))? {
-        let name = path.file_name().and_then(|it| it.to_str());
-        if name.is_some_and(|it| it.starts_with(namespace.prefix())) {
+        let name = path.file_name().and_then(|name| name.to_str());
+        if name.is_some_and(|name| name.starts_with(namespace.prefix())) {
             measure(&path, &mut size);
         }
     }
@@ -97,8 +96,8 @@ fn look_at(namespace: Namespace, is_marked: bool, locks: &str) -> Result<Remains
     })
 }
 
-/// Who holds a lock file, from the kernel's list of locks: trying to lock it could be in the way of
-/// a deployment that is about to begin.
+/// The process that holds a lock file, from the kernel's list of locks: trying to lock it could disturb a
+/// deployment that is starting.
 pub(crate) fn supervisor(file: &Path, locks: &str) -> Option<u32> {
     let metadata = fs::metadata(file).ok()?;
     locks.lines().find_map(|line| holder(line, &metadata))
@@ -118,7 +117,7 @@ fn holder(line: &str, file: &Metadata) -> Option<u32> {
     is_this.then(|| pid.parse().ok())?
 }
 
-/// Adds up files and bytes. What vanishes in between is not counted.
+/// Adds up files and bytes. Files that vanish in the meantime are not counted.
 fn measure(path: &Path, size: &mut (u64, u64)) {
     let metadata: io::Result<Metadata> = fs::symlink_metadata(path);
     let Ok(metadata) = metadata else { return };
@@ -141,11 +140,11 @@ mod tests {
     }
 
     #[test]
-    fn who_runs_is_told_from_who_is_dead_and_only_the_dead_are_removed() {
+    fn only_dead_deployments_are_removed() {
         let base = base();
         let lives = Namespace::below("lives", base.path()).unwrap();
         let lock = lives.acquire().unwrap();
-        // A killed supervisor leaves its lock file, and whatever else there is.
+        // // A killed supervisor leaves its lock file and others.
         let dead = base.path().join("dead");
         let marked = Namespace::below("dead", base.path()).unwrap();
         private::Root::open(&marked).unwrap();
@@ -171,20 +170,20 @@ mod tests {
     }
 
     #[test]
-    fn what_says_not_that_it_is_a_deployment_is_named_and_stays() {
+    fn a_directory_without_marker_is_reported_and_kept() {
         let base = base();
         let photos = base.path().join("photos");
         fs::create_dir(&photos).unwrap();
         fs::write(photos.join("one.jpg"), "x").unwrap();
-        // The mark of another is none.
+        // // The marker of another deployment does not count.
         let other = Namespace::below("other", base.path()).unwrap();
         private::Root::open(&other).unwrap();
         let mark = other.root().join("parallax-deployment");
         fs::copy(mark, photos.join("parallax-deployment")).unwrap();
         let found = deployments(base.path()).unwrap();
-        let told = found.iter().map(|it| (it.namespace.name(), it.is_marked));
-        let told: Vec<_> = told.collect();
-        assert_eq!(told, [("other", true), ("photos", false)]);
+        let names = found.iter().map(|it| (it.namespace.name(), it.is_marked));
+        let names: Vec<_> = names.collect();
+        assert_eq!(names, [("other", true), ("photos", false)]);
         let error = found[1].remove().unwrap_err().to_string();
         assert!(
             error.contains("photos\" is no directory of a deployment"),
@@ -196,13 +195,13 @@ mod tests {
     }
 
     #[test]
-    fn where_nothing_was_ever_run_there_is_nothing() {
+    fn a_missing_directory_has_no_deployments() {
         let base = base();
         assert_eq!(deployments(&base.path().join("none")).unwrap(), []);
     }
 
     #[test]
-    fn other_kinds_of_lines_are_passed_over() {
+    fn other_lines_are_ignored() {
         let file = fs::metadata("/proc/self/maps").unwrap();
         for line in [
             "",

@@ -1,11 +1,11 @@
-//! Shared memory is reserved when it is given its size.
+//! Shared memory is allocated when its size is set.
 //!
-//! iceoryx2 0.10 makes a segment, gives it its size with `ftruncate`, and writes to it. In a file system of memory a file's
-//! size takes nothing: memory is taken when a page is first written, and where there is none left the kernel ends
-//! the process (SIGBUS). That cannot be mended after the segment has been made, for by then iceoryx2 has
-//! written to it. So this takes the place of the C library's `ftruncate` in the program: it does the same, and then has the file
-//! system take the memory at once; where that fails, so does the call, and iceoryx2 tells it as any other
-//! failure.
+//! iceoryx2 0.10 creates a segment, sets its size with `ftruncate`, and writes to it. On tmpfs setting the
+//! size allocates nothing: pages are allocated when first written, and if no memory is left then the kernel
+//! kills the process (SIGBUS). This cannot be fixed after the segment has been created, because iceoryx2 has
+//! written to it by then. So this module replaces the C library's `ftruncate` in the program: it does the
+//! same, and then has the file system allocate the memory at once. If that fails, the call fails, and
+//! iceoryx2 reports it as any other failure.
 #![expect(
     unsafe_code,
     reason = "it takes the place of a function of the C library"
@@ -18,12 +18,12 @@ use std::os::fd::{BorrowedFd, RawFd};
 use rustix::fs::{FallocateFlags, fallocate, fstatfs};
 use rustix::io::Errno;
 
-/// File systems in memory (statfs(2)).
+/// The magic number of tmpfs (statfs(2)).
 const TMPFS_MAGIC: u64 = 0x0102_1994;
 
-/// The size that was refused last, bytes; 0 if none was.
+/// The last size that was refused, bytes; 0 if none was.
 static REFUSED: AtomicU64 = AtomicU64::new(0);
-/// Whether that was more than any file may have.
+/// Whether it exceeded the limit on the size of a file.
 static IS_LIMITED: AtomicBool = AtomicBool::new(false);
 
 /// Why a segment could not be given its size.
@@ -31,11 +31,11 @@ static IS_LIMITED: AtomicBool = AtomicBool::new(false);
 pub(crate) enum Refused {
     /// Its file system is full.
     NoRoom { wanted_bytes: u64 },
-    /// No file of this process may be as large.
+    /// It exceeds the limit on the size of a file.
     TooLarge { wanted_bytes: u64 },
 }
 
-/// Why the last segment was refused that was; none if none was.
+/// The reason for the last refusal; none if there was none.
 pub(crate) fn refused() -> Option<Refused> {
     let wanted_bytes = REFUSED.load(Ordering::Relaxed);
     if wanted_bytes == 0 {
@@ -47,13 +47,13 @@ pub(crate) fn refused() -> Option<Refused> {
     }
 }
 
-/// ftruncate(2), which also takes the memory of a file in memory.
+/// ftruncate(2), which also allocates the memory of a file on tmpfs.
 #[unsafe(no_mangle)]
 extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
     if fd < 0 {
         return failed(Errno::BADF);
     }
-    // SAFETY: the caller owns the descriptor for as long as the call takes, as the function asks of him.
+    // // SAFETY: the caller keeps the descriptor open during the call, as the contract of `ftruncate` asks.
     let fd = unsafe { BorrowedFd::borrow_raw(fd) };
     let Ok(len) = u64::try_from(len) else {
         return failed(Errno::INVAL);
@@ -71,21 +71,21 @@ extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
 }
 
 fn take(fd: BorrowedFd<'_>, len: u64) -> Result<(), Errno> {
-    let is_memory = fstatfs(fd).is_ok_and(|it| it.f_type as u64 == TMPFS_MAGIC);
+    let is_memory = fstatfs(fd).is_ok_and(|system| system.f_type as u64 == TMPFS_MAGIC);
     if len == 0 || !is_memory {
         return Ok(());
     }
     match fallocate(fd, FallocateFlags::KEEP_SIZE, 0, len) {
-        // Not every kernel can; then there is the memory that is free when it is used.
+        // // Not every kernel supports this; then pages are allocated when first used.
         Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),
         taken => taken,
     }
 }
 
 fn failed(error: Errno) -> c_int {
-    // SAFETY: the location is that of the calling thread, and always there.
+    // // SAFETY: the location belongs to the calling thread and is always valid.
     let location = unsafe { libc::__errno_location() };
-    // SAFETY: as above; nothing else refers to it meanwhile.
+    // // SAFETY: as above; there is no other reference to it.
     unsafe { location.write(error.raw_os_error()) };
     -1
 }
@@ -96,18 +96,21 @@ mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
     #[test]
-    fn what_is_given_a_size_in_memory_has_its_memory() {
+    fn setting_the_size_on_tmpfs_allocates_the_memory() {
         let file = tempfile::tempfile_in("/dev/shm").unwrap();
         // SAFETY: the file is open.
         let outcome = unsafe { libc::ftruncate(file.as_raw_fd(), 1 << 20) };
         assert_eq!(outcome, 0);
-        let found = file.metadata().unwrap();
-        assert_eq!((found.len(), found.blocks() * 512), (1 << 20, 1 << 20));
+        let metadata = file.metadata().unwrap();
+        assert_eq!(
+            (metadata.len(), metadata.blocks() * 512),
+            (1 << 20, 1 << 20)
+        );
     }
 
     #[test]
-    fn a_descriptor_that_is_none_is_refused() {
-        // SAFETY: there is nothing that could be changed.
+    fn an_invalid_descriptor_is_refused() {
+        // // SAFETY: the descriptor is invalid, so nothing is changed.
         let outcome = unsafe { libc::ftruncate(-1, 5) };
         let error = std::io::Error::last_os_error();
         assert_eq!((outcome, error.raw_os_error()), (-1, Some(libc::EBADF)));

@@ -1,4 +1,4 @@
-//! On which cores a process runs, how urgently, and whether its memory may leave the machine's.
+//! CPU affinity, real-time priority and memory locking of a process.
 #![expect(
     unsafe_code,
     reason = "sched_setscheduler has no safe binding that takes the number of a priority"
@@ -17,32 +17,32 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 pub use denied::{Denied, Refusal};
 pub use text::SchedulingError;
 
-/// What a process asks of the system's scheduler. The default asks for nothing.
+/// What a process requests from the system's scheduler. The default requests nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Scheduling {
-    /// Cores that it may run on, as Linux numbers them from 0; if empty those that it was started on.
+    /// Cores that it may run on, numbered from 0 as Linux does; if empty those that it was started on.
     pub cores: Vec<usize>,
-    /// To run before everything that has no real-time priority.
+    /// Run before all processes without real-time priority.
     pub real_time: Option<RealTime>,
-    /// To keep in memory what it has once used (`mlockall`).
+    /// Keep used pages in memory (`mlockall`).
     pub lock_memory: bool,
-    /// To look for messages without pause instead of sleeping until one comes.
+    /// Poll for messages without pause instead of sleeping until one arrives.
     pub spin: bool,
 }
 
 /// A priority above that of all ordinary processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RealTime {
-    /// Who runs of those with the same priority.
+    /// The order among threads of the same priority.
     pub policy: Policy,
     /// 1 to 99; the highest runs.
     pub priority: u8,
 }
 
-/// Who runs of those with the same real-time priority.
+/// The order among threads of the same real-time priority.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Policy {
-    /// Who came first, until it sleeps (`SCHED_FIFO`).
+    /// The first one, until it sleeps (`SCHED_FIFO`).
     #[default]
     Fifo,
     /// All in turn (`SCHED_RR`).
@@ -56,8 +56,8 @@ pub const MAX_CORES: usize = CpuSet::MAX_CPU;
 const CAP_IPC_LOCK: u32 = 14;
 
 impl Scheduling {
-    /// Asks the system for all of it, for the calling thread and those it will start: call it first in
-    /// a process. What is denied is left as it was, and said.
+    /// Applies the requests to the calling thread and those it will start: call it first in a process. Denied
+    /// requests change nothing and are returned.
     pub fn apply(&self) -> Vec<Denied> {
         let memory = if self.lock_memory {
             lock_memory()
@@ -67,13 +67,13 @@ impl Scheduling {
         [self.apply_to_thread(), memory.into_iter().collect()].concat()
     }
 
-    /// What [`apply`](Self::apply) would say in a process that this one starts: tried on a thread that
-    /// ends at once, so that nothing of this process changes.
+    /// What [`apply`](Self::apply) would return in a process that this one starts. It is tried on a
+    /// short-lived thread, so that this process does not change.
     pub fn rehearse(&self) -> Vec<Denied> {
         let wanted = self.clone();
         let thread = thread::Builder::new().name("rehearsal".to_owned());
         let tried = thread.spawn(move || wanted.apply_to_thread());
-        let tried = tried.ok().and_then(|it| it.join().ok());
+        let tried = tried.ok().and_then(|thread| thread.join().ok());
         let memory = self.lock_memory.then(memory_limit).flatten();
         let memory = memory.map(|limit_bytes| Denied::Memory {
             limit_bytes: Some(limit_bytes),
@@ -85,8 +85,8 @@ impl Scheduling {
     /// The same without what was denied.
     #[must_use]
     pub fn without(mut self, denied: &[Denied]) -> Self {
-        for it in denied {
-            match it {
+        for denial in denied {
+            match denial {
                 Denied::Cores { allowed, .. } => self.cores.retain(|core| allowed.contains(core)),
                 Denied::RealTime { .. } => self.real_time = None,
                 Denied::Memory { .. } => self.lock_memory = false,
@@ -111,8 +111,8 @@ impl RealTime {
         let parameters = libc::sched_param {
             sched_priority: i32::from(self.priority),
         };
-        // SAFETY: the call reads `parameters`, which lives, and changes how the calling thread (0) is
-        // scheduled and nothing in memory.
+        // // SAFETY: the call only reads `parameters`, which is alive, and changes the scheduling of the
+        // calling thread (0).
         let status = unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) };
         (status != 0).then(|| Denied::RealTime {
             asked: self,
@@ -121,23 +121,23 @@ impl RealTime {
     }
 }
 
-/// Keeps the calling thread to those of the cores that it may use.
+/// Restricts the calling thread to the requested cores, as far as it may use them.
 fn keep_to(asked: &[usize]) -> Option<Denied> {
     if asked.is_empty() {
         return None;
     }
     let mut wanted = CpuSet::new();
-    for &core in asked.iter().filter(|it| **it < MAX_CORES) {
+    for &core in asked.iter().filter(|core| **core < MAX_CORES) {
         wanted.set(core);
     }
-    // The system takes those that exist and that the process's group may use, if there are any.
+    // // The system uses the cores that exist and that the process's group may use, if there are any.
     let refusal = sched_setaffinity(None, &wanted).err();
     let allowed = own_cores().unwrap_or_default();
-    let are_all = asked.iter().all(|it| allowed.contains(it));
+    let are_all = asked.iter().all(|core| allowed.contains(core));
     (refusal.is_some() || !are_all).then(|| Denied::Cores {
         asked: asked.to_vec(),
         allowed,
-        source: refusal.map(|it| io::Error::from(it).into()),
+        source: refusal.map(|error| io::Error::from(error).into()),
     })
 }
 
@@ -145,22 +145,22 @@ fn keep_to(asked: &[usize]) -> Option<Denied> {
 ///
 /// # Errors
 ///
-/// The system does not say.
+/// The system call fails.
 pub fn own_cores() -> io::Result<Vec<usize>> {
     let set = sched_getaffinity(None)?;
-    Ok((0..MAX_CORES).filter(|it| set.is_set(*it)).collect())
+    Ok((0..MAX_CORES).filter(|core| set.is_set(*core)).collect())
 }
 
-/// Keeps every page that was or will be used where it is.
+/// Locks every page that is or will be used into memory.
 fn lock_memory() -> Option<Denied> {
     if let Some(limit_bytes) = memory_limit() {
-        // Within a limit it would succeed now, and a later allocation fail.
+        // // With a limit it would succeed now, and a later allocation would fail.
         return Some(Denied::Memory {
             limit_bytes: Some(limit_bytes),
             source: io::ErrorKind::PermissionDenied.into(),
         });
     }
-    // On fault: of a pool only what is used, not the chunks that nobody ever needs.
+    // // On fault: locks only the used chunks of a pool.
     let flags = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
     mlockall(flags).err().map(|error| Denied::Memory {
         limit_bytes: None,
@@ -175,25 +175,25 @@ fn memory_limit() -> Option<u64> {
     (!has_capability(&status, CAP_IPC_LOCK)).then_some(limit)
 }
 
-/// Whether `/proc/PID/status` says that a process has a capability.
+/// Whether a process has a capability according to `/proc/PID/status`.
 fn has_capability(status: &str, capability: u32) -> bool {
-    let effective = status.lines().find_map(|it| it.strip_prefix("CapEff:"));
-    let mask = effective.and_then(|it| u64::from_str_radix(it.trim(), 16).ok());
-    mask.is_some_and(|it| it >> capability & 1 == 1)
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    let mask = effective.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> capability & 1 == 1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// On a thread of its own, for what is asked for stays.
+    /// Runs on a separate thread, because the scheduling of a thread stays changed.
     fn on_a_thread<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> T {
         let thread = thread::Builder::new().spawn(body).unwrap();
         thread.join().unwrap()
     }
 
     #[test]
-    fn a_thread_and_those_it_starts_keep_to_their_cores() {
+    fn a_thread_and_its_children_run_on_the_requested_cores() {
         let last = *own_cores().unwrap().last().unwrap();
         let scheduling = Scheduling {
             cores: vec![last],
@@ -208,11 +208,14 @@ mod tests {
             )
         });
         assert_eq!(got, (vec![], vec![last], vec![last]));
-        assert!(own_cores().unwrap().contains(&last), "this one goes on");
+        assert!(
+            own_cores().unwrap().contains(&last),
+            "this thread is not restricted"
+        );
     }
 
     #[test]
-    fn cores_that_are_not_there_are_said_and_the_others_used() {
+    fn missing_cores_are_reported_and_the_others_used() {
         let first = own_cores().unwrap()[0];
         let none = MAX_CORES + 7;
         let scheduling = Scheduling {
@@ -230,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rehearsal_says_what_the_real_thing_would_and_changes_nothing() {
+    fn a_rehearsal_returns_the_same_denials_and_changes_nothing() {
         let scheduling = Scheduling {
             cores: vec![own_cores().unwrap()[0], MAX_CORES],
             real_time: Some(RealTime {
@@ -253,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_priority_that_does_not_exist_is_denied() {
+    fn an_invalid_priority_is_denied() {
         let real_time = Some(RealTime {
             policy: Policy::Fifo,
             priority: 200,
@@ -271,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn capabilities_are_bits_counted_from_the_right() {
+    fn capabilities_are_bits_of_the_mask() {
         let status = "Name:\tx\nCapPrm:\tffffffffffffffff\nCapEff:\t0000000000004000\n";
         assert!(has_capability(status, 14));
         assert!(!has_capability(status, 13) && !has_capability(status, 15));

@@ -1,4 +1,5 @@
-//! Creation and opening of the services behind a topic, with patience where others do the same.
+//! Creation and opening of the iceoryx2 services of a topic, with retries while another process does the
+//! same.
 
 use core::time::Duration;
 use std::thread::sleep;
@@ -24,13 +25,13 @@ use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
 use crate::topic::{Delivery, TopicPlan};
 
-/// How long a service that another process is creating or removing is waited for.
+/// How long to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
 const IN_FLUX_PAUSE: Duration = Duration::from_millis(10);
-/// Processes that may open one topic: more than a deployment has, since the dead count until they
-/// are cleaned away.
+/// Processes that may open one topic: more than a deployment has, since dead ones count until they are
+/// cleaned up.
 const MAX_NODES: usize = 96;
-/// Ports of one wake-up: as many as a process may have views, with room for the dead.
+/// Ports of one wake-up: as many as a process may have views, with spare slots for dead ones.
 const MAX_WAKE_UP_PORTS: usize = 64;
 
 /// Attribute of a service: longest array, elements.
@@ -49,10 +50,10 @@ pub(crate) type Messages<E, H> = PortFactory<ipc::Service, [E], H>;
 /// The wake-up of a topic in one process.
 pub(crate) type WakeUp = EventFactory<ipc::Service>;
 
-/// A port of a topic cannot be made.
+/// A port of a topic cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
-    /// Nobody created the topic.
+    /// /// The topic does not exist.
     #[error(
         "topic {topic:?} does not exist; topics are created by the supervisor before it starts processes"
     )]
@@ -60,14 +61,14 @@ pub enum PortError {
         /// Name of the topic.
         topic: String,
     },
-    /// The topic carries something else than the port would.
+    /// The topic has another message type than the port.
     #[error(
         "topic {topic:?} does not carry {expected}; were the processes built from different versions?"
     )]
     WrongType {
         /// Name of the topic.
         topic: String,
-        /// What the port would carry.
+        /// The message type of the port.
         expected: &'static str,
     },
     /// The topic exists but cannot be opened.
@@ -88,7 +89,7 @@ pub enum PortError {
         #[source]
         source: EventOpenError,
     },
-    /// The sending end cannot be made.
+    /// The publisher cannot be created.
     #[error("cannot make a publisher of topic {topic:?}")]
     Publisher {
         /// Name of the topic.
@@ -97,7 +98,7 @@ pub enum PortError {
         #[source]
         source: PublisherCreateError,
     },
-    /// The receiving end cannot be made.
+    /// The subscriber cannot be created.
     #[error("cannot make a subscriber of topic {topic:?}")]
     Subscriber {
         /// Name of the topic.
@@ -106,7 +107,7 @@ pub enum PortError {
         #[source]
         source: SubscriberCreateError,
     },
-    /// The sending end of the wake-up cannot be made.
+    /// The notifier cannot be created.
     #[error("cannot make a notifier of topic {topic:?}")]
     Notifier {
         /// Name of the topic.
@@ -115,7 +116,7 @@ pub enum PortError {
         #[source]
         source: NotifierCreateError,
     },
-    /// The receiving end of the wake-up cannot be made.
+    /// The listener cannot be created.
     #[error("cannot make a listener of topic {topic:?}")]
     Listener {
         /// Name of the topic.
@@ -124,7 +125,7 @@ pub enum PortError {
         #[source]
         source: ListenerCreateError,
     },
-    /// The memory of the publisher is not there.
+    /// The memory of the publisher cannot be reserved.
     #[error("cannot reserve the memory of topic {topic:?}")]
     Memory {
         /// Name of the topic.
@@ -133,7 +134,7 @@ pub enum PortError {
         #[source]
         source: MemoryError,
     },
-    /// The name of the topic is not one that iceoryx2 accepts.
+    /// iceoryx2 does not accept the name of the topic.
     #[error("topic name {topic:?} is empty, too long, or not plain text")]
     Name {
         /// Name of the topic.
@@ -141,8 +142,8 @@ pub enum PortError {
     },
 }
 
-/// The events of a topic: its wake-up if it has one, and the acknowledgement of connections if
-/// nothing may be lost.
+/// The events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
+/// connections.
 pub(crate) fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
     let mut names = Vec::new();
     if plan.wakes() {
@@ -154,7 +155,7 @@ pub(crate) fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
     names
 }
 
-/// The event by which subscribers say that they are connected to a publisher.
+/// The event by which subscribers acknowledge a publisher.
 pub(crate) fn ready_name(topic: &str) -> String {
     format!("{topic}/ready")
 }
@@ -275,7 +276,7 @@ pub(crate) fn open_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<Wake
     })
 }
 
-/// What the plan of a topic says that iceoryx2 has no field for.
+/// The parts of a topic's plan that iceoryx2 has no field for.
 pub(crate) struct Extras {
     /// Longest array, elements.
     pub(crate) max_len: usize,
@@ -287,7 +288,7 @@ pub(crate) struct Extras {
     pub(crate) mapped: usize,
     /// Whether senders wake receivers.
     pub(crate) wakes: bool,
-    /// Whether anything may be lost.
+    /// What happens when a receiver is slower than its sender.
     pub(crate) delivery: Delivery,
 }
 
@@ -335,8 +336,7 @@ fn service_name(topic: &str) -> Result<ServiceName, PortError> {
     })
 }
 
-/// Repeats what fails only because another process is in the middle of creating, removing or
-/// cleaning up the same service.
+/// Retries what fails only because another process is creating, removing or cleaning up the same service.
 fn patiently<T, E>(
     mut attempt: impl FnMut() -> Result<T, E>,
     in_flux: impl Fn(&E) -> bool,

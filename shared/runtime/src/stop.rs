@@ -1,7 +1,7 @@
-//! The wish to end, by signal or by word, and a file descriptor that wakes whoever waits.
+//! The stop request, raised by a signal handler or by the program, with a file descriptor to wait for.
 #![expect(
     unsafe_code,
-    reason = "what a handler of a signal may do is for the caller to promise, and alarm has no safe binding"
+    reason = "signal handlers must be async-signal-safe, which the compiler cannot check, and alarm has no safe binding"
 )]
 
 use core::time::Duration;
@@ -18,17 +18,17 @@ use signal_hook_registry::register_sigaction;
 
 use crate::now_nanos;
 
-/// The signals that ask a process to end.
+/// The signals that request a stop.
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Signals that come so soon after the first say the same: `timeout` sends two, and so does a terminal that closes.
+/// Signals so soon after the first count as one request: `timeout` sends two, and so does a closing terminal.
 const SAME_WISH: Duration = Duration::from_millis(500);
-/// How long a process that somebody else than its supervisor has told to end goes on, seconds. Who tells all processes
-/// at once, as systemd does, tells the supervisor too, which then ends them in order.
+/// How long a process continues after a signal that is not from its supervisor, seconds. systemd signals all
+/// processes at once, including the supervisor, which then ends them in order.
 const UNASKED_SECONDS: u32 = 2;
 /// The exit status of a process that is ended by a second signal.
 const ENDED_AT_ONCE: i32 = 130;
 
-/// A flag that once raised stays up; clones share it.
+/// A stop request: a flag that is never cleared; clones share it.
 #[derive(Debug, Clone)]
 pub struct Stop {
     inner: Arc<Inner>,
@@ -37,19 +37,19 @@ pub struct Stop {
 #[derive(Debug)]
 struct Inner {
     requested: AtomicBool,
-    /// The signal that came last; 0 if none did.
+    /// The last signal; 0 if there was none.
     signal: AtomicUsize,
-    /// When the first came, [`now_nanos`]; 0 if none did.
+    /// Time of the first signal, [`now_nanos`]; 0 if there was none.
     first_at_nanos: AtomicU64,
-    /// A signal of somebody else than the supervisor; 0 if none came.
+    /// The last signal that was not from the supervisor; 0 if there was none.
     unasked: AtomicUsize,
-    /// Becomes readable when the flag is raised and is never read.
+    /// Becomes readable when stop is requested, and is never read.
     reader: UnixStream,
     writer: UnixStream,
 }
 
 impl Stop {
-    /// A flag that only [`request`](Self::request) raises.
+    /// A stop request that only [`request`](Self::request) raises.
     ///
     /// # Errors
     ///
@@ -69,9 +69,9 @@ impl Stop {
         })
     }
 
-    /// A flag that SIGINT, SIGTERM and SIGHUP raise as well. A second SIGINT or SIGTERM, half a second or more
-    /// after the first signal, ends the process at once with exit status 130. A second SIGHUP does not: a terminal that
-    /// closes sends two, and nobody waits any more for the end.
+    /// A stop request that SIGINT, SIGTERM and SIGHUP raise as well. A second SIGINT or SIGTERM, half a
+    /// second or more after the first signal, ends the process at once with exit status 130. A second SIGHUP
+    /// does not: a closing terminal sends two.
     ///
     /// Call it once in a process, before threads are started.
     ///
@@ -92,11 +92,11 @@ impl Stop {
         Ok(stop)
     }
 
-    /// A flag that the same signals raise if the supervisor sends them.
+    /// A stop request that the same signals raise if the supervisor sends them.
     ///
-    /// Those of anybody else say nothing about the run. They end the process as they would end one that does not
-    /// handle them, two seconds later, unless the supervisor has asked it to end by then: what it
-    /// leaves unfinished is then as after any other death, and its successor goes on with it.
+    /// Signals of other processes concern only this process, not the run. They end it two seconds later, as
+    /// if they were not handled, unless the supervisor has requested a stop by then. The supervisor restarts
+    /// it as after any other death.
     ///
     /// * `supervisor`: its process id.
     pub(crate) fn on_signals_of(supervisor: u32) -> io::Result<Self> {
@@ -107,7 +107,7 @@ impl Stop {
                 if sender(info) == Some(supervisor) {
                     inner.raise(signal);
                 } else if inner.unasked.swap(signal as usize, Ordering::AcqRel) == 0 {
-                    // SAFETY: it has no precondition, and may be called in a handler.
+                    // // SAFETY: `alarm` has no precondition and is async-signal-safe.
                     unsafe { libc::alarm(UNASKED_SECONDS) };
                 }
             })?;
@@ -115,7 +115,7 @@ impl Stop {
         let inner = Arc::clone(&stop.inner);
         on_signal(SIGALRM, move |_| {
             let unasked = inner.unasked.load(Ordering::Acquire);
-            // Nothing can be done about a failure here, and the process only goes on.
+            // // On failure the process continues; nothing else can be done here.
             if unasked != 0 && !inner.requested.load(Ordering::Acquire) {
                 emulate_default_handler(unasked as i32).ok();
             }
@@ -123,17 +123,17 @@ impl Stop {
         Ok(stop)
     }
 
-    /// Raises the flag.
+    /// /// Requests the stop.
     pub fn request(&self) {
         self.inner.wake();
     }
 
-    /// Whether the flag is up.
+    /// /// Whether stop was requested.
     pub fn is_requested(&self) -> bool {
         self.inner.requested.load(Ordering::Acquire)
     }
 
-    /// The number of the signal that came last, if one did.
+    /// The number of the last signal, if there was one.
     pub fn signal(&self) -> Option<i32> {
         match self.inner.signal.load(Ordering::Acquire) {
             0 => None,
@@ -143,13 +143,13 @@ impl Stop {
 }
 
 impl AsFd for Stop {
-    /// Readable once the flag is up; not to be read from.
+    /// Readable once stop is requested; must not be read from.
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.inner.reader.as_fd()
     }
 }
 
-/// All that handlers do: atomic numbers, the clock, and one system call. None allocates or takes a lock.
+/// The work of the signal handlers: atomics, the clock, and one system call. It neither allocates nor locks.
 impl Inner {
     fn raise(&self, signal: i32) {
         self.signal.store(signal as usize, Ordering::Release);
@@ -158,11 +158,11 @@ impl Inner {
 
     fn wake(&self) {
         self.requested.store(true, Ordering::Release);
-        // A full socket is readable, which is all that is wanted of it.
+        // // A full socket is readable already.
         rustix::io::write(&self.writer, &[1]).ok();
     }
 
-    /// Whether a signal has come before, and long enough ago to have been another wish.
+    /// Whether an earlier signal is old enough for this one to be a separate request.
     fn is_repeated(&self) -> bool {
         let now = now_nanos();
         let first = &self.first_at_nanos;
@@ -173,10 +173,10 @@ impl Inner {
     }
 }
 
-/// Has a signal handled, for as long as the process lives.
+/// Installs a signal handler for the life of the process.
 fn on_signal(signal: i32, handler: impl Fn(&siginfo_t) + Send + Sync + 'static) -> io::Result<()> {
-    // SAFETY: the handlers of this file do nothing that is not allowed in one (see [`Inner`]): they neither
-    // allocate nor take a lock.
+    // // SAFETY: the handlers of this file are async-signal-safe (see [`Inner`]): they neither allocate nor
+    // lock.
     unsafe { register_sigaction(signal, handler) }.map(drop)
 }
 
@@ -185,7 +185,7 @@ fn sender(info: &siginfo_t) -> Option<u32> {
     if info.si_code > 0 {
         return None;
     }
-    // SAFETY: signals that processes send carry the sender (sigaction(2): codes that are not positive).
+    // // SAFETY: signals sent by processes carry the sender (sigaction(2): codes that are not positive).
     let pid = unsafe { info.si_pid() };
     u32::try_from(pid).ok()
 }

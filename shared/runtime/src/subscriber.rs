@@ -17,7 +17,7 @@ use crate::service::{self, Messages, PortError};
 use crate::topic::Delivery;
 use crate::{Copies, Waiter};
 
-/// A message could not be taken in.
+/// A message could not be received.
 #[derive(Debug, thiserror::Error)]
 pub enum ReceiveError {
     /// The process holds as many messages of the topic as it may.
@@ -44,7 +44,7 @@ pub struct Subscriber<T: Message> {
 }
 
 impl<T: Message> Subscriber<T> {
-    /// Takes the oldest message that waits, if one does.
+    /// Takes the oldest waiting message, if there is one.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ impl<T: Message> Subscriber<T> {
         Ok(None)
     }
 
-    /// Takes all messages that wait and answers with the newest.
+    /// Takes all waiting messages and returns the newest.
     ///
     /// # Errors
     ///
@@ -72,7 +72,7 @@ impl<T: Message> Subscriber<T> {
         Ok(latest)
     }
 
-    /// Processes that may send, dead ones included until they are cleaned away.
+    /// Number of publishers, including those of dead processes until they are cleaned up.
     pub fn n_publishers(&self) -> usize {
         self.port.n_publishers()
     }
@@ -84,14 +84,14 @@ impl<T: Message> Subscriber<T> {
     }
 }
 
-/// Receives arrays where they lie.
+/// Receives arrays in place, without copying.
 #[derive(Debug)]
 pub struct SliceSubscriber<E: Element, H: Header> {
     port: Port<E, H>,
 }
 
 impl<E: Element, H: Header> SliceSubscriber<E, H> {
-    /// Takes the oldest array that waits, if one does. Its memory is held until it is dropped.
+    /// Takes the oldest waiting array, if there is one. Its memory is held until it is dropped.
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
         Ok(self.port.receive()?.map(|sample| Sample { sample }))
     }
 
-    /// Takes all arrays that wait and answers with the newest.
+    /// Takes all waiting arrays and returns the newest.
     ///
     /// # Errors
     ///
@@ -111,15 +111,15 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
             match self.receive() {
                 Ok(Some(sample)) => latest = Some(sample),
                 Ok(None) => return Ok(latest),
-                // A newer one waits: it was sent since the last look.
+                // // A newer one was sent since the last check.
                 Err(ReceiveError::TooManyHeld { .. }) if latest.is_some() => latest = None,
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// A copy of an array, for whoever keeps it longer than its sender can do without the memory. It is
-    /// counted ([`Bus::copies`]).
+    /// Copies an array, for use beyond the time its sender can spare the memory. The copy is counted
+    /// ([`Bus::copies`]).
     pub fn copy_of(&self, sample: &Sample<E, H>) -> Vec<E> {
         self.port.copies.add(size_of_val(sample.payload()));
         sample.payload().to_vec()
@@ -144,7 +144,7 @@ impl<E: Element, H: Header> Sample<E, H> {
         self.sample.payload()
     }
 
-    /// What travels with it. Check it against the array before use: it comes from another process.
+    /// The header. Check it against the array before use: it comes from another process.
     pub fn header(&self) -> &H {
         self.sample.user_header()
     }
@@ -155,14 +155,14 @@ struct Port<E: Message, H: Header> {
     topic: Arc<str>,
     subscriber: IoxSubscriber<ipc::Service, [E], H>,
     messages: Messages<E, H>,
-    /// Tells publishers that this subscriber hears them; only where nothing may be lost.
+    /// Tells publishers that this subscriber is connected; only with lossless delivery.
     ready: Option<Notifier<ipc::Service>>,
     known_publishers: RefCell<Vec<u128>>,
     copies: Copies,
 }
 
 impl Bus {
-    /// Makes the receiving end of a topic of messages; new messages wake `waiter`.
+    /// Creates a subscriber of a topic of messages; new messages wake `waiter`.
     ///
     /// # Errors
     ///
@@ -177,7 +177,7 @@ impl Bus {
         })
     }
 
-    /// Makes the receiving end of a topic of arrays; new arrays wake `waiter`.
+    /// Creates a subscriber of a topic of arrays; new arrays wake `waiter`.
     ///
     /// # Errors
     ///
@@ -202,8 +202,8 @@ impl<E: Message, H: Header> Port<E, H> {
             Delivery::Lossless => Some(bus.notifier(&service::ready_name(topic))?),
         };
         if waiter.spins() {
-            // Nobody need wake who is awake.
-            waiter.look_without_pause();
+            // // A spinning waiter needs no wake-up.
+            waiter.poll_without_pause();
         } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
         }
@@ -227,20 +227,20 @@ impl<E: Message, H: Header> Port<E, H> {
         Ok(port)
     }
 
-    /// Connects to the publishers that are there.
+    /// Connects to the existing publishers.
     fn connect(&self) {
-        // Listed before they are connected to, so that none is acknowledged that was not: one may
-        // have come while this subscriber was being made.
+        // // Listed before connecting, so that only connected publishers are acknowledged: a new one may
+        // appear in between.
         let publishers = self.publishers();
         match self.subscriber.update_connections() {
             Ok(()) => self.acknowledge(publishers),
-            // It will be tried again when something is to be received.
+            // // Connecting is tried again at the next receive.
             Err(error) => tracing::debug!(topic = %self.topic, %error, "cannot connect"),
         }
     }
 
     fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
-        // Listed before they are connected to, as in `connect`.
+        // // Listed before connecting, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample = self.subscriber.receive().map_err(|source| match source {
@@ -265,7 +265,7 @@ impl<E: Message, H: Header> Port<E, H> {
         ids
     }
 
-    /// Says once to every publisher that it is heard.
+    /// Acknowledges every publisher once.
     fn acknowledge(&self, publishers: Vec<u128>) {
         let Some(ready) = &self.ready else { return };
         let mut known = self.known_publishers.borrow_mut();

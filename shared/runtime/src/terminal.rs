@@ -12,20 +12,20 @@ use rustix::termios::{
 
 use crate::Stop;
 
-/// Keys of the terminal that standard input is, one by one and without being shown; dropping it gives
-/// the terminal back as it was. Ctrl-C stays a signal.
+/// Reads single keys from the terminal on standard input, without echo; dropping it restores the terminal.
+/// Ctrl-C still sends a signal.
 #[derive(Debug)]
 pub struct Keys {
-    /// None where standard input is no terminal.
+    /// None if standard input is not a terminal.
     before: Option<Termios>,
 }
 
 impl Keys {
-    /// Begins to take keys. Where standard input is no terminal there are none.
+    /// Starts to read keys. There are none if standard input is not a terminal.
     ///
     /// # Errors
     ///
-    /// The terminal refuses.
+    /// The terminal cannot be configured.
     pub fn new() -> io::Result<Self> {
         let stdin = io::stdin();
         if !stdin.is_terminal() {
@@ -44,7 +44,7 @@ impl Keys {
         })
     }
 
-    /// Waits for a key, until `timeout` passes or the process is to stop.
+    /// Waits for a key, `timeout` or a stop request.
     ///
     /// # Errors
     ///
@@ -64,18 +64,18 @@ impl Keys {
             Err(Errno::INTR) => return Ok(None),
             Err(error) => return Err(error.into()),
         }
-        if fds.get(1).is_none_or(|it| it.revents().is_empty()) {
+        if fds.get(1).is_none_or(|fd| fd.revents().is_empty()) {
             return Ok(None);
         }
         let mut key = [0];
-        // Not through the buffer of standard input, which would hide further keys from `poll`.
+        // // Unbuffered: the buffer of standard input would hide further keys from `poll`.
         match rustix::io::read(&stdin, &mut key)? {
             0 => Err(io::ErrorKind::UnexpectedEof.into()),
             _ => Ok(Some(key[0])),
         }
     }
 
-    /// Columns and rows of the terminal that standard output is, if it is one.
+    /// Columns and rows of the terminal on standard output, if it is one.
     pub fn size() -> Option<[usize; 2]> {
         let size = tcgetwinsize(io::stdout()).ok()?;
         (size.ws_col > 0).then(|| [size.ws_col, size.ws_row].map(usize::from))
@@ -87,7 +87,7 @@ impl Drop for Keys {
         if let Some(before) = &self.before
             && let Err(error) = tcsetattr(io::stdin(), OptionalActions::Now, before)
         {
-            tracing::debug!(%error, "cannot give the terminal back as it was");
+            tracing::debug!(%error, "cannot restore the terminal");
         }
     }
 }

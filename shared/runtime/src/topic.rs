@@ -6,37 +6,37 @@ use crate::payload::{Element, Header, Message};
 /// What happens when a receiver is slower than its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
-    /// The sender never waits: a full buffer loses its oldest message, so the latest wins.
+    /// The sender never waits: a full buffer drops its oldest message, so the latest frame wins.
     #[default]
     Realtime,
     /// Nothing is lost: a full buffer makes the sender wait.
     Lossless,
 }
 
-/// How many ports a topic has and how much each of them may hold.
+/// The number of ports of a topic and their buffers.
 ///
-/// Memory is reserved for the worst case, so that a sender never runs out:
+/// Memory is reserved for the worst case, so that a sender always has some:
 /// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher, unless
-/// [`TopicPlan::with_few_chunks`] says otherwise.
+/// [`TopicPlan::with_few_chunks`] is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Ports that may send at the same time.
+    /// Largest number of publishers.
     pub publishers: usize,
-    /// Ports that may receive at the same time.
+    /// Largest number of subscribers.
     pub subscribers: usize,
-    /// Messages that wait for one subscriber.
+    /// /// Queue length of a subscriber, messages.
     pub buffer: usize,
-    /// Messages that one subscriber may hold at the same time.
+    /// /// Messages that one subscriber may borrow at the same time.
     pub borrowed: usize,
-    /// Messages that one publisher may write at the same time.
+    /// /// Messages that one publisher may have on loan at the same time.
     pub loaned: usize,
 }
 
 impl Limits {
     /// One publisher that writes one message at a time.
     ///
-    /// * `buffer`: messages that wait for one subscriber.
-    /// * `borrowed`: messages that one subscriber may hold at the same time.
+    /// * `buffer`: queue length of a subscriber, messages.
+    /// * `borrowed`: messages that one subscriber may borrow at the same time.
     pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
         Self {
             publishers: 1,
@@ -48,7 +48,7 @@ impl Limits {
     }
 }
 
-/// One topic of a deployment: its name, what travels there, and how.
+/// One topic of a deployment: its name, message type and quality of service.
 #[derive(Debug, Clone)]
 pub struct TopicPlan {
     topic: String,
@@ -63,7 +63,7 @@ pub struct TopicPlan {
 }
 
 impl TopicPlan {
-    /// A topic of messages that are copied in and out: [`Bus::publisher`], [`Bus::subscriber`].
+    /// A topic of messages that are copied when sent and received: [`Bus::publisher`], [`Bus::subscriber`].
     pub fn messages<T: Message>(topic: String, delivery: Delivery, limits: Limits) -> Self {
         Self {
             topic,
@@ -77,10 +77,10 @@ impl TopicPlan {
         }
     }
 
-    /// A topic of arrays with a header, written and read where they lie:
-    /// [`Bus::slice_publisher`], [`Bus::slice_subscriber`].
+    /// A topic of arrays with a header, written and read in place: [`Bus::slice_publisher`],
+    /// [`Bus::slice_subscriber`].
     ///
-    /// The array begins on a cache line, because its header's size is a multiple of one.
+    /// The array starts on a cache line, because its header's size is a multiple of one.
     ///
     /// * `max_len`: longest array, elements.
     pub fn slices<E: Element, H: Header>(
@@ -89,7 +89,7 @@ impl TopicPlan {
         limits: Limits,
         max_len: usize,
     ) -> Self {
-        // Not by iceoryx2's `payload_alignment`, which would align every element.
+        // // iceoryx2's `payload_alignment` would align every element.
         const { assert!(align_of::<H>() == CACHE_LINE && size_of::<H>().is_multiple_of(CACHE_LINE)) };
         Self {
             topic,
@@ -103,20 +103,19 @@ impl TopicPlan {
         }
     }
 
-    /// Leaves out the wake-up: receivers of this topic look at it when they see fit.
+    /// Leaves out the wake-up: receivers of this topic poll it.
     #[must_use]
     pub fn without_wake_up(mut self) -> Self {
         self.wakes = false;
         self
     }
 
-    /// For large arrays: says that so few chunks do, at least 1.
+    /// Limits the chunks of a publisher of large arrays, at least 1.
     ///
-    /// With [`Delivery::Lossless`] a publisher has no more than these, and
-    /// [`SlicePublisher::loan`](crate::SlicePublisher::loan) waits until one is free: any number that
-    /// leaves one to write while every receiver holds its own keeps all of them going. With
-    /// [`Delivery::Realtime`], where nobody may be made to wait, there are as many as before, but
-    /// only these are mapped ahead of use; the others cost a sender no memory unless receivers lag.
+    /// With [`Delivery::Lossless`] a publisher has only these, and
+    /// [`SlicePublisher::loan`](crate::SlicePublisher::loan) waits until one is free: one more than all
+    /// receivers borrow is enough. With [`Delivery::Realtime`], where a sender never waits, there are as many
+    /// as before, but only these are mapped ahead of use; the others cost no memory unless receivers lag.
     #[must_use]
     pub fn with_few_chunks(mut self, chunks: usize) -> Self {
         self.usual_chunks = Some(chunks.max(1));
@@ -133,7 +132,7 @@ impl TopicPlan {
         self.delivery
     }
 
-    /// How many ports, and how much each may hold.
+    /// The number of ports and their buffers.
     pub fn limits(&self) -> Limits {
         self.limits
     }
@@ -143,7 +142,7 @@ impl TopicPlan {
         self.max_len
     }
 
-    /// Whether senders wake receivers.
+    /// Whether senders notify receivers.
     pub fn wakes(&self) -> bool {
         self.wakes
     }
@@ -154,7 +153,7 @@ impl TopicPlan {
         let most = limits.subscribers * (limits.buffer + limits.borrowed) + limits.loaned;
         match self.delivery {
             Delivery::Realtime => most,
-            Delivery::Lossless => self.usual_chunks.map_or(most, |it| it.min(most)),
+            Delivery::Lossless => self.usual_chunks.map_or(most, |chunks| chunks.min(most)),
         }
     }
 
@@ -164,12 +163,12 @@ impl TopicPlan {
         self.usual_chunks.map_or(chunks, |it| it.min(chunks))
     }
 
-    /// Bytes of one message, where it is an array of the longest.
+    /// Largest size of one message, bytes.
     pub fn message_bytes(&self) -> u64 {
         self.chunk_bytes as u64
     }
 
-    /// Shared memory that all publishers of the topic take together, bytes; the largest number where it is more.
+    /// Shared memory of all publishers of the topic together, bytes; saturates.
     pub fn pool_bytes(&self) -> u64 {
         let chunks = (self.limits.publishers as u64).saturating_mul(self.chunks() as u64);
         chunks.saturating_mul(self.chunk_bytes as u64)
@@ -183,7 +182,7 @@ impl TopicPlan {
 
 /// Bytes of a cache line, and of the widest vector register.
 const CACHE_LINE: usize = 64;
-/// What iceoryx2 puts before the user header, with its alignment.
+/// The header of iceoryx2 before the user header, with its alignment.
 const TRANSPORT_HEADER_BYTES: usize = 64;
 
 /// Bytes of one chunk.

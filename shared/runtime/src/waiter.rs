@@ -1,4 +1,4 @@
-//! Sleeping until there is something to do.
+//! Waiting for messages or a stop request.
 #![expect(
     unsafe_code,
     reason = "iceoryx2 hands out the file descriptor of a listener only as a number"
@@ -18,26 +18,26 @@ use crate::bus::Bus;
 use crate::service::{self, PortError};
 use crate::{Progress, Stop};
 
-/// Longest sleep. A sender may die between sending and waking, so receivers must look for
-/// themselves; and a process that sleeps for long would look as if it hung.
+/// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own;
+/// and a process that sleeps for long would seem to hang.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
 
-/// Turns after which one that does not sleep lets others have its core, if any want it: rarely enough to cost
-/// a message less than a tenth of a microsecond in the mean.
-const TURNS_BETWEEN_YIELDS: u32 = 64;
+/// Iterations after which a spinning waiter yields its core: rarely enough to cost a message less than a
+/// tenth of a microsecond on average.
+const ITERATIONS_BETWEEN_YIELDS: u32 = 64;
 
-/// Why [`Waiter::wait`] came back.
+/// Why [`Waiter::wait`] returned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Woken {
-    /// Somebody sent something.
+    /// A message was sent.
     Message,
-    /// Time passed. There may be messages all the same.
+    /// Time passed. There may still be messages.
     Time,
-    /// The process is to end.
+    /// Stop was requested.
     Stop,
 }
 
-/// Sleeping failed.
+/// Waiting failed.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot wait for messages")]
 pub struct WaitError(#[source] io::Error);
@@ -48,15 +48,15 @@ pub struct Waiter {
     listeners: Vec<Listener<ipc::Service>>,
     stop: Stop,
     progress: Progress,
-    /// Whether it never sleeps while there is somebody to hear.
+    /// Whether it spins instead of sleeping while there are subscribers.
     spins: bool,
-    /// Whether there is.
+    /// /// Whether there are subscribers.
     has_ports: bool,
     n_turns: Cell<u32>,
 }
 
 impl Bus {
-    /// A waiter, which subscribers are given when they are made.
+    /// Creates a waiter, which is passed to subscribers when they are created.
     pub fn waiter(&self) -> Waiter {
         Waiter {
             listeners: Vec::new(),
@@ -80,12 +80,12 @@ impl Bus {
 }
 
 impl Waiter {
-    /// Sleeps until a message comes, `timeout` or 100 ms pass, or the process is to stop.
+    /// Sleeps until a message arrives, `timeout` or 100 ms pass, or stop is requested.
     ///
-    /// Whatever the answer, receive from every subscriber until nothing is left before waiting
-    /// again: several messages may wake only once.
+    /// Whatever is returned, receive from every subscriber until nothing is left before waiting again:
+    /// several messages may cause only one wake-up.
     ///
-    /// Of a bus that [spins](Bus::with_spin), and with subscribers, it does not sleep but comes back at once.
+    /// With a bus that [spins](Bus::with_spin), and with subscribers, it returns at once instead of sleeping.
     ///
     /// # Errors
     ///
@@ -97,7 +97,7 @@ impl Waiter {
         self.sleep(timeout)
     }
 
-    /// Lets the caller look for itself, without a pause.
+    /// Lets the caller poll without a pause.
     fn turn(&self) -> Woken {
         self.progress.tick();
         if self.stop.is_requested() {
@@ -105,7 +105,7 @@ impl Waiter {
         }
         let n_turns = self.n_turns.get().wrapping_add(1);
         self.n_turns.set(n_turns);
-        if n_turns.is_multiple_of(TURNS_BETWEEN_YIELDS) {
+        if n_turns.is_multiple_of(ITERATIONS_BETWEEN_YIELDS) {
             std::thread::yield_now();
         } else {
             core::hint::spin_loop();
@@ -113,7 +113,7 @@ impl Waiter {
         Woken::Time
     }
 
-    /// Sleeps until a message comes, even if it spins otherwise.
+    /// Sleeps until a message arrives, even if the bus spins.
     fn sleep(&self, timeout: Duration) -> Result<Woken, WaitError> {
         self.progress.tick();
         if self.stop.is_requested() {
@@ -125,7 +125,10 @@ impl Waiter {
             return Ok(Woken::Stop);
         }
         for &index in &awake {
-            let drained = self.listeners.get(index).map(|it| it.try_wait(|_| {}));
+            let drained = self
+                .listeners
+                .get(index)
+                .map(|listener| listener.try_wait(|_| {}));
             if let Some(Err(error)) = drained {
                 tracing::debug!(?error, "cannot drain a wake-up");
             }
@@ -137,24 +140,24 @@ impl Waiter {
         }
     }
 
-    /// Sleeps until the process is to stop, and calls `again` for every receiver that comes anew: one
-    /// that had to be restarted has not heard the last message.
+    /// Sleeps until stop is requested, and calls `resend` for every new receiver: one that was restarted has
+    /// not received the last message.
     ///
     /// * `n_connected`: how many receivers there are.
     ///
     /// # Errors
     ///
-    /// [`WaitError`], and what `again` fails with.
+    /// [`WaitError`], and the errors of `resend`.
     pub fn linger<E: From<WaitError>>(
         &self,
         n_connected: impl Fn() -> usize,
-        mut again: impl FnMut() -> Result<(), E>,
+        mut resend: impl FnMut() -> Result<(), E>,
     ) -> Result<(), E> {
         let mut known = n_connected();
         while self.sleep(Duration::from_millis(20))? != Woken::Stop {
             let now = n_connected();
             if now > known {
-                again()?;
+                resend()?;
             }
             known = now;
         }
@@ -165,8 +168,8 @@ impl Waiter {
         self.spins
     }
 
-    /// Notes that there is somebody to hear who wakes nobody.
-    pub(crate) fn look_without_pause(&mut self) {
+    /// Notes that there is a subscriber without wake-up.
+    pub(crate) fn poll_without_pause(&mut self) {
         self.has_ports = true;
     }
 
@@ -174,7 +177,7 @@ impl Waiter {
         self.listeners.push(listener);
     }
 
-    /// The listeners that have something.
+    /// The listeners with pending events.
     fn poll(&self, timeout: Duration) -> Result<Vec<usize>, WaitError> {
         let mut fds: Vec<PollFd<'_>> = self
             .listeners
@@ -201,7 +204,7 @@ impl Waiter {
 }
 
 fn fd_of(listener: &Listener<ipc::Service>) -> BorrowedFd<'_> {
-    // SAFETY: the number is not kept beyond this function, as `native_handle` asks.
+    // // SAFETY: the number is not kept beyond this function, as `native_handle` requires.
     let fd = unsafe { listener.file_descriptor().native_handle() };
     // SAFETY: the listener owns the descriptor and keeps it open while it is borrowed.
     unsafe { BorrowedFd::borrow_raw(fd) }

@@ -1,11 +1,11 @@
-//! What readers of TOML and JSON say of a value, in the words of people.
+//! Rewrites the error texts of TOML and JSON parsers for users.
 
-/// A text in which complaints of `serde` are replaced by what a user can act on.
+/// Replaces serde's terms in an error text by terms that users know.
 ///
 /// ```
-/// let said = "line 3: invalid type: string \"x\", expected u64";
+/// let text = "line 3: invalid type: string \"x\", expected u64";
 /// assert_eq!(
-///     runtime::in_words(said),
+///     runtime::in_words(text),
 ///     "line 3: expected a whole number of at least 0, found the text \"x\""
 /// );
 /// ```
@@ -22,7 +22,7 @@ fn line(text: &str) -> String {
         {
             let end = [" at line ", " in `"]
                 .iter()
-                .filter_map(|it| rest.find(it))
+                .filter_map(|mark| rest.find(mark))
                 .min();
             let (asked, after) = rest.split_at(end.unwrap_or(rest.len()));
             let got = if kind.contains("length") {
@@ -33,8 +33,8 @@ fn line(text: &str) -> String {
             return format!("{before}expected {}, found {got}{after}", wanted(asked));
         }
     }
-    if let Some(said) = of_transport(text) {
-        return said;
+    if let Some(readable) = of_transport(text) {
+        return readable;
     }
     if text.starts_with("string values must be quoted") {
         return "expected a value; text must stand in quotes, as in key = \"text\"".to_owned();
@@ -51,28 +51,29 @@ fn line(text: &str) -> String {
     .fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
-/// `SendError::InternalError`, which is all that the transport says of what went wrong.
+/// Rewrites `SendError::InternalError`, which is the whole error text of iceoryx2.
 fn of_transport(text: &str) -> Option<String> {
     let (of, what) = text.split_once("Error::")?;
-    let is_name = |it: &str| {
-        it.starts_with(char::is_uppercase) && it.bytes().all(|it| it.is_ascii_alphanumeric())
+    let is_name = |name: &str| {
+        name.starts_with(char::is_uppercase)
+            && name.bytes().all(|byte| byte.is_ascii_alphanumeric())
     };
     if !is_name(of) || !is_name(what) {
         return None;
     }
-    let words = apart(what);
+    let words = split_words(what);
     Some(format!(
-        "iceoryx2, which carries the messages, says: {words} ({of}Error)"
+        "the transport iceoryx2 reports: {words} ({of}Error)"
     ))
 }
 
-/// What the transport says of an error that has no words of its own.
-pub(crate) fn said(error: &impl std::fmt::Debug) -> String {
-    apart(&format!("{error:?}"))
+/// The name of a transport error that has no text, as words.
+pub(crate) fn spaced(error: &impl std::fmt::Debug) -> String {
+    split_words(&format!("{error:?}"))
 }
 
 /// `InternalError` in words.
-fn apart(name: &str) -> String {
+fn split_words(name: &str) -> String {
     let mut words = String::new();
     for letter in name.chars() {
         if letter.is_uppercase() && !words.is_empty() {
@@ -83,9 +84,9 @@ fn apart(name: &str) -> String {
     words
 }
 
-/// What a value is.
+/// /// Describes the value that was found.
 fn found(got: &str) -> String {
-    let plain = |it: &str| it.trim_matches('`').to_owned();
+    let plain = |value: &str| value.trim_matches('`').to_owned();
     if let Some(text) = got.strip_prefix("string ") {
         return format!("the text {text}");
     }
@@ -103,7 +104,7 @@ fn found(got: &str) -> String {
     }
 }
 
-/// What would do.
+/// /// Describes the expected value.
 fn wanted(asked: &str) -> String {
     let number = asked
         .strip_prefix("an array of length ")
@@ -133,12 +134,12 @@ fn wanted(asked: &str) -> String {
 mod tests {
     use super::in_words;
 
-    fn check(said: &str, expect: &str) {
-        assert_eq!(in_words(said), expect);
+    fn check(text: &str, expect: &str) {
+        assert_eq!(in_words(text), expect);
     }
 
     #[test]
-    fn types_of_the_program_are_words_of_its_users() {
+    fn types_are_described_in_terms_of_users() {
         check(
             "invalid value: integer `-1`, expected u64",
             "expected a whole number of at least 0, found -1",
@@ -166,17 +167,17 @@ mod tests {
     }
 
     #[test]
-    fn what_serde_did_not_say_stays_as_it_is() {
+    fn other_texts_are_unchanged() {
         for text in ["", "no such footage: a.mp4", "expected 3, found 4\n\nx"] {
             check(text, text);
         }
     }
 
     #[test]
-    fn what_the_transport_says_is_said_to_be_its_own() {
+    fn errors_of_the_transport_are_attributed_to_it() {
         check(
             "SendError::InternalError",
-            "iceoryx2, which carries the messages, says: internal error (SendError)",
+            "the transport iceoryx2 reports: internal error (SendError)",
         );
         for text in ["Error: a::b", "a::b", "SendError::", "see std::io"] {
             check(text, text);

@@ -109,7 +109,7 @@ impl Ports {
             .push(bus.publisher(&topic::pair_pose(worker)).unwrap());
     }
 
-    /// Triangulate, which publishes the result, and record, which sees everything.
+    /// Triangulate, which publishes the result, and record, which receives everything.
     fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
         for view in 0..N_VIEWS {
             self.poses_in
@@ -136,7 +136,7 @@ impl Ports {
 }
 
 #[test]
-fn a_deployment_of_eight_views_fits_its_topics_and_its_plan_of_memory() {
+fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
     runtime::raise_file_limit();
     for delivery in [Delivery::Realtime, Delivery::Lossless] {
         let plan = plan(delivery);

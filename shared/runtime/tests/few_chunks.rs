@@ -1,4 +1,4 @@
-//! Topics of large arrays that make do with few chunks.
+//! Topics of large arrays with few chunks.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -10,10 +10,10 @@ use messages::FrameHeader;
 use runtime::{Bus, Delivery, Limits, SendError, SlicePublisher, SliceSubscriber, Stop, TopicPlan};
 
 const SOON: Duration = Duration::from_secs(20);
-/// Elements of every array: bytes enough for pages to tell chunks apart.
+/// Elements of every array: enough bytes to distinguish chunks by their pages.
 const LEN: usize = 1 << 20;
 
-/// One chunk to write and one to hold, where the worst case asks for nine.
+/// One chunk to write and one to borrow, where the worst case needs nine.
 fn plan(delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(2, 2, 2);
     TopicPlan::slices::<u8, FrameHeader>("large".to_owned(), delivery, limits, LEN)
@@ -26,7 +26,7 @@ fn send(publisher: &SlicePublisher<u8, FrameHeader>, value: u8) -> Result<usize,
     loan.send()
 }
 
-/// The two ends of a topic both of whose chunks are on their way.
+/// Publisher and subscriber of a topic with both chunks in use.
 fn full(
     deployment: &Deployment,
     patience: Duration,
@@ -60,7 +60,7 @@ fn mapped(deployment: &Deployment) -> usize {
 }
 
 #[test]
-fn a_sender_waits_until_a_chunk_is_given_back() {
+fn a_sender_waits_until_a_chunk_is_released() {
     const N: u8 = 100;
     let deployment = Deployment::new(&[plan(Delivery::Lossless)]);
     let namespace = deployment.namespace().clone();
@@ -99,19 +99,19 @@ fn a_sender_waits_until_a_chunk_is_given_back() {
 }
 
 #[test]
-fn what_a_receiver_held_that_is_gone_comes_back() {
+fn chunks_of_a_dropped_receiver_are_released() {
     let deployment = Deployment::new(&[plan(Delivery::Lossless)]);
     let (publisher, subscriber) = full(&deployment, SOON);
     let held = subscriber.receive().unwrap().unwrap();
     drop((held, subscriber));
-    // Nobody hears it, but both chunks serve again.
+    // // There is no receiver, but both chunks can be used again.
     for value in [3, 4] {
         assert_eq!(send(&publisher, value).unwrap(), 0);
     }
 }
 
 #[test]
-fn a_sender_gives_up_on_a_chunk_that_never_comes_back() {
+fn a_sender_gives_up_on_a_chunk_that_is_never_released() {
     let deployment = Deployment::new(&[plan(Delivery::Lossless)]);
     let (publisher, subscriber) = full(&deployment, Duration::from_millis(100));
     let held = subscriber.receive().unwrap().unwrap();
@@ -123,7 +123,7 @@ fn a_sender_gives_up_on_a_chunk_that_never_comes_back() {
 }
 
 #[test]
-fn a_sender_that_waits_for_a_chunk_obeys_a_stop() {
+fn a_sender_that_waits_for_a_chunk_stops_on_request() {
     let deployment = Deployment::new(&[plan(Delivery::Lossless)]);
     let (publisher, subscriber) = full(&deployment, Duration::from_mins(10));
     deployment.stop().request();
@@ -133,7 +133,7 @@ fn a_sender_that_waits_for_a_chunk_obeys_a_stop() {
 }
 
 #[test]
-fn where_the_latest_wins_nobody_waits_and_chunks_that_are_not_needed_are_not_mapped() {
+fn with_realtime_delivery_a_sender_never_waits_and_unused_chunks_are_not_mapped() {
     let deployment = Deployment::new(&[plan(Delivery::Realtime)]);
     let bus = deployment.bus("both");
     let publisher = bus.slice_publisher("large").unwrap();
@@ -148,7 +148,7 @@ fn where_the_latest_wins_nobody_waits_and_chunks_that_are_not_needed_are_not_map
         held = subscriber.latest().unwrap();
         assert_eq!(held.as_ref().unwrap().payload()[LEN - 1], value);
     }
-    // Of the nine chunks those serve again that were given back last.
+    // // Of the nine chunks the last released ones are used again.
     let in_use = mapped(&deployment);
     assert!(
         in_use < 4 * LEN,
@@ -160,7 +160,7 @@ fn where_the_latest_wins_nobody_waits_and_chunks_that_are_not_needed_are_not_map
     assert_eq!(
         held.unwrap().payload()[0],
         49,
-        "what is held is not overwritten"
+        "a borrowed array is not overwritten"
     );
     assert_eq!(subscriber.latest().unwrap().unwrap().payload()[0], 99);
 }

@@ -9,7 +9,7 @@ use messages::Health;
 use runtime::{Bus, LockError, Namespace, NamespaceError, Stop, process_topics};
 
 #[test]
-fn a_deployment_that_runs_is_not_started_again() {
+fn a_running_deployment_is_not_started_again() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let lock = namespace.acquire().unwrap();
@@ -22,7 +22,7 @@ fn a_deployment_that_runs_is_not_started_again() {
 }
 
 #[test]
-fn nothing_is_left_after_the_end() {
+fn no_file_is_left_after_the_end() {
     let deployment = Deployment::new(&process_topics("a"));
     let namespace = deployment.namespace().clone();
     let bus = deployment.bus("a");
@@ -36,11 +36,11 @@ fn nothing_is_left_after_the_end() {
 }
 
 #[test]
-fn what_a_killed_run_left_behind_is_removed() {
+fn files_of_a_killed_run_are_removed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let leftover = format!("/dev/shm/{}123.data", namespace.prefix());
-    // What a run that was killed leaves: its directory says whose it is.
+    // // Files that a killed run leaves: its directory has the marker file.
     std::mem::forget(namespace.acquire().unwrap());
     fs::remove_file(namespace.root().join("lock")).unwrap();
     fs::write(&leftover, "x").unwrap();
@@ -53,7 +53,7 @@ fn what_a_killed_run_left_behind_is_removed() {
 }
 
 #[test]
-fn files_of_others_stay() {
+fn files_of_other_programs_are_kept() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let (own, other) = (namespace(base.path()), namespace(base.path()));
     let path = format!("/dev/shm/{}123.data", other.prefix());
@@ -64,7 +64,7 @@ fn files_of_others_stay() {
 }
 
 #[test]
-fn a_deployment_with_a_living_process_is_left_alone() {
+fn a_deployment_with_a_living_process_is_not_removed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let bus = Bus::open(&namespace, "survivor", &Stop::new().unwrap()).unwrap();
@@ -112,7 +112,7 @@ fn the_longest_root_has_room_for_sockets() {
 }
 
 #[test]
-fn names_that_are_no_file_names_are_refused() {
+fn invalid_directory_names_are_refused() {
     for name in ["", ".", "..", "a/b", "a b", "\u{e4}", &"x".repeat(33)] {
         let error = Namespace::new(name).unwrap_err();
         assert!(

@@ -1,4 +1,4 @@
-//! Ports of two or more participants in one process; faults need real processes, see `supervise`.
+//! Publishers and subscribers within one process; faults need real processes, see `supervise`.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -28,7 +28,7 @@ fn frames(delivery: Delivery, max_len: usize) -> TopicPlan {
 }
 
 #[test]
-fn a_message_arrives_and_wakes() {
+fn a_message_arrives_and_wakes_the_receiver() {
     let deployment = Deployment::new(&[small(Delivery::Realtime, 4)]);
     let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
     let publisher = sender.publisher::<ViewQuality>("small").unwrap();
@@ -45,7 +45,7 @@ fn a_message_arrives_and_wakes() {
 }
 
 #[test]
-fn an_array_is_read_where_it_was_written() {
+fn an_array_is_read_in_place() {
     let deployment = Deployment::new(&[frames(Delivery::Realtime, 1000)]);
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
@@ -80,7 +80,7 @@ fn an_array_that_is_too_long_is_refused_with_the_numbers() {
 }
 
 #[test]
-fn a_loan_that_is_dropped_is_seen_by_nobody() {
+fn a_dropped_loan_is_not_sent() {
     let deployment = Deployment::new(&[frames(Delivery::Realtime, 10)]);
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
@@ -115,11 +115,15 @@ fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
         loan.send().unwrap();
     }
     assert_eq!(subscriber.latest().unwrap().unwrap().payload(), [99; 8]);
-    assert_eq!(held.payload(), [200; 8], "what is held is not overwritten");
+    assert_eq!(
+        held.payload(),
+        [200; 8],
+        "a borrowed array is not overwritten"
+    );
 }
 
 #[test]
-fn who_may_hold_one_array_gets_the_newest_of_several() {
+fn a_receiver_that_may_borrow_one_array_gets_the_newest() {
     let limits = Limits::new(1, 3, 1);
     let plan =
         TopicPlan::slices::<u8, FrameHeader>("frames".to_owned(), Delivery::Realtime, limits, 8);
@@ -174,7 +178,7 @@ fn a_slow_receiver_of_a_lossless_topic_gets_everything_in_order() {
 }
 
 #[test]
-fn a_subscriber_that_was_there_first_counts_once_it_hears_the_publisher() {
+fn an_earlier_subscriber_counts_once_it_is_connected() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
     let (sender, receiver) = (deployment.bus("sender"), deployment.bus("receiver"));
     let mut waiter = receiver.waiter();
@@ -192,7 +196,7 @@ fn a_subscriber_that_was_there_first_counts_once_it_hears_the_publisher() {
 }
 
 #[test]
-fn a_sender_that_waits_for_room_obeys_a_stop() {
+fn a_sender_that_waits_for_room_stops_on_request() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
     let (publisher, subscriber, waiter) = blocked(&deployment, Duration::from_mins(10));
     let stop = deployment.stop().clone();
@@ -235,7 +239,7 @@ fn blocked(
 }
 
 #[test]
-fn a_stop_wakes_whoever_waits() {
+fn a_stop_request_ends_a_wait() {
     let deployment = Deployment::new(&[]);
     let waiter = deployment.bus("waiter").waiter();
     assert_eq!(waiter.wait(Duration::ZERO).unwrap(), Woken::Time);
@@ -261,7 +265,7 @@ fn another_type_is_refused_by_name() {
 }
 
 #[test]
-fn a_topic_that_nobody_created_is_refused() {
+fn a_missing_topic_is_refused() {
     let deployment = Deployment::new(&[]);
     let error = deployment
         .bus("lost")
@@ -282,7 +286,7 @@ fn one_publisher_too_many_is_refused() {
 }
 
 #[test]
-fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
+fn a_pool_has_its_planned_size_and_is_allocated() {
     let plans = [
         frames(Delivery::Realtime, 1_000_003),
         frames(Delivery::Realtime, 1_000_003).with_few_chunks(2),
@@ -301,7 +305,7 @@ fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
             .find(|name| {
                 std::path::Path::new(name)
                     .extension()
-                    .is_some_and(|it| it == "data")
+                    .is_some_and(|extension| extension == "data")
             })
             .unwrap();
         let file = std::fs::metadata(format!("/dev/shm/{pool}")).unwrap();
@@ -317,7 +321,7 @@ fn a_pool_takes_what_its_plan_says_and_all_of_it_is_there() {
 }
 
 #[test]
-fn two_deployments_do_not_hear_each_other() {
+fn two_deployments_do_not_exchange_messages() {
     let (one, two) = (
         Deployment::new(&[small(Delivery::Realtime, 4)]),
         Deployment::new(&[small(Delivery::Realtime, 4)]),

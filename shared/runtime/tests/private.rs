@@ -1,6 +1,6 @@
-//! A deployment is one user's, whatever the umask is and whatever others have left.
+//! A deployment belongs to one user, whatever the umask and whatever files other users have left.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-#![expect(clippy::print_stderr, reason = "a test that cannot try all says so")]
+#![expect(clippy::print_stderr, reason = "a test reports what it skips")]
 
 mod common;
 
@@ -18,7 +18,7 @@ use runtime::{
 use rustix::fs::Mode;
 use rustix::process::{getuid, umask};
 
-/// Nobody's: not root's, and not that of whoever runs tests.
+/// A user that is neither root nor the one who runs the tests.
 const OTHER: u32 = 65_534;
 
 fn is_root() -> bool {
@@ -33,7 +33,7 @@ fn below(path: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What a deployment that runs has in the file system and in shared memory.
+/// The files of a running deployment, including shared memory.
 fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
     let mut files = Vec::new();
     below(deployment.namespace().root(), &mut files);
@@ -62,7 +62,7 @@ fn with_ports(use_it: impl FnOnce(&Deployment)) {
 }
 
 #[test]
-fn nobody_else_may_enter_whatever_the_umask_is() {
+fn files_are_closed_to_others_whatever_the_umask() {
     umask(Mode::empty());
     with_ports(|deployment| {
         let root = deployment.namespace().root();
@@ -80,10 +80,10 @@ fn nobody_else_may_enter_whatever_the_umask_is() {
 }
 
 #[test]
-fn another_user_can_open_nothing() {
+fn another_user_cannot_open_any_file() {
     umask(Mode::empty());
     if !is_root() {
-        eprintln!("not root: what another user sees is told from modes alone, in the test above");
+        eprintln!("not root: access by another user is checked by modes only, in the test above");
         return;
     }
     with_ports(|deployment| {
@@ -103,7 +103,7 @@ fn another_user_can_open_nothing() {
 }
 
 #[test]
-fn a_directory_that_was_open_is_shut() {
+fn an_open_directory_is_closed_to_others() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     fs::create_dir(namespace.root()).unwrap();
@@ -114,14 +114,14 @@ fn a_directory_that_was_open_is_shut() {
     drop(lock);
 }
 
-/// That it is said whose the path is.
+/// Checks that the error names the path and its owner.
 fn assert_foreign(error: &BusError, path: &Path, owner: u32) {
     let text = error.to_string();
-    let said = match error {
+    let named = match error {
         BusError::Privacy(PrivacyError::Foreign { path, .. }) => Some(path.as_path()),
         _ => None,
     };
-    assert_eq!(said, Some(path), "{error}");
+    assert_eq!(named, Some(path), "{error}");
     assert!(text.contains(&owner.to_string()), "{text}");
     let hint = error.hint().unwrap();
     assert!(
@@ -131,7 +131,7 @@ fn assert_foreign(error: &BusError, path: &Path, owner: u32) {
 }
 
 #[test]
-fn the_directory_of_another_user_is_refused_with_his_name() {
+fn the_directory_of_another_user_is_refused_with_the_owner() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let (namespace, owner) = if is_root() {
         let namespace = namespace(base.path());
@@ -150,20 +150,20 @@ fn the_directory_of_another_user_is_refused_with_his_name() {
 }
 
 #[test]
-fn what_another_user_has_put_in_the_way_is_named() {
+fn files_of_another_user_at_the_paths_of_a_deployment_are_named() {
     if !is_root() {
         eprintln!("not root: no file can be given to another user");
         return;
     }
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
-    // Where the directories of a user would lie.
+    // // At the parent directory of a user's deployments.
     chown(base.path(), Some(OTHER), None).unwrap();
     let own = namespace(base.path());
     let Err(LockError::Bus(error)) = own.acquire() else {
         panic!("it is below another user's");
     };
     assert_foreign(&error, base.path(), OTHER);
-    // What would be taken for shared memory of the deployment.
+    // // With a name of the deployment's shared memory.
     chown(base.path(), Some(0), None).unwrap();
     let leftover = PathBuf::from(format!("/dev/shm/{}7.data", own.prefix()));
     fs::write(&leftover, "x").unwrap();
@@ -178,13 +178,13 @@ fn what_another_user_has_put_in_the_way_is_named() {
 }
 
 #[test]
-fn a_file_in_the_place_of_the_directory_is_named() {
+fn a_file_instead_of_the_directory_is_named() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     fs::write(namespace.root(), "x").unwrap();
     let error = namespace.acquire().unwrap_err();
     assert!(error.to_string().contains("is not a directory"), "{error}");
-    // Nor is a way to another one followed.
+    // // A symbolic link is not followed either.
     fs::remove_file(namespace.root()).unwrap();
     symlink(base.path(), namespace.root()).unwrap();
     let error = namespace.acquire().unwrap_err();
@@ -209,18 +209,18 @@ fn census(path: &Path) -> Vec<(PathBuf, u32)> {
     let mut found = Vec::new();
     below(path, &mut found);
     found.sort();
-    let mode = |it: &PathBuf| fs::symlink_metadata(it).unwrap().mode();
+    let mode = |path: &PathBuf| fs::symlink_metadata(path).unwrap().mode();
     found
         .into_iter()
-        .map(|it| (it.clone(), mode(&it)))
+        .map(|path| (path.clone(), mode(&path)))
         .collect()
 }
 
 #[test]
-fn a_link_in_the_place_of_the_base_is_never_followed() {
+fn a_link_instead_of_the_base_is_never_followed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let home = home(base.path(), "t");
-    // Where another user's directories would lie; made by somebody else, if that can be done here.
+    // // At the parent directory of a user's deployments; created by another user, if this test runs as root.
     let link = base.path().join("px");
     symlink(&home, &link).unwrap();
     let owner = if is_root() {
@@ -248,7 +248,7 @@ fn a_link_in_the_place_of_the_base_is_never_followed() {
 }
 
 #[test]
-fn a_directory_that_is_no_deployments_is_named_and_stays_as_it_was() {
+fn a_directory_without_marker_is_named_and_not_changed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let home = home(base.path(), "t");
     let before = census(&home);
@@ -263,14 +263,14 @@ fn a_directory_that_is_no_deployments_is_named_and_stays_as_it_was() {
 }
 
 #[test]
-fn a_base_in_which_others_may_replace_what_is_there_is_shut() {
+fn a_base_that_others_may_write_is_closed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let mode = || fs::metadata(base.path()).unwrap().mode() & 0o7777;
     fs::set_permissions(base.path(), Permissions::from_mode(0o777)).unwrap();
     let own = namespace(base.path());
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o755);
-    // Where everybody may make something and nobody remove another's, as in /tmp, it is safe.
+    // // With the sticky bit, as in /tmp, it is safe.
     fs::set_permissions(base.path(), Permissions::from_mode(0o1777)).unwrap();
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o1777);

@@ -1,6 +1,7 @@
-//! What a killed process held is given back, also where several clean up at once, or were killed while they did.
+//! The slots of a killed process are released, also if several processes clean up at once or are killed while
+//! they do.
 //!
-//! This executable is also the processes that are killed, so it has no harness.
+//! This executable also runs as the processes that are killed, so it has no test harness.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;
@@ -24,9 +25,9 @@ fn main() {
     match std::env::args().nth(1).as_deref() {
         Some("role:sender") => sender(),
         Some("role:cleaner") => cleaner(),
-        Some("role:in-vain") => a_slot_is_free_again_however_often_its_clean_up_was_in_vain(),
+        Some("role:in-vain") => a_slot_is_released_after_failed_clean_ups(),
         Some("role:unfinished") => {
-            a_slot_is_free_again_although_its_owner_left_something_unfinished();
+            a_slot_is_released_if_its_owner_left_incomplete_files();
         }
         // One process cleans up in one deployment only, as a supervisor does.
         _ => ["role:in-vain", "role:unfinished"]
@@ -41,7 +42,7 @@ fn passes(test: &str) {
     assert!(status.success(), "{test}: {status}");
 }
 
-fn a_slot_is_free_again_however_often_its_clean_up_was_in_vain() {
+fn a_slot_is_released_after_failed_clean_ups() {
     let (deployment, bus) = deployment();
     let node = killed_sender(&deployment);
     let lock = node.with_file_name(format!(
@@ -52,14 +53,14 @@ fn a_slot_is_free_again_however_often_its_clean_up_was_in_vain() {
     let mut other = child("role:cleaner", &[&lock]);
     let mut cleaner = Cleaner::default();
     for _ in 0..3 {
-        assert_eq!(cleaner.clean(&bus), 0, "another process is at it");
+        assert_eq!(cleaner.clean(&bus), 0, "another process holds the lock");
     }
     kill(&mut other);
     assert_eq!(cleaner.clean(&bus), 1);
     bus.publisher::<ViewQuality>(TOPIC).unwrap();
 }
 
-fn a_slot_is_free_again_although_its_owner_left_something_unfinished() {
+fn a_slot_is_released_if_its_owner_left_incomplete_files() {
     let (deployment, bus) = deployment();
     let node = killed_sender(&deployment);
     let tag = node.join(format!("{}17.port_tag", deployment.namespace().prefix()));
@@ -75,7 +76,7 @@ fn a_slot_is_free_again_although_its_owner_left_something_unfinished() {
     assert_eq!(shared_memory(&namespace), Vec::<String>::new());
 }
 
-/// A deployment with one topic, which has room for one sender.
+/// A deployment with one topic, which allows one publisher.
 fn deployment() -> (Deployment, Bus) {
     let limits = Limits::new(1, 1, 1);
     let plan = TopicPlan::messages::<ViewQuality>(TOPIC.to_owned(), Delivery::Realtime, limits);
@@ -84,7 +85,7 @@ fn deployment() -> (Deployment, Bus) {
     (deployment, bus)
 }
 
-/// The folder in which iceoryx2 keeps what a process held that was then killed.
+/// The folder of iceoryx2 with the tags of a killed process.
 fn killed_sender(deployment: &Deployment) -> PathBuf {
     let namespace = deployment.namespace();
     let nodes = namespace.root().join("nodes");
@@ -106,7 +107,7 @@ fn folders(nodes: &Path) -> Vec<PathBuf> {
     paths.filter(|it| it.is_dir()).collect()
 }
 
-/// Starts this executable as another process, and waits until that holds what it is to hold.
+/// Starts this executable as another process, and waits until it is ready.
 fn child(role: &str, arguments: &[&Path]) -> Child {
     let mut child = Command::new(std::env::current_exe().unwrap())
         .arg(role)
@@ -136,7 +137,7 @@ fn sender() {
     wait_to_be_killed();
 }
 
-/// Holds the lock that iceoryx2 takes on a dead node that it cleans up.
+/// Holds the lock that iceoryx2 takes to clean up a dead node.
 fn cleaner() {
     let path = std::env::args_os().nth(2).unwrap();
     let file = File::options().read(true).write(true).open(path).unwrap();
@@ -144,9 +145,9 @@ fn cleaner() {
     wait_to_be_killed();
 }
 
-#[expect(clippy::print_stdout, reason = "who started this process reads it")]
+#[expect(clippy::print_stdout, reason = "the parent process reads it")]
 fn wait_to_be_killed() {
     println!("ready");
-    // Longer than the test takes; nobody is left behind if that fails.
+    // // Longer than the test takes; the process ends even if the test fails.
     sleep(Duration::from_mins(1));
 }

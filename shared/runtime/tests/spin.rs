@@ -1,4 +1,4 @@
-//! A receiver that looks without pause hears the same, and costs its sender no wake-up.
+//! A receiver that polls without pause gets the same messages, and its sender sends no wake-up.
 
 use crate::common;
 
@@ -11,7 +11,7 @@ use messages::FrameHeader;
 use runtime::{Bus, Delivery, Limits, TopicPlan, Woken};
 
 const TOPIC: &str = "pixels";
-/// What takes longer will never happen.
+/// What takes longer counts as never.
 const WATCHDOG: Duration = Duration::from_mins(1);
 
 fn deployment(delivery: Delivery) -> Deployment {
@@ -21,7 +21,7 @@ fn deployment(delivery: Delivery) -> Deployment {
 }
 
 #[test]
-fn whatever_is_sent_is_heard_by_who_never_sleeps() {
+fn a_spinning_receiver_gets_all_messages() {
     for delivery in [Delivery::Realtime, Delivery::Lossless] {
         let deployment = deployment(delivery);
         let is_heard = AtomicBool::new(true);
@@ -34,7 +34,10 @@ fn whatever_is_sent_is_heard_by_who_never_sleeps() {
                 for number in 0..100 {
                     let begin = Instant::now();
                     while !is_heard.swap(false, Ordering::AcqRel) {
-                        assert!(begin.elapsed() < WATCHDOG, "number {number} was not heard");
+                        assert!(
+                            begin.elapsed() < WATCHDOG,
+                            "number {number} was not received"
+                        );
                         std::thread::yield_now();
                     }
                     let mut loan = publisher.loan(1).unwrap();
@@ -47,22 +50,22 @@ fn whatever_is_sent_is_heard_by_who_never_sleeps() {
             let port = bus
                 .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)
                 .unwrap();
-            let (mut heard, begin) = (Vec::new(), Instant::now());
-            while heard.len() < 100 && begin.elapsed() < WATCHDOG {
-                // It does not sleep, so nobody tells it why it came back.
+            let (mut received, begin) = (Vec::new(), Instant::now());
+            while received.len() < 100 && begin.elapsed() < WATCHDOG {
+                // // It does not sleep, so the reason for returning is always time.
                 assert_eq!(waiter.wait(WATCHDOG).unwrap(), Woken::Time);
                 if let Some(sample) = port.receive().unwrap() {
-                    heard.push(sample.payload()[0]);
+                    received.push(sample.payload()[0]);
                     is_heard.store(true, Ordering::Release);
                 }
             }
-            assert_eq!(heard, (0..100).collect::<Vec<u8>>());
+            assert_eq!(received, (0..100).collect::<Vec<u8>>());
         });
     }
 }
 
 #[test]
-fn who_has_nobody_to_hear_sleeps_all_the_same() {
+fn a_spinning_waiter_without_subscribers_sleeps() {
     let deployment = deployment(Delivery::Realtime);
     let bus = deployment.bus("camera").with_spin(true);
     let waiter = bus.waiter();
@@ -72,7 +75,7 @@ fn who_has_nobody_to_hear_sleeps_all_the_same() {
 }
 
 #[test]
-fn who_never_sleeps_still_stops_and_shows_that_it_is_alive() {
+fn a_spinning_waiter_stops_on_request_and_makes_progress() {
     let deployment = deployment(Delivery::Realtime);
     let bus = deployment.bus("pose").with_spin(true);
     let mut waiter = bus.waiter();

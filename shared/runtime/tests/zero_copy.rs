@@ -1,4 +1,4 @@
-//! Arrays are read where they were written, and what is copied is counted.
+//! Arrays are sent without copying, and copies are counted.
 
 use crate::common;
 
@@ -19,13 +19,13 @@ fn deployment() -> Deployment {
     ])
 }
 
-/// File and offset, whoever looks.
+/// File and offset, the same in all processes.
 fn file(place: &Mapped) -> (u64, u64) {
     (place.inode, place.offset)
 }
 
 #[test]
-fn every_receiver_reads_pixels_where_the_sender_wrote_them() {
+fn every_receiver_reads_pixels_in_place() {
     let deployment = deployment();
     let camera = deployment.bus("camera");
     let readers = ["one", "two"].map(|it| deployment.bus(it));
@@ -50,7 +50,7 @@ fn every_receiver_reads_pixels_where_the_sender_wrote_them() {
             assert!(sample.payload().iter().all(|it| *it == round));
             let read = mapped_at(sample.payload()).unwrap().unwrap();
             assert_eq!(file(&read), file(&written));
-            assert!(!read.is_writable, "a reader cannot spoil it");
+            assert!(!read.is_writable, "a reader cannot change it");
         }
     }
     let copied = readers.each_ref().map(|it| it.copies().bytes());
@@ -58,7 +58,7 @@ fn every_receiver_reads_pixels_where_the_sender_wrote_them() {
 }
 
 #[test]
-fn what_is_kept_longer_is_a_copy_and_counts() {
+fn kept_arrays_are_counted_as_copies() {
     let deployment = deployment();
     let (camera, recorder) = (deployment.bus("camera"), deployment.bus("recorder"));
     let mut waiter = recorder.waiter();
@@ -71,13 +71,17 @@ fn what_is_kept_longer_is_a_copy_and_counts() {
     loan.send().unwrap();
     let kept = port.copy_of(&port.receive().unwrap().unwrap());
     assert_eq!(kept, [7; 1000]);
-    assert_eq!(mapped_at(&kept).unwrap(), None, "it lies elsewhere");
+    assert_eq!(
+        mapped_at(&kept).unwrap(),
+        None,
+        "it is not in shared memory"
+    );
     assert_eq!(recorder.copies().bytes(), 1000);
     assert_eq!(camera.copies().bytes(), 0);
 }
 
 #[test]
-fn messages_of_fixed_size_are_copied_once_each_way() {
+fn messages_are_copied_once_when_sent_and_once_when_received() {
     let deployment = deployment();
     let (from, to) = (deployment.bus("from"), deployment.bus("to"));
     let mut waiter = to.waiter();

@@ -1,10 +1,10 @@
-//! What the system does not grant a process, and what to try.
+//! Scheduling requests that the system denies, and what to try.
 
 use std::io;
 
 use super::{Policy, RealTime, text};
 
-/// Something that the system does not grant. The process can go on without.
+/// A request that the system denies. The process can continue without it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
     /// Not all cores may be used.
@@ -16,7 +16,7 @@ pub enum Denied {
         asked: Vec<usize>,
         /// What may be used.
         allowed: Vec<usize>,
-        /// Why, if the system said so.
+        /// Why, if the system call failed.
         #[source]
         source: Option<Refusal>,
     },
@@ -32,7 +32,7 @@ pub enum Denied {
     /// Memory may not be locked, or not all of it.
     #[error("cannot lock memory{}", limit(.limit_bytes.as_ref()))]
     Memory {
-        /// How much may be locked, bytes; none if that is not the reason.
+        /// The limit, bytes; none if that is not the reason.
         limit_bytes: Option<u64>,
         /// Why.
         #[source]
@@ -40,7 +40,7 @@ pub enum Denied {
     },
 }
 
-/// Why the system said no.
+/// The error of the system.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{text}")]
 pub struct Refusal {
@@ -81,7 +81,7 @@ impl Denied {
 }
 
 impl Policy {
-    /// What Linux calls it.
+    /// Its name in Linux.
     pub fn system_name(self) -> &'static str {
         match self {
             Self::Fifo => "SCHED_FIFO",
@@ -91,5 +91,5 @@ impl Policy {
 }
 
 fn limit(bytes: Option<&u64>) -> String {
-    bytes.map_or_else(String::new, |it| format!(" beyond {it} bytes"))
+    bytes.map_or_else(String::new, |limit| format!(" beyond {limit} bytes"))
 }

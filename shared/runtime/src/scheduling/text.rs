@@ -1,20 +1,20 @@
-//! Scheduling in words: what users see of it, and what a process is told on its command line.
+//! Scheduling as text, for users and for the command line of a process.
 
 use core::fmt::{self, Display, Formatter};
 use core::str::FromStr;
 
 use super::{Policy, RealTime, Scheduling};
 
-/// A text that says nothing about scheduling.
+/// A text that is not a scheduling option.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{word:?} is none of cores=0,1 fifo=1 round-robin=1 lock-memory spin")]
+#[error("{option:?} is none of cores=0,1 fifo=1 round-robin=1 lock-memory spin")]
 pub struct SchedulingError {
-    /// The word.
-    pub word: String,
+    /// The text.
+    pub option: String,
 }
 
 impl Display for Scheduling {
-    /// Words with spaces between them, `cores=0,1 fifo=50 lock-memory spin`; nothing if nothing is asked for.
+    /// Options separated by spaces, `cores=0,1 fifo=50 lock-memory spin`; empty if nothing is requested.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let mut words = Vec::new();
         if !self.cores.is_empty() {
@@ -37,27 +37,29 @@ impl FromStr for Scheduling {
     type Err = SchedulingError;
 
     fn from_str(text: &str) -> Result<Self, SchedulingError> {
-        let mut it = Self::default();
-        for word in text.split_whitespace() {
-            it.take(word).ok_or_else(|| SchedulingError {
-                word: word.to_owned(),
+        let mut scheduling = Self::default();
+        for option in text.split_whitespace() {
+            scheduling.take(option).ok_or_else(|| SchedulingError {
+                option: option.to_owned(),
             })?;
         }
-        Ok(it)
+        Ok(scheduling)
     }
 }
 
 impl Scheduling {
-    fn take(&mut self, word: &str) -> Option<()> {
-        match word.split_once('=') {
-            None if word == "lock-memory" => self.lock_memory = true,
-            None if word == "spin" => self.spin = true,
+    fn take(&mut self, option: &str) -> Option<()> {
+        match option.split_once('=') {
+            None if option == "lock-memory" => self.lock_memory = true,
+            None if option == "spin" => self.spin = true,
             Some(("cores", list)) => {
                 let cores = list.split(',').map(str::parse);
                 self.cores = cores.collect::<Result<_, _>>().ok()?;
             }
             Some((name, priority)) => {
-                let policy = Policy::ALL.into_iter().find(|it| it.name() == name)?;
+                let policy = Policy::ALL
+                    .into_iter()
+                    .find(|policy| policy.name() == name)?;
                 let priority = priority.parse().ok()?;
                 self.real_time = Some(RealTime { policy, priority });
             }
@@ -71,7 +73,7 @@ impl Policy {
     /// All.
     pub const ALL: [Self; 2] = [Self::Fifo, Self::RoundRobin];
 
-    /// As users write it.
+    /// Its name in settings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fifo => "fifo",
@@ -80,7 +82,7 @@ impl Policy {
     }
 }
 
-/// Numbers with commas between them.
+/// Numbers separated by commas.
 pub(super) fn list(numbers: &[usize]) -> String {
     let numbers: Vec<String> = numbers.iter().map(ToString::to_string).collect();
     if numbers.is_empty() {
@@ -94,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_again() {
+    fn written_text_is_parsed_back() {
         let real_time = [
             None,
             Some((Policy::Fifo, 1)),
@@ -103,27 +105,27 @@ mod tests {
         for cores in [vec![], vec![3], vec![0, 1, 17]] {
             for real_time in real_time {
                 for (lock_memory, spin) in [(false, false), (true, false), (false, true)] {
-                    let it = Scheduling {
+                    let scheduling = Scheduling {
                         cores: cores.clone(),
                         real_time: real_time
                             .map(|(policy, priority)| RealTime { policy, priority }),
                         lock_memory,
                         spin,
                     };
-                    assert_eq!(it.to_string().parse(), Ok(it));
+                    assert_eq!(scheduling.to_string().parse(), Ok(scheduling));
                 }
             }
         }
     }
 
     #[test]
-    fn who_asks_for_nothing_says_nothing() {
+    fn the_default_is_an_empty_text() {
         assert_eq!(Scheduling::default().to_string(), "");
     }
 
     #[test]
-    fn other_words_are_refused_by_name() {
-        for word in [
+    fn unknown_options_are_named_in_the_error() {
+        for option in [
             "core=1",
             "cores=",
             "cores=1,x",
@@ -131,8 +133,8 @@ mod tests {
             "fifo=256",
             "spins",
         ] {
-            let error = format!("spin {word}").parse::<Scheduling>().unwrap_err();
-            assert_eq!(error.word, word);
+            let error = format!("spin {option}").parse::<Scheduling>().unwrap_err();
+            assert_eq!(error.option, option);
         }
     }
 }

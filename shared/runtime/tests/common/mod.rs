@@ -1,4 +1,4 @@
-//! A deployment of its own for every test, which leaves nothing behind.
+//! A deployment of its own for every test, which leaves no files behind.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 use std::path::Path;
@@ -41,7 +41,7 @@ impl Deployment {
         &self.stop
     }
 
-    /// Names and process ids of those who are registered.
+    /// Names and process ids of the registered processes.
     pub(crate) fn alive(&self) -> Vec<String> {
         let base = self.namespace().base();
         let all = runtime::deployments(base).unwrap();
