@@ -230,11 +230,7 @@ fn every_frame_of_a_live_run_has_one_line_though_triangulation_was_killed() {
 #[test]
 fn a_stopped_view_is_found_out_and_no_frame_is_lost() {
     let struck = Struck::new(PACED, "STOP", "pose --index 1");
-    assert!(
-        struck.said.contains("gave no sign of life"),
-        "{}",
-        struck.said
-    );
+    assert!(struck.said.contains("sent no heartbeat"), "{}", struck.said);
     struck.assert_every_frame();
     // All that it may cost is the frame that it held, and the one that waited for it.
     let without = struck.without_all();

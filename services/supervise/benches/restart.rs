@@ -1,14 +1,14 @@
-//! From `kill -9` of a sender to the first message of its successor at a receiver that went on, with
-//! no pause before the restart, as for every process that has worked for a while.
+//! Time from `kill -9` of a sender to the first message of the restarted sender at a running receiver,
+//! without a pause before the restart, as for every process that has worked for a while.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
-#![expect(clippy::print_stdout, reason = "a bench says what it measured")]
+#![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
 use std::time::{Duration, Instant};
 
-use common::{Case, Seen, kill};
+use common::{Case, Recorded, kill};
 use runtime::Delivery;
 use supervise::Role;
 
@@ -27,12 +27,12 @@ fn main() {
     let (mut pid, mut killed) = (0, None);
     let mut millis = Vec::new();
     case.run(|event, stop| match event {
-        Seen::Started(name, started, _) if name == "source" => pid = *started,
-        Seen::Line(name, line) if name == "source" && line == "sent 64" => {
+        Recorded::Started(name, started, _) if name == "source" => pid = *started,
+        Recorded::Line(name, line) if name == "source" && line == "sent 64" => {
             killed = Some(Instant::now());
             kill("-9", pid);
         }
-        Seen::Line(name, line) if name == "sink" => {
+        Recorded::Line(name, line) if name == "sink" => {
             let begin = format!("got {} ", millis.len() + 1);
             if let Some(at) = killed.filter(|_| line.starts_with(&begin)) {
                 millis.push(at.elapsed().as_millis());

@@ -1,4 +1,4 @@
-//! What the supervisor tells while it works.
+//! //! Events that the supervisor reports during a run.
 
 use core::fmt;
 use core::time::Duration;
@@ -8,7 +8,7 @@ use messages::Health;
 /// How a process ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Death {
-    /// It ended by itself: with an exit status other than 0, or with 0 before it was done.
+    /// It ended on its own: with an exit status other than 0, or with 0 before it had finished.
     Exit {
         /// The exit status.
         status: i32,
@@ -18,29 +18,29 @@ pub enum Death {
         /// The signal.
         number: i32,
     },
-    /// It was killed because its main loop stood still.
+    /// It was killed because its main loop hung.
     Hung {
         /// For how long.
         still: Duration,
     },
-    /// It was killed because one turn of its main loop took far more work than any before it.
+    /// It was killed because one iteration of its main loop took far more processor time than any before.
     Spun {
-        /// Processor time of that turn.
+        /// Processor time of that iteration.
         worked: Duration,
-        /// That of the longest before it.
+        /// Processor time of the longest one before.
         longest: Duration,
     },
-    /// It was killed because it gave no sign of life.
+    /// It was killed because it sent no heartbeat.
     Silent {
         /// For how long.
         still: Duration,
     },
-    /// It was killed because its main loop never began.
+    /// It was killed because its main loop never started.
     NeverBegan {
-        /// How long it was given.
+        /// How long the supervisor waited.
         waited: Duration,
     },
-    /// It could not even be started.
+    /// It could not be started.
     NotStarted,
 }
 
@@ -55,21 +55,21 @@ impl fmt::Display for Death {
                 let [worked, longest] = [worked, longest].map(Duration::as_millis);
                 write!(
                     f,
-                    "worked for {worked} ms on one thing, where none took more than {longest} ms before"
+                    "computed for {worked} ms in one iteration, where none took more than {longest} ms before"
                 )
             }
             Self::Silent { still } => {
-                write!(f, "gave no sign of life for {:.1} s", still.as_secs_f64())
+                write!(f, "sent no heartbeat for {:.1} s", still.as_secs_f64())
             }
             Self::NeverBegan { waited } => {
-                write!(f, "did not begin within {:.1} s", waited.as_secs_f64())
+                write!(f, "did not start within {:.1} s", waited.as_secs_f64())
             }
             Self::NotStarted => f.write_str("could not be started"),
         }
     }
 }
 
-/// What the supervisor tells while it works; `process` is the name of a process.
+/// /// An event of a run; `process` is the name of a process.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event<'a> {
     /// A process has been started.
@@ -88,19 +88,19 @@ pub enum Event<'a> {
         /// The line.
         text: &'a str,
     },
-    /// A process has given a sign of life.
+    /// A process has sent a heartbeat.
     Health {
         /// Its name.
         process: &'a str,
-        /// What it says.
+        /// The heartbeat.
         health: &'a Health,
     },
-    /// A process is done.
+    /// A process has finished.
     Finished {
         /// Its name.
         process: &'a str,
     },
-    /// A process has ended that should not have.
+    /// A process has died.
     Died {
         /// Its name.
         process: &'a str,
@@ -111,16 +111,16 @@ pub enum Event<'a> {
     Restarting {
         /// Its name.
         process: &'a str,
-        /// When.
+        /// /// The pause before.
         pause: Duration,
     },
     /// A process will not be started again.
     GivenUp {
         /// Its name.
         process: &'a str,
-        /// How often it had been.
+        /// How often it was restarted.
         restarts: u32,
     },
-    /// All processes are being asked to end.
+    /// The stop request is sent to all processes.
     Stopping,
 }

@@ -1,20 +1,20 @@
-//! What became of a run.
+//! //! The outcome of a run.
 
 use messages::{Health, Metrics, Refusal};
 
-/// What became of a run.
+/// /// The outcome of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// All processes, in the order of the plan.
     pub processes: Vec<ProcessOutcome>,
-    /// Whether the run was stopped before it was done.
+    /// Whether the run was stopped before it had finished.
     pub interrupted: bool,
 }
 
 impl Outcome {
-    /// Whether a process was given up on the way, or was not done when all others were.
+    /// Whether a process was given up, or had not finished when all others had.
     pub fn is_degraded(&self) -> bool {
-        self.processes.iter().any(|it| match it.state {
+        self.processes.iter().any(|process| match process.state {
             State::GivenUp => true,
             State::Stopped => !self.interrupted,
             State::Running | State::Finished => false,
@@ -22,63 +22,65 @@ impl Outcome {
     }
 }
 
-/// What became of a process.
+/// The outcome of one process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProcessOutcome {
     /// Its name.
     pub name: String,
-    /// Which service it is.
+    /// Its service.
     pub service: String,
     /// How it ended.
     pub state: State,
     /// How often it was restarted.
     pub restarts: u32,
-    /// What it did, all its lives together.
+    /// Its counts, over all restarts.
     pub counts: Counts,
-    /// Its last sign of life.
+    /// Its last heartbeat.
     pub last: Option<Health>,
-    /// What its last life has said last of its times and counts; not checked.
+    /// Its last metrics; not checked.
     pub measured: Option<Metrics>,
 }
 
-/// How a process stands.
+/// The state of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// It works.
+    /// /// It runs.
     Running,
-    /// It has seen the end of the footage and passed it on.
+    /// It has received the end of stream and sent it on.
     Finished,
-    /// It was asked to end before it was done.
+    /// It was stopped before it had finished.
     Stopped,
     /// It failed too often.
     GivenUp,
 }
 
-/// What a process did.
+/// The counts of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Messages taken in.
+    /// /// Messages received.
     pub n_received: u64,
-    /// Messages sent out.
+    /// /// Messages sent.
     pub n_sent: u64,
-    /// Messages or frames lost before they reached it, or that came too late.
+    /// Messages or frames that were lost before they reached it, or came too late.
     pub n_dropped: u64,
-    /// Most memory that any of its lives has held, shared memory included, bytes.
+    /// Peak memory over all restarts, including shared memory, bytes.
     pub peak_memory_bytes: u64,
-    /// Messages that it refused, by cause ([`Refusal::ALL`]); signs of life that were not its own count
-    /// here too.
+    /// Messages that it refused, by cause ([`Refusal::ALL`]); includes heartbeats on its topic that were not
+    /// its own.
     pub refused: [u64; Refusal::N],
 }
 
 impl Counts {
-    /// With what a process has done since it was started.
+    /// Adds the counts since the last start.
     pub(crate) fn and(self, health: Option<&Health>) -> Self {
         health.map_or(self, |health| Self {
             n_received: self.n_received.saturating_add(health.n_received),
             n_sent: self.n_sent.saturating_add(health.n_sent),
             n_dropped: self.n_dropped.saturating_add(health.n_dropped),
             peak_memory_bytes: self.peak_memory_bytes.max(health.peak_memory_bytes),
-            refused: std::array::from_fn(|it| self.refused[it].saturating_add(health.refused[it])),
+            refused: std::array::from_fn(|cause| {
+                self.refused[cause].saturating_add(health.refused[cause])
+            }),
         })
     }
 }

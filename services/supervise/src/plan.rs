@@ -1,4 +1,4 @@
-//! What is to be run, and with how much patience.
+//! The plan of a run: processes, topics and time limits.
 
 use core::time::Duration;
 use std::ffi::OsString;
@@ -10,21 +10,21 @@ use tracing::Level;
 /// A deployment, as the supervisor sees it.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// The program that becomes any of the services: `executable service <service> <args>`.
+    /// The program that runs every service: `executable service <service> <args>`.
     pub executable: PathBuf,
-    /// What every process finds in its standard input, in every life: a file that it needs could be removed meanwhile.
+    /// The standard input of every process, also after a restart: a file could be removed in the meantime.
     pub given: Vec<u8>,
-    /// Where the deployment lives.
+    /// The location of the deployment.
     pub namespace: Namespace,
-    /// The run; goes into the stamp of every message.
+    /// The session, which goes into the stamp of every message.
     pub session: u64,
     /// What happens when a receiver is slower than its sender.
     pub delivery: Delivery,
-    /// All topics, those of the processes' signs of life included.
+    /// All topics, including those of the heartbeats.
     pub topics: Vec<TopicPlan>,
-    /// All processes, consumers first: a sender waits for its receivers anyway, but so it need not.
+    /// All processes, consumers first, so that senders do not have to wait for their receivers.
     pub processes: Vec<ProcessSpec>,
-    /// How much patience there is.
+    /// Time limits.
     pub policy: Policy,
     /// The least important events that services log.
     pub log: Level,
@@ -37,34 +37,35 @@ pub struct ProcessSpec {
     pub name: String,
     /// Which service it is, for example `pose`.
     pub service: String,
-    /// Its own arguments; what every service needs to know is added.
+    /// Its own arguments; those of every service are added.
     pub args: Vec<OsString>,
-    /// What becomes of the run without it.
+    /// What happens to the run without it.
     pub role: Role,
-    /// What it asks of the system's scheduler.
+    /// Its requests to the system's scheduler.
     pub scheduling: Scheduling,
-    /// How many times the processor time of any turn before it a turn of its main loop may take, some messages after
-    /// the first; one that has taken more is no work any more. None if turns say nothing about each other.
+    /// After some messages: how many times the processor time of the longest iteration of its main loop an
+    /// iteration may take. One that takes more is taken for an endless loop. None if the iterations are not
+    /// comparable.
     pub most_work: Option<u32>,
 }
 
-/// What becomes of the run when a process has been given up.
+/// What happens to the run when a process has been given up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The run fails.
     Essential,
-    /// The run goes on, degraded, as long as one process of the same service is left.
+    /// The run continues, degraded, as long as one process of the same service is left.
     Redundant,
-    /// The run goes on, degraded.
+    /// The run continues, degraded.
     Optional,
 }
 
 /// How much patience there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Policy {
-    /// A process that has worked for so long is started again at once.
+    /// A process that has worked for so long is restarted at once.
     pub steady_after: Duration,
-    /// Pause before the restart of one that ended sooner; it doubles each time that it does so again.
+    /// Pause before the restart of one that died sooner; doubles with every such death.
     pub first_pause: Duration,
     /// Longest pause before a restart.
     pub longest_pause: Duration,
@@ -72,22 +73,22 @@ pub struct Policy {
     pub max_restarts: usize,
     /// How long a restart counts.
     pub restart_window: Duration,
-    /// How long a process may take until its main loop turns for the first time.
+    /// How long a process may take until the first iteration of its main loop.
     pub startup_limit: Duration,
-    /// How long a process that the system calls stopped may give no sign of life; and the processor time that
-    /// any turn of a main loop may take, however little those before it took ([`ProcessSpec::most_work`]).
+    /// How long a stopped process (SIGSTOP) may send no heartbeat; and the processor time that any iteration
+    /// of a main loop may take, however short those before were ([`ProcessSpec::most_work`]).
     pub stopped_limit: Duration,
-    /// How long any process may give no sign of life: they come from a thread of its own, whatever it
-    /// computes, so one that is silent is stopped, or gets no processor.
+    /// How long any process may send no heartbeat. A separate thread sends them, so a silent process is
+    /// stopped or gets no processor time.
     pub silence_limit: Duration,
-    /// How long the main loop of a process may stand still: longer than any frame takes.
+    /// How long the main loop of a process may hang: longer than any frame takes.
     pub hang_limit: Duration,
-    /// How long those that wait for messages may wait in vain, once others are done and some had to
-    /// be restarted or given up.
+    /// How long a process may wait for messages without receiving any, once others have finished and some
+    /// were restarted or given up.
     pub idle_limit: Duration,
-    /// How long processes may take to end when they are asked to.
+    /// How long processes may take to end after the stop request.
     pub grace: Duration,
-    /// How often what the dead left is cleaned up where no death was noticed.
+    /// Period of the clean-up after dead processes, besides that at every death.
     pub clean_period: Duration,
 }
 
@@ -114,7 +115,7 @@ impl Policy {
     /// The pause before the next restart, or none if the process is to be given up.
     ///
     /// * `recent`: restarts within the window.
-    /// * `hasty`: how many of its last lives in a row ended before they were steady.
+    /// * `hasty`: how many times in a row it died before [`Policy::steady_after`].
     pub(crate) fn pause(&self, recent: usize, hasty: u32) -> Option<Duration> {
         if recent >= self.max_restarts {
             return None;
@@ -135,13 +136,13 @@ mod tests {
     use super::Policy;
 
     #[test]
-    fn who_worked_starts_at_once_and_pauses_of_others_double_up_to_the_longest_and_then_end() {
+    fn steady_processes_restart_at_once_and_pauses_of_others_double_up_to_a_limit() {
         let policy = Policy {
             max_restarts: 9,
             ..Policy::default()
         };
         let millis: Vec<_> = (0..10)
-            .map(|nth| policy.pause(nth, nth as u32).map(|it| it.as_millis()))
+            .map(|nth| policy.pause(nth, nth as u32).map(|pause| pause.as_millis()))
             .collect();
         let expected = [0, 100, 200, 400, 800, 1600, 3200, 5000, 5000].map(Some);
         assert_eq!(millis[..9], expected);

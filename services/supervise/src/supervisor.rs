@@ -1,4 +1,4 @@
-//! The loop that starts, watches, restarts and stops.
+//! The loop that starts, watches, restarts and stops processes.
 
 use core::time::Duration;
 use std::io;
@@ -10,52 +10,52 @@ use runtime::{
     Stop, preflight, wait_for_any,
 };
 
-use crate::watch::{Life, Sequel, Watch, death_of};
+use crate::watch::{Phase, Sequel, Watch, death_of};
 use crate::{Death, Event, Outcome, Plan, Role};
 
 /// Longest sleep of the supervisor: how late a hang or a due restart may be noticed.
 const TURN: Duration = Duration::from_millis(50);
-/// A turn that took this long means that the supervisor itself was stopped, and saw no signs of life.
+/// An iteration that took this long means that the supervisor itself was stopped, and received no heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
 
 /// The run failed.
 #[derive(Debug, thiserror::Error)]
 pub enum SuperviseError {
-    /// The deployment is not free.
+    /// The deployment cannot be locked.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// There is no room for it.
+    /// There is not enough memory, or too few open files.
     #[error(transparent)]
     Preflight(#[from] PreflightError),
     /// Its topics cannot be created.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A sign of life cannot be subscribed to.
+    /// A topic of heartbeats cannot be subscribed to.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// A process says that what it was given is wrong.
+    /// A process reports that its input is wrong.
     #[error("{process} cannot work: {message}")]
     Unusable {
         /// Its name.
         process: String,
         /// Its exit status.
         kind: ExitKind,
-        /// What it wrote.
+        /// Its output.
         message: String,
     },
-    /// A process that the run cannot do without failed too often.
+    /// An essential process failed too often.
     #[error("{process} {death}, and was given up after {restarts} restarts\n{message}")]
     GivenUp {
         /// Its name.
         process: String,
-        /// How it ended last.
+        /// Its last death.
         death: Death,
         /// How often it had been restarted.
         restarts: u32,
-        /// What it wrote at last.
+        /// The end of its output.
         message: String,
     },
-    /// The system cannot tell about children.
+    /// The child processes cannot be watched.
     #[error("cannot watch the processes")]
     Watch(#[source] io::Error),
 }
@@ -82,20 +82,20 @@ impl Fault for SuperviseError {
     }
 }
 
-/// When processes are asked to end once more: so soon that they take it for the same wish (`runtime::Stop`).
-const ASK_AGAIN: core::ops::Range<Duration> =
+/// When the stop request is repeated: soon enough to count as the same request (`runtime::Stop`).
+const REPEAT_STOP: core::ops::Range<Duration> =
     Duration::from_millis(100)..Duration::from_millis(300);
 
-/// Runs a deployment until all its processes are done, `stop` is requested, or it fails.
+/// Runs a deployment until all its processes have finished, `stop` is requested, or it fails.
 ///
-/// A process is done when it says in its signs of life that it has finished. It is asked to end once all are done,
-/// so that its last message stays there for a receiver that had to be restarted. One that ends
-/// without having said so and without having been asked to has failed, whatever its exit status is.
+/// A process has finished when its heartbeats report so. It is stopped once all have finished, so that its
+/// last message remains available to a restarted receiver. A process that ends without having finished and
+/// without a stop request has failed, whatever its exit status.
 ///
-/// However it ends, no process, no file and no shared memory of the deployment is left. Call it from
+/// Afterwards no process, file or shared memory of the deployment is left, whatever the outcome. Call it from
 /// a thread that lives as long as the run: its children end with it.
 ///
-/// * `on_event`: is told what happens, and must not take long.
+/// * `on_event`: is called for every event, and must not take long.
 ///
 /// # Errors
 ///
@@ -153,12 +153,14 @@ impl Supervisor<'_> {
         while !self.stop.is_requested() {
             let now = Instant::now();
             if now.saturating_duration_since(last_turn) > ASLEEP {
-                self.watches.iter_mut().for_each(|watch| watch.forgive(now));
+                self.watches
+                    .iter_mut()
+                    .for_each(|watch| watch.restart_timers(now));
             }
             last_turn = now;
             for index in 0..self.watches.len() {
                 self.start_if_due(index, now)?;
-                self.listen(index, now);
+                self.receive(index, now);
                 self.reap(index, now)?;
             }
             if self.is_done(now) {
@@ -172,14 +174,14 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// How long the next restart leaves to sleep.
+    /// Time until the next restart.
     fn until_due(&self) -> Duration {
         let now = Instant::now();
         self.watches
             .iter()
-            .filter_map(|watch| match watch.life {
-                Life::Due(at) => Some(at.saturating_duration_since(now)),
-                Life::Running(_) | Life::Ended(_) | Life::GivenUp => None,
+            .filter_map(|watch| match watch.phase {
+                Phase::Due(at) => Some(at.saturating_duration_since(now)),
+                Phase::Running(_) | Phase::Ended(_) | Phase::GivenUp => None,
             })
             .fold(TURN, Duration::min)
     }
@@ -191,7 +193,7 @@ impl Supervisor<'_> {
 
     fn start_if_due(&mut self, index: usize, now: Instant) -> Result<(), SuperviseError> {
         let watch = &mut self.watches[index];
-        let Life::Due(at) = watch.life else {
+        let Phase::Due(at) = watch.phase else {
             return Ok(());
         };
         if now < at {
@@ -230,10 +232,10 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Takes in what a process says: lines and signs of life.
-    fn listen(&mut self, index: usize, now: Instant) {
+    /// Reads the output, heartbeats and metrics of a process.
+    fn receive(&mut self, index: usize, now: Instant) {
         let watch = &mut self.watches[index];
-        if let Life::Running(child) = &mut watch.life {
+        if let Phase::Running(child) = &mut watch.phase {
             match child.read_lines() {
                 Ok(lines) => {
                     for text in &lines {
@@ -249,7 +251,7 @@ impl Supervisor<'_> {
                 }
             }
         }
-        match watch.signs.latest() {
+        match watch.heartbeats.latest() {
             Ok(Some(health)) => {
                 if watch.note_health(&health, self.plan.session, now) {
                     (self.on_event)(Event::Health {
@@ -260,22 +262,24 @@ impl Supervisor<'_> {
             }
             Ok(None) => {}
             Err(error) => {
-                tracing::warn!(process = watch.spec.name, %error, "cannot hear its signs of life");
+                tracing::warn!(process = watch.spec.name, %error, "cannot receive its heartbeats");
             }
         }
         match watch.metrics.latest() {
-            Ok(said) => said.iter().for_each(|it| watch.note_metrics(it)),
+            Ok(metrics) => metrics
+                .iter()
+                .for_each(|message| watch.note_metrics(message)),
             Err(error) => {
-                tracing::warn!(process = watch.spec.name, %error, "cannot hear its times");
+                tracing::warn!(process = watch.spec.name, %error, "cannot receive its metrics");
             }
         }
     }
 
-    /// Notices the end of a process, and ends one that hangs.
+    /// Handles the end of a process, and kills one that hangs.
     fn reap(&mut self, index: usize, now: Instant) -> Result<(), SuperviseError> {
         let watch = &mut self.watches[index];
         let overdue = watch.overdue(&self.plan.policy, now);
-        let Life::Running(child) = &mut watch.life else {
+        let Phase::Running(child) = &mut watch.phase else {
             return Ok(());
         };
         if let Some(death) = overdue {
@@ -285,11 +289,11 @@ impl Supervisor<'_> {
         let Some(status) = child.try_wait().map_err(SuperviseError::Watch)? else {
             return Ok(());
         };
-        // What it said last.
-        self.listen(index, now);
+        // // Its last messages.
+        self.receive(index, now);
         let watch = &mut self.watches[index];
-        // Who was told to end together with the supervisor may be sooner.
-        let is_in_order = watch.says_finished() || self.stop.is_requested();
+        // // A process that was signalled together with the supervisor may end earlier.
+        let is_in_order = watch.reports_finished() || self.stop.is_requested();
         if let Some(death) = death_of(status, is_in_order) {
             return self.died(index, death, now);
         }
@@ -304,7 +308,7 @@ impl Supervisor<'_> {
         let watch = &mut self.watches[index];
         let process = watch.spec.name.as_str();
         (self.on_event)(Event::Died { process, death });
-        // Dropping the child waits for its end, without which it could not be cleaned up after.
+        // // Dropping the child waits for its end, which the clean-up needs.
         match watch.die(death, &self.plan.policy, now) {
             Sequel::Restart(pause) => {
                 let process = watch.spec.name.as_str();
@@ -352,16 +356,16 @@ impl Supervisor<'_> {
         })
     }
 
-    /// Whether all processes are done, or those that are not wait in vain: where one was given up or
-    /// had to be restarted, others may never hear of the end.
+    /// Whether all processes have finished, or the others only wait: if one was given up or restarted, others
+    /// may never receive the end of stream.
     fn is_done(&self, now: Instant) -> bool {
-        let trouble = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
-        let in_vain =
-            self.watches.iter().any(trouble) && self.watches.iter().any(Watch::is_finished);
+        let was_lost = |watch: &Watch| watch.is_given_up() || watch.epoch > 0;
+        let may_miss_end =
+            self.watches.iter().any(was_lost) && self.watches.iter().any(Watch::is_finished);
         self.watches.iter().all(|watch| {
             watch.is_finished()
                 || watch.is_given_up()
-                || (in_vain && watch.is_idle(&self.plan.policy, now))
+                || (may_miss_end && watch.is_idle(&self.plan.policy, now))
         })
     }
 
@@ -369,11 +373,11 @@ impl Supervisor<'_> {
         self.cleaned = now;
         let cleaned = self.cleaner.clean(self.bus);
         if cleaned > 0 {
-            tracing::debug!(cleaned, "cleaned up after the dead");
+            tracing::debug!(cleaned, "cleaned up after dead processes");
         }
     }
 
-    /// Asks all processes to end, and ends those that do not.
+    /// Stops all processes, and kills those that do not end.
     fn shut_down(&mut self) {
         (self.on_event)(Event::Stopping);
         self.watches
@@ -381,22 +385,23 @@ impl Supervisor<'_> {
             .filter_map(Watch::child)
             .for_each(Child::terminate);
         let begin = Instant::now();
-        let mut is_asked_again = false;
+        let mut is_repeated = false;
         while self.watches.iter().any(|watch| watch.child().is_some()) {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
             let patient = waited < self.plan.policy.grace;
-            // Who was told to end by somebody else at the same moment hears one signal of the two, maybe not ours.
-            if !is_asked_again && ASK_AGAIN.contains(&waited) {
-                is_asked_again = true;
+            // // Two signals at the same time may merge into one, and its sender may be the other process:
+            // repeat ours.
+            if !is_repeated && REPEAT_STOP.contains(&waited) {
+                is_repeated = true;
                 self.watches
                     .iter()
                     .filter_map(Watch::child)
                     .for_each(Child::terminate);
             }
             for index in 0..self.watches.len() {
-                self.listen(index, now);
-                self.part(index, patient);
+                self.receive(index, now);
+                self.release(index, patient);
             }
             if let Err(error) = self.sleep(TURN, None) {
                 tracing::warn!(%error, "cannot wait for the processes to end");
@@ -405,16 +410,16 @@ impl Supervisor<'_> {
         self.clean(Instant::now());
     }
 
-    /// Lets go of a process that has ended, or is out of time.
-    fn part(&mut self, index: usize, patient: bool) {
+    /// Releases a process that has ended, or has run out of time.
+    fn release(&mut self, index: usize, patient: bool) {
         let watch = &mut self.watches[index];
-        let Life::Running(child) = &mut watch.life else {
+        let Phase::Running(child) = &mut watch.phase else {
             return;
         };
         if matches!(child.try_wait(), Ok(None)) && patient {
             return;
         }
-        self.listen(index, Instant::now());
+        self.receive(index, Instant::now());
         self.watches[index].end();
     }
 }

@@ -1,6 +1,6 @@
 //! Deployments whose processes are killed, stopped, or fail.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+#![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
 use crate::common;
 
@@ -10,22 +10,22 @@ use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::{Command, Stdio};
 
-use common::{Case, Run, Seen, is_alive, kill};
+use common::{Case, Recorded, Run, is_alive, kill};
 use runtime::{Delivery, ExitKind, Fault as _};
 use supervise::{Death, Role, State, SuperviseError};
 
 const KILLED: Death = Death::Signal { number: 9 };
 
-/// Kills a process when it is told something for the first time.
+/// Kills a process at the first matching event.
 fn kill_once<'a>(
     process: &'a str,
     signal: &'a str,
-    when: impl Fn(&Seen) -> bool + 'a,
-) -> impl FnMut(&Seen, &runtime::Stop) + 'a {
+    when: impl Fn(&Recorded) -> bool + 'a,
+) -> impl FnMut(&Recorded, &runtime::Stop) + 'a {
     let pid = Cell::new(None);
     let done = Cell::new(false);
     move |event, _| {
-        if let Seen::Started(name, started, 0) = event
+        if let Recorded::Started(name, started, 0) = event
             && name == process
         {
             pid.set(Some(*started));
@@ -37,14 +37,14 @@ fn kill_once<'a>(
     }
 }
 
-fn is_line(event: &Seen, process: &str, text: &str) -> bool {
-    matches!(event, Seen::Line(name, line) if name == process && line == text)
+fn is_line(event: &Recorded, process: &str, text: &str) -> bool {
+    matches!(event, Recorded::Line(name, line) if name == process && line == text)
 }
 
-/// Whether the sink tells of a frame from a life of its sender.
-fn heard_from(event: &Seen, epoch: u32) -> bool {
+/// Whether the sink reports a frame of this epoch of its sender.
+fn is_from_epoch(event: &Recorded, epoch: u32) -> bool {
     let begin = format!("got {epoch} ");
-    matches!(event, Seen::Line(name, line) if name == "sink" && line.starts_with(&begin))
+    matches!(event, Recorded::Line(name, line) if name == "sink" && line.starts_with(&begin))
 }
 
 fn state_of(run: &Run, process: &str) -> State {
@@ -58,7 +58,7 @@ fn state_of(run: &Run, process: &str) -> State {
 }
 
 #[test]
-fn a_sender_that_waits_for_a_killed_receiver_goes_on() {
+fn a_sender_that_waits_for_a_killed_receiver_continues() {
     let mut case = Case::new(
         Delivery::Lossless,
         &[
@@ -68,7 +68,7 @@ fn a_sender_that_waits_for_a_killed_receiver_goes_on() {
         ],
     );
     case.plan.policy.max_restarts = 0;
-    // The sink has what the sender could send before the dam stopped it.
+    // // The sink has the messages that were sent before the dam blocked the sender.
     let run = case.run(kill_once("dam", "-9", |event| {
         is_line(event, "dam", "holding")
     }));
@@ -81,7 +81,7 @@ fn a_sender_that_waits_for_a_killed_receiver_goes_on() {
 }
 
 #[test]
-fn what_a_killed_sender_was_writing_is_never_seen_and_its_successor_is_heard() {
+fn an_incomplete_message_of_a_killed_sender_is_never_received_and_its_restart_continues() {
     let case = Case::new(
         Delivery::Lossless,
         &[
@@ -97,7 +97,7 @@ fn what_a_killed_sender_was_writing_is_never_seen_and_its_successor_is_heard() {
 }
 
 #[test]
-fn a_killed_sender_comes_back_and_the_others_go_on() {
+fn a_killed_sender_is_restarted_and_the_others_continue() {
     let case = Case::new(
         Delivery::Realtime,
         &[
@@ -108,7 +108,7 @@ fn a_killed_sender_comes_back_and_the_others_go_on() {
     let mut kill = kill_once("source", "-9", |event| is_line(event, "source", "sent 32"));
     let run = case.run(|event, stop| {
         kill(event, stop);
-        if heard_from(event, 1) {
+        if is_from_epoch(event, 1) {
             stop.request();
         }
     });
@@ -119,7 +119,7 @@ fn a_killed_sender_comes_back_and_the_others_go_on() {
 }
 
 #[test]
-fn who_is_told_to_end_by_somebody_else_than_the_supervisor_has_failed() {
+fn a_process_that_ends_by_a_foreign_signal_has_failed() {
     for (signal, number) in [("-TERM", 15), ("-INT", 2), ("-HUP", 1)] {
         let case = Case::new(
             Delivery::Realtime,
@@ -133,7 +133,7 @@ fn who_is_told_to_end_by_somebody_else_than_the_supervisor_has_failed() {
         });
         let run = case.run(|event, stop| {
             kill(event, stop);
-            if heard_from(event, 1) {
+            if is_from_epoch(event, 1) {
                 stop.request();
             }
         });
@@ -144,7 +144,7 @@ fn who_is_told_to_end_by_somebody_else_than_the_supervisor_has_failed() {
 }
 
 #[test]
-fn who_ends_well_before_it_is_done_has_failed() {
+fn a_process_that_exits_before_it_has_finished_has_failed() {
     let case = Case::new(Delivery::Realtime, &[("only", "leave", Role::Essential)]);
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("only"), [Death::Exit { status: 0 }]);
@@ -153,7 +153,7 @@ fn who_ends_well_before_it_is_done_has_failed() {
 }
 
 #[test]
-fn a_receiver_that_is_killed_at_the_very_end_comes_back_and_hears_the_end() {
+fn a_receiver_killed_at_the_end_of_stream_is_restarted_and_receives_it() {
     for delivery in [Delivery::Realtime, Delivery::Lossless] {
         let case = Case::new(
             delivery,
@@ -170,7 +170,7 @@ fn a_receiver_that_is_killed_at_the_very_end_comes_back_and_hears_the_end() {
 }
 
 #[test]
-fn a_stopped_process_looks_alive_but_is_found_out() {
+fn a_stopped_process_is_detected() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[
@@ -178,16 +178,16 @@ fn a_stopped_process_looks_alive_but_is_found_out() {
             ("source", "send 1000000 1 1", Role::Essential),
         ],
     );
-    // Nothing but the state of the process can tell.
+    // // Only the state of the process can show it.
     case.plan.policy.silence_limit = Duration::from_mins(10);
     case.plan.policy.hang_limit = Duration::from_mins(10);
-    // Late enough for it to have given a sign of life.
+    // // Late enough for it to have sent a heartbeat.
     let mut freeze = kill_once("source", "-STOP", |event| {
         is_line(event, "source", "sent 512")
     });
     let run = case.run(|event, stop| {
         freeze(event, stop);
-        if heard_from(event, 1) {
+        if is_from_epoch(event, 1) {
             stop.request();
         }
     });
@@ -197,7 +197,7 @@ fn a_stopped_process_looks_alive_but_is_found_out() {
 }
 
 #[test]
-fn a_main_loop_that_stands_still_is_found_out() {
+fn a_hanging_main_loop_is_detected() {
     let case = Case::new(
         Delivery::Realtime,
         &[("knot", "hang-once", Role::Essential)],
@@ -208,8 +208,8 @@ fn a_main_loop_that_stands_still_is_found_out() {
     assert_eq!(state_of(&run, "knot"), State::Finished);
 }
 
-/// How processes die that compute for a while, as they usually do, and then for long.
-fn deaths_of_one_that_computes(how: &str, most_work: Option<u32>) -> Vec<Death> {
+/// The deaths of a process that computes for its usual time, and then for long.
+fn deaths_of_computing_process(how: &str, most_work: Option<u32>) -> Vec<Death> {
     let mut case = Case::new(Delivery::Realtime, &[("mill", how, Role::Essential)]);
     case.plan.policy.hang_limit = Duration::from_mins(10);
     case.plan.processes[0].most_work = most_work;
@@ -219,23 +219,23 @@ fn deaths_of_one_that_computes(how: &str, most_work: Option<u32>) -> Vec<Death> 
 }
 
 #[test]
-fn who_computes_for_ever_is_found_out_by_the_work_it_did_before() {
-    let deaths = deaths_of_one_that_computes("compute 20 600000", Some(3));
+fn an_endless_loop_is_detected_by_comparison_with_earlier_work() {
+    let deaths = deaths_of_computing_process("compute 20 600000", Some(3));
     assert!(matches!(deaths[..], [Death::Spun { .. }]), "{deaths:?}");
 }
 
 #[test]
-fn who_computes_twice_as_long_as_before_is_left_alone() {
-    assert_eq!(deaths_of_one_that_computes("compute 300 600", Some(3)), []);
+fn computing_twice_as_long_as_before_is_allowed() {
+    assert_eq!(deaths_of_computing_process("compute 300 600", Some(3)), []);
 }
 
 #[test]
-fn who_is_known_to_be_uneven_is_left_alone() {
-    assert_eq!(deaths_of_one_that_computes("compute 20 1500", None), []);
+fn computing_long_is_allowed_without_a_limit() {
+    assert_eq!(deaths_of_computing_process("compute 20 1500", None), []);
 }
 
 #[test]
-fn who_always_finds_more_to_do_and_never_waits_is_at_work() {
+fn a_process_that_never_waits_is_not_taken_for_hanging() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[("mill", "compute 20 0", Role::Essential)],
@@ -245,7 +245,7 @@ fn who_always_finds_more_to_do_and_never_waits_is_at_work() {
 }
 
 #[test]
-fn who_computes_for_long_is_waited_for() {
+fn a_long_computation_is_awaited() {
     let mut case = Case::new(
         Delivery::Lossless,
         &[
@@ -255,7 +255,7 @@ fn who_computes_for_long_is_waited_for() {
             ("source", "send 3 1 1", Role::Essential),
         ],
     );
-    // Trouble, others that are done, and a silent main loop for longer than the idle may wait.
+    // // A failed process, finished ones, and a computation that is longer than the idle limit.
     case.plan.policy.max_restarts = 0;
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("thinker"), []);
@@ -263,7 +263,7 @@ fn who_computes_for_long_is_waited_for() {
 }
 
 #[test]
-fn who_has_worked_for_a_while_is_started_again_at_once() {
+fn a_process_that_has_worked_for_a_while_is_restarted_at_once() {
     let processes = [
         ("sink", "receive 0", Role::Essential),
         ("source", "send 1000000 20 1", Role::Essential),
@@ -271,17 +271,17 @@ fn who_has_worked_for_a_while_is_started_again_at_once() {
     let pauses_of = |steady_after| {
         let mut case = Case::new(Delivery::Realtime, &processes);
         case.plan.policy.steady_after = steady_after;
-        let sent = |event: &Seen| is_line(event, "source", "sent 64");
+        let sent = |event: &Recorded| is_line(event, "source", "sent 64");
         let mut kill = kill_once("source", "-9", sent);
         let run = case.run(|event, stop| {
             kill(event, stop);
-            if matches!(event, Seen::Restarting(..)) {
+            if matches!(event, Recorded::Restarting(..)) {
                 stop.request();
             }
         });
         assert_eq!(run.deaths("source"), [KILLED]);
-        let pauses = run.seen.iter().filter_map(|event| match event {
-            Seen::Restarting(_, pause) => Some(*pause),
+        let pauses = run.events.iter().filter_map(|event| match event {
+            Recorded::Restarting(_, pause) => Some(*pause),
             _ => None,
         });
         pauses.collect::<Vec<_>>()
@@ -292,15 +292,15 @@ fn who_has_worked_for_a_while_is_started_again_at_once() {
 }
 
 #[test]
-fn a_crash_loop_is_given_up_after_longer_and_longer_pauses() {
+fn a_crash_loop_is_given_up_after_increasing_pauses() {
     let mut case = Case::new(Delivery::Realtime, &[("wreck", "panic", Role::Essential)]);
     case.plan.policy.max_restarts = 3;
     let run = case.run(|_, _| {});
     let pauses: Vec<_> = run
-        .seen
+        .events
         .iter()
         .filter_map(|event| match event {
-            Seen::Restarting(_, pause) => Some(pause.as_millis()),
+            Recorded::Restarting(_, pause) => Some(pause.as_millis()),
             _ => None,
         })
         .collect();
@@ -316,7 +316,7 @@ fn a_crash_loop_is_given_up_after_longer_and_longer_pauses() {
 }
 
 #[test]
-fn a_recorder_that_keeps_dying_does_not_stop_the_run() {
+fn an_optional_process_that_keeps_dying_does_not_stop_the_run() {
     let mut case = Case::new(
         Delivery::Lossless,
         &[
@@ -333,7 +333,7 @@ fn a_recorder_that_keeps_dying_does_not_stop_the_run() {
 }
 
 #[test]
-fn a_run_goes_on_with_the_views_that_are_left() {
+fn a_run_continues_with_the_remaining_views() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[
@@ -348,7 +348,7 @@ fn a_run_goes_on_with_the_views_that_are_left() {
 }
 
 #[test]
-fn who_waits_in_vain_for_a_view_that_was_given_up_does_not_hold_up_the_end() {
+fn a_process_that_waits_for_a_given_up_view_does_not_block_the_end() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[
@@ -364,7 +364,7 @@ fn who_waits_in_vain_for_a_view_that_was_given_up_does_not_hold_up_the_end() {
 }
 
 #[test]
-fn who_missed_the_end_while_it_was_restarted_does_not_hold_up_the_end() {
+fn a_process_that_missed_the_end_of_stream_does_not_block_the_end() {
     let case = Case::new(
         Delivery::Realtime,
         &[
@@ -394,9 +394,9 @@ fn a_run_without_any_view_left_fails() {
 }
 
 #[test]
-fn a_process_that_never_begins_is_killed() {
+fn a_process_that_never_starts_its_main_loop_is_killed() {
     let mut case = Case::new(Delivery::Realtime, &[("mute", "idle", Role::Essential)]);
-    // A program that runs but gives no sign of life.
+    // // A program that runs but sends no heartbeat.
     case.plan.executable = "/bin/sleep".into();
     case.plan.policy.startup_limit = Duration::from_millis(200);
     case.plan.policy.max_restarts = 0;
@@ -426,7 +426,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
     let pids: Vec<u32> = (0..2)
         .map(|_| lines.next().unwrap().unwrap().parse().unwrap())
         .collect();
-    // Both have begun: their files are there.
+    // // Both have started: their files exist.
     assert!(pids.iter().all(|&pid| is_alive(pid)), "{pids:?}");
     supervisor.kill().unwrap();
     supervisor.wait().unwrap();
@@ -435,9 +435,9 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
 }
 
 #[test]
-fn a_full_shared_memory_is_an_error_with_the_numbers_and_no_sigbus() {
+fn full_shared_memory_is_an_error_with_the_numbers_instead_of_sigbus() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
-    // A file system of 8 megabytes that only this process sees.
+    // // A file system of 8 megabytes, mounted for this process only.
     let script = format!(
         "mount -t tmpfs -o size=8m tmpfs /dev/shm || exit 99; exec {} fill {}",
         env!("CARGO_BIN_EXE_supervise-dummy"),
@@ -455,17 +455,17 @@ fn a_full_shared_memory_is_an_error_with_the_numbers_and_no_sigbus() {
         return;
     }
     let text = String::from_utf8(output.stdout).unwrap();
-    let said: Vec<&str> = text.lines().collect();
-    assert!(output.status.success(), "{:?}: {said:?}", output.status);
-    assert_eq!(said.len(), 2, "{said:?}");
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(output.status.success(), "{:?}: {lines:?}", output.status);
+    assert_eq!(lines.len(), 2, "{lines:?}");
     assert!(
-        said[0].contains("needs 5") && said[0].contains("8 MB are free"),
+        lines[0].contains("needs 5") && lines[0].contains("8 MB are free"),
         "{}",
-        said[0]
+        lines[0]
     );
     assert!(
-        said[1].contains("needs 4") && said[1].contains("are free in /dev/shm"),
+        lines[1].contains("needs 4") && lines[1].contains("are free in /dev/shm"),
         "{}",
-        said[1]
+        lines[1]
     );
 }

@@ -1,11 +1,11 @@
-//! Deployments whose processes behave.
+//! Deployments without faults.
 
 use crate::common;
 
 use core::time::Duration;
 use std::time::Instant;
 
-use common::{Case, Seen, is_alive};
+use common::{Case, Recorded, is_alive};
 use runtime::{Delivery, ExitKind, Fault as _};
 use supervise::{Role, State, SuperviseError};
 
@@ -57,7 +57,7 @@ fn a_realtime_run_does_not_wait_for_a_slow_receiver() {
 }
 
 #[test]
-fn a_stop_ends_everything_cleanly() {
+fn a_stop_request_ends_all_processes_cleanly() {
     let case = Case::new(
         Delivery::Realtime,
         &[
@@ -66,7 +66,7 @@ fn a_stop_ends_everything_cleanly() {
         ],
     );
     let run = case.run(|event, stop| {
-        if matches!(event, Seen::Line(_, line) if line == "sent 16") {
+        if matches!(event, Recorded::Line(_, line) if line == "sent 16") {
             stop.request();
         }
     });
@@ -76,13 +76,13 @@ fn a_stop_ends_everything_cleanly() {
         outcome
             .processes
             .iter()
-            .all(|it| it.state == State::Stopped)
+            .all(|process| process.state == State::Stopped)
     );
     assert!(run.deaths("sink").is_empty() && run.deaths("source").is_empty());
 }
 
 #[test]
-fn who_does_not_end_when_asked_is_killed() {
+fn a_process_that_ignores_the_stop_request_is_killed() {
     let mut case = Case::new(Delivery::Realtime, &[("rock", "stubborn", Role::Essential)]);
     case.plan.policy.grace = Duration::from_millis(300);
     let run = case.run(|_, _| {});
@@ -91,11 +91,11 @@ fn who_does_not_end_when_asked_is_killed() {
 }
 
 #[test]
-fn what_a_process_leaves_behind_ends_with_it() {
+fn children_of_a_process_end_with_it() {
     let case = Case::new(Delivery::Realtime, &[("parent", "orphan", Role::Essential)]);
     let mut orphan = None;
     let run = case.run(|event, _| {
-        if let Seen::Line(_, line) = event {
+        if let Recorded::Line(_, line) = event {
             orphan = line.strip_prefix("child ").map(|pid| pid.parse().unwrap());
         }
     });
@@ -127,7 +127,7 @@ fn wrong_input_fails_the_run_with_the_message_and_status_of_the_process() {
 }
 
 #[test]
-fn a_program_that_is_not_there_is_named() {
+fn a_missing_program_is_named() {
     let mut case = Case::new(Delivery::Realtime, &[("ghost", "idle", Role::Essential)]);
     case.plan.executable = "/nowhere/parallax".into();
     case.plan.policy.max_restarts = 1;

@@ -1,4 +1,4 @@
-//! Runs a deployment of dummies under the supervisor and notes what happens.
+//! Runs a deployment of dummy processes under the supervisor and records the events.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
 use std::path::Path;
@@ -12,12 +12,12 @@ use runtime::{Delivery, Limits, Namespace, Scheduling, Stop, TopicPlan, process_
 use supervise::{Death, Event, Outcome, Plan, Policy, ProcessSpec, Role, SuperviseError};
 use tracing::Level;
 
-/// A run that takes longer has got stuck.
+/// A run that takes longer is stuck.
 const WATCHDOG: Duration = Duration::from_mins(2);
 
-/// What happened, in order.
+/// /// A recorded event.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Seen {
+pub(crate) enum Recorded {
     Started(String, u32, u32),
     Line(String, String),
     Finished(String),
@@ -27,15 +27,15 @@ pub(crate) enum Seen {
     Stopping,
 }
 
-/// A deployment in a place of its own.
+/// A deployment in a folder of its own.
 pub(crate) struct Case {
     pub(crate) plan: Plan,
     base: tempfile::TempDir,
 }
 
-/// What a run came to.
+/// The events and the result of a run.
 pub(crate) struct Run {
-    pub(crate) seen: Vec<Seen>,
+    pub(crate) events: Vec<Recorded>,
     pub(crate) result: Result<Outcome, SuperviseError>,
 }
 
@@ -86,23 +86,23 @@ impl Case {
         Self { plan, base }
     }
 
-    /// Runs to the end. `react` is told everything, and may stop the run.
-    pub(crate) fn run(&self, mut react: impl FnMut(&Seen, &Stop)) -> Run {
+    /// Runs to the end. `react` is called for every event, and may stop the run.
+    pub(crate) fn run(&self, mut react: impl FnMut(&Recorded, &Stop)) -> Run {
         let stop = Stop::new().unwrap();
         let watchdog = Watchdog::new(&stop);
-        let mut seen = Vec::new();
+        let mut events = Vec::new();
         let result = supervise::run(&self.plan, &stop, &mut |event| {
             if let Some(event) = note(&event) {
                 react(&event, &stop);
-                seen.push(event);
+                events.push(event);
             }
         });
-        assert!(!watchdog.barked(), "stuck: {seen:#?}");
+        assert!(!watchdog.has_fired(), "stuck: {events:#?}");
         self.assert_nothing_left();
-        Run { seen, result }
+        Run { events, result }
     }
 
-    /// The directory that the deployment's root lies in.
+    /// The parent directory of the deployment's root.
     pub(crate) fn base(&self) -> &Path {
         self.base.path()
     }
@@ -122,7 +122,7 @@ impl Case {
 }
 
 impl Drop for Case {
-    /// Removes what a failed test left.
+    /// Removes the files that a failed test left.
     fn drop(&mut self) {
         drop(self.plan.namespace.acquire());
     }
@@ -133,7 +133,7 @@ impl Run {
         self.result.as_ref().unwrap()
     }
 
-    /// Frames that a receiver got, with the epoch of their sender.
+    /// Frames that a receiver received, with the epoch of their sender.
     pub(crate) fn got(&self, receiver: &str) -> Vec<(u32, u64)> {
         self.lines(receiver)
             .filter_map(|line| {
@@ -144,26 +144,26 @@ impl Run {
     }
 
     pub(crate) fn lines<'a>(&'a self, process: &'a str) -> impl Iterator<Item = &'a str> {
-        self.seen.iter().filter_map(move |event| match event {
-            Seen::Line(name, text) if name == process => Some(text.as_str()),
+        self.events.iter().filter_map(move |event| match event {
+            Recorded::Line(name, text) if name == process => Some(text.as_str()),
             _ => None,
         })
     }
 
     pub(crate) fn deaths(&self, process: &str) -> Vec<Death> {
-        let of = |event: &Seen| match event {
-            Seen::Died(name, death) if name == process => Some(*death),
+        let of = |event: &Recorded| match event {
+            Recorded::Died(name, death) if name == process => Some(*death),
             _ => None,
         };
-        self.seen.iter().filter_map(of).collect()
+        self.events.iter().filter_map(of).collect()
     }
 
     pub(crate) fn pids(&self, process: &str) -> Vec<u32> {
-        let of = |event: &Seen| match event {
-            Seen::Started(name, pid, _) if name == process => Some(*pid),
+        let of = |event: &Recorded| match event {
+            Recorded::Started(name, pid, _) if name == process => Some(*pid),
             _ => None,
         };
-        self.seen.iter().filter_map(of).collect()
+        self.events.iter().filter_map(of).collect()
     }
 }
 
@@ -175,40 +175,40 @@ pub(crate) fn kill(signal: &str, pid: u32) {
     assert!(status.unwrap().success(), "kill {signal} {pid}");
 }
 
-/// Whether a process runs: it is there, and not a zombie.
+/// Whether a process runs: it exists, and is not a zombie.
 pub(crate) fn is_alive(pid: u32) -> bool {
     let line = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
-    line.is_ok_and(|it| !it.is_empty())
+    line.is_ok_and(|line| !line.is_empty())
 }
 
-fn note(event: &Event<'_>) -> Option<Seen> {
+fn note(event: &Event<'_>) -> Option<Recorded> {
     Some(match event {
         Event::Started {
             process,
             pid,
             epoch,
-        } => Seen::Started((*process).to_owned(), *pid, *epoch),
-        Event::Line { process, text } => Seen::Line((*process).to_owned(), (*text).to_owned()),
-        Event::Finished { process } => Seen::Finished((*process).to_owned()),
-        Event::Died { process, death } => Seen::Died((*process).to_owned(), *death),
-        Event::Restarting { process, pause } => Seen::Restarting((*process).to_owned(), *pause),
-        Event::GivenUp { process, restarts } => Seen::GivenUp((*process).to_owned(), *restarts),
-        Event::Stopping => Seen::Stopping,
+        } => Recorded::Started((*process).to_owned(), *pid, *epoch),
+        Event::Line { process, text } => Recorded::Line((*process).to_owned(), (*text).to_owned()),
+        Event::Finished { process } => Recorded::Finished((*process).to_owned()),
+        Event::Died { process, death } => Recorded::Died((*process).to_owned(), *death),
+        Event::Restarting { process, pause } => Recorded::Restarting((*process).to_owned(), *pause),
+        Event::GivenUp { process, restarts } => Recorded::GivenUp((*process).to_owned(), *restarts),
+        Event::Stopping => Recorded::Stopping,
         Event::Health { .. } => return None,
     })
 }
 
-/// Stops a run that has got stuck.
+/// Stops a run that is stuck.
 struct Watchdog {
-    barked: Arc<AtomicBool>,
+    has_fired: Arc<AtomicBool>,
     _over: mpsc::SyncSender<()>,
 }
 
 impl Watchdog {
     fn new(stop: &Stop) -> Self {
-        let barked = Arc::new(AtomicBool::new(false));
+        let has_fired = Arc::new(AtomicBool::new(false));
         let (over, is_over) = mpsc::sync_channel(0);
-        let (bark, stop) = (Arc::clone(&barked), stop.clone());
+        let (bark, stop) = (Arc::clone(&has_fired), stop.clone());
         std::thread::Builder::new()
             .name("watchdog".to_owned())
             .spawn(move || {
@@ -219,12 +219,12 @@ impl Watchdog {
             })
             .unwrap();
         Self {
-            barked,
+            has_fired,
             _over: over,
         }
     }
 
-    fn barked(&self) -> bool {
-        self.barked.load(Ordering::Acquire)
+    fn has_fired(&self) -> bool {
+        self.has_fired.load(Ordering::Acquire)
     }
 }

@@ -1,4 +1,4 @@
-//! Dummies that are no services: a supervisor to be killed, and a process that fills shared memory.
+//! Dummy processes that are not services: a supervisor to be killed, and a process that fills shared memory.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use runtime::{
 use supervise::{Event, Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
-/// Supervises two idle processes, and says their process ids once they have begun.
+/// Supervises two idle processes, and prints their process ids once they have started.
 pub(crate) fn supervise(base: &Path) -> ExitCode {
     match try_supervise(base) {
         Ok(()) => ExitCode::SUCCESS,
@@ -41,13 +41,13 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         policy: Policy::default(),
         log: Level::WARN,
     };
-    let mut begun: Vec<String> = Vec::new();
+    let mut started: Vec<String> = Vec::new();
     supervise::run(&plan, &endless(), &mut |event| {
         if let Event::Health { process, health } = event
-            && !begun.iter().any(|it| it == process)
+            && !started.iter().any(|name| name == process)
         {
-            begun.push(process.to_owned());
-            say(&health.pid.to_string());
+            started.push(process.to_owned());
+            print_line(&health.pid.to_string());
         }
     })?;
     Ok(())
@@ -58,7 +58,7 @@ fn endless() -> Stop {
     Stop::new().expect("two file descriptors")
 }
 
-/// Asks for 50 megabytes where there are 8, first politely and then by force.
+/// Requests 50 megabytes where 8 are free: first with the preflight check, then without.
 pub(crate) fn fill(base: &Path) -> ExitCode {
     let plan = TopicPlan::slices::<u8, FrameHeader>(
         "data".to_owned(),
@@ -67,32 +67,29 @@ pub(crate) fn fill(base: &Path) -> ExitCode {
         7_000_000,
     );
     let preflight = preflight(core::slice::from_ref(&plan));
-    say(&preflight.map_or_else(
-        |error| causes::in_one_line(&error),
-        |()| "it fits".to_owned(),
-    ));
-    match force(base, &plan) {
+    print_line(&preflight.map_or_else(|error| causes::in_one_line(&error), |()| "it fits".to_owned()));
+    match without_preflight(base, &plan) {
         Ok(text) => {
-            say(&text);
+            print_line(&text);
             ExitCode::SUCCESS
         }
         Err(failure) => failure.exit(),
     }
 }
 
-fn force(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
+fn without_preflight(base: &Path, plan: &TopicPlan) -> Result<String, Failure> {
     let lock = Namespace::below("t", base)?.acquire()?;
     let bus = Bus::open(lock.namespace(), "greedy", &endless())?;
     let topics = bus.create_topics(core::slice::from_ref(plan))?;
-    let said = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
+    let text = match bus.slice_publisher::<u8, FrameHeader>(plan.topic()) {
         Ok(_) => "it fits".to_owned(),
         Err(error) => causes::in_one_line(&error),
     };
     drop(topics);
-    Ok(said)
+    Ok(text)
 }
 
 #[expect(clippy::expect_used, reason = "a test fails by panicking")]
-fn say(text: &str) {
-    writeln!(std::io::stdout().lock(), "{text}").expect("somebody listens");
+fn print_line(text: &str) {
+    writeln!(std::io::stdout().lock(), "{text}").expect("standard output is read");
 }

@@ -1,4 +1,4 @@
-//! A process that behaves well or badly, as its first argument says.
+//! A process that works or fails, depending on its first argument.
 
 mod alone;
 
@@ -11,7 +11,7 @@ use std::time::Instant;
 use messages::{FrameHeader, Status, ViewQuality};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, Woken, run_service};
 
-/// What all of them talk about.
+/// The topic of all dummy processes.
 const TOPIC: &str = "data";
 const SOON: Duration = Duration::from_millis(50);
 
@@ -57,8 +57,8 @@ fn text(arg: &OsString) -> Option<String> {
     arg.to_str().map(str::to_owned)
 }
 
-/// The supervisor hands on what is written.
-fn say(text: &str) -> Result<(), Failure> {
+/// Prints a line, which the supervisor reports as an event.
+fn print_line(text: &str) -> Result<(), Failure> {
     use std::io::Write as _;
     writeln!(std::io::stdout().lock(), "{text}").or_fail(ExitKind::Run)
 }
@@ -68,9 +68,9 @@ fn failure(status: u64) -> Failure {
     Failure::new(kind, "model.bin: byte 17 is wrong").with_hint("take another")
 }
 
-/// Sends `n` frames, then the end, and then the end again and again.
+/// Sends `n` frames, then the end of stream, and repeats it.
 ///
-/// * `leaves`: whether it ends after the first end.
+/// * `leaves`: whether it exits after the first end of stream.
 fn send(
     service: &Service,
     n: u64,
@@ -103,16 +103,16 @@ fn send(
             service.health().sent(frame);
             frame += 1;
             if frame % 16 == 0 {
-                say(&format!("sent {frame}"))?;
+                print_line(&format!("sent {frame}"))?;
             }
         }
     }
     Ok(())
 }
 
-/// Receives until the end, and says what it got.
+/// Receives until the end of stream, and prints every frame.
 ///
-/// * `dies`: whether it is killed when it hears the end.
+/// * `dies`: whether it is killed at the end of stream.
 fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let subscriber = service
@@ -123,7 +123,7 @@ fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
             let header = sample.header();
             let value = header.stamp.frame as u8;
             if sample.payload().iter().any(|&it| it != value) {
-                say("torn")?;
+                print_line("torn")?;
             }
             if header.status == Status::END {
                 if dies {
@@ -133,7 +133,7 @@ fn receive(service: &Service, pause: u64, dies: bool) -> Result<(), Failure> {
                 continue;
             }
             service.health().received(1);
-            say(&format!(
+            print_line(&format!(
                 "got {} {}",
                 header.stamp.epoch, header.stamp.frame
             ))?;
@@ -149,15 +149,16 @@ fn hold(service: &Service) -> Result<(), Failure> {
     let subscriber = service
         .bus()
         .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
-    // Connected, as one that dies in the middle of its work is.
+    // // Connected, like a process that dies during its work.
     while subscriber.receive()?.is_none() {
         waiter.wait(SOON)?;
     }
-    say("holding")?;
+    print_line("holding")?;
     idle(service)
 }
 
-/// The first time it is killed in the middle of writing; then it sends three frames and is done.
+/// At its first start it is killed while it holds a loan; after the restart it sends three frames and
+/// finishes.
 fn die_in_loan(service: &Service) -> Result<(), Failure> {
     if service.epoch() > 0 {
         return send(service, 3, 0, 1, false);
@@ -169,7 +170,7 @@ fn die_in_loan(service: &Service) -> Result<(), Failure> {
         loan.payload_mut().fill(frame as u8);
         loan.header_mut().stamp.frame = frame;
         loan.send()?;
-        // One at a time, so that none replaces the other.
+        // // One at a time, so that no frame is replaced.
         std::thread::sleep(SOON);
     }
     let mut loan = publisher.loan(publisher.max_len())?;
@@ -188,7 +189,7 @@ fn die() -> Result<(), Failure> {
     Err(Failure::new(ExitKind::Run, "survived kill -9"))
 }
 
-/// The first time its main loop turns once and then stands still.
+/// At its first start its main loop makes one iteration and then hangs.
 fn hang_once(service: &Service) -> Result<(), Failure> {
     service.progress().tick();
     while service.epoch() == 0 {
@@ -197,7 +198,7 @@ fn hang_once(service: &Service) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for so many seconds, and is done unless it was interrupted.
+/// Computes for `seconds`, and finishes unless it was interrupted.
 fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     service.progress().tick();
     std::thread::sleep(Duration::from_secs(seconds));
@@ -207,8 +208,8 @@ fn think(service: &Service, seconds: u64) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Computes for three seconds, `usual` milliseconds at a time, and never waits; then once, in its first life, for `long`
-/// of them.
+/// Computes for three seconds, `usual` milliseconds per iteration, without waiting; then once, at its first
+/// start, for `long` milliseconds.
 fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
     let burn = |millis: u64| {
         let begin = Instant::now();
@@ -231,7 +232,7 @@ fn compute(service: &Service, usual: u64, long: u64) -> Result<(), Failure> {
     idle(service)
 }
 
-/// Is done at once, and waits to be told to end.
+/// Finishes at once, and waits for the stop request.
 fn idle(service: &Service) -> Result<(), Failure> {
     let waiter = service.bus().waiter();
     service.health().finished();
@@ -247,7 +248,7 @@ fn wrong_type(service: &Service) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The first time it ends well before its work is done.
+/// At its first start it exits with status 0 before it has finished.
 fn leave(service: &Service) -> Result<(), Failure> {
     service.progress().tick();
     if service.epoch() > 0 {
@@ -256,7 +257,7 @@ fn leave(service: &Service) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Does not end when it is asked to.
+/// Ignores the stop request.
 fn stubborn(service: &Service) -> Result<(), Failure> {
     service.health().finished();
     loop {
@@ -265,12 +266,12 @@ fn stubborn(service: &Service) -> Result<(), Failure> {
     }
 }
 
-/// Starts a process of its own and leaves it.
+/// Starts a child process and does not end it.
 fn orphan(service: &Service) -> Result<(), Failure> {
     let child = Command::new("sleep")
         .arg("600")
         .spawn()
         .or_fail(ExitKind::Run)?;
-    say(&format!("child {}", child.id()))?;
+    print_line(&format!("child {}", child.id()))?;
     idle(service)
 }
