@@ -1,7 +1,7 @@
-//! Where the time of a process goes: measured in the process, sent as a message, read with care.
+//! Times and counts of a process: measured in the process, sent as a message, and checked when read.
 //!
-//! A [`Meter`] takes durations and counts, [`Rates`] say how often something happened lately, and a
-//! [`Reading`] is what a message of another process says, checked. Nothing here reads a clock.
+//! A [`Meter`] collects durations and counts, [`Rates`] computes recent rates, and a [`Reading`] is the
+//! checked content of another process's message. Nothing here reads a clock.
 #![forbid(unsafe_code)]
 
 mod meter;

@@ -1,28 +1,28 @@
-//! Durations and counts of one process, as they happen.
+//! //! Collects durations and counts of one process.
 
 use hdrhistogram::Histogram;
 use messages::{Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span};
 
-/// Longest duration that is told apart, nanoseconds: an hour.
+/// Longest measurable duration, nanoseconds: an hour.
 const LONGEST_NANOS: u64 = 3_600_000_000_000;
 
-/// How one frame went through a process, nanoseconds.
+/// The times of one frame in a process, nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Passage {
-    /// From its message being sent until work on it began, if it came as one.
+    /// From sending of its message to the start of the work, if there was a message.
     pub waiting: Option<u64>,
-    /// Work on it.
+    /// Computing.
     pub computing: u64,
-    /// Taking memory for the answer and sending it.
+    /// Loaning memory for the result and sending it.
     pub publishing: u64,
-    /// From its capture until the answer was ready, if that is known.
+    /// From capture to result, if known.
     pub since_capture: Option<u64>,
 }
 
-/// Durations and counts of one process, as they happen.
+/// Collects durations and counts of one process.
 ///
-/// A histogram is made when the first duration of its stage and view comes; after that nothing is
-/// allocated. What comes when all rows are taken ([`MAX_ROWS`]) is not measured.
+/// A histogram is created with the first duration of its stage and view; after that nothing is allocated.
+/// Durations that need a further row beyond [`MAX_ROWS`] are ignored.
 #[derive(Debug)]
 pub struct Meter {
     rows: Vec<Row>,
@@ -54,24 +54,24 @@ impl Default for Meter {
 }
 
 impl Meter {
-    /// Says whose view the process works for.
+    /// Sets the view that the process works for.
     ///
-    /// * `name`: the camera's; what does not fit into a message is cut off.
+    /// * `name`: the camera's; truncated if it does not fit into a message.
     pub fn belongs_to(&mut self, view: usize, name: &str) {
         self.view = number_of(Some(view));
         self.name = cut(name);
     }
 
-    /// Notes a duration.
+    /// /// Records a duration.
     ///
     /// * `view`: of which view, if of one.
     pub fn spent(&mut self, span: Span, view: Option<usize>, nanos: u64) {
         let view = number_of(view);
-        let known = self
+        let existing = self
             .rows
             .iter()
-            .position(|it| it.span == span && it.view == view);
-        let index = known.unwrap_or(self.rows.len());
+            .position(|row| row.span == span && row.view == view);
+        let index = existing.unwrap_or(self.rows.len());
         if index == self.rows.len() {
             if index == MAX_ROWS {
                 return;
@@ -86,7 +86,7 @@ impl Meter {
         self.rows[index].histogram.saturating_record(nanos);
     }
 
-    /// Notes how a frame went through the process.
+    /// Records the times of a frame.
     pub fn passed(&mut self, passage: &Passage) {
         if let Some(nanos) = passage.waiting {
             self.spent(Span::WAITING, None, nanos);
@@ -98,41 +98,41 @@ impl Meter {
         }
     }
 
-    /// Counts what was lost.
+    /// Counts losses.
     pub fn dropped(&mut self, cause: Cause, n: u64) {
         self.n_dropped[cause as usize] += n;
     }
 
-    /// What was lost, all causes together.
+    /// Losses of all causes together.
     pub fn n_dropped(&self) -> u64 {
         self.n_dropped.iter().sum()
     }
 
-    /// Notes how many frames or results wait in the process.
+    /// Records how many frames or results wait in the process.
     pub fn queued(&mut self, n: usize) {
         let n = u32::try_from(n).unwrap_or(NO_QUEUE - 1).min(NO_QUEUE - 1);
-        let longest = self.queue.map_or(0, |it| it[1]);
+        let longest = self.queue.map_or(0, |[_, longest]| longest);
         self.queue = Some([n, longest.max(n)]);
     }
 
-    /// Counts evidence that was sent out.
+    /// Counts evidence that was sent.
     pub fn sent_evidence(&mut self, bytes: u64) {
         self.evidence_bytes += bytes;
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn n_rows(&self) -> usize {
         self.rows.len()
     }
 
-    /// A row as it is sent, its rate left open; `None` beyond [`Self::n_rows`].
+    /// A row of the message, without its rate; `None` beyond [`Self::n_rows`].
     pub fn row(&self, index: usize) -> Option<MetricsRow> {
         let Row {
             span,
             view,
             histogram,
         } = self.rows.get(index)?;
-        // The histogram answers with the upper end of a bucket, which may lie beyond the longest.
+        // // The histogram returns the upper end of a bucket, which may exceed the longest duration.
         let at = |quantile| histogram.value_at_quantile(quantile).min(histogram.max());
         Some(MetricsRow {
             span: *span,
@@ -146,7 +146,7 @@ impl Meter {
         })
     }
 
-    /// What is sent, but for the rows and what the process knows of itself.
+    /// The message without the rows and the process's own fields.
     pub fn head(&self) -> Metrics {
         let [queue, longest_queue] = self.queue.unwrap_or([NO_QUEUE; 2]);
         Metrics {
@@ -166,7 +166,7 @@ fn number_of(view: Option<usize>) -> u32 {
         .unwrap_or(NO_VIEW)
 }
 
-/// As much of a name as fits, whole characters.
+/// Truncates a name between characters.
 fn cut(name: &str) -> [u8; MAX_NAME] {
     let mut bytes = [0; MAX_NAME];
     let len = name.floor_char_boundary(MAX_NAME);
@@ -188,12 +188,12 @@ mod tests {
     proptest! {
         /// Two significant digits: the buckets of a histogram are at most a hundredth wide.
         #[test]
-        fn percentiles_are_those_of_the_durations_to_a_hundredth(
+        fn percentiles_are_exact_to_a_hundredth(
             mut nanos in proptest::collection::vec(1_u64..10_000_000_000, 1..300)
         ) {
             let mut meter = Meter::default();
-            for &it in &nanos {
-                meter.spent(Span::COMPUTING, None, it);
+            for &duration in &nanos {
+                meter.spent(Span::COMPUTING, None, duration);
             }
             let row = meter.row(0).unwrap();
             nanos.sort_unstable();
@@ -216,18 +216,23 @@ mod tests {
         meter.spent(Span::WAITING, Some(0), 2000);
         meter.spent(Span::COMPUTING, None, 3000);
         meter.spent(Span::WAITING, Some(1), 1000);
-        let rows: Vec<_> = (0..meter.n_rows()).filter_map(|it| meter.row(it)).collect();
-        let told: Vec<_> = rows.iter().map(|it| (it.span, it.view, it.count)).collect();
+        let rows: Vec<_> = (0..meter.n_rows())
+            .filter_map(|index| meter.row(index))
+            .collect();
+        let counts: Vec<_> = rows
+            .iter()
+            .map(|row| (row.span, row.view, row.count))
+            .collect();
         let expected = [
             (Span::WAITING, 1, 2),
             (Span::WAITING, 0, 1),
             (Span::COMPUTING, NO_VIEW, 1),
         ];
-        assert_eq!(told, expected);
+        assert_eq!(counts, expected);
     }
 
     #[test]
-    fn what_has_no_row_left_is_not_measured() {
+    fn durations_without_a_free_row_are_ignored() {
         let mut meter = Meter::default();
         for view in 0..2 * MAX_ROWS {
             meter.spent(Span::WAITING, Some(view), 1);
@@ -237,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn longer_than_an_hour_is_an_hour_and_nothing_is_a_nanosecond() {
+    fn durations_are_clamped_to_a_nanosecond_and_an_hour() {
         let mut meter = Meter::default();
         meter.spent(Span::COMPUTING, None, u64::MAX);
         meter.spent(Span::PUBLISHING, None, 0);
@@ -271,6 +276,6 @@ mod tests {
             "\u{e4}".repeat(16)
         );
         meter.belongs_to(3, &format!("x{}", "\u{e4}".repeat(16)));
-        assert_eq!(meter.head().name[31], 0, "half a character does not go in");
+        assert_eq!(meter.head().name[31], 0, "no part of a character is kept");
     }
 }

@@ -1,15 +1,15 @@
-//! How often things happened lately.
+//! //! Recent rates.
 
 use std::collections::VecDeque;
 
 use messages::{MAX_ROWS, Metrics};
 
-/// How far back "lately" reaches, nanoseconds.
+/// The time window of the rates, nanoseconds.
 const REACH_NANOS: u64 = 5_000_000_000;
-/// Less time than this says nothing about a rate, nanoseconds.
+/// Shortest time that gives a rate, nanoseconds.
 const LEAST_NANOS: u64 = 200_000_000;
 
-/// How often things happened lately: over the last five seconds, or since the beginning.
+/// Rates over the last five seconds, or since the start.
 #[derive(Debug)]
 pub struct Rates {
     past: VecDeque<Past>,
@@ -23,7 +23,7 @@ struct Past {
 }
 
 impl Rates {
-    /// Begins, with nothing done yet.
+    /// Starts with counts of zero.
     ///
     /// * `at_nanos`: now.
     pub fn new(at_nanos: u64) -> Self {
@@ -37,13 +37,13 @@ impl Rates {
         }
     }
 
-    /// Fills the rates of a message in, whose counts and time are there, and remembers those. Rows must
-    /// keep their places from message to message.
+    /// Computes the rates of a message from its counts and time, and keeps those. Rows must keep their order
+    /// from message to message.
     pub fn fill(&mut self, message: &mut Metrics) {
         let now = Past {
             at_nanos: message.at_nanos,
             n_sent: message.n_sent,
-            counts: message.rows.map(|it| it.count),
+            counts: message.rows.map(|row| row.count),
         };
         while self.past.len() > 1
             && now.at_nanos.saturating_sub(self.past[1].at_nanos) > REACH_NANOS
@@ -77,37 +77,41 @@ mod tests {
     const SECOND: u64 = 1_000_000_000;
 
     fn message(at_nanos: u64, n_sent: u64, count: u64) -> Metrics {
-        let mut it = Metrics {
+        let mut message_of_second = Metrics {
             at_nanos,
             n_sent,
             ..Metrics::default()
         };
-        it.rows[1].count = count;
-        it
+        message_of_second.rows[1].count = count;
+        message_of_second
     }
 
-    fn rates(it: &Metrics) -> [u64; 2] {
-        [it.sent_millihertz, it.rows[1].millihertz]
+    fn rates(message_of_second: &Metrics) -> [u64; 2] {
+        [
+            message_of_second.sent_millihertz,
+            message_of_second.rows[1].millihertz,
+        ]
     }
 
     #[test]
-    fn what_goes_on_evenly_has_one_rate() {
+    fn steady_events_have_a_constant_rate() {
         let mut rates_of = Rates::new(7 * SECOND);
         for second in 1..20 {
-            let mut it = message((7 + second) * SECOND, 20 * second, 5 * second);
-            rates_of.fill(&mut it);
-            assert_eq!(rates(&it), [20_000, 5_000], "{second}");
+            let mut message_of_second = message((7 + second) * SECOND, 20 * second, 5 * second);
+            rates_of.fill(&mut message_of_second);
+            assert_eq!(rates(&message_of_second), [20_000, 5_000], "{second}");
         }
     }
 
     #[test]
-    fn what_has_stopped_has_no_rate_after_five_seconds() {
+    fn the_rate_is_zero_five_seconds_after_the_last_event() {
         let mut rates_of = Rates::new(0);
         let mut last = [1; 2];
         for second in 1..=12 {
-            let mut it = message(second * SECOND, 100 * second.min(3), second.min(3));
-            rates_of.fill(&mut it);
-            let now = rates(&it);
+            let mut message_of_second =
+                message(second * SECOND, 100 * second.min(3), second.min(3));
+            rates_of.fill(&mut message_of_second);
+            let now = rates(&message_of_second);
             assert!(second <= 3 || now[0] <= last[0], "{second}: {now:?}");
             last = now;
         }
@@ -115,15 +119,15 @@ mod tests {
     }
 
     #[test]
-    fn a_moment_says_nothing_about_a_rate() {
+    fn too_short_a_time_gives_no_rate() {
         let mut rates_of = Rates::new(0);
-        let mut it = message(LEAST_NANOS - 1, 1000, 1000);
-        rates_of.fill(&mut it);
-        assert_eq!(rates(&it), [0, 0]);
+        let mut message_of_second = message(LEAST_NANOS - 1, 1000, 1000);
+        rates_of.fill(&mut message_of_second);
+        assert_eq!(rates(&message_of_second), [0, 0]);
     }
 
     #[test]
-    fn memory_is_bounded_however_often_somebody_looks() {
+    fn memory_is_bounded_for_any_number_of_messages() {
         let mut rates_of = Rates::new(0);
         for nth in 0..10_000 {
             rates_of.fill(&mut message(nth * SECOND / 10, nth, nth));

@@ -1,16 +1,16 @@
-//! What another process says about itself, checked.
+//! //! The checked content of another process's metrics message.
 
 use messages::{
     Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
 };
 
-/// A message that no process of ours would send.
+/// A malformed metrics message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReadingError {
-    /// More rows than there is room for.
+    /// More rows than a message can hold.
     #[error("{rows} rows, a message has room for {MAX_ROWS}")]
     TooManyRows {
-        /// As many as it says.
+        /// The stated number.
         rows: u32,
     },
     /// A stage that does not exist.
@@ -21,18 +21,18 @@ pub enum ReadingError {
         /// Its stage.
         span: u32,
     },
-    /// A view that cannot be.
+    /// An invalid view.
     #[error("view {view} of at most {MAX_VIEWS}")]
     UnknownView {
         /// The view.
         view: u32,
     },
-    /// Percentiles that fall.
+    /// Percentiles that are not ascending.
     #[error("row {row} has percentiles that fall, or none of {count} durations")]
     Disordered {
         /// Which row.
         row: usize,
-        /// How many durations it says it has seen.
+        /// The stated number of durations.
         count: u64,
     },
     /// Two rows of the same stage and view.
@@ -43,7 +43,7 @@ pub enum ReadingError {
         /// The second.
         second: usize,
     },
-    /// A name that is no text.
+    /// A name that is not UTF-8.
     #[error("the name of the view is not UTF-8, or goes on after its end")]
     Name,
     /// A flag that is neither 0 nor 1.
@@ -52,57 +52,57 @@ pub enum ReadingError {
         /// Its value.
         finished: u32,
     },
-    /// A queue that is longer than it ever was, or a time before the beginning.
+    /// Counts or times that contradict each other.
     #[error("counts that contradict each other: {what}")]
     Contradiction {
-        /// Which.
+        /// /// The contradiction.
         what: &'static str,
     },
 }
 
-/// What another process says about itself.
+/// /// The metrics of another process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reading {
-    /// Run of the deployment.
+    /// The session.
     pub session: u64,
     /// Process id.
     pub pid: u32,
     /// How often the process has been restarted.
     pub restarts: u32,
-    /// When it began, `CLOCK_MONOTONIC`, nanoseconds.
+    /// When the process started, `CLOCK_MONOTONIC`, nanoseconds.
     pub began_at_nanos: u64,
-    /// When it said this, `CLOCK_MONOTONIC`, nanoseconds.
+    /// When the message was sent, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
-    /// Messages taken in.
+    /// /// Messages received.
     pub n_received: u64,
-    /// Messages sent out.
+    /// /// Messages sent.
     pub n_sent: u64,
-    /// The same per second lately, in thousandths.
+    /// Messages sent per second recently, in thousandths.
     pub sent_millihertz: u64,
     /// Messages or frames lost, in the order of [`Cause::ALL`].
     pub n_dropped: [u64; N_CAUSES],
-    /// Evidence sent out, bytes.
+    /// Evidence sent, bytes.
     pub evidence_bytes: u64,
-    /// Physical memory, bytes; 0 where the system does not say.
+    /// Physical memory, bytes; 0 where the system does not report it.
     pub memory_bytes: u64,
-    /// The most it has ever held, bytes.
+    /// Peak physical memory, bytes.
     pub peak_memory_bytes: u64,
-    /// Frames or results that wait, and the most that ever did, where there is a queue.
+    /// Current and longest queue of frames or results, if there is a queue.
     pub queue: Option<[u32; 2]>,
     /// Its view, if it works for one.
     pub view: Option<ViewName>,
-    /// Whether it has seen the end of the footage and passed it on.
+    /// Whether it has received the end of stream and sent it on.
     pub is_finished: bool,
     /// Durations by stage and view.
     pub times: Vec<Timed>,
 }
 
-/// A view, as the process that works for it calls it.
+/// The view that a process works for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ViewName {
     /// Its number.
     pub index: usize,
-    /// Its camera's name; empty if the process has not said.
+    /// Its camera's name; empty if unknown.
     pub name: String,
 }
 
@@ -111,17 +111,17 @@ pub struct ViewName {
 pub struct Timed {
     /// Which stage.
     pub span: Span,
-    /// Of which view, if of one.
+    /// The view, if it belongs to one.
     pub view: Option<usize>,
     /// How many were measured.
     pub count: u64,
-    /// How many per second lately, in thousandths.
+    /// Number per second recently, in thousandths.
     pub millihertz: u64,
-    /// Half are no longer.
+    /// Median.
     pub p50_nanos: u64,
-    /// 99 of 100 are no longer.
+    /// 99th percentile.
     pub p99_nanos: u64,
-    /// 999 of 1000 are no longer.
+    /// 99.9th percentile.
     pub p99_9_nanos: u64,
     /// The longest.
     pub max_nanos: u64,
@@ -133,9 +133,11 @@ impl Reading {
     /// # Errors
     ///
     /// [`ReadingError`].
-    pub fn from_message(it: &Metrics) -> Result<Self, ReadingError> {
-        let rows = it.rows.get(..it.n_rows as usize);
-        let rows = rows.ok_or(ReadingError::TooManyRows { rows: it.n_rows })?;
+    pub fn from_message(message: &Metrics) -> Result<Self, ReadingError> {
+        let rows = message.rows.get(..message.n_rows as usize);
+        let rows = rows.ok_or(ReadingError::TooManyRows {
+            rows: message.n_rows,
+        })?;
         let mut times: Vec<Timed> = Vec::with_capacity(rows.len());
         for (second, row) in rows.iter().enumerate() {
             let timed = timed(second, row)?;
@@ -145,39 +147,38 @@ impl Reading {
             }
             times.push(timed);
         }
-        if it.finished > 1 {
+        if message.finished > 1 {
             return Err(ReadingError::Flag {
-                finished: it.finished,
+                finished: message.finished,
             });
         }
-        if it.at_nanos < it.began_at_nanos {
+        if message.at_nanos < message.began_at_nanos {
             let what = "it was sent before the process began";
             return Err(ReadingError::Contradiction { what });
         }
-        let view = view_of(it.view)?;
-        let name = name_of(&it.name)?;
+        let view = view_of(message.view)?;
+        let name = name_of(&message.name)?;
         Ok(Self {
-            session: it.session,
-            pid: it.pid,
-            restarts: it.epoch,
-            began_at_nanos: it.began_at_nanos,
-            at_nanos: it.at_nanos,
-            n_received: it.n_received,
-            n_sent: it.n_sent,
-            sent_millihertz: it.sent_millihertz,
-            n_dropped: it.n_dropped,
-            evidence_bytes: it.evidence_bytes,
-            memory_bytes: it.memory_bytes,
-            peak_memory_bytes: it.peak_memory_bytes,
-            queue: queue_of(it)?,
+            session: message.session,
+            pid: message.pid,
+            restarts: message.epoch,
+            began_at_nanos: message.began_at_nanos,
+            at_nanos: message.at_nanos,
+            n_received: message.n_received,
+            n_sent: message.n_sent,
+            sent_millihertz: message.sent_millihertz,
+            n_dropped: message.n_dropped,
+            evidence_bytes: message.evidence_bytes,
+            memory_bytes: message.memory_bytes,
+            peak_memory_bytes: message.peak_memory_bytes,
+            queue: queue_of(message)?,
             view: view.map(|index| ViewName { index, name }),
-            is_finished: it.finished == 1,
+            is_finished: message.finished == 1,
             times,
         })
     }
 
-    /// As a message. What does not fit is left out: rows beyond [`MAX_ROWS`], bytes of a name beyond
-    /// [`MAX_NAME`].
+    /// Writes a message, without rows beyond [`MAX_ROWS`] and bytes of a name beyond [`MAX_NAME`].
     pub fn to_message(&self) -> Metrics {
         let mut rows = [MetricsRow::default(); MAX_ROWS];
         for (row, it) in rows.iter_mut().zip(&self.times) {
@@ -193,9 +194,9 @@ impl Reading {
             };
         }
         let mut name = [0; MAX_NAME];
-        let said = self.view.as_ref().map_or("", |it| &it.name);
-        for (byte, said) in name.iter_mut().zip(said.bytes()) {
-            *byte = said;
+        let text = self.view.as_ref().map_or("", |view| &view.name);
+        for (byte, character) in name.iter_mut().zip(text.bytes()) {
+            *byte = character;
         }
         let [queue, longest_queue] = self.queue.unwrap_or([NO_QUEUE; 2]);
         Metrics {
@@ -222,31 +223,36 @@ impl Reading {
         }
     }
 
-    /// What was lost for one cause.
+    /// Losses of one cause.
     pub fn n_dropped_by(&self, cause: Cause) -> u64 {
         self.n_dropped[cause as usize]
     }
 }
 
-fn timed(row: usize, it: &MetricsRow) -> Result<Timed, ReadingError> {
-    if !Span::ALL.contains(&it.span) {
-        let span = it.span.0;
+fn timed(row: usize, row_message: &MetricsRow) -> Result<Timed, ReadingError> {
+    if !Span::ALL.contains(&row_message.span) {
+        let span = row_message.span.0;
         return Err(ReadingError::UnknownSpan { row, span });
     }
-    let rising = [it.p50_nanos, it.p99_nanos, it.p99_9_nanos, it.max_nanos];
-    if !rising.is_sorted() || (it.count == 0) != (it.max_nanos == 0) {
-        let count = it.count;
+    let rising = [
+        row_message.p50_nanos,
+        row_message.p99_nanos,
+        row_message.p99_9_nanos,
+        row_message.max_nanos,
+    ];
+    if !rising.is_sorted() || (row_message.count == 0) != (row_message.max_nanos == 0) {
+        let count = row_message.count;
         return Err(ReadingError::Disordered { row, count });
     }
     Ok(Timed {
-        span: it.span,
-        view: view_of(it.view)?,
-        count: it.count,
-        millihertz: it.millihertz,
-        p50_nanos: it.p50_nanos,
-        p99_nanos: it.p99_nanos,
-        p99_9_nanos: it.p99_9_nanos,
-        max_nanos: it.max_nanos,
+        span: row_message.span,
+        view: view_of(row_message.view)?,
+        count: row_message.count,
+        millihertz: row_message.millihertz,
+        p50_nanos: row_message.p50_nanos,
+        p99_nanos: row_message.p99_nanos,
+        p99_9_nanos: row_message.p99_9_nanos,
+        max_nanos: row_message.max_nanos,
     })
 }
 
@@ -258,8 +264,8 @@ fn view_of(view: u32) -> Result<Option<usize>, ReadingError> {
     }
 }
 
-fn queue_of(it: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
-    match [it.queue, it.longest_queue] {
+fn queue_of(message: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
+    match [message.queue, message.longest_queue] {
         [NO_QUEUE, NO_QUEUE] => Ok(None),
         both @ [now, longest] if now <= longest && longest != NO_QUEUE => Ok(Some(both)),
         _ => Err(ReadingError::Contradiction {
@@ -347,13 +353,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_sent_is_what_is_read(it in any_reading()) {
+        fn a_reading_survives_a_round_trip(it in any_reading()) {
             prop_assert_eq!(Reading::from_message(&it.to_message()), Ok(it));
         }
 
-        /// Whatever it is, it is read or refused; and what is read can be sent again.
+        /// Any message is either read or refused; a message that is read can be written again.
         #[test]
-        fn no_message_is_read_as_something_else(
+        fn any_message_is_refused_or_survives_a_round_trip(
             it in any_reading(), n_rows in any::<u32>(), name in any::<[u8; MAX_NAME]>(),
             words in any::<[u32; 6]>(), row in 0..MAX_ROWS,
         ) {
@@ -391,7 +397,7 @@ mod tests {
         it
     }
 
-    /// What is said about a message that was changed.
+    /// The error for a changed message.
     fn refused(change: impl FnOnce(&mut Metrics)) -> ReadingError {
         let mut it = message();
         change(&mut it);
@@ -399,42 +405,48 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_changed_is_read() {
+    fn an_unchanged_message_is_read() {
         assert_eq!(Reading::from_message(&message()).unwrap().times.len(), 2);
     }
 
     #[test]
-    fn refuses_more_rows_than_there_are() {
+    fn refuses_too_many_rows() {
         let rows = MAX_ROWS as u32 + 1;
-        let error = refused(|it| it.n_rows = rows);
+        let error = refused(|message| message.n_rows = rows);
         assert_eq!(error, ReadingError::TooManyRows { rows });
         assert_eq!(error.to_string(), "25 rows, a message has room for 24");
     }
 
     #[test]
-    fn refuses_a_stage_that_does_not_exist() {
-        let error = refused(|it| it.rows[1].span = Span(5));
+    fn refuses_an_unknown_stage() {
+        let error = refused(|message| message.rows[1].span = Span(5));
         assert_eq!(error, ReadingError::UnknownSpan { row: 1, span: 5 });
     }
 
     #[test]
-    fn refuses_a_view_that_cannot_be() {
+    fn refuses_an_invalid_view() {
         let expected = ReadingError::UnknownView { view: 16 };
-        assert_eq!(refused(|it| it.rows[0].view = 16), expected);
-        assert_eq!(refused(|it| it.view = 16), expected);
+        assert_eq!(refused(|message| message.rows[0].view = 16), expected);
+        assert_eq!(refused(|message| message.view = 16), expected);
     }
 
     #[test]
-    fn refuses_percentiles_that_fall_or_come_from_nothing() {
+    fn refuses_descending_percentiles_and_those_of_no_durations() {
         let expected = |count| ReadingError::Disordered { row: 0, count };
-        assert_eq!(refused(|it| it.rows[0].p50_nanos = 3), expected(3));
-        assert_eq!(refused(|it| it.rows[0].max_nanos = 1), expected(3));
-        assert_eq!(refused(|it| it.rows[0].count = 0), expected(0));
+        assert_eq!(
+            refused(|message| message.rows[0].p50_nanos = 3),
+            expected(3)
+        );
+        assert_eq!(
+            refused(|message| message.rows[0].max_nanos = 1),
+            expected(3)
+        );
+        assert_eq!(refused(|message| message.rows[0].count = 0), expected(0));
     }
 
     #[test]
     fn refuses_two_rows_of_the_same_stage_and_view() {
-        let error = refused(|it| it.rows[1].view = 0);
+        let error = refused(|message| message.rows[1].view = 0);
         let expected = ReadingError::Twice {
             first: 0,
             second: 1,
@@ -443,21 +455,29 @@ mod tests {
     }
 
     #[test]
-    fn refuses_a_name_that_is_no_text_or_goes_on_after_its_end() {
-        assert_eq!(refused(|it| it.name[0] = 0xff), ReadingError::Name);
-        assert_eq!(refused(|it| it.name[5] = b'x'), ReadingError::Name);
+    fn refuses_a_name_that_is_not_utf8_or_continues_after_its_end() {
+        assert_eq!(
+            refused(|message| message.name[0] = 0xff),
+            ReadingError::Name
+        );
+        assert_eq!(
+            refused(|message| message.name[5] = b'x'),
+            ReadingError::Name
+        );
     }
 
     #[test]
     fn refuses_counts_that_contradict_each_other() {
         let is_contradiction = |it| matches!(it, ReadingError::Contradiction { .. });
-        assert!(is_contradiction(refused(|it| it.queue = 3)));
-        assert!(is_contradiction(refused(|it| (
-            it.queue,
-            it.longest_queue
+        assert!(is_contradiction(refused(|message| message.queue = 3)));
+        assert!(is_contradiction(refused(|message| (
+            message.queue,
+            message.longest_queue
         ) = (3, 2))));
-        assert!(is_contradiction(refused(|it| it.began_at_nanos = 1)));
-        let error = refused(|it| it.finished = 2);
+        assert!(is_contradiction(refused(
+            |message| message.began_at_nanos = 1
+        )));
+        let error = refused(|message| message.finished = 2);
         assert_eq!(error, ReadingError::Flag { finished: 2 });
     }
 }

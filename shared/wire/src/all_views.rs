@@ -1,4 +1,4 @@
-//! What all views agreed on at once, as the answers of pairs of them.
+//! The result of fusing all views at once, as messages of pairs.
 
 use messages::PairPose;
 use multiview::{AllViewsEstimate, PairEstimate, PairStart};
@@ -7,11 +7,11 @@ use pipeline::{AllViewsHypothesis, AllViewsResult, PairResult};
 use crate::error::{equal, index};
 use crate::{WireError, pair_to_message};
 
-/// Writes the answer of all views, or that there is none: message `v - 1` is about view `v` and the first
-/// view that answered; the caller fills in stamps and timing.
+/// Writes the result of all views, or that there is none: message `v - 1` is about view `v` and the first
+/// view of the result; the caller fills in stamps and timing.
 ///
-/// Each carries the energy of all views. The message of a view that was not solved, or is the first itself, says
-/// that there is no answer.
+/// Each contains the energy of all views. The message of a view that was not solved, or is the first itself,
+/// has no result.
 ///
 /// * `n_views`: of the rig.
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
@@ -40,13 +40,13 @@ pub fn all_views_to_messages(
     (1..n_views).map(message).collect()
 }
 
-/// Checks that a message is about the view that its number says, and an earlier one.
+/// Checks that a message is about the view of its number and an earlier one.
 ///
 /// * `n_views`: of the rig.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there is no such view, or the message names others.
+/// [`WireError`] if there is no such view, or the message is about others.
 pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireError> {
     let nth = index(
         "answer",
@@ -71,7 +71,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
     Ok(())
 }
 
-/// The first view of an answer, and the one at a place.
+/// The pair of the first view of a result and the one at `place`.
 fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     let hypothesis = |it: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
@@ -90,16 +90,16 @@ fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     }
 }
 
-/// Puts the answer of all views together; `None` if there is none.
+/// Combines the messages to the result of all views; `None` if there is none.
 ///
-/// The iterations are empty and the share of active terms is 0 in what is read.
+/// The iterations are not sent: they are empty, and the share of active terms is 0.
 ///
 /// * `pairs`: of one frame, as [`pair_from_message`](crate::pair_from_message) reads them, in ascending order of
 ///   their second view.
 ///
 /// # Errors
 ///
-/// [`WireError`] if they are not of one answer: another first view, order or number of hypotheses, or another
+/// [`WireError`] if they are not of one result: another first view, order or number of hypotheses, or another
 /// energy.
 pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResult>, WireError> {
     let Some(first) = pairs.first() else {
@@ -135,7 +135,7 @@ pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResul
     Ok(Some(answer))
 }
 
-/// A hypothesis that knows the first view only.
+/// A hypothesis with the first view only.
 fn alone(it: &PairEstimate) -> AllViewsHypothesis {
     AllViewsHypothesis {
         exchanged: vec![false],
@@ -161,7 +161,7 @@ mod tests {
 
     const N_VIEWS: usize = 5;
 
-    /// Answers of views 0 to 4, of which some are missing.
+    /// Results of views 0 to 4, some of which are missing.
     fn any_answer() -> impl Strategy<Value = AllViewsResult> {
         let views = prop::sample::subsequence((0..N_VIEWS).collect::<Vec<_>>(), 2..=N_VIEWS);
         views.prop_flat_map(|views| {
@@ -204,7 +204,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_answer_comes_back_as_it_was_sent(answer in any_answer()) {
+        fn a_result_survives_a_round_trip(answer in any_answer()) {
             let messages = all_views_to_messages(N_VIEWS, Some(&answer), 0b11111).unwrap();
             prop_assert_eq!(messages.len(), N_VIEWS - 1);
             prop_assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), Some(answer));
@@ -221,14 +221,14 @@ mod tests {
     }
 
     #[test]
-    fn no_answer_is_sent_as_such() {
+    fn a_missing_result_is_sent_as_such() {
         let messages = all_views_to_messages(3, None, 0b001).unwrap();
         assert_eq!(messages.len(), 2);
         assert!(messages.iter().all(|it| it.status == Status::TOO_FEW_VIEWS));
         assert_eq!(all_views_from_pairs(&read(&messages)).unwrap(), None);
     }
 
-    /// Views 0, 1 and 2 as they are sent.
+    /// The pairs of views 0, 1 and 2.
     fn pairs() -> [PairResult; 2] {
         let pose = || Pose {
             parts: vec![fmp::Placement::default(); 3],
@@ -244,19 +244,19 @@ mod tests {
     }
 
     #[test]
-    fn refuses_messages_that_are_not_of_one_answer() {
+    fn refuses_messages_of_different_results() {
         let change = |change: fn(&mut [PairResult; 2])| {
             let mut pairs = pairs();
             change(&mut pairs);
             all_views_from_pairs(&pairs).unwrap_err().to_string()
         };
-        let got = change(|it| it[1].views = [1, 2]);
+        let got = change(|pairs| pairs[1].views = [1, 2]);
         assert_eq!(got, "first view is 1, expected 0");
-        let got = change(|it| it[1].views = [0, 1]);
+        let got = change(|pairs| pairs[1].views = [0, 1]);
         assert_eq!(got, "view before of entry 1 is 1, the limit is 1");
-        let got = change(|it| it[1].hypotheses.clear());
+        let got = change(|pairs| pairs[1].hypotheses.clear());
         assert_eq!(got, "n_hypotheses is 0, expected 1");
-        let got = change(|it| it[1].hypotheses[0].energy = 3.0);
+        let got = change(|pairs| pairs[1].hypotheses[0].energy = 3.0);
         assert_eq!(
             got,
             "energy of entry 1 is 3, expected that of the other views"

@@ -2,7 +2,7 @@
 
 use messages::Refusal;
 
-/// A message says something that cannot be, or a value does not fit into its message.
+/// A message is malformed, or a value does not fit into its message.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WireError {
     /// A count is larger than the array that it counts.
@@ -15,7 +15,7 @@ pub enum WireError {
         /// Largest value allowed.
         limit: usize,
     },
-    /// Sender and receiver do not work on the same thing.
+    /// Sender and receiver have different models, rigs or layouts.
     #[error("{field} is {got}, expected {expected}")]
     Mismatch {
         /// The number.
@@ -25,7 +25,7 @@ pub enum WireError {
         /// The value that the receiver has.
         expected: usize,
     },
-    /// An index points outside.
+    /// An index is out of range.
     #[error("{field} of entry {entry} is {got}, the limit is {limit}")]
     OutOfRange {
         /// The index.
@@ -46,28 +46,28 @@ pub enum WireError {
         entry: usize,
         /// Its value.
         got: f64,
-        /// What would do.
+        /// What is expected.
         expected: &'static str,
     },
     /// The message is from another run.
     #[error("session is {got}, expected {expected}")]
     Session {
-        /// The run that it names.
+        /// Its session.
         got: u64,
-        /// The receiver's.
+        /// The receiver's session.
         expected: u64,
     },
-    /// The message does not come from whom the topic belongs to.
+    /// The message does not come from the sender of the topic.
     #[error("{field} is {got}, but this is the topic of {expected}")]
     Sender {
-        /// What it names.
+        /// The field.
         field: &'static str,
-        /// The sender that it names.
+        /// Its value.
         got: usize,
-        /// The one that the topic belongs to.
+        /// The sender of the topic.
         expected: usize,
     },
-    /// The message speaks of a time that has not come yet.
+    /// The message has a time in the future.
     #[error("{field} lies {} ms ahead of the clock", .ahead_nanos / 1_000_000)]
     Future {
         /// The time stamp.
@@ -75,7 +75,7 @@ pub enum WireError {
         /// How far ahead it is.
         ahead_nanos: u64,
     },
-    /// No footage has so many frames.
+    /// The frame number is too large.
     #[error("{field} is {got}, the limit is {limit}")]
     Frame {
         /// The number.
@@ -88,7 +88,7 @@ pub enum WireError {
 }
 
 impl WireError {
-    /// Under which cause the receiver counts it.
+    /// The cause under which the receiver counts it.
     pub fn refusal(&self) -> Refusal {
         match self {
             Self::TooMany { .. } | Self::Mismatch { .. } => Refusal::Size,
@@ -109,7 +109,7 @@ pub(crate) fn count(field: &'static str, got: usize, limit: usize) -> Result<usi
     Ok(got)
 }
 
-/// Refuses a number that is not the receiver's.
+/// Refuses a number that differs from the receiver's.
 pub(crate) fn equal(field: &'static str, got: usize, expected: usize) -> Result<(), WireError> {
     if got != expected {
         return Err(WireError::Mismatch {

@@ -1,4 +1,4 @@
-//! Response maps: the header of an array that is never copied.
+//! Response maps: the header of an array that is sent without copying.
 
 use fmp::{Bound, Bounds, Layout, Region, Responses, Scope, ScopeError};
 use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
@@ -6,7 +6,7 @@ use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Evidence as it arrived: the responses where they lie, and the bounds of their levels.
+/// Received evidence: the responses in place, and the bounds of their levels.
 #[derive(Debug, Clone)]
 pub struct EvidenceView<'a> {
     responses: Responses<'a>,
@@ -20,11 +20,11 @@ impl EvidenceView<'_> {
     }
 }
 
-/// Writes what the values are responses of, which levels are valid and what they offer at most; the caller
-/// fills in stamp and timing.
+/// Writes the scope of the responses, the valid levels and their bounds; the caller fills in stamp and
+/// timing.
 ///
 /// * `levels`: ascending.
-/// * `bounds`: of the same responses; a level of which nothing sensible is known counts as unknown.
+/// * `bounds`: of the same responses; an invalid bound is sent as unknown.
 ///
 /// # Errors
 ///
@@ -63,13 +63,13 @@ pub fn evidence_to_message(
     Ok(message)
 }
 
-/// Views the values that came with `message` as responses of `layout`, where they lie.
+/// Reads the values sent with `message` as responses of `layout`, in place.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the image size is not that of `layout`, the scope does not lie on it, there are
-/// fewer values than the scope has cells, the levels are not ascending levels of it, or a bound is
-/// none: it is not a number, minus infinity, or its size is negative or infinite.
+/// [`WireError`] if the image size is not that of `layout`, the scope exceeds it, there are fewer values than
+/// the scope has cells, the levels are not ascending levels of it, or a bound is invalid: not a number, minus
+/// infinity, or with a negative or infinite size.
 pub fn evidence_from_message<'a>(
     message: &'a EvidenceHeader,
     values: &'a [f32],
@@ -105,7 +105,7 @@ pub fn evidence_from_message<'a>(
     })
 }
 
-/// What is wrong with a bound.
+/// The error of an invalid bound.
 fn refusal(entry: usize, bound: Bound) -> Option<WireError> {
     let refused = |field, got: f32, expected| {
         Some(WireError::Value {
@@ -192,7 +192,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn levels_bounds_and_scope_come_back_as_they_were_sent(
+        fn levels_bounds_and_scope_survive_a_round_trip(
             scope in scope(),
             mask in prop::collection::vec(any::<bool>(), 96),
             known in prop::collection::vec((-1e6..1e6_f32, 0.0..1e6_f32, any::<bool>()), 96),
@@ -218,7 +218,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_arrives_is_refused_or_readable(
+        fn any_message_is_refused_or_readable(
             n_levels in any::<u32>(),
             small in 0_u32..4,
             levels in prop::collection::vec(0_u16..20, MAX_LEVELS),
@@ -274,19 +274,22 @@ mod tests {
     }
 
     #[test]
-    fn refuses_levels_that_nobody_computed() {
-        let before = refused(|it| it.scope_levels[0] = 2);
+    fn refuses_levels_outside_the_scope() {
+        let before = refused(|header| header.scope_levels[0] = 2);
         assert_eq!(before, "levels of entry 0 is 1, expected ascending levels");
-        let after = refused(|it| it.scope_levels[1] = 1);
+        let after = refused(|header| header.scope_levels[1] = 1);
         assert_eq!(after, "levels of entry 0 is 1, the limit is 1");
     }
 
     #[test]
     fn refuses_a_scope_beyond_the_image() {
-        assert_eq!(refused(|it| it.x[1] = 81), "region is 81, expected 80");
+        assert_eq!(
+            refused(|header| header.x[1] = 81),
+            "region is 81, expected 80"
+        );
         let n_levels = layout().levels.len();
         let want = format!("scope_levels is 999, expected {n_levels}");
-        assert_eq!(refused(|it| it.scope_levels[1] = 999), want);
+        assert_eq!(refused(|header| header.scope_levels[1] = 999), want);
     }
 
     #[test]
@@ -303,20 +306,22 @@ mod tests {
     }
 
     #[test]
-    fn refuses_bounds_that_are_none() {
-        let said = |best: f32, size: f32| refused(|it| (it.best[0], it.size[0]) = (best, size));
+    fn refuses_invalid_bounds() {
+        let error_of = |best: f32, size: f32| {
+            refused(|header| (header.best[0], header.size[0]) = (best, size))
+        };
         assert_eq!(
-            said(f32::NAN, 1.0),
+            error_of(f32::NAN, 1.0),
             "best of entry 0 is NaN, expected a score"
         );
-        assert!(said(f32::NEG_INFINITY, 1.0).contains("best"));
+        assert!(error_of(f32::NEG_INFINITY, 1.0).contains("best"));
         for size in [f32::NAN, f32::INFINITY, -1.0] {
-            assert!(said(0.0, size).contains("size"));
+            assert!(error_of(0.0, size).contains("size"));
         }
     }
 
     #[test]
-    fn a_bound_that_is_none_is_sent_as_unknown() {
+    fn an_invalid_bound_is_sent_as_unknown() {
         let layout = layout();
         for best in [f32::NAN, f32::NEG_INFINITY] {
             let bounds = Bounds::new(vec![Bound { best, size: 1.0 }; layout.levels.len()]);

@@ -1,8 +1,8 @@
-//! Messages to domain types and back, each direction checked.
+//! Converts messages to domain types and back, with checks in both directions.
 //!
-//! Whatever arrives was written by another process, so every count, index and number is compared
-//! with its limit before it is used; what a [`Model`](fmp::Model) and a [`Layout`](fmp::Layout)
-//! allow is the limit. Entries past a count are ignored when read and zero when written.
+//! A received message was written by another process, so every count, index and number is compared with its
+//! limit before it is used; the [`Model`](fmp::Model) and the [`Layout`](fmp::Layout) define the limits.
+//! Entries past a count are ignored when read and zero when written.
 #![forbid(unsafe_code)]
 
 mod all_views;

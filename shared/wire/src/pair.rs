@@ -1,4 +1,4 @@
-//! What a pair of views agreed on.
+//! The result of fusing a pair of views.
 
 use fmp::Pose;
 use messages::{PairHypothesis, PairPose, Status};
@@ -8,9 +8,9 @@ use pipeline::PairResult;
 use crate::error::{count, equal, finite, index};
 use crate::{WireError, pose_from_message, pose_to_message};
 
-/// Writes the answer of a pair, or that there is none; the caller fills in stamp and timing.
+/// Writes the result of a pair, or that there is none; the caller fills in stamp and timing.
 ///
-/// The way to the answer ([`PairEstimate::iterations`]) stays behind, its length is sent.
+/// Of [`PairEstimate::iterations`] only the length is sent.
 ///
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
 ///
@@ -59,9 +59,9 @@ fn hypothesis(estimate: &PairEstimate) -> Result<PairHypothesis, WireError> {
     })
 }
 
-/// Reads the answer of a pair; `None` unless the status is [`Status::OK`].
+/// Reads the result of a pair; `None` unless the status is [`Status::OK`].
 ///
-/// The iterations are empty in what is read.
+/// Its iterations are empty.
 ///
 /// * `plans`: the views of the rig.
 ///
@@ -91,13 +91,13 @@ pub fn pair_from_message(
     }))
 }
 
-/// Checks that an answer is about the views of the pair that it names.
+/// Checks that a result is about the views of its pair.
 ///
 /// * `pairs`: those of the deployment.
 ///
 /// # Errors
 ///
-/// [`WireError`] if there is no such pair, or it is one of other views.
+/// [`WireError`] if there is no such pair, or it has other views.
 pub fn check_views(message: &PairPose, pairs: &[[usize; 2]]) -> Result<(), WireError> {
     let pair = index("pair", 0, message.stamp.view as usize, pairs.len())?;
     for (got, expected) in message.views.iter().zip(pairs[pair]) {
@@ -168,7 +168,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn an_answer_comes_back_as_it_was_sent(
+        fn a_result_survives_a_round_trip(
             hypotheses in prop::collection::vec(any_estimate(), 1..=2),
         ) {
             let answer = PairResult { views: [0, 1], hypotheses };
@@ -177,7 +177,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_arrives_is_refused_or_two_views_of_the_rig(
+        fn any_message_is_refused_or_about_two_views_of_the_rig(
             poses in prop::array::uniform2(pose_message()),
             views in prop::array::uniform2(prop_oneof![0_u32..3, any::<u32>()]),
             n_hypotheses in prop_oneof![0_u32..4, any::<u32>()],
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn no_answer_is_sent_as_such() {
+    fn a_missing_result_is_sent_as_such() {
         let message = pair_to_message([0, 1], None, 0b01).unwrap();
         assert_eq!(message.status, Status::TOO_FEW_VIEWS);
         assert_eq!(message.views_present, 0b01);
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_about_the_views_of_its_pair() {
+    fn a_result_of_other_views_than_its_pair_is_refused() {
         let pairs = [[0, 1], [0, 2], [1, 2]];
         let mut message = pair_to_message([0, 2], None, 0).unwrap();
         message.stamp.view = 1;

@@ -27,7 +27,7 @@ pub fn pose_to_message(pose: &Pose) -> Result<PoseMessage, WireError> {
     Ok(message)
 }
 
-/// Reads a pose that must lie on `layout` and have the parts of `model`.
+/// Reads a pose, which must be within `layout` and have the parts of `model`.
 ///
 /// # Errors
 ///
@@ -116,7 +116,7 @@ pub fn candidates_from_message(
         .collect()
 }
 
-/// Adds how well the parts of the first candidate fit.
+/// Adds the local scores of the parts of the first candidate.
 ///
 /// # Errors
 ///
@@ -138,7 +138,7 @@ pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result
     Ok(())
 }
 
-/// Reads how well the parts of the first candidate fit.
+/// Reads the local scores of the parts of the first candidate.
 ///
 /// # Errors
 ///
@@ -176,13 +176,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_pose_comes_back_as_it_was_sent(pose in any_pose()) {
+        fn a_pose_survives_a_round_trip(pose in any_pose()) {
             let message = pose_to_message(&pose).unwrap();
             prop_assert_eq!(pose_from_message(&message, &model(), &layout()).unwrap(), pose);
         }
 
         #[test]
-        fn candidates_come_back_in_their_order(
+        fn candidates_keep_their_order(
             poses in prop::collection::vec(any_pose(), 0..=MAX_CANDIDATES),
         ) {
             let message = candidates_to_message(&poses, layout().image_size).unwrap();
@@ -192,7 +192,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_arrives_is_either_refused_or_inside_the_layout(
+        fn any_message_is_refused_or_within_the_layout(
             message in pose_message(),
             status in 0_u32..8,
             n_candidates in any::<u32>(),
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn local_scores_come_back_unless_they_are_no_numbers() {
+    fn local_scores_survive_a_round_trip_and_must_be_finite() {
         let score = LocalScore {
             response: 1.5,
             contrast: -2.0,
@@ -231,10 +231,10 @@ mod tests {
         let back = local_from_message(&message, 3).unwrap();
         assert_eq!(back, [score, LocalScore::default(), score]);
         message.local[1].margin = f32::NAN;
-        let said = local_from_message(&message, 3).unwrap_err().to_string();
-        assert_eq!(said, "local of entry 1 is NaN, expected a finite number");
-        let said = local_from_message(&message, MAX_PARTS + 1).unwrap_err();
-        assert_eq!(said.to_string(), "local is 33, the limit is 32");
+        let error = local_from_message(&message, 3).unwrap_err().to_string();
+        assert_eq!(error, "local of entry 1 is NaN, expected a finite number");
+        let error = local_from_message(&message, MAX_PARTS + 1).unwrap_err();
+        assert_eq!(error.to_string(), "local is 33, the limit is 32");
     }
 
     fn sent() -> PoseMessage {
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_a_level_that_is_not_there() {
+    fn refuses_a_missing_level() {
         let limit = layout().levels.len();
         let level = limit as u16;
         let got = refused(PoseMessage { level, ..sent() });

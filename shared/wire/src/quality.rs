@@ -5,7 +5,7 @@ use messages::{MAX_PARTS, PairPose, Status, ViewQuality};
 use crate::WireError;
 use crate::error::{count, equal, finite};
 
-/// Writes a prediction, or that there is none; the caller fills in stamp and timing.
+/// Writes predicted errors, or that there are none; the caller fills in stamp and timing.
 ///
 /// * `sigma_px`: expected error of every part, pixels of the frame.
 ///
@@ -86,10 +86,10 @@ pub fn tau_from_message(
         .map(Some)
 }
 
-/// Adds what was predicted of one of the two views of an answer.
+/// Adds the prediction for one of the two views of a pair.
 ///
 /// * `side`: 0 for the first view, 1 for the second.
-/// * `age`: how many frames ago it was predicted.
+/// * `age`: age of the prediction, frames.
 /// * `sigma_px`: expected error of every part, pixels of the frame.
 ///
 /// # Errors
@@ -109,8 +109,7 @@ pub fn sigma_to_pair(
     Ok(())
 }
 
-/// Reads what was predicted of one of the two views of an answer, and how many frames before it; `None` where
-/// nothing was.
+/// Reads the prediction for one of the two views of a pair and its age in frames; `None` if there is none.
 ///
 /// * `side`: 0 for the first view, 1 for the second.
 ///
@@ -152,7 +151,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_prediction_comes_back_as_it_was_sent(
+        fn a_prediction_survives_a_round_trip(
             sigma in prop::collection::vec(0.0_f32..1e3, 1..=MAX_PARTS),
         ) {
             let message = sigma_to_message(Some(&sigma)).unwrap();
@@ -160,7 +159,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_arrives_is_refused_or_a_distance(
+        fn any_message_is_refused_or_not_negative(
             status in 0_u32..8,
             n_parts in any::<u32>(),
             bits in prop::array::uniform32(any::<u32>()),
@@ -178,7 +177,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_prediction_comes_back_from_a_pair_as_it_was_sent(
+        fn a_prediction_in_a_pair_survives_a_round_trip(
             sigma in prop::collection::vec(0.0_f32..1e3, 1..=MAX_PARTS),
             side in 0_usize..2,
             age in 0_u64..70_000,
@@ -191,7 +190,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_arrives_with_a_pair_is_refused_or_a_distance(
+        fn any_prediction_in_a_pair_is_refused_or_not_negative(
             sigma_age in any::<[u16; 2]>(),
             bits in prop::array::uniform32(any::<u32>()),
             n_parts in 0_usize..40,
@@ -215,13 +214,13 @@ mod tests {
     }
 
     #[test]
-    fn thresholds_come_back_with_their_prediction_or_not_at_all() {
+    fn thresholds_are_read_with_their_prediction_only() {
         let mut message = sigma_to_message(Some(&[1.0, 2.0])).unwrap();
         assert_eq!(tau_from_message(&message, 2).unwrap(), None);
         tau_to_message(&mut message, &[3.0, 4.0]).unwrap();
         assert_eq!(tau_from_message(&message, 2).unwrap(), Some(vec![3.0, 4.0]));
-        let said = tau_from_message(&message, 3).unwrap_err().to_string();
-        assert_eq!(said, "n_thresholds is 2, expected 3");
+        let error = tau_from_message(&message, 3).unwrap_err().to_string();
+        assert_eq!(error, "n_thresholds is 2, expected 3");
         assert!(tau_to_message(&mut message, &[f32::NAN]).is_err());
         message.status = Status::NO_PREDICTION;
         assert_eq!(tau_from_message(&message, 2).unwrap(), None);

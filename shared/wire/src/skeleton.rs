@@ -1,4 +1,4 @@
-//! The result: joints in the world and the views that made them.
+//! The result: joints in the world and the views that were used.
 
 use geometry::{TriangulateError, Triangulated};
 use messages::{
@@ -38,7 +38,7 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     Ok(message)
 }
 
-/// The message after the last result.
+/// The end of stream of the results.
 pub fn end_of_results(session: u64) -> Pose3d {
     let mut message = empty();
     message.stamp.session = session;
@@ -46,8 +46,8 @@ pub fn end_of_results(session: u64) -> Pose3d {
     message
 }
 
-/// Checks the counts of a result against the receiver's rig and joint set, and that what it has found
-/// lies somewhere.
+/// Checks the counts of a result against the receiver's rig and joint set, and that its coordinates are
+/// finite.
 ///
 /// # Errors
 ///
@@ -80,7 +80,7 @@ fn all_finite(field: &'static str, numbers: &[f64]) -> Result<(), WireError> {
     entries.try_for_each(|(entry, it)| finite(field, entry, *it).map(|_| ()))
 }
 
-/// A result without anything in it.
+/// An empty result.
 fn empty() -> Pose3d {
     Pose3d {
         stamp: Stamp::default(),
@@ -123,7 +123,7 @@ fn joint_to_message(joint: &Result<Triangulated, TriangulateError>) -> Joint3d {
                 status: Status::OK,
             }
         }
-        // Whatever was wrong with the views: too few of them could be used.
+        // // All other errors mean that too few views could be used.
         Err(_) => Joint3d {
             status: Status::TOO_FEW_VIEWS,
             ..Joint3d::default()
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_arrives_in_its_place() {
+    fn every_field_survives_a_round_trip() {
         let got = skeleton_to_message(&skeleton(), 0b11).unwrap();
         assert_eq!((got.n_joints, got.n_views, got.n_pairs), (2, 2, 1));
         assert_eq!((got.views_present, got.views_used), (0b11, 0b101));
@@ -228,18 +228,22 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_was_found_nowhere() {
+    fn refuses_coordinates_that_are_not_finite() {
         let good = skeleton_to_message(&skeleton(), 0b11).unwrap();
         let refused = |change: fn(&mut Pose3d)| {
             let mut message = good;
             change(&mut message);
             check_pose3d(&message, 2, 2).is_err()
         };
-        assert!(refused(|it| it.joints[0].in_world[2] = f64::NAN));
-        assert!(refused(|it| it.views[0].centres_px[1][0] = f64::INFINITY));
-        // What was not found may say anything.
-        assert!(!refused(|it| it.joints[1].in_world[0] = f64::NAN));
-        assert!(!refused(|it| it.views[1].centres_px[0][0] = f64::NAN));
+        assert!(refused(|message| message.joints[0].in_world[2] = f64::NAN));
+        assert!(refused(
+            |message| message.views[0].centres_px[1][0] = f64::INFINITY
+        ));
+        // // Entries that were not found are not checked.
+        assert!(!refused(|message| message.joints[1].in_world[0] = f64::NAN));
+        assert!(!refused(
+            |message| message.views[1].centres_px[0][0] = f64::NAN
+        ));
     }
 
     #[test]

@@ -1,30 +1,29 @@
-//! Whether a message belongs to its topic, to this run and to this time.
+//! Checks the stamps of messages: session, sender and time.
 
 use messages::{FrameHeader, Stamp, Status, Timing};
 
 use crate::WireError;
 use crate::error::equal;
 
-/// How far a time stamp may be ahead: the clock is the same for all processes of a machine, so this is
-/// ample.
+/// How far a time stamp may be ahead. All processes of a machine share the clock, so this is generous.
 const SLACK_NANOS: u64 = 1_000_000_000;
-/// More frames than any camera takes in its life.
+/// More frames than any camera captures.
 const MOST_FRAMES: u64 = 1 << 40;
 
-/// What the receiver of a topic knows before a message comes.
+/// The stamp that the receiver of a topic expects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expected {
-    /// The run.
+    /// The session.
     pub session: u64,
-    /// Whose topic it is: the view; 0 for what is about all views.
+    /// The view of the topic; 0 for messages about all views.
     pub view: usize,
     /// `CLOCK_MONOTONIC`, nanoseconds.
     pub now_nanos: u64,
 }
 
 impl Expected {
-    /// Checks that a message is from this run and from whom the topic belongs to, and speaks of nothing
-    /// that is still to come.
+    /// Checks that a message is from this session and from the sender of the topic, and has no time in the
+    /// future.
     ///
     /// # Errors
     ///
@@ -41,10 +40,10 @@ impl Expected {
         self.check_time(stamp, timing)
     }
 
-    /// Checks that the answer of a pair is from this run, from a worker that has this pair, and speaks of
-    /// nothing that is still to come. `view` is the worker.
+    /// Checks that the result of a pair is from this session and from the worker of the pair, and has no time
+    /// in the future. `view` is the worker.
     ///
-    /// * `n_workers`: to whom the pairs are dealt in turn.
+    /// * `n_workers`: the pairs are assigned to them in turn.
     ///
     /// # Errors
     ///
@@ -66,8 +65,7 @@ impl Expected {
         self.check_time(stamp, timing)
     }
 
-    /// Checks that a message that names nobody is from this run, and speaks of nothing that is still to
-    /// come.
+    /// Checks that a message without a view is from this session, and has no time in the future.
     ///
     /// # Errors
     ///
@@ -87,12 +85,12 @@ impl Expected {
         })
     }
 
-    /// Checks that a message speaks of nothing that is still to come.
+    /// Checks that a message has no time in the future.
     ///
     /// # Errors
     ///
-    /// [`WireError::Future`] if a time is more than a second ahead, [`WireError::Frame`] if the number of
-    /// the frame is not one.
+    /// [`WireError::Future`] if a time is more than a second ahead, [`WireError::Frame`] if the frame number
+    /// is too large.
     pub fn check_time(&self, stamp: &Stamp, timing: &Timing) -> Result<(), WireError> {
         for (field, nanos) in [
             ("captured_at", stamp.captured_at_nanos),
@@ -110,12 +108,12 @@ impl Expected {
 
 /// Checks a frame against its pixels; one without an image may have any.
 ///
-/// * `n_bytes`: of the pixels that came.
+/// * `n_bytes`: of the received pixels.
 ///
 /// # Errors
 ///
-/// [`WireError`] if the pixels do not fill the image, if more frames were dropped than there can be, and
-/// as [`Expected::check`].
+/// [`WireError`] if the pixels do not fill the image, if the number of dropped frames is too large, and as
+/// [`Expected::check`].
 pub fn check_frame(
     header: &FrameHeader,
     n_bytes: usize,
@@ -182,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Why a frame of 36 bytes that was changed is refused.
+    /// The error of a changed frame of 36 bytes.
     fn refused(change: impl Fn(&mut FrameHeader)) -> (Refusal, String) {
         let mut header = header();
         check_frame(&header, 36, &EXPECTED).unwrap();
@@ -192,29 +190,32 @@ mod tests {
     }
 
     #[test]
-    fn what_is_of_another_run_or_view_is_refused() {
-        let (cause, said) = refused(|it| it.stamp.session = 8);
+    fn messages_of_another_session_or_view_are_refused() {
+        let (cause, text) = refused(|header| header.stamp.session = 8);
         assert_eq!(cause, Refusal::Session);
-        assert_eq!(said, "session is 8, expected 7");
-        let (cause, said) = refused(|it| it.stamp.view = u32::MAX);
+        assert_eq!(text, "session is 8, expected 7");
+        let (cause, text) = refused(|header| header.stamp.view = u32::MAX);
         assert_eq!(cause, Refusal::Sender);
-        assert_eq!(said, "view is 4294967295, but this is the topic of 2");
+        assert_eq!(text, "view is 4294967295, but this is the topic of 2");
     }
 
     #[test]
-    fn what_is_still_to_come_is_refused() {
-        let (cause, said) = refused(|it| it.stamp.captured_at_nanos = 6_500_000_000);
+    fn times_in_the_future_are_refused() {
+        let (cause, text) = refused(|header| header.stamp.captured_at_nanos = 6_500_000_000);
         assert_eq!(cause, Refusal::Time);
-        assert_eq!(said, "captured_at lies 1500 ms ahead of the clock");
+        assert_eq!(text, "captured_at lies 1500 ms ahead of the clock");
         assert_eq!(
-            refused(|it| it.timing.sent_at_nanos = u64::MAX).0,
+            refused(|header| header.timing.sent_at_nanos = u64::MAX).0,
             Refusal::Time
         );
         assert_eq!(
-            refused(|it| it.timing.received_at_nanos = u64::MAX).0,
+            refused(|header| header.timing.received_at_nanos = u64::MAX).0,
             Refusal::Time
         );
-        assert_eq!(refused(|it| it.stamp.frame = u64::MAX).0, Refusal::Time);
+        assert_eq!(
+            refused(|header| header.stamp.frame = u64::MAX).0,
+            Refusal::Time
+        );
         let mut soon = header();
         soon.stamp.captured_at_nanos = 6_000_000_000;
         check_frame(&soon, 36, &EXPECTED).unwrap();
@@ -222,22 +223,25 @@ mod tests {
 
     #[test]
     fn pixels_that_do_not_fill_their_image_are_refused() {
-        assert_eq!(refused(|it| it.width = 5).0, Refusal::Size);
-        let (cause, said) = refused(|it| (it.width, it.height) = (u32::MAX, u32::MAX));
+        assert_eq!(refused(|header| header.width = 5).0, Refusal::Size);
+        let (cause, text) = refused(|header| (header.width, header.height) = (u32::MAX, u32::MAX));
         assert_eq!(cause, Refusal::Size);
-        assert_eq!(said, format!("bytes is 36, expected {}", usize::MAX));
+        assert_eq!(text, format!("bytes is 36, expected {}", usize::MAX));
         let mut empty = header();
         empty.status = Status::NO_FRAME;
         check_frame(&empty, 1, &EXPECTED).unwrap();
     }
 
     #[test]
-    fn nobody_drops_more_frames_than_there_can_be() {
-        assert_eq!(refused(|it| it.n_dropped = u64::MAX).0, Refusal::Time);
+    fn too_many_dropped_frames_are_refused() {
+        assert_eq!(
+            refused(|header| header.n_dropped = u64::MAX).0,
+            Refusal::Time
+        );
     }
 
     #[test]
-    fn a_worker_speaks_of_its_own_pairs_only() {
+    fn results_of_pairs_of_another_worker_are_refused() {
         for pair in [2, 5, 8] {
             let stamp = Stamp {
                 view: pair,
@@ -251,7 +255,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_arrives_is_refused_or_in_time(
+        fn any_message_is_refused_or_has_a_valid_time(
             words in prop::array::uniform5(any::<u64>()),
             near in any::<bool>(),
         ) {

@@ -49,7 +49,7 @@ pub(crate) fn layout() -> Layout {
     Layout::new(&model(), 80, 60).unwrap()
 }
 
-/// Poses that lie on [`layout`].
+/// Poses within [`layout`].
 pub(crate) fn any_pose() -> impl Strategy<Value = Pose> {
     let layout = layout();
     let levels = layout.levels.len();
@@ -68,7 +68,7 @@ pub(crate) fn any_pose() -> impl Strategy<Value = Pose> {
     })
 }
 
-/// Messages of any bytes, often almost right.
+/// Messages of arbitrary bytes, often almost valid.
 pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
     let number = || prop_oneof![0_u16..6, any::<u16>()];
     let cells = || prop::collection::vec(number(), MAX_PARTS);
@@ -95,7 +95,7 @@ pub(crate) fn plans() -> Vec<Arc<ViewPlan>> {
     plans_of(2)
 }
 
-/// So many views of [`layout`]'s size, side by side.
+/// `n_views` views of [`layout`]'s size, side by side.
 pub(crate) fn plans_of(n_views: usize) -> Vec<Arc<ViewPlan>> {
     let camera = |x: f64| Camera {
         name: format!("at {x}"),
