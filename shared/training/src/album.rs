@@ -1,11 +1,11 @@
-//! The images that a model is trained on, handed over by whoever can read them.
+//! Access to the training images, implemented by the caller.
 
 use datasets::Picture;
 
-/// Why an image cannot be had.
+/// Why an image cannot be read.
 pub type AlbumError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Images by number; asked for again and again, from several threads.
+/// Images by number; requested repeatedly, from several threads.
 pub trait Album: Sync {
     /// The image of a person.
     ///
@@ -14,10 +14,10 @@ pub trait Album: Sync {
     /// Whatever keeps it from being read.
     fn person(&self, person: usize) -> Result<Picture, AlbumError>;
 
-    /// Number of images without people.
+    /// Number of background images, which show no people.
     fn n_backgrounds(&self) -> usize;
 
-    /// An image without people.
+    /// /// A background image.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Hard mistakes: wrong poses of a person that the model likes as well as the right one.
+//! Loss-augmented inference: wrong poses of a person that score as well as the right one.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use fmp::{ExtraTerms, Extractor, Layout, Model, Pose, Responses, Solver};
 
 use crate::latent::Marked;
 
-/// Searches images of people for the pose that violates its margin most.
+/// Searches images of people for the pose with the largest margin violation.
 #[derive(Debug)]
 pub(crate) struct Confuser {
     model: Arc<Model>,
@@ -15,15 +15,15 @@ pub(crate) struct Confuser {
     solver: Solver,
 }
 
-/// How wrong a pose is: the mean over its parts, each between 0 and the same greatest loss.
+/// The loss of a pose: the mean over its parts, each between 0 and the same maximum.
 ///
-/// As terms of the solver it makes the inference loss-augmented.
+/// Added to the solver's terms it gives loss-augmented inference.
 #[derive(Debug)]
 pub(crate) struct Loss<'a> {
     layout: &'a Layout,
     side: usize,
     marked: &'a Marked,
-    /// Greatest loss of a part.
+    /// Largest loss of a part.
     weight: f64,
 }
 

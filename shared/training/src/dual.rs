@@ -1,8 +1,8 @@
-//! The structural support vector machine, by dual coordinate descent over the examples at hand.
+//! The structural support vector machine, solved by dual coordinate descent over the working set of examples.
 //!
 //! Primal: `min_v 1/2 |v|^2 + sum_g C_g max(0, max_{j in g} (b_j - v . x_j))` with some coordinates of
 //! `v` not negative; an example `j` belongs to a group `g` (one person, or one place of a negative
-//! image), of which the worst counts. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`,
+//! image), of which only the worst counts. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`,
 //! `sum_{j in g} a_j <= C_g`, `v(a) = [sum_j a_j x_j]` with the negative among those coordinates set
 //! to 0. Source: Yang & Ramanan 2013, section 5, and what is known of their release's solver.
 
@@ -17,12 +17,12 @@ use crate::sparse::Sparse;
 
 pub use solve::{Effort, Gap};
 
-/// One demand on the solution: `v . x >= margin`.
+/// A constraint on the solution: `v . x >= margin`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Constraint {
     /// The example.
     pub x: Sparse,
-    /// What its product with the solution is to reach.
+    /// The required product with the solution.
     pub margin: f64,
 }
 
@@ -45,7 +45,7 @@ struct Group<K> {
     members: Vec<usize>,
 }
 
-/// What a violated example costs, and with which others.
+/// The cost of a violated example, and its group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost<K> {
     /// The group: only its worst example counts.
@@ -56,7 +56,7 @@ pub struct Cost<K> {
 
 /// The examples, and the solution so far.
 ///
-/// `K` names the groups, `T` is what the caller wants to remember of an example.
+/// `K` identifies the groups, `T` is the caller's tag of an example.
 #[derive(Debug)]
 pub struct Machine<K, T> {
     entries: Vec<Entry<T>>,
@@ -65,7 +65,7 @@ pub struct Machine<K, T> {
     non_negative: Range<usize>,
     /// Sum of the examples, weighted by their shares.
     sum: Vec<f64>,
-    /// The solution: the sum with its negative coordinates set to 0 where they may not be.
+    /// The solution: the sum, with negative values of the non-negative coordinates set to 0.
     solution: Vec<f32>,
     bytes: usize,
 }
@@ -86,9 +86,9 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         }
     }
 
-    /// Adds a demand. The cost of a group is that of its first example.
+    /// Adds a constraint. The cost of a group is that of its first example.
     ///
-    /// * `share`: of the example in the solution; 0 if it is not known from before, see
+    /// * `share`: of the example in the solution; 0 for a new example, see
     ///   [`Self::entries`].
     pub fn add(&mut self, cost: Cost<K>, tag: T, demand: Constraint, share: f64) {
         let Cost { group, of_unit } = cost;
@@ -146,13 +146,13 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         solution
     }
 
-    /// Removes the examples that are not wanted, with their share in the solution.
+    /// Keeps only the wanted examples; the others lose their share in the solution.
     pub fn retain(&mut self, wanted: impl Fn(&T) -> bool) {
         self.keep(&|it| wanted(&it.tag));
     }
 
-    /// Removes examples without a share that meet their margin with `room` to spare, and, of all without
-    /// a share, as many of those with most room that the others hold at most `bytes`.
+    /// Shrinks the working set: removes examples without a share that exceed their margin by `room`, and of
+    /// the others without a share those with the largest slack until at most `bytes` are used.
     ///
     /// * `may_go`: whether an example with this tag may be removed.
     pub fn forget(&mut self, room: f64, bytes: usize, may_go: impl Fn(&T) -> bool) {

@@ -1,4 +1,4 @@
-//! What a placed pose looks like to the trainer: a sparse vector.
+//! The feature vector of a pose, as a sparse vector.
 
 use std::sync::Arc;
 
@@ -8,17 +8,17 @@ use kernels::{FeatureMap, N_CHANNELS};
 use crate::shape::{Coordinates, MIN_STIFFNESS, Shape};
 use crate::sparse::{Run, Sparse};
 
-/// A pose as the trainer sees it: its score under the vector `v` is `features . v + fixed`.
+/// The features of a pose: its score with the vector `v` is `features . v + fixed`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Example {
     /// Features.
     pub features: Sparse,
-    /// What the least stiffness, which is not trained, adds to the score.
+    /// The part of the score due to the minimum stiffness, which is not trained.
     pub fixed: f64,
 }
 
 impl Example {
-    /// Reads the features of a pose off its level, and keeps them.
+    /// Copies the features of a pose from its level.
     ///
     /// # Panics
     ///
@@ -35,7 +35,7 @@ impl Example {
         Self::with(shape, at, pose, None, runs.collect())
     }
 
-    /// As [`Self::of`], but the features stay where they are.
+    /// As [`Self::of`], but the features are shared, not copied.
     ///
     /// # Panics
     ///

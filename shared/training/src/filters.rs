@@ -1,4 +1,4 @@
-//! The first filters: a linear support vector machine for every part and type by itself.
+//! The initial filters: a separate linear support vector machine for every part and type.
 
 use rayon::prelude::*;
 
@@ -14,13 +14,13 @@ pub(crate) struct FilterSettings {
     pub cost: f64,
     /// Cost of a positive one, in costs of a negative one.
     pub positive_weight: f64,
-    /// When a machine stops.
+    /// Stopping criterion of a machine.
     pub effort: Effort,
     /// Seed of the order of the steps.
     pub seed: u64,
 }
 
-/// Trains a filter for every type of every part, and puts them together to a first model.
+/// Trains a filter for every type of every part, and combines them into an initial model.
 ///
 /// The biases of the machines become those of the types, all springs are as soft as they may be, and
 /// everything is divided by the number of parts, so that a person scores about 1.

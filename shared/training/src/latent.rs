@@ -1,4 +1,4 @@
-//! The best placement of a person whose parts are known roughly.
+//! The best pose of a person near the annotated parts (latent positive examples).
 
 #[cfg(test)]
 mod tests;
@@ -6,20 +6,20 @@ mod tests;
 use fmp::{FeaturePyramid, Layout, Model, Placement, Pose, Springs};
 use kernels::N_CHANNELS;
 
-/// A person in an image of one's own choice.
+/// An annotated person in an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
     /// Centres of the parts, pixels; the centre of the top-left pixel is (0, 0).
     pub parts: Vec<[f64; 2]>,
     /// Side of every part's box, pixels.
     pub side: f64,
-    /// Types that the parts must have; `None` where every type will do.
+    /// Required types of the parts; `None` if any type is allowed.
     pub types: Option<Vec<usize>>,
 }
 
 impl Marked {
-    /// The rectangle `[x1, y1, x2, y2]` in which the person is looked for: that around all boxes, grown
-    /// on every side by half of its width and height together (Yang & Ramanan 2013).
+    /// The rectangle `[x1, y1, x2, y2]` in which the person is searched: that around all boxes, grown on
+    /// every side by half of its width and height together (Yang & Ramanan 2013).
     pub fn surroundings(&self) -> [f64; 4] {
         let half = self.side / 2.0;
         let low = |axis: usize| {
@@ -45,7 +45,7 @@ impl Marked {
     }
 }
 
-/// A cell at which a part may lie.
+/// A possible cell of a part.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     x: usize,
@@ -55,8 +55,8 @@ struct Cell {
 
 /// The highest-scoring pose whose parts all overlap the marked ones.
 ///
-/// Exact over all levels: as few cells overlap enough, all pairs of them are compared. `None` where
-/// no level lets every part overlap, which is so for people smaller than the model.
+/// Exact over all levels: since few cells overlap enough, all pairs of them are compared. `None` if on no
+/// level every part can overlap, as for people smaller than the model.
 ///
 /// * `overlap`: least intersection over union of every part's box with the marked one.
 pub(crate) fn best_near(
@@ -86,7 +86,7 @@ pub(crate) fn best_near(
     best
 }
 
-/// The pose whose boxes overlap the marked ones best, whatever the model thinks of it.
+/// The pose whose boxes overlap the marked ones best, regardless of its score.
 ///
 /// `None` as in [`best_near`].
 pub(crate) fn nearest(

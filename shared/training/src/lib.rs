@@ -1,9 +1,9 @@
 //! Trains flexible mixtures of parts from people whose joints are marked (Yang & Ramanan 2013).
 //!
-//! Reading order: a [`Plan`] is made of the people alone (sizes, types of parts); a [`Trainer`] goes
-//! through the [`Step`]s: first filters, placing people, collecting hard examples and solving the
-//! structural support vector machine ([`Machine`]). Images come from an [`Album`], progress goes to a
-//! [`Watch`], and between any two steps a [`Checkpoint`] can be taken.
+//! Reading order: a [`Plan`] is computed from the annotations alone (sizes, types of parts); a [`Trainer`]
+//! runs the [`Step`]s: initial filters, placing people, mining hard examples and solving the structural
+//! support vector machine ([`Machine`]). Images come from an [`Album`], progress is reported to a [`Watch`],
+//! and between any two steps a [`Checkpoint`] can be taken.
 #![forbid(unsafe_code)]
 
 mod album;

@@ -1,11 +1,11 @@
-//! Hard negatives: what the model takes for a person where there is none.
+//! Hard negatives: false positives of the model on images without people.
 
 use std::sync::Arc;
 
 use datasets::Picture;
 use fmp::{Extractor, Layout, Model, Pose, Responses, Solver};
 
-/// Searches images for false alarms.
+/// Searches images for false positives.
 #[derive(Debug)]
 pub(crate) struct Miner {
     model: Arc<Model>,
@@ -16,7 +16,7 @@ pub(crate) struct Miner {
 impl Miner {
     /// Prepares the search.
     ///
-    /// * `model`: with the levels per octave that are to be searched.
+    /// * `model`: with the levels per octave to search.
     pub(crate) fn new(model: Model) -> Self {
         let model = Arc::new(model);
         Self {

@@ -1,11 +1,11 @@
-//! Where an example comes from: enough to make it again.
+//! The origin of an example, from which it can be recomputed.
 
 use fmp::{Placement, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::shape::Shape;
 
-/// A pose in a file: level, and `(x, y, type)` of every part.
+/// A pose as it is stored: level, and `(x, y, type)` of every part.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub(crate) struct Placed {
     level: u16,
@@ -40,17 +40,17 @@ impl Placed {
     }
 }
 
-/// What an example is an example of. People count as in the plan.
+/// The origin of an example. People are numbered as in the plan.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) enum Origin {
-    /// A person where they are.
+    /// The right pose of a person.
     Right {
         /// Who.
         person: u32,
         /// Where.
         pose: Placed,
     },
-    /// The right pose of a person less a wrong one.
+    /// The difference of the right pose of a person and a wrong one.
     Mistake {
         /// Who.
         person: u32,
@@ -71,7 +71,7 @@ pub(crate) enum Origin {
 pub(crate) enum Group {
     /// A person.
     Right(u32),
-    /// The mistakes made with a person.
+    /// The wrong poses of a person.
     Mistakes(u32),
     /// Image, level, row and column of the root.
     Background(u32, u16, u16, u16),

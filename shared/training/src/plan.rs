@@ -1,4 +1,4 @@
-//! What is known of the people before the first image is looked at: their sizes and types.
+//! What follows from the annotations without images: sizes of the people and types of their parts.
 
 use crate::latent::Marked;
 use crate::scale::{box_sides, filter_side};
@@ -6,7 +6,7 @@ use crate::settings::Settings;
 use crate::shape::Shape;
 use crate::types::{Types, cluster};
 
-/// The parts of a model: what an annotated person is turned into.
+/// The tree of a model's parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
     /// Names of the parts, root first.
@@ -25,7 +25,7 @@ impl Tree {
     }
 }
 
-/// Who is trained on, and with which shape of model.
+/// The people to train on, and the shape of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     shape: Shape,
@@ -33,7 +33,7 @@ pub struct Plan {
     n_small: usize,
 }
 
-/// A person who is trained on.
+/// A person of the training set.
 #[derive(Debug, Clone, PartialEq)]
 struct Planned {
     /// Number in the album.
@@ -46,7 +46,7 @@ struct Planned {
 /// Why nothing can be trained.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// Nobody is left.
+    /// /// No person is large enough.
     #[error(
         "of {n_people} people, none is large enough for filters of {filter_px} pixels: take larger pictures, or smaller filters"
     )]
@@ -56,7 +56,7 @@ pub enum PlanError {
         /// Side of the filters at full resolution, pixels.
         filter_px: usize,
     },
-    /// A person has no definite place.
+    /// The parts of a person are incomplete.
     #[error("person {person} has {got} finite parts, expected {expected}")]
     Parts {
         /// Number in the album, from 1.
@@ -66,12 +66,12 @@ pub enum PlanError {
         /// Parts of the model.
         expected: usize,
     },
-    /// The people are so small that filters would have no inside.
+    /// The people are too small for the smallest filter.
     #[error(
         "the people are too small: 95 of 100 have heads of more than {side_px:.1} pixels, and the filters would have {cells} cells, expected at least 3; enlarge the pictures"
     )]
     Small {
-        /// Side of the part boxes that all but the smallest twentieth have, pixels.
+        /// Fifth percentile of the sides of the part boxes, pixels.
         side_px: f64,
         /// Cells that fit.
         cells: usize,

@@ -1,13 +1,13 @@
-//! How large a person is: one square box for all parts.
+//! The size of a person: the side of one square box for all parts.
 
 use statistics::Sorted;
 
 /// Sizes of the part boxes of all people, in pixels of their images.
 ///
-/// The length of every edge of the tree is divided by its usual length, which is counted in lengths
-/// of the first edge (neck to head); the side of a person's boxes is the upper quartile of these.
-/// So the box has the size that the head would have, though the head may be tilted towards the
-/// camera. Source: Yang & Ramanan 2013, their release's `pointtobox`.
+/// The length of every edge of the tree is divided by its typical length relative to the first edge (neck to
+/// head); the side of a person's boxes is the upper quartile of these. So the box has the size that the head
+/// would have, though the head may be tilted towards the camera. Source: Yang & Ramanan 2013, their release's
+/// `pointtobox`.
 ///
 /// * `people`: centres of the parts of every person, pixels.
 /// * `parents`: of every part; `None` for the root.
@@ -39,8 +39,8 @@ pub(crate) fn box_sides(people: &[Vec<[f64; 2]>], parents: &[Option<usize>]) -> 
     people.iter().map(side).collect()
 }
 
-/// The side of the filters, cells, and of the boxes that they come from, pixels: the boxes of all but
-/// the smallest twentieth of the people hold it.
+/// The side of the filters, cells, and of the boxes that they come from, pixels: the fifth percentile of the
+/// box sizes.
 pub(crate) fn filter_side(sides: &[f64], cell_px: usize) -> (usize, f64) {
     let side = quantile(sides.to_vec(), 0.05);
     ((side / cell_px as f64).floor() as usize, side)
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn the_box_grows_with_the_person() {
+    fn the_box_scales_with_the_person() {
         let people = [person(1.0), person(1.5), person(3.0)];
         let sides = box_sides(&people, &PARENTS);
         assert!(
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_and_people_at_one_point_have_no_size() {
+    fn no_people_and_people_at_one_point_have_no_size() {
         assert!(box_sides(&[], &PARENTS).is_empty());
         let side = box_sides(&[vec![[3.0, 3.0]; 4]], &PARENTS)[0];
         assert_eq!(side, 0.0);

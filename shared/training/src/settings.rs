@@ -14,10 +14,10 @@ use crate::types::TypesBy;
 pub struct Settings {
     /// Types of every part (6: Yang & Ramanan 2013).
     pub n_types: usize,
-    /// What the types of a part are told apart by.
+    /// How the parts are clustered into types.
     pub types_by: TypesBy,
     /// Whether the left side of the body is the mirror image of the right one: types, filters, springs and
-    /// biases. Only true of people who are trained on with their mirror images.
+    /// biases. Only valid if the training set contains the mirror images.
     pub symmetric: bool,
     /// Random starts of every clustering, of which the tightest is taken.
     pub cluster_starts: usize,
@@ -29,8 +29,7 @@ pub struct Settings {
     pub interval: usize,
     /// Levels per octave on which images without people are searched.
     pub mining_interval: usize,
-    /// Cost of an image place without a person that scores above -1, for every unit (the `C` of the
-    /// machine).
+    /// Cost per unit of a negative that scores above -1 (the `C` of the machine).
     pub cost: f64,
     /// Cost of a person who scores below 1, in costs of a negative.
     pub positive_weight: f64,
@@ -41,22 +40,22 @@ pub struct Settings {
     pub pose_margin: f64,
     /// Least intersection over union of a placed part's box with the marked one.
     pub overlap: f64,
-    /// Gap of the machine that is good enough, as a share of its objective.
+    /// Duality gap at which the machine stops, as a share of its objective.
     pub tolerance: f64,
     /// Memory for examples and the features that they show, MiB; what the solution needs is kept even
     /// if it takes more.
     pub cache_mib: usize,
-    /// Score by which a place without a person must stay clear of its margin to be dropped.
+    /// Slack beyond the margin at which a negative is removed from the working set.
     pub room: f64,
-    /// Most places of one image without people that are added at a time, best first.
+    /// Most negatives that are added from one image at a time, best first.
     pub per_image: usize,
-    /// Images without people that are searched between two solutions.
+    /// Background images that are searched between two solutions.
     pub batch: usize,
     /// Rounds in which the types of the parts are those of the clusters.
     pub fixed_rounds: usize,
     /// Rounds after them, in which the model chooses the types.
     pub latent_rounds: usize,
-    /// How often all images without people are searched in a round.
+    /// Passes over all background images in a round.
     pub passes: usize,
     /// Seed of everything random.
     pub seed: u64,
@@ -91,7 +90,7 @@ impl Default for Settings {
     }
 }
 
-/// A setting that nothing can be trained with.
+/// A setting out of range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{key} is {got}, expected {min} to {max}")]
 pub struct SettingsError {
@@ -106,7 +105,7 @@ pub struct SettingsError {
 }
 
 impl Settings {
-    /// Checks that every setting lies where a training makes sense.
+    /// Checks that every setting is in its range.
     ///
     /// # Errors
     ///

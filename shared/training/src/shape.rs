@@ -1,18 +1,18 @@
-//! Where every number of a model lies in the vector that is trained.
+//! The layout of a model's parameters in the trained vector.
 
 use fmp::{Edge, Filter, Model, ModelError, ModelSpec, N_CHANNELS, PartSpec, Spring, Springs};
 
-/// The smallest quadratic coefficient of a trained spring, score per cell^2: keeps every spring
-/// pulling (Yang & Ramanan 2013).
+/// The smallest quadratic coefficient of a trained spring, score per cell^2: keeps every spring convex (Yang
+/// & Ramanan 2013).
 pub const MIN_STIFFNESS: f64 = 0.01;
 
-/// How weakly the root's bias is regularised: its part of the norm counts this much squared.
+/// How weakly the root's bias is regularised: the square of this factor weights its part of the norm.
 const ROOT_BIAS_SCALE: f64 = 0.01;
 
-/// What stays as it is while a model is trained: tree, sizes, names, and where the springs rest.
+/// The fixed properties of a model: tree, sizes, names, and rest positions of the springs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
-    /// Where the model comes from, for people.
+    /// The source of the model, as text.
     pub name: String,
     /// Names of the parts, root first.
     pub part_names: Vec<String>,
@@ -57,7 +57,7 @@ impl Shape {
         self.anchors[part].len()
     }
 
-    /// Where the model's numbers lie.
+    /// The layout of the trained vector.
     pub fn coordinates(&self) -> Coordinates {
         let mut first_type = vec![0];
         let mut first_bias = vec![0];
@@ -86,7 +86,7 @@ impl Shape {
     ///
     /// # Errors
     ///
-    /// [`ModelError`] if the shape is no tree or a number is not finite.
+    /// [`ModelError`] if the shape is not a tree or a number is not finite.
     ///
     /// # Panics
     ///
@@ -151,7 +151,7 @@ impl Coordinates {
         self.root + 1
     }
 
-    /// Whether there is nothing to train; never, since the root has a bias.
+    /// Whether the vector is empty; never, since the root has a bias.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -187,7 +187,7 @@ impl Coordinates {
         self.biases + self.first_bias[part] + parent_type * n_types + mixture
     }
 
-    /// Where the root's bias lies, and its feature.
+    /// Index of the root's bias, and its feature.
     pub fn root(&self) -> (usize, f32) {
         (self.root, (1.0 / ROOT_BIAS_SCALE) as f32)
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 struct Span {
     start: u32,
     len: u32,
-    /// Where the values are, in one's own list or the shared one.
+    /// Start of the values in the vector's own or in the shared array.
     at: u32,
     shared: bool,
 }
@@ -32,7 +32,7 @@ pub struct Sparse {
 pub enum Run {
     /// A copy.
     Own(Vec<f32>),
-    /// So many values of the shared array, from there on.
+    /// A range of the shared array.
     Shared {
         /// The first.
         at: usize,
@@ -181,7 +181,7 @@ impl Sparse {
     }
 }
 
-/// Sums in sixteen strands, so that the compiler can keep them side by side.
+/// Sums in sixteen accumulators, so that the compiler can vectorise.
 fn sum_of_products(a: &[f32], b: &[f32]) -> f64 {
     const STRANDS: usize = 16;
     let mut sums = [0.0_f32; STRANDS];
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn shared_values_count_as_ones_own() {
+    fn shared_values_give_the_same_products() {
         let shared: Arc<[f32]> = [7.0, 1.0, 2.0, 3.0, 8.0].into();
         let runs = [(2, Run::Shared { at: 1, len: 3 }), (9, Run::Own(vec![4.0]))];
         let it = Sparse::sharing(Some(Arc::clone(&shared)), runs);

@@ -1,11 +1,11 @@
-//! The model and its mirror image: what is learned of one side of the body holds for the other.
+//! Symmetrises the model: both sides of the body get mirrored parameters.
 
 use fmp::N_CHANNELS;
 use kernels::MIRRORED_CHANNEL;
 
 use crate::shape::{Coordinates, Shape};
 
-/// Where every number of a model's vector goes in its mirror image, and with which sign.
+/// For every parameter its index in the mirror image, and its sign.
 ///
 /// People are trained on with their mirror images, so the best model is its own mirror image; an
 /// approximate one is not, and its mean with its mirror image costs no more (the objective is convex).
@@ -212,7 +212,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_balanced_stays(seed in any::<u64>()) {
+        fn balancing_twice_changes_nothing(seed in any::<u64>()) {
             let shape = shape();
             let symmetry = Symmetry::of(&shape).unwrap();
             let once = symmetry.balance(&numbers(shape.coordinates().len(), seed));

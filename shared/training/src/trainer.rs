@@ -24,13 +24,13 @@ use crate::watch::{Event, Step, Watch};
 
 pub use checkpoint::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-/// Why a training ended early.
+/// Why a training failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// Somebody stopped it.
+    /// It was stopped.
     #[error("stopped")]
     Stopped,
-    /// An image of a person cannot be had.
+    /// An image of a person cannot be read.
     #[error("the image of person {person}")]
     Person {
         /// Number in the album, from 1.
@@ -39,7 +39,7 @@ pub enum TrainError {
         #[source]
         source: AlbumError,
     },
-    /// An image without people cannot be had.
+    /// A background image cannot be read.
     #[error("image {image} of those without people")]
     Background {
         /// Number in the album, from 1.
@@ -48,10 +48,10 @@ pub enum TrainError {
         #[source]
         source: AlbumError,
     },
-    /// There is nothing to tell people from.
+    /// There are no background images.
     #[error("there are no images without people: a model cannot be trained on people alone")]
     NoBackgrounds,
-    /// Nobody could be placed.
+    /// No person could be placed.
     #[error("none of {n_people} people could be placed on any level of the pyramid")]
     NobodyPlaced {
         /// People there were.
@@ -60,12 +60,12 @@ pub enum TrainError {
     /// A pose does not lie on its image, which must have changed since the pose was found.
     #[error("a pose does not lie on its image: an image has changed since the training began")]
     Moved,
-    /// What was trained is no model.
+    /// The trained parameters are not a valid model.
     #[error("what was trained is no model")]
     Model(#[from] ModelError),
 }
 
-/// A training under way. Deterministic: the same plan, images and settings give the same model, bit for
+/// A training in progress. Deterministic: the same plan, images and settings give the same model, bit for
 /// bit, on any number of threads, and whether or not it was interrupted between steps.
 pub struct Trainer<'a> {
     plan: &'a Plan,
@@ -80,7 +80,7 @@ pub struct Trainer<'a> {
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
     /// Where every person was placed last.
     right: Vec<Option<Placed>>,
-    /// What makes either side of the body the mirror image of the other.
+    /// The symmetry of the model, if it is symmetric.
     symmetry: Option<Symmetry>,
     v: Vec<f64>,
     threshold: f64,
@@ -95,7 +95,7 @@ impl std::fmt::Debug for Trainer<'_> {
 }
 
 impl<'a> Trainer<'a> {
-    /// Nothing is trained yet.
+    /// /// Prepares a training.
     ///
     /// # Errors
     ///
@@ -144,7 +144,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     ///
-    /// See [`TrainError`]; what was done in this step is then to be thrown away, with this trainer.
+    /// See [`TrainError`]; the trainer must not be used afterwards.
     pub fn step(&mut self) -> Result<bool, TrainError> {
         let Some(&step) = self.steps.get(self.next) else {
             return Ok(false);
@@ -167,7 +167,7 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     ///
-    /// [`TrainError::Model`] if the numbers went astray.
+    /// [`TrainError::Model`] if the parameters are not a valid model.
     pub fn model(&self) -> Result<Model, TrainError> {
         Ok(self.plan.shape().model(&self.v, self.threshold)?)
     }
@@ -212,10 +212,10 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Places everybody anew, and replaces the examples that are made of people.
+    /// Places all people again, and replaces their examples.
     fn place(&mut self, round: usize) -> Result<(), TrainError> {
         let placed = self.best_placements(round < self.settings.fixed_rounds)?;
-        // Most people stay where they were, or nearly so: their shares are a good guess.
+        // // Most people keep their placement, or nearly so: their shares are a good start.
         let mut shares = vec![0.0; self.plan.n_people()];
         for (origin, share) in self.machine.entries() {
             if let Origin::Right { person, .. } = origin {
@@ -238,11 +238,11 @@ impl<'a> Trainer<'a> {
 
     fn learn(&mut self, random: &mut fastrand::Rng) -> Result<(), TrainError> {
         let (effort, watch) = (self.effort(), self.watch);
-        let mut told = |gap: Gap| {
+        let mut report = |gap: Gap| {
             watch.tell(Event::Gap(gap));
             watch.go_on()
         };
-        self.machine.solve(effort, random, &mut told);
+        self.machine.solve(effort, random, &mut report);
         self.go_on()?;
         self.forget();
         self.v = self.balanced(self.machine.solution());
@@ -255,11 +255,11 @@ impl<'a> Trainer<'a> {
         self.machine.bytes() + cells.values().map(|it| it.bytes()).sum::<usize>()
     }
 
-    /// Drops wrong poses that the solution does not need, and the features that no example shows.
+    /// Drops wrong poses without a share, and the features that no example uses.
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
-        // A right pose that needs no share now may need one again, and would not be found anew.
+        // // A right pose without a share may need one later, and would not be found again.
         let may_go = |it: &Origin| !matches!(it, Origin::Right { .. });
         self.machine.forget(self.settings.room, room, may_go);
         let image = |it: &Origin| match it {
@@ -275,7 +275,7 @@ impl<'a> Trainer<'a> {
         cells.retain(|it, _| shown.contains(it));
     }
 
-    /// Sets the threshold that all but the twentieth part of the people reach (Yang & Ramanan 2013).
+    /// Sets the threshold to the fifth percentile of the people's scores (Yang & Ramanan 2013).
     fn judge(&mut self) -> Result<(), TrainError> {
         let placed = self.best_placements(false)?;
         let scores = placed.into_iter().flatten().map(|it| it.1);
@@ -283,7 +283,7 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Makes examples, and gives each the next of the shares.
+    /// Adds examples, each with the next of the shares.
     fn add(
         &mut self,
         origins: Vec<Origin>,
@@ -306,7 +306,7 @@ impl<'a> Trainer<'a> {
     }
 }
 
-/// Passes after which a solution is taken as it is.
+/// Most passes of a solution.
 const MAX_PASSES: usize = 200;
 
 fn steps(settings: &Settings, n_backgrounds: usize) -> Vec<Step> {

@@ -1,10 +1,10 @@
-//! Types of parts: clusters of where a part lies relative to its neighbours.
+//! Types of parts: clusters of a part's offsets from its neighbours.
 
 use rayon::prelude::*;
 
 use crate::settings::Settings;
 
-/// What the types of a part are told apart by.
+/// The offsets that define the types of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TypesBy {
@@ -14,7 +14,7 @@ pub enum TypesBy {
     Neighbours,
 }
 
-/// The type of every person's part, and where the types rest.
+/// The type of every person's part, and the anchors of the types.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Types {
     /// Type of every part of every person: `[person][part]`.
@@ -29,7 +29,7 @@ pub(crate) struct Types {
 /// number. Those of a part in the middle come in mirrored pairs, 0 and 1, 2 and 3...; if their number is
 /// odd, it has one less.
 ///
-/// Fewer types are found where fewer people differ.
+/// There are fewer types if there are fewer different people.
 ///
 /// * `people`: centres of the parts of every person, in cells of the level at which the person has
 ///   the size of the model.
@@ -42,7 +42,7 @@ pub(crate) fn cluster(
     let other = |part: usize| mirror.map_or(part, |it| it[part]);
     let clustered = |part: usize| -> Vec<(usize, OfPart)> {
         let mut random = fastrand::Rng::with_seed(settings.seed ^ ((part as u64) << 32));
-        let sight = Sight::of(part, parents, settings.types_by);
+        let sight = Offsets::of(part, parents, settings.types_by);
         match mirror {
             Some(mirror) if other(part) == part && settings.n_types > 1 => {
                 let both = [
@@ -76,16 +76,16 @@ pub(crate) fn cluster(
     }
 }
 
-/// What of a person the types of a part are told apart by.
-struct Sight {
+/// The offsets by which a part is clustered.
+struct Offsets {
     part: usize,
     neighbours: Vec<usize>,
-    /// Seen in a mirror: offsets to the left count as to the right.
+    /// Whether the offsets are mirrored.
     in_mirror: bool,
 }
 
-impl Sight {
-    /// The parts whose offsets tell the types of `part` apart, its parent first.
+impl Offsets {
+    /// The parts whose offsets define the types of `part`, its parent first.
     fn of(part: usize, parents: &[Option<usize>], by: TypesBy) -> Self {
         let children = (0..parents.len()).filter(|&it| parents[it] == Some(part));
         let mut neighbours: Vec<_> = parents[part].into_iter().collect();
@@ -127,7 +127,7 @@ impl Sight {
 struct OfPart {
     /// Type of every person's part.
     labels: Vec<usize>,
-    /// The middle of every type.
+    /// The centre of every type.
     centres: Vec<Vec<f64>>,
 }
 
@@ -142,9 +142,9 @@ impl OfPart {
         Self { labels, centres }
     }
 
-    /// The types of the other side of the body: everybody has the one whose mirror image is nearest.
+    /// The types of the other side of the body: each person gets the one whose mirror image is nearest.
     ///
-    /// * `points`: the other side as it is seen in a mirror.
+    /// * `points`: the mirrored offsets of the other side.
     fn mirrored(&self, points: &[Vec<f64>]) -> Self {
         let nearest = |point: &Vec<f64>| nearest(point, &self.centres).map_or(0, |it| it.0);
         Self {
@@ -153,7 +153,7 @@ impl OfPart {
         }
     }
 
-    /// Where the types rest, `[x, y]` from the first neighbour, cells.
+    /// The anchors of the types, `[x, y]` from the first neighbour, cells.
     fn anchors(&self) -> Vec<[i32; 2]> {
         let anchor = |it: &Vec<f64>| match it[..] {
             [x, y, ..] => [x, y].map(|it| it.round() as i32),
@@ -163,9 +163,9 @@ impl OfPart {
     }
 }
 
-/// Types of a part in the middle, in pairs: what lies to the left is clustered as its mirror image.
+/// Types of a part in the middle, in pairs: offsets to the left are clustered as their mirror images.
 ///
-/// * `both`: everybody's part as it is, and in a mirror.
+/// * `both`: every person's offsets, and mirrored.
 fn in_the_middle(
     [plain, mirrored]: [Vec<Vec<f64>>; 2],
     settings: &Settings,
@@ -190,7 +190,7 @@ fn in_the_middle(
     OfPart { labels, centres }
 }
 
-/// A point as it is seen in a mirror.
+/// A mirrored point.
 fn in_mirror(point: &[f64]) -> Vec<f64> {
     let axes = point.iter().enumerate();
     axes.map(|(axis, it)| if axis % 2 == 0 { -it } else { *it })
@@ -280,7 +280,7 @@ fn by_size(mut labels: Vec<usize>, k: usize) -> Vec<usize> {
     labels
 }
 
-/// Rounds after which a start that still moves is taken as it is.
+/// Most iterations of a start.
 const MAX_ROUNDS: usize = 1000;
 
 #[cfg(test)]

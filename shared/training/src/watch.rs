@@ -1,18 +1,18 @@
-//! What a training tells while it runs.
+//! Progress of a training.
 
 use crate::dual::Gap;
 
-/// One thing to do; a training is a list of them.
+/// A step; a training is a list of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Train a filter for every part and type by itself.
+    /// Train a separate filter for every part and type.
     Filters,
     /// Find every person's best placement.
     Place {
         /// From 0.
         round: usize,
     },
-    /// Search some images for examples, and train on all that there are.
+    /// Mine examples on some images, and solve on the whole working set.
     Learn {
         /// From 0.
         round: usize,
@@ -25,10 +25,10 @@ pub enum Step {
     Judge,
 }
 
-/// Something that happened.
+/// An event of a training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
-    /// Images of the step that have been looked at.
+    /// Progress within the step, images.
     Images {
         /// So far.
         done: usize,
@@ -39,14 +39,14 @@ pub enum Event {
     Placed {
         /// How many.
         n: usize,
-        /// People whom no level shows at the size of the model.
+        /// People who fit the model on no level.
         n_lost: usize,
         /// Their mean score under the model so far.
         mean_score: f64,
     },
     /// Examples were collected.
     Collected {
-        /// Places without a person that score above -1.
+        /// Negatives that score above -1.
         backgrounds: usize,
         /// Wrong poses.
         mistakes: usize,
@@ -55,15 +55,15 @@ pub enum Event {
         /// Bytes that they take.
         bytes: usize,
     },
-    /// The machine is that far.
+    /// The duality gap of the machine.
     Gap(Gap),
 }
 
-/// Whoever looks on; called from several threads.
+/// Receives the progress of a training; called from several threads.
 pub trait Watch: Sync {
-    /// Hears what happened.
+    /// Receives an event.
     fn tell(&self, event: Event);
 
-    /// Whether to go on; asked often.
+    /// Whether to continue; called often.
     fn go_on(&self) -> bool;
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{Entry, Machine};
 
-/// How far the solution is from the best one on the examples at hand.
+/// The duality gap of the solution on the working set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     /// Value of the primal objective: an upper bound of the best.
@@ -26,28 +26,28 @@ impl Gap {
     }
 }
 
-/// When the descent stops.
+/// The stopping criteria of the descent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Gap that is good enough, as a share of the objective.
+    /// Duality gap at which to stop, as a share of the objective.
     pub tolerance: f64,
     /// Most passes over all examples.
     pub max_passes: usize,
 }
 
-/// Most passes over the examples that still move, for every look at all.
+/// Most passes over the active examples between two passes over all.
 const PASSES_OVER_MOVING: usize = 10;
 
-/// Miss or room, in margins, up to which an example with a part of its cost rests.
+/// Slope, in margins, up to which an example with a share below its cost is at its optimum.
 const RESTING: f64 = 0.01;
 
-/// Room up to which examples without a share may come to need one before the next look at all.
+/// Slack up to which examples without a share stay active until the next pass over all.
 const NEAR: f64 = 0.05;
 
 impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     /// Improves the solution until the gap is small enough, or the passes are used up.
     ///
-    /// * `go_on`: hears the gap before the first and after every pass; answers whether to go on.
+    /// * `go_on`: called with the gap before the first and after every pass; returns whether to continue.
     pub fn solve(
         &mut self,
         effort: Effort,
@@ -77,7 +77,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         gap
     }
 
-    /// The gap on the examples at hand.
+    /// The duality gap on the working set.
     pub fn gap(&self) -> Gap {
         self.gap_of(&self.slopes())
     }
@@ -111,7 +111,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
         margin - x.dot(&self.solution)
     }
 
-    /// Computes the solution anew from the shares, so that it depends on nothing but them.
+    /// Recomputes the solution from the shares, so that it depends only on them.
     fn sum_up(&mut self) {
         self.sum.fill(0.0);
         for entry in &self.entries {
@@ -128,8 +128,8 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     }
 
     /// Moves the share of one example to its best value while the others are held; within a group
-    /// whose shares are used up, takes from another of the group. `true` if it moved so far that
-    /// another look may be worth while.
+    /// whose shares are used up, takes from another of the group. `true` if it moved far enough to stay
+    /// active.
     fn step(&mut self, at: usize) -> bool {
         let slope = self.slope(at);
         let entry = &self.entries[at];
@@ -181,8 +181,7 @@ impl<K: Ord + Clone + Sync, T: Sync> Machine<K, T> {
     }
 }
 
-/// How far to go along a slope; where it does not bend (an example of zeros, a twin of another), as
-/// far as may be.
+/// The Newton step along a slope; unbounded where the curvature is 0 (an example of zeros, or a duplicate).
 fn newton(slope: f64, curvature: f64) -> f64 {
     if curvature > 0.0 {
         slope / curvature
@@ -193,5 +192,5 @@ fn newton(slope: f64, curvature: f64) -> f64 {
     }
 }
 
-/// Room in a group, as a share of its cost, below which it counts as full: rounding.
+/// Slack of a group, as a share of its cost, below which it counts as full (rounding).
 const FULL: f64 = 1e-9;

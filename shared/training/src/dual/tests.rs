@@ -1,4 +1,4 @@
-//! Laws of the machine on problems that can be solved by hand or judged by their gap.
+//! Properties of the machine on problems with a known solution or gap.
 
 use proptest::prelude::*;
 
@@ -24,7 +24,7 @@ fn cost(group: usize, of_unit: f64) -> Cost<usize> {
 }
 
 #[test]
-fn two_points_are_parted_in_the_middle() {
+fn two_points_are_separated_in_the_middle() {
     // w x + b with points at 1 (wrong) and 3 (right): w = 1, b = -2, were the bias free; it is
     // regularised too, so that min w^2 + b^2 under w + b <= -1, 3 w + b >= 1 is asked for.
     let mut machine = Machine::new(2, 0..0);
@@ -49,7 +49,7 @@ fn a_cheap_example_is_given_up() {
 }
 
 #[test]
-fn of_a_group_only_the_worst_example_counts() {
+fn only_the_worst_example_of_a_group_counts() {
     let value_with = |n: usize| {
         let mut machine = Machine::new(1, 0..0);
         for _ in 0..n {
@@ -63,7 +63,7 @@ fn of_a_group_only_the_worst_example_counts() {
 }
 
 #[test]
-fn an_example_of_zeros_takes_what_its_group_has() {
+fn an_example_of_zeros_takes_the_whole_cost_of_its_group() {
     // No solution meets its margin: the loss is its cost, of which the dual knows once it has it all.
     let mut machine = Machine::new(1, 0..0);
     machine.add(cost(0, 0.3), "zeros", demand(&[0.0], 1.0), 0.0);
@@ -80,7 +80,7 @@ fn an_example_of_zeros_takes_what_its_group_has() {
 }
 
 #[test]
-fn what_may_not_be_negative_is_not() {
+fn non_negative_coordinates_stay_non_negative() {
     let mut machine = Machine::new(2, 1..2);
     machine.add(cost(0, 5.0), (), demand(&[1.0, -1.0], 1.0), 0.0);
     let x = Sparse::new([(0, vec![1.0]), (1, vec![-1.0])]);
@@ -116,7 +116,7 @@ fn filled(examples: &[(usize, Vec<i8>, i8)]) -> Machine<usize, usize> {
 
 proptest! {
     #[test]
-    fn the_gap_closes_and_never_turns(examples in examples()) {
+    fn the_gap_closes_and_is_never_negative(examples in examples()) {
         let mut machine = filled(&examples);
         let before = machine.gap();
         prop_assert!(before.dual <= before.primal + 1e-9);
@@ -161,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_forgotten_had_no_part_in_the_solution(examples in examples()) {
+    fn removed_examples_had_no_share_in_the_solution(examples in examples()) {
         let mut machine = filled(&examples);
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let (before, solution) = (machine.gap(), machine.solution());
@@ -173,7 +173,7 @@ proptest! {
     }
 
     #[test]
-    fn what_may_not_go_is_never_forgotten(examples in examples()) {
+    fn protected_examples_are_never_removed(examples in examples()) {
         let mut machine = filled(&examples);
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let even: Vec<usize> = (0..examples.len()).step_by(2).collect();

@@ -1,4 +1,4 @@
-//! What is found near a marked person, against looking at everything.
+//! Poses near a marked person, compared with an exhaustive search.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn marked(types: Option<Vec<usize>>) -> Marked {
     }
 }
 
-/// The score of a pose as the trainer sees it.
+/// The score of a pose by its feature vector.
 fn score(v: &[f64], pyramid: &FeaturePyramid<'_>, pose: &Pose) -> f64 {
     let (shape, v) = (shape(), v.iter().map(|it| *it as f32).collect::<Vec<_>>());
     let map = pyramid.level(usize::from(pose.level));
@@ -80,7 +80,7 @@ fn placements(
 }
 
 #[test]
-fn nothing_near_the_marks_is_better() {
+fn the_best_pose_near_the_marks_is_found() {
     let v = vector(7);
     let model = shape().model(&v, 0.0).unwrap();
     let picture = noise(71, 80, 5);
@@ -142,7 +142,7 @@ fn an_example_times_the_vector_is_the_score_of_its_pose() {
 }
 
 #[test]
-fn people_whom_no_level_shows_are_not_placed() {
+fn people_without_a_fitting_level_are_not_placed() {
     let model = shape().model(&vector(1), 0.0).unwrap();
     let picture = noise(71, 80, 5);
     let layout = Layout::new(&model, 71, 80).unwrap();
@@ -175,7 +175,7 @@ fn the_nearest_pose_lies_within_half_a_cell_and_has_the_types() {
 }
 
 #[test]
-fn the_worst_mistake_has_the_most_score_and_loss() {
+fn the_worst_wrong_pose_maximises_score_plus_loss() {
     let v = vector(23);
     let model = shape().model(&v, 0.0).unwrap();
     let (picture, marked) = (noise(71, 80, 9), marked(None));

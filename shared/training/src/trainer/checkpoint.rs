@@ -1,4 +1,4 @@
-//! Where a training stood: enough to go on as if it had never been interrupted.
+//! The state of a training, from which it continues exactly as if it had not been interrupted.
 
 mod bytes;
 
@@ -15,11 +15,11 @@ pub use bytes::CheckpointBytesError;
 
 /// The state of a training between two steps.
 ///
-/// Examples are kept as where they come from, a hundred bytes each; their features are read off the
-/// images again.
+/// Examples are stored by their origin, a hundred bytes each; their features are computed from the images
+/// again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// What is trained: another plan or other settings have another one.
+    /// Fingerprint of the plan and the settings.
     fingerprint: u64,
     n_done: usize,
     v: Vec<f64>,
@@ -28,7 +28,7 @@ pub struct Checkpoint {
     examples: Vec<(Origin, f64)>,
 }
 
-/// Why a training cannot go on from a checkpoint.
+/// Why a training cannot be resumed from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// It belongs to another training.
@@ -42,7 +42,7 @@ pub enum CheckpointError {
         /// What is wrong.
         what: &'static str,
     },
-    /// Going on failed.
+    /// Resuming failed.
     #[error(transparent)]
     Train(#[from] TrainError),
 }
@@ -55,7 +55,7 @@ impl Checkpoint {
 }
 
 impl<'a> Trainer<'a> {
-    /// The state after the last step that was done.
+    /// The state after the last finished step.
     pub fn checkpoint(&self) -> Checkpoint {
         Checkpoint {
             fingerprint: self.fingerprint(),
@@ -71,7 +71,7 @@ impl<'a> Trainer<'a> {
         }
     }
 
-    /// Goes on from a checkpoint.
+    /// Resumes from a checkpoint.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Looking at images: placing people, searching for false alarms and mistakes, reading off features.
+//! Work on images: placing people, mining hard negatives and wrong poses, computing features.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,22 +18,22 @@ use crate::origin::{Origin, Placed};
 use crate::shape::Shape;
 use crate::watch::{Event, Step};
 
-/// Images that the windows of the first filters come from, and windows of each.
+/// Background images for the windows of the initial filters, and windows of each.
 const WINDOW_IMAGES: usize = 100;
 const WINDOWS: usize = 20;
 
 impl Trainer<'_> {
-    /// Runs `look` for every one of `all` side by side; the answers in order.
-    fn look_at<S: Sync, T: Send>(
+    /// Runs `visit` for every item of `all` in parallel; the results in order.
+    fn visit_all<S: Sync, T: Send>(
         &self,
         all: &[S],
-        look: impl Fn(&S) -> Result<T, TrainError> + Sync,
+        visit: impl Fn(&S) -> Result<T, TrainError> + Sync,
     ) -> Result<Vec<T>, TrainError> {
         let done = AtomicUsize::new(0);
         all.par_iter()
             .map(|it| {
                 self.go_on()?;
-                let seen = look(it)?;
+                let seen = visit(it)?;
                 let done = 1 + done.fetch_add(1, Ordering::Relaxed);
                 let of = all.len();
                 self.watch.tell(Event::Images { done, of });
@@ -64,7 +64,7 @@ impl Trainer<'_> {
         })
     }
 
-    /// The model as it is now, for images without people.
+    /// The current model, for background images.
     fn mining_model(&self) -> Result<Model, TrainError> {
         let shape = Shape {
             interval: self.settings.mining_interval,
@@ -73,12 +73,11 @@ impl Trainer<'_> {
         Ok(shape.model(&self.v, 0.0)?)
     }
 
-    /// Everybody whose parts are marked, as close to the marks as cells allow, with the types of the
-    /// clusters.
+    /// All marked people, as close to the marks as the cells allow, with the types of the clusters.
     pub(super) fn nearest(&self) -> Result<Vec<Example>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
-        let placed = self.look_at(&all, |&it| {
+        let placed = self.visit_all(&all, |&it| {
             let (image, marked) = self.person(it, true)?;
             Ok(on_pyramid(&model, &image, |pyramid, layout| {
                 let pose = nearest(&model, layout, &marked, self.settings.overlap)?;
@@ -94,12 +93,12 @@ impl Trainer<'_> {
         Ok(placed)
     }
 
-    /// Random windows of images without people.
+    /// Random windows of background images.
     pub(super) fn windows(&self) -> Result<Vec<Vec<f32>>, TrainError> {
         let model = self.model()?;
         let side = self.plan.shape().side;
         let images: Vec<_> = (0..self.album.n_backgrounds().min(WINDOW_IMAGES)).collect();
-        let found = self.look_at(&images, |&image| {
+        let found = self.visit_all(&images, |&image| {
             let mut random = fastrand::Rng::with_seed(self.seed_of(image));
             let picture = self.background(image)?;
             let windows = on_pyramid(&model, &picture, |pyramid, layout| {
@@ -116,14 +115,14 @@ impl Trainer<'_> {
         Ok(found.concat())
     }
 
-    /// Where the model as it is now places everybody near their marks, and the scores.
+    /// The best poses of all people near their marks under the current model, and the scores.
     pub(super) fn best_placements(
         &self,
         with_types: bool,
     ) -> Result<Vec<Option<(Placed, f64)>>, TrainError> {
         let model = self.model()?;
         let all: Vec<_> = (0..self.plan.n_people()).collect();
-        let placed = self.look_at(&all, |&it| {
+        let placed = self.visit_all(&all, |&it| {
             let (image, marked) = self.person(it, with_types)?;
             Ok(on_pyramid(&model, &image, |pyramid, layout| {
                 let pose = best_near(&model, pyramid, layout, &marked, self.settings.overlap)?;
@@ -144,7 +143,7 @@ impl Trainer<'_> {
         Ok(placed)
     }
 
-    /// Adds the examples of a batch: false alarms of images without people, and wrong poses.
+    /// Adds the examples of a batch: hard negatives of background images, and wrong poses.
     pub(super) fn collect(&mut self, step: Step) -> Result<(), TrainError> {
         let Step::Learn { round, pass, batch } = step else {
             return Ok(());
@@ -164,7 +163,7 @@ impl Trainer<'_> {
         };
         let held: BTreeSet<&Origin> = self.machine.entries().map(|it| it.0).collect();
         let images = share(self.album.n_backgrounds(), 0);
-        let mut origins = self.false_alarms(&images, &held)?;
+        let mut origins = self.hard_negatives(&images, &held)?;
         let backgrounds = origins.len();
         if self.settings.pose_weight > 0.0 {
             let people = share(self.plan.n_people(), 1);
@@ -181,7 +180,7 @@ impl Trainer<'_> {
         Ok(())
     }
 
-    pub(super) fn false_alarms(
+    pub(super) fn hard_negatives(
         &self,
         images: &[usize],
         held: &BTreeSet<&Origin>,
@@ -193,9 +192,9 @@ impl Trainer<'_> {
                 *n_held.entry(*image as usize).or_default() += 1;
             }
         }
-        let found = self.look_at(images, |&image| {
+        let found = self.visit_all(images, |&image| {
             let picture = self.background(image)?;
-            // Those that are held may all score best, as each may keep some slack.
+            // // The ones in the working set may all score best, as each may keep some slack.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|it| Origin::Background {
@@ -214,7 +213,7 @@ impl Trainer<'_> {
         held: &BTreeSet<&Origin>,
     ) -> Result<Vec<Origin>, TrainError> {
         let confuser = Confuser::new(self.model()?);
-        let found = self.look_at(people, |&it| {
+        let found = self.visit_all(people, |&it| {
             if self.right[it].is_none() {
                 return Ok(None);
             }
@@ -229,12 +228,12 @@ impl Trainer<'_> {
         Ok(found.filter(|it| !held.contains(it)).collect())
     }
 
-    /// What the machine is to demand of every origin.
+    /// The constraints of all origins.
     pub(super) fn constraints(&self, origins: &[Origin]) -> Result<Vec<Constraint>, TrainError> {
         let (of_people, of_images) = (self.model()?, self.mining_model()?);
         let same = |a: &Origin, b: &Origin| a.source() == b.source();
         let runs: Vec<&[Origin]> = origins.chunk_by(same).collect();
-        let made = self.look_at(&runs, |run| {
+        let made = self.visit_all(&runs, |run| {
             let made = match run.first() {
                 None => Some(Vec::new()),
                 Some(Origin::Background { image, .. }) => {
@@ -303,7 +302,7 @@ impl Trainer<'_> {
         }))
     }
 
-    /// The features of an image without people, kept as long as examples show them.
+    /// The features of a background image, kept as long as examples use them.
     fn cells(&self, image: usize, pyramid: &FeaturePyramid<'_>, layout: &Layout) -> Arc<Cells> {
         let held = || self.cells.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(it) = held().get(&image) {
@@ -322,13 +321,13 @@ fn on_layout(placed: &Placed, layout: &Layout) -> Option<Pose> {
     pose.parts.iter().all(lies).then_some(pose)
 }
 
-/// Runs `look` on the features of an image, if it is large enough for the model.
+/// Runs `visit` on the features of an image, if it is large enough for the model.
 fn on_pyramid<T>(
     model: &Model,
     image: &Picture,
-    look: impl FnOnce(&FeaturePyramid<'_>, &Layout) -> Option<T>,
+    visit: impl FnOnce(&FeaturePyramid<'_>, &Layout) -> Option<T>,
 ) -> Option<T> {
     let view = image.view();
     let layout = Layout::new(model, view.width(), view.height()).ok()?;
-    look(&FeaturePyramid::new(model, view, &layout), &layout)
+    visit(&FeaturePyramid::new(model, view, &layout), &layout)
 }

@@ -1,4 +1,4 @@
-//! Whole trainings on drawn figures.
+//! Complete trainings on drawn figures.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -67,14 +67,14 @@ impl Album for Figures {
     }
 }
 
-/// Stops after a number of questions.
+/// Stops after a number of calls of `go_on`.
 struct Quiet {
     left: AtomicUsize,
     placed: AtomicBool,
 }
 
 impl Quiet {
-    fn for_ever() -> Self {
+    fn endless() -> Self {
         Self::after(usize::MAX)
     }
 
@@ -131,7 +131,7 @@ fn plan(settings: &Settings) -> Plan {
 }
 
 fn trained(settings: &Settings) -> Model {
-    let (plan, watch) = (plan(settings), Quiet::for_ever());
+    let (plan, watch) = (plan(settings), Quiet::endless());
     let album = figures();
     let mut trainer = Trainer::new(&plan, settings, &album, &watch).unwrap();
     while trainer.step().unwrap() {}
@@ -162,7 +162,7 @@ fn off(model: &Model, person: usize) -> f64 {
 }
 
 #[test]
-fn figures_that_were_not_trained_on_are_found() {
+fn figures_outside_the_training_set_are_found() {
     let model = trained(&settings());
     let worst = (100..120).map(|it| off(&model, it)).fold(0.0, f64::max);
     assert!(worst < 6.0, "{worst} px");
@@ -182,9 +182,9 @@ fn the_number_of_threads_changes_nothing() {
 }
 
 #[test]
-fn an_interrupted_training_ends_as_if_it_had_not_been() {
+fn an_interrupted_training_gives_the_same_model() {
     let settings = settings();
-    let (plan, album, watch) = (plan(&settings), figures(), Quiet::for_ever());
+    let (plan, album, watch) = (plan(&settings), figures(), Quiet::endless());
     let whole = trained(&settings);
     let mut trainer = Trainer::new(&plan, &settings, &album, &watch).unwrap();
     let mut checkpoints = vec![trainer.checkpoint()];
@@ -208,13 +208,13 @@ fn resume<'a>(
         n_people: 10,
         n_backgrounds: 8,
     };
-    static WATCH: std::sync::LazyLock<Quiet> = std::sync::LazyLock::new(Quiet::for_ever);
+    static WATCH: std::sync::LazyLock<Quiet> = std::sync::LazyLock::new(Quiet::endless);
     Trainer::resume((plan, settings), &ALBUM, &*WATCH, checkpoint)
 }
 
 #[test]
 fn a_checkpoint_of_other_settings_is_refused() {
-    let (mine, album, watch) = (settings(), figures(), Quiet::for_ever());
+    let (mine, album, watch) = (settings(), figures(), Quiet::endless());
     let others = Settings {
         seed: 2,
         ..mine.clone()
@@ -226,7 +226,7 @@ fn a_checkpoint_of_other_settings_is_refused() {
 }
 
 #[test]
-fn stopping_is_heard_in_every_step() {
+fn every_step_can_be_stopped() {
     let (settings, album) = (settings(), figures());
     let plan = plan(&settings);
     for questions in [0, 3, 12, 40] {
@@ -244,7 +244,7 @@ fn stopping_is_heard_in_every_step() {
 
 #[test]
 fn an_unreadable_background_is_named() {
-    let (settings, watch) = (settings(), Quiet::for_ever());
+    let (settings, watch) = (settings(), Quiet::endless());
     let album = Figures {
         n_people: 10,
         n_backgrounds: 14,
@@ -264,7 +264,7 @@ fn an_unreadable_background_is_named() {
 
 #[test]
 fn without_backgrounds_nothing_is_trained() {
-    let (settings, watch) = (settings(), Quiet::for_ever());
+    let (settings, watch) = (settings(), Quiet::endless());
     let album = Figures {
         n_people: 10,
         n_backgrounds: 0,
@@ -275,9 +275,9 @@ fn without_backgrounds_nothing_is_trained() {
 }
 
 #[test]
-fn people_stay_examples_however_well_they_are_told_apart() {
-    let (album, watch) = (figures(), Quiet::for_ever());
-    // Next to nothing is kept without need.
+fn people_stay_in_the_working_set_however_well_they_are_separated() {
+    let (album, watch) = (figures(), Quiet::endless());
+    // // Almost no example without a share is kept.
     let settings = Settings {
         room: 0.0,
         cache_mib: 1,
@@ -301,8 +301,8 @@ fn people_stay_examples_however_well_they_are_told_apart() {
 }
 
 #[test]
-fn places_that_are_held_already_do_not_hide_others() {
-    let (album, watch) = (figures(), Quiet::for_ever());
+fn negatives_in_the_working_set_do_not_hide_others() {
+    let (album, watch) = (figures(), Quiet::endless());
     let settings = Settings {
         per_image: 1,
         ..settings()
@@ -312,7 +312,7 @@ fn places_that_are_held_already_do_not_hide_others() {
     trainer.step().unwrap();
     let mut held = Vec::new();
     for _ in 0..5 {
-        let found = trainer.false_alarms(&[0], &held.iter().collect());
+        let found = trainer.hard_negatives(&[0], &held.iter().collect());
         held.extend(found.unwrap());
     }
     let different: std::collections::BTreeSet<_> = held.iter().collect();
@@ -321,7 +321,7 @@ fn places_that_are_held_already_do_not_hide_others() {
 
 #[test]
 fn every_background_is_searched_in_every_pass() {
-    let (settings, album, watch) = (settings(), figures(), Quiet::for_ever());
+    let (settings, album, watch) = (settings(), figures(), Quiet::endless());
     let plan = plan(&settings);
     let trainer = Trainer::new(&plan, &settings, &album, &watch).unwrap();
     let learn = |it: &&Step| matches!(it, Step::Learn { .. });

@@ -1,4 +1,4 @@
-//! Clusters that are found, and their mirror images.
+//! Clusters and their mirror images.
 
 use super::*;
 
@@ -38,7 +38,7 @@ fn clusters_are_found_the_largest_first() {
 }
 
 #[test]
-fn neighbours_tell_apart_what_the_parent_does_not() {
+fn neighbours_separate_types_that_the_parent_does_not() {
     let by_parent = cluster(&people(), (&PARENTS, None), &settings(3, TypesBy::Parent));
     assert_eq!(
         by_parent.anchors[2].len(),
@@ -70,7 +70,7 @@ fn few_people_have_few_types() {
 }
 
 #[test]
-fn the_seed_decides() {
+fn the_seed_determines_the_result() {
     let people = people();
     let twice = [0, 1].map(|_| cluster(&people, (&PARENTS, None), &settings(2, TypesBy::Parent)));
     assert_eq!(twice[0], twice[1]);

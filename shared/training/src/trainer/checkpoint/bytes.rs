@@ -21,7 +21,7 @@ const ENVELOPE: Envelope = Envelope {
 /// Most bytes of a payload: ten million examples are far from it.
 const MAX_BYTES: usize = 4 << 30;
 
-/// Why bytes are no checkpoint, or none could be made.
+/// Why bytes are not a checkpoint, or could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointBytesError {
     /// Another kind or version of file, or a damaged one.
@@ -48,8 +48,7 @@ const fn configuration() -> Configuration<LittleEndian, Varint, Limit<MAX_BYTES>
 impl Checkpoint {
     /// Makes the bytes of a file; [`Self::from_bytes`] gives the same checkpoint and stamp.
     ///
-    /// * `stamp`: whatever the caller knows of the training that the checkpoint does not, a hash of the
-    ///   images say.
+    /// * `stamp`: the caller's fingerprint of data outside the checkpoint, for example a hash of the images.
     ///
     /// # Errors
     ///
@@ -60,8 +59,8 @@ impl Checkpoint {
         Ok(ENVELOPE.seal(&payload))
     }
 
-    /// Reads the bytes of a file: the checkpoint and the stamp. Whether they fit a training is judged
-    /// when it goes on, see [`Trainer::resume`](crate::Trainer::resume).
+    /// Reads the bytes of a file: the checkpoint and the stamp. Whether they fit a training is checked when
+    /// it is resumed, see [`Trainer::resume`](crate::Trainer::resume).
     ///
     /// # Errors
     ///
