@@ -1,17 +1,17 @@
-//! How a training went: what every pass gave, drawn as an SVG.
+//! Learning curves of a training as SVG.
 
 use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-/// What one pass over the samples gave.
+/// The results of one pass over the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
-    /// Mean loss while learning.
+    /// Mean training loss.
     pub learnt: f32,
-    /// Mean loss of the samples that are validated on, after the pass.
+    /// Mean validation loss after the pass.
     pub validated: f32,
-    /// Mean area under the ROC of these.
+    /// Mean area under the ROC of the validation samples.
     pub area: f64,
 }
 
@@ -45,13 +45,13 @@ pub fn svg(passes: &[Pass], best: Option<usize>) -> String {
 /// One diagram.
 fn panel(what: &str, lines: &[(&str, &str, &Vec<f64>)], best: Option<usize>, top: f64) -> String {
     let all = lines.iter().flat_map(|it| it.2).filter(|it| it.is_finite());
-    let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
-        [low.min(*it), high.max(*it)]
+    let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+        [low.min(*value), high.max(*value)]
     });
     let n = lines.first().map_or(0, |it| it.2.len());
     let x = |at: usize| MARGIN + WIDTH * at as f64 / (n.max(2) - 1) as f64;
-    let y = |it: f64| {
-        let share = (it - low) / (high - low).max(1e-9);
+    let y = |value: f64| {
+        let share = (value - low) / (high - low).max(1e-9);
         top + MARGIN + HEIGHT * (1.0 - share)
     };
     let mut out = String::new();
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_drawn_of_nothing() {
+    fn no_passes_give_no_curves() {
         let drawn = svg(&[], None);
         assert!(!drawn.contains("NaN") && !drawn.contains("<path"));
     }

@@ -1,4 +1,4 @@
-//! Predicted errors against true ones, part by part.
+//! Evaluates predicted errors against true ones, part by part.
 
 use skeleton::N_PARTS;
 use statistics::Sorted;
@@ -6,7 +6,7 @@ use statistics::Sorted;
 use crate::sample::Sample;
 use crate::score::{area, rank_correlation};
 
-/// How good predictions are.
+/// The quality of predictions.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judgement {
     /// How many samples.
@@ -52,18 +52,21 @@ impl Judgement {
             beyond: Vec::new(),
         };
         for (part, tau) in tau.iter().enumerate() {
-            let said: Vec<f32> = predicted[..n].iter().map(|it| it[part]).collect();
-            let is: Vec<f32> = truth
+            let expected: Vec<f32> = predicted[..n].iter().map(|it| it[part]).collect();
+            let actual: Vec<f32> = truth
                 .iter()
                 .map(|it| it.errors_px[part] / it.height_px)
                 .collect();
-            let beyond: Vec<bool> = is.iter().map(|it| it > tau).collect();
-            let off = said.iter().zip(&is).map(|(a, b)| f64::from((a - b).abs()));
+            let beyond: Vec<bool> = actual.iter().map(|error| error > tau).collect();
+            let off = expected
+                .iter()
+                .zip(&actual)
+                .map(|(a, b)| f64::from((a - b).abs()));
             let n_beyond = beyond.iter().filter(|it| **it).count();
-            judgement.area.push(area(&said, &beyond));
+            judgement.area.push(area(&expected, &beyond));
             judgement
                 .rank_correlation
-                .push(rank_correlation(&said, &is));
+                .push(rank_correlation(&expected, &actual));
             judgement.inaccuracy.push(off.sum::<f64>() / n as f64);
             judgement.beyond.push(n_beyond as f64 / n as f64);
         }
@@ -102,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_is_the_best_prediction_and_a_constant_says_nothing() {
+    fn the_truth_is_the_best_prediction_and_a_constant_is_chance_level() {
         let samples = [sample(1.0), sample(5.0), sample(3.0), sample(9.0)];
         let all: Vec<&Sample> = samples.iter().collect();
         let tau = tau(&all);

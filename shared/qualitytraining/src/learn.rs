@@ -1,4 +1,4 @@
-//! Networks run and taught by burn.
+//! Runs and trains networks with burn.
 
 mod forward;
 
@@ -11,7 +11,7 @@ use crate::onnx::width_of;
 use crate::parameters::{Inputs, Parameter, Role};
 use crate::settings::Loss;
 
-/// How much of a running statistic every batch replaces.
+/// Share of a running statistic that every batch replaces.
 const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 
 /// The inputs of some samples.
@@ -19,9 +19,9 @@ const MOMENTUM_OF_STATISTICS: f32 = 0.05;
 pub struct Batch {
     /// How many samples.
     pub n: usize,
-    /// `[n, 3, height, width]`; empty for networks that see no tile.
+    /// `[n, 3, height, width]`; empty for networks without a tile.
     pub tiles: Vec<f32>,
-    /// `[n, values]`; empty for networks that see no evidence.
+    /// `[n, values]`; empty for networks without evidence.
     pub evidence: Vec<f32>,
 }
 
@@ -30,11 +30,11 @@ pub struct Batch {
 pub struct Step {
     /// Length of the step.
     pub rate: f32,
-    /// Share of the last step that is made again.
+    /// Momentum: share of the last step that is repeated.
     pub momentum: f32,
     /// Share of every weight that is added to its gradient.
     pub decay: f32,
-    /// Gradients longer than this are shortened to it.
+    /// Gradient clipping: longer gradients are scaled to this length.
     pub longest: f32,
     /// Cost.
     pub loss: Loss,
@@ -42,24 +42,24 @@ pub struct Step {
 
 /// A network that learns by stochastic gradient descent with momentum.
 ///
-/// Everything that decides what it learns next is in [`parameters`](Self::parameters), [`speeds`](Self::speeds) and the
-/// caller's dice; on the CPU the same of these gives the same bits.
+/// Its whole state is in [`parameters`](Self::parameters), [`speeds`](Self::speeds) and the caller's random
+/// generator; on the CPU equal states give equal bits.
 #[derive(Debug)]
 pub struct Learner {
     shape: Shape,
     inputs: Inputs,
     parameters: Vec<Parameter>,
     speeds: Vec<Vec<f32>>,
-    /// Parameters before this one are not learnt.
+    /// Parameters before this one are frozen.
     frozen: usize,
     device: Device,
 }
 
 impl Learner {
-    /// Takes a network over.
+    /// /// Creates a learner for a network.
     ///
-    /// * `speeds`: of an earlier learner; none if it begins.
-    /// * `frozen`: how many of the first parameters are left as they are.
+    /// * `speeds`: of an earlier learner; none at the start.
+    /// * `frozen`: how many of the first parameters are not trained.
     pub fn new(
         shape: Shape,
         inputs: Inputs,
@@ -83,7 +83,7 @@ impl Learner {
         }
     }
 
-    /// The numbers.
+    /// /// The parameters.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
     }
@@ -93,7 +93,7 @@ impl Learner {
         &self.speeds
     }
 
-    /// What the network says, `[n, parts]`.
+    /// The output of the network, `[n, parts]`.
     pub fn predict(&self, batch: &Batch) -> Vec<f32> {
         let tensors: Vec<Tensor<1>> = self
             .parameters
@@ -101,11 +101,11 @@ impl Learner {
             .map(|it| list(&it.values, &self.device))
             .collect();
         let mut forward = self.forward(batch, &self.device, &tensors);
-        let said = network::run(&mut forward, &self.shape).list();
-        numbers(said.reshape([-1]))
+        let output = network::run(&mut forward, &self.shape).list();
+        numbers(output.reshape([-1]))
     }
 
-    /// One step towards what is true.
+    /// One training step.
     ///
     /// * `truth`: `[n, parts]`.
     /// * Returns the loss before it, the mean over the samples.
@@ -124,10 +124,10 @@ impl Learner {
             .collect();
         let mut forward = self.forward(batch, &device, &tensors);
         forward.dice = Some(dice);
-        let said = network::run(&mut forward, &self.shape).list();
+        let output = network::run(&mut forward, &self.shape).list();
         let seen = forward.seen;
-        let truth = TensorData::new(truth.to_vec(), said.dims());
-        let off = said - Tensor::from_data(truth, &device);
+        let truth = TensorData::new(truth.to_vec(), output.dims());
+        let off = output - Tensor::from_data(truth, &device);
         let cost = match step.loss {
             Loss::L2 => (off.clone() * off) * 0.5,
             Loss::Robust => {
@@ -181,7 +181,7 @@ impl Learner {
         }
     }
 
-    /// Moves the running statistics of the layers that learn.
+    /// Updates the running statistics of the trained layers.
     fn remember(&mut self, seen: Vec<BatchStatistics>) {
         for BatchStatistics { at, mean, variance } in seen {
             if at < self.frozen {
@@ -233,7 +233,7 @@ fn list(values: &[f32], device: &Device) -> Tensor<1> {
     Tensor::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
 }
 
-/// The numbers of a tensor of `f32`, which all of ours are.
+/// The values of a tensor of `f32`.
 fn numbers(of: Tensor<1>) -> Vec<f32> {
     of.into_data_as::<f32>().try_into_vec().unwrap_or_default()
 }

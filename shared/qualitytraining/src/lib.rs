@@ -1,4 +1,4 @@
-//! Training of the network that predicts how far off every part of a single view is (the paper's section 4.3).
+//! Training of the network that predicts the error of every part in a single view (the paper's section 4.3).
 #![forbid(unsafe_code)]
 
 pub mod sample;

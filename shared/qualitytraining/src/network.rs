@@ -1,4 +1,5 @@
-//! The networks, each written once: what plans their parameters, runs them and writes them as ONNX only differs in [`Ops`].
+//! The networks, each defined once: planning parameters, running and writing ONNX are implementations of
+//! [`Ops`].
 
 use skeleton::N_PARTS;
 use viewquality::{N_TYPES, PART_NUMBERS};
@@ -6,19 +7,19 @@ use viewquality::{N_TYPES, PART_NUMBERS};
 /// A convolution, followed by batch normalisation (where asked for) and `ReLU`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conv {
-    /// Channels that come out.
+    /// Output channels.
     pub channels: usize,
     /// Side of the square kernel, odd; as much padding as keeps the size at stride 1.
     pub kernel: usize,
     /// Step between two outputs.
     pub stride: usize,
-    /// One filter for every channel instead of one for all of them; `channels` are those that go in.
+    /// Depthwise: one filter for every channel; `channels` is the number of input channels.
     pub by_channel: bool,
     /// Whether its outputs are normalised over the batch; it then has no bias of its own.
     pub normalised: bool,
 }
 
-/// Which columns of the evidence say where the parts are: heights of the tile from its centre.
+/// The columns of the evidence with the positions of the parts: tile heights from its centre.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Places {
     /// Across the tile, one column a part.
@@ -40,7 +41,7 @@ impl Default for Places {
     }
 }
 
-/// Numbers of the evidence that there are of every part.
+/// Numbers per part in the evidence.
 pub(crate) const PER_PART: usize = PART_NUMBERS.len() + N_TYPES;
 
 /// Column of a number of a part.
@@ -51,8 +52,8 @@ pub(crate) fn column(part: usize, name: &str) -> Option<usize> {
 
 /// The operations that networks are made of.
 ///
-/// Values have one entry a sample before all else: maps are `[n, channels, rows, cols]`, lists `[n, values]`. Whoever
-/// has parameters takes them in the order of the calls, which is the same for every implementation.
+/// The first dimension of a value is the batch: maps are `[n, channels, rows, cols]`, lists `[n, values]`.
+/// Parameters are used in the order of the calls, which is the same for every implementation.
 pub trait Ops {
     /// A map or a list.
     type Value: Clone;
@@ -69,11 +70,11 @@ pub trait Ops {
     fn mean(&mut self, of: &Self::Value) -> Self::Value;
     /// A map as a list.
     fn flat(&mut self, of: &Self::Value) -> Self::Value;
-    /// What a map shows around every part: a list of the channels of the first part, of the second, and so on.
+    /// Pools a map around every part: a list of the channels of the first part, of the second, and so on.
     ///
     /// The mean of the map weighted by a Gaussian of the given deviation (cells of the map) about the part.
     fn look(&mut self, of: &Self::Value, places: &Places, deviation: f32) -> Self::Value;
-    /// Lists one after the other.
+    /// Concatenates lists.
     fn join(&mut self, of: &[&Self::Value]) -> Self::Value;
     /// A dense layer with bias.
     fn dense(&mut self, of: &Self::Value, name: &str, values: usize) -> Self::Value;
@@ -87,11 +88,11 @@ pub trait Ops {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// The evidence of the search alone: the baseline that pixels must beat.
+    /// The evidence alone, without pixels: the baseline.
     Evidence,
-    /// A few separable convolutions, looked at around every part, and the evidence.
+    /// A few separable convolutions, pooled around every part, and the evidence.
     Small,
-    /// The paper's: VGG-16 with another top, which sees the tile alone.
+    /// The paper's: VGG-16 with another top, on the tile alone.
     Vgg16,
 }
 
@@ -99,7 +100,7 @@ impl Kind {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Evidence, Self::Small, Self::Vgg16];
 
-    /// What it is called in settings and files.
+    /// Its name in settings and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Evidence => "evidence",
@@ -108,7 +109,7 @@ impl Kind {
         }
     }
 
-    /// Height and width of its tile, pixels; `None` where it sees none.
+    /// Height and width of its tile, pixels; `None` if it uses none.
     pub fn tile(self) -> Option<[usize; 2]> {
         match self {
             Self::Evidence => None,
@@ -117,7 +118,7 @@ impl Kind {
         }
     }
 
-    /// Whether it sees the evidence.
+    /// Whether it uses the evidence.
     pub fn sees_evidence(self) -> bool {
         self != Self::Vgg16
     }
@@ -148,7 +149,7 @@ pub fn run<O: Ops>(ops: &mut O, shape: &Shape) -> O::Value {
     }
 }
 
-/// Deviation of what is looked at around a part, cells of the map.
+/// Standard deviation of the pooling around a part, cells of the map.
 const LOOK: f32 = 0.7;
 
 fn small<O: Ops>(ops: &mut O, shape: &Shape) -> O::Value {

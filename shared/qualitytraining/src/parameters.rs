@@ -1,27 +1,27 @@
-//! The numbers that a network learns, and how they begin.
+//! The parameters of a network, and their initialisation.
 
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::network::{self, Conv, Ops, Places, Shape};
 
-/// What a list of parameters is for.
+/// The role of a list of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
-    /// Learnt, and kept small by weight decay.
+    /// Trained with weight decay.
     Weight,
-    /// Learnt.
+    /// /// Trained without weight decay.
     Bias,
-    /// A statistic of the data: not learnt.
+    /// A statistic of the data: not trained.
     Fixed,
 }
 
 /// One list of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Layer and what it is there, `first.weight` say.
+    /// Layer and role, for example `first.weight`.
     pub name: String,
-    /// Its sizes, the one that changes fastest last.
+    /// Its dimensions, row-major.
     pub dims: Vec<usize>,
     /// What it is for.
     pub role: Role,
@@ -29,7 +29,7 @@ pub struct Parameter {
     pub values: Vec<f32>,
 }
 
-/// What is known of the samples before training: what the networks are given.
+/// Sizes and statistics of the networks' inputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inputs {
     /// Height and width of the tile, pixels.
@@ -45,7 +45,7 @@ pub struct Inputs {
 /// Weights are drawn from a normal distribution with the deviation `sqrt(2 / n_inputs)` (He et al. 2015), those of
 /// the last layer are 0, slopes are 1/4, and biases 0 but for the last ones, which are `outputs`.
 ///
-/// * `outputs`: what the network says of every part before it has learnt anything.
+/// * `outputs`: the outputs of the untrained network for every part.
 pub fn initial(shape: &Shape, inputs: &Inputs, outputs: &[f32], seed: u64) -> Vec<Parameter> {
     let mut plan = Plan {
         inputs,
@@ -99,7 +99,7 @@ pub(crate) fn normal(rng: &mut Rng) -> f32 {
     (radius * (core::f64::consts::TAU * rng.f64()).cos()) as f32
 }
 
-/// Sizes of what a convolution gives.
+/// Dimensions of the output of a convolution.
 pub(crate) fn convolved(of: &[usize], conv: Conv) -> Dims {
     let side = |it: usize| (it - 1) / conv.stride + 1;
     vec![conv.channels, side(of[1]), side(of[2])]

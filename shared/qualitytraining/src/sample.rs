@@ -1,4 +1,4 @@
-//! What a network learns from: a person in a picture, what the search made of it, and how far off that is.
+//! Training samples: a person in a picture, the evidence of the search, and the errors of the parts.
 
 use serde::{Deserialize, Serialize};
 use skeleton::MIRROR;
@@ -10,9 +10,9 @@ pub const MARGIN: usize = 16;
 /// One person in one picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
-    /// Whom it shows, or which sequence it is of: what may not be on two sides of a split.
+    /// The person or sequence it shows; a group is never split between training and validation.
     pub group: String,
-    /// Where it is from, for people.
+    /// Its source, as text.
     pub source: String,
     /// The tile with [`MARGIN`] pixels more on every side, `rows x cols x 3`, red, green and blue.
     pub picture: Vec<u8>,

@@ -1,4 +1,4 @@
-//! How good predicted errors are, as they are used: is a part further off than its threshold or not.
+//! Measures of predicted errors as classifiers: is the error of a part above its threshold?
 
 /// Area under the ROC: the probability that a sample that is positive scores higher than one that is not; ties
 /// count half.
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_right_about_everything_has_an_area_of_1_and_what_says_nothing_a_half() {
+    fn a_perfect_score_has_area_1_and_a_constant_a_half() {
         let positive = [false, true, false, true];
         assert_eq!(area(&[1.0, 3.0, 2.0, 4.0], &positive), Some(1.0));
         assert_eq!(area(&[1.0; 4], &positive), Some(0.5));
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn any_growing_function_has_a_rank_correlation_of_1() {
+    fn any_increasing_function_has_rank_correlation_1() {
         let a = [1.0, 5.0, 2.0, 9.0];
         let b = a.map(f32::exp);
         assert!((rank_correlation(&a, &b).unwrap() - 1.0).abs() < 1e-12);

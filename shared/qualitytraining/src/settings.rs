@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::network::{Kind, Shape};
 
-/// What the difference between what is said and what is true costs.
+/// The loss of the difference between prediction and truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Loss {
@@ -28,7 +28,7 @@ impl Loss {
     }
 }
 
-/// What the network says of an error.
+/// The unit of the network's output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unit {
@@ -55,17 +55,17 @@ pub struct Settings {
     pub network: Kind,
     /// Seed of everything random.
     pub seed: u64,
-    /// What is learnt of an error.
+    /// Unit of the output.
     pub unit: Unit,
-    /// Cost of a difference.
+    /// Loss.
     pub loss: Loss,
-    /// Passes over the samples at most.
+    /// Most passes over the samples.
     pub epochs: u32,
-    /// Passes without a better validation after which it ends.
+    /// Passes without improvement of the validation after which it ends.
     pub patience: u32,
     /// Samples of one step.
     pub batch: usize,
-    /// Length of a step at the beginning; falls to 0 as a cosine.
+    /// Initial learning rate; decreases to 0 as a cosine.
     pub rate: f32,
     /// Share of the last step that is made again.
     pub momentum: f32,
@@ -73,7 +73,7 @@ pub struct Settings {
     pub decay: f32,
     /// Gradients longer than this are shortened to it.
     pub longest: f32,
-    /// Share of the groups (subjects, images) that are validated on.
+    /// Share of the groups (subjects, images) for validation.
     pub validation: f32,
     /// Channels of the small network's first layer.
     pub width: usize,
@@ -81,15 +81,15 @@ pub struct Settings {
     pub hidden: usize,
     /// Share of them that is dropped.
     pub dropout: f32,
-    /// VGG-16: passes in which only the top learns.
+    /// VGG-16: passes in which only the top is trained.
     pub frozen_epochs: u32,
-    /// VGG-16: blocks of convolutions, counted from the last, that learn after these.
+    /// VGG-16: blocks of convolutions, counted from the last, that are trained after these.
     pub unfrozen_blocks: usize,
-    /// How samples are varied.
+    /// Augmentation of the samples.
     pub vary: Vary,
 }
 
-/// How samples are varied while training; never those that are validated or judged on.
+/// Augmentation of the training samples; validation and test samples are not changed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
@@ -148,7 +148,7 @@ impl Default for Settings {
     }
 }
 
-/// A setting that cannot be.
+/// A setting out of range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{what} is {got}, expected {expected}")]
 pub struct SettingError {
@@ -161,7 +161,7 @@ pub struct SettingError {
 }
 
 impl Settings {
-    /// Refuses what cannot be.
+    /// Checks that all settings are in range.
     ///
     /// # Errors
     ///
@@ -232,7 +232,7 @@ mod tests {
     type Change = fn(&mut Settings);
 
     #[test]
-    fn the_defaults_are_fine_and_what_cannot_be_is_refused_by_name() {
+    fn the_defaults_are_valid_and_invalid_settings_are_named() {
         assert_eq!(Settings::default().check(), Ok(()));
         let change: [(&str, Change); 5] = [
             ("batch", |it| it.batch = 0),

@@ -20,7 +20,7 @@ const SAMPLES: [u8; 8] = *b"PLXTILES";
 /// Most bytes of a payload.
 const MAX_BYTES: usize = 16 << 30;
 
-/// Why bytes are not what they should be, or cannot be made.
+/// Why bytes cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// Another kind or version of file, or a damaged one.
@@ -38,7 +38,7 @@ pub enum StoreError {
         /// Bytes that follow.
         left: usize,
     },
-    /// A sample does not have the sizes that the file says.
+    /// A sample has other sizes than its header, or invalid numbers.
     #[error("sample {sample} ({file_says}) has other sizes, or numbers that are none")]
     Sample {
         /// Which, from 1.
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn samples_survive_a_round_trip() {
         let samples = samples();
         let bytes = samples.to_bytes().unwrap();
         assert_eq!(Samples::from_bytes(&bytes).unwrap(), samples);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_the_samples_in_a_sound_payload_is_refused() {
+    fn trailing_data_in_the_payload_is_refused() {
         let longer = wrap(
             SAMPLES,
             &(
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_of_other_sizes_and_numbers_that_are_none_are_refused() {
+    fn samples_with_wrong_sizes_or_invalid_numbers_are_refused() {
         let change: [fn(&mut Sample); 4] = [
             |it| it.picture.truncate(10),
             |it| it.evidence[7] = f32::NAN,

@@ -1,4 +1,5 @@
-//! A training: passes over samples until nothing gets better, with a state that can be written down after each.
+//! A training: passes over samples until the validation does not improve any more, with a checkpoint after
+//! each.
 
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
@@ -18,10 +19,10 @@ use crate::vary::{NetworkSample, plain, varied};
 
 const CHECKPOINT: [u8; 8] = *b"PLXQUALI";
 
-/// Everything that a training knows after a pass.
+/// The state of a training after a pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct State {
-    /// What the samples and settings were, as a hash.
+    /// Hash of the samples and settings.
     stamp: u64,
     parameters: Vec<Parameter>,
     speeds: Vec<Vec<f32>>,
@@ -30,10 +31,10 @@ struct State {
     best: Option<(usize, Vec<Parameter>)>,
 }
 
-/// Why a training cannot begin, or go on.
+/// Why a training cannot start or resume.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// No samples are left to learn from, or to validate on.
+    /// There are no samples for training, or for validation.
     #[error(
         "{learnt} samples to learn from and {validated} to validate on are too few: there must be several groups"
     )]
@@ -51,7 +52,7 @@ pub enum TrainError {
         /// Height and width.
         expected: [usize; 2],
     },
-    /// Weights of another network.
+    /// The given weights belong to another network.
     #[error("weights for `{name}` are missing, or have another size")]
     Weights {
         /// The parameter.
@@ -78,9 +79,9 @@ pub struct Trainer<'a> {
 }
 
 impl<'a> Trainer<'a> {
-    /// Prepares a training, from the beginning or from where a checkpoint was written.
+    /// Prepares a training, from the start or from a checkpoint.
     ///
-    /// * `weights`: parameters to begin with, by name; those that are not given are drawn.
+    /// * `weights`: initial parameters by name; the others are random.
     /// * `checkpoint`: bytes of [`Self::checkpoint`].
     ///
     /// # Errors
@@ -131,7 +132,7 @@ impl<'a> Trainer<'a> {
         })
     }
 
-    /// How many samples are learnt from, and validated on.
+    /// Number of training and of validation samples.
     pub fn n_samples(&self) -> [usize; 2] {
         [self.learnt.len(), self.validated.len()]
     }
@@ -151,7 +152,7 @@ impl<'a> Trainer<'a> {
         self.state.best.as_ref().map(|it| it.0)
     }
 
-    /// Whether there is nothing more to be done.
+    /// Whether the training has finished.
     pub fn is_done(&self) -> bool {
         let n = self.state.passes.len();
         let waited = self.best().map_or(0, |best| n - 1 - best);
@@ -169,7 +170,8 @@ impl<'a> Trainer<'a> {
 
     /// One pass over the samples, and the validation after it.
     ///
-    /// * `go_on`: asked before every step, with the steps done and to be done; the pass is left if it says no.
+    /// * `go_on`: called before every step, with the steps done and the steps in all; `false` aborts the
+    ///   pass.
     /// * Returns whether the pass was finished; if not, nothing has changed.
     pub fn pass(&mut self, go_on: &mut dyn FnMut(usize, usize) -> bool) -> bool {
         let nth = self.state.passes.len();
@@ -216,21 +218,21 @@ impl<'a> Trainer<'a> {
         true
     }
 
-    /// Judges the best network so far on samples.
+    /// Evaluates the best network so far on samples.
     pub fn judge(&self, samples: &[&Sample]) -> Judgement {
         let learner = self.best_learner();
-        let said: Vec<Vec<f32>> = self.predict(&learner, samples);
+        let predicted: Vec<Vec<f32>> = self.predict(&learner, samples);
         let unit: viewquality::Unit = self.settings.unit.into();
         let shares = |it: &Vec<f32>| {
             it.iter()
                 .map(|it| unit.error(*it, 1.0).unwrap_or(0.0))
                 .collect()
         };
-        let shares: Vec<Vec<f32>> = said.iter().map(shares).collect();
+        let shares: Vec<Vec<f32>> = predicted.iter().map(shares).collect();
         Judgement::new(&shares, samples, &self.tau)
     }
 
-    /// The samples that are validated on.
+    /// The validation samples.
     pub fn validated(&self) -> &[&'a Sample] {
         &self.validated
     }
@@ -261,11 +263,11 @@ impl<'a> Trainer<'a> {
 
     /// The inputs of samples and what the best network predicts for them, in the network's unit.
     pub fn predictions(&self, samples: &[&Sample]) -> Vec<(NetworkSample, Vec<f32>)> {
-        let said = self.predict(&self.best_learner(), samples);
+        let predicted = self.predict(&self.best_learner(), samples);
         let seen = samples
             .iter()
             .map(|it| plain(it, self.tile, self.with_tile()));
-        seen.zip(said).collect()
+        seen.zip(predicted).collect()
     }
 
     fn best_parameters(&self) -> &[Parameter] {
@@ -332,21 +334,21 @@ impl<'a> Trainer<'a> {
                 .iter()
                 .map(|it| plain(it, self.tile, self.with_tile()))
                 .collect();
-            let said = learner.predict(&self.batch(&seen).0);
-            all.extend(said.chunks_exact(N_PARTS).map(<[f32]>::to_vec));
+            let predicted = learner.predict(&self.batch(&seen).0);
+            all.extend(predicted.chunks_exact(N_PARTS).map(<[f32]>::to_vec));
         }
         all
     }
 
     /// Loss and mean area of the samples that are validated on.
     fn validate(&self, learner: &Learner) -> (f32, f64) {
-        let said = self.predict(learner, &self.validated);
+        let predicted = self.predict(learner, &self.validated);
         let unit: viewquality::Unit = self.settings.unit.into();
         let mut cost = 0.0;
-        for (said, sample) in said.iter().zip(&self.validated) {
-            for (said, px) in said.iter().zip(&sample.errors_px) {
+        for (predicted, sample) in predicted.iter().zip(&self.validated) {
+            for (predicted, px) in predicted.iter().zip(&sample.errors_px) {
                 let label = unit.label(f64::from(*px), f64::from(sample.height_px)) as f32;
-                cost += self.settings.loss.of(said - label);
+                cost += self.settings.loss.of(predicted - label);
             }
         }
         let shares = |it: &Vec<f32>| {
@@ -354,9 +356,9 @@ impl<'a> Trainer<'a> {
                 .map(|it| unit.error(*it, 1.0).unwrap_or(0.0))
                 .collect()
         };
-        let shares: Vec<Vec<f32>> = said.iter().map(shares).collect();
+        let shares: Vec<Vec<f32>> = predicted.iter().map(shares).collect();
         let judgement = Judgement::new(&shares, &self.validated, &self.tau);
-        (cost / said.len() as f32, judgement.mean_area())
+        (cost / predicted.len() as f32, judgement.mean_area())
     }
 }
 
@@ -377,7 +379,7 @@ fn inputs_of(samples: &[&Sample], tile: [usize; 2]) -> Inputs {
         let middle = mean(&|it| f64::from(it.evidence[at]));
         let squared = mean(&|it| (f64::from(it.evidence[at]) - middle).powi(2));
         means.push(middle as f32);
-        // What hardly ever differs says nothing; it is not blown up.
+        // // A nearly constant value carries no information and is not scaled up.
         deviations.push(squared.sqrt().max(0.05) as f32);
     }
     Inputs {
@@ -401,7 +403,7 @@ fn stamp(settings: &Settings, samples: &Samples) -> u64 {
     )
 }
 
-/// The state before the first pass: the network says the mean of every part.
+/// The state before the first pass: the network predicts the mean of every part.
 fn begin(
     settings: &Settings,
     inputs: &Inputs,
@@ -433,7 +435,7 @@ fn begin(
     })
 }
 
-/// How many of the first parameters do not learn in a pass.
+/// How many of the first parameters are frozen in a pass.
 fn frozen(settings: &Settings, pass: usize, parameters: &[Parameter]) -> usize {
     if settings.network != Kind::Vgg16 {
         return 0;

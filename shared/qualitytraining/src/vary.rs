@@ -1,4 +1,4 @@
-//! Samples as a network sees them: as they are, or varied so that there are more of them.
+//! Network inputs of samples, unchanged or augmented.
 
 use fastrand::Rng;
 use skeleton::{MIRROR, N_PARTS};
@@ -9,7 +9,7 @@ use crate::parameters::normal;
 use crate::sample::{MARGIN, Sample, picture_size};
 use crate::settings::Vary;
 
-/// A sample as a network sees it.
+/// The inputs and labels of one sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkSample {
     /// Planes of the tile, `3 x height x width`, colours from 0 to 1 normalised.
@@ -22,12 +22,12 @@ pub struct NetworkSample {
     pub errors_px: Vec<f32>,
 }
 
-/// Where a varied tile lies in its sample.
+/// The position of an augmented tile in its sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Place {
     /// Pixels of the sample's tile per pixel of this one.
     scale: f32,
-    /// How far its centre is from the sample's, pixels of the sample's tile.
+    /// Offset of its centre from the sample's, pixels of the sample's tile.
     shift: [f32; 2],
     mirrored: bool,
 }
@@ -40,7 +40,7 @@ const AS_IT_IS: Place = Place {
 
 /// A sample as it is.
 ///
-/// * `with_tile`: whether the network sees tiles.
+/// * `with_tile`: whether the network uses tiles.
 pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample {
     NetworkSample {
         tile: if with_tile {
@@ -54,9 +54,9 @@ pub fn plain(sample: &Sample, tile: TileShape, with_tile: bool) -> NetworkSample
     }
 }
 
-/// A sample varied by chance.
+/// A randomly augmented sample.
 ///
-/// * `unknown`: what the evidence says where nothing is known of it (the means): types of a mirrored person, since
+/// * `unknown`: the values of unknown evidence (the means): types of a mirrored person, since
 ///   the types of a part and of the part on the other side do not correspond.
 pub fn varied(
     sample: &Sample,
@@ -100,7 +100,7 @@ pub fn varied(
     }
 }
 
-/// The evidence of a tile that lies elsewhere.
+/// The evidence of a moved tile.
 fn moved(evidence: &[f32], tile: TileShape, place: Place, unknown: &[f32]) -> Vec<f32> {
     let mut moved = evidence.to_vec();
     if place.mirrored {
@@ -148,7 +148,7 @@ fn pixels(sample: &Sample, tile: TileShape, place: Place) -> Vec<f32> {
     for row in 0..tile.height {
         let (y, v) = at(row, tile.height, place.shift[1], rows);
         for col in 0..tile.width {
-            // A mirrored tile is moved in the mirror.
+            // // A mirrored tile is moved in the opposite direction.
             let (from, shift) = if place.mirrored {
                 (tile.width - 1 - col, -place.shift[0])
             } else {
@@ -197,7 +197,7 @@ fn blur(planes: &mut [f32], tile: TileShape, deviation: f32) {
     }
 }
 
-/// As the networks are given colours.
+/// Normalises colours for the networks.
 fn normalised(planes: &[f32], tile: TileShape) -> Vec<f32> {
     let Normalisation { mean, deviation } = Normalisation::IMAGENET;
     let area = tile.height * tile.width;

@@ -1,4 +1,4 @@
-//! Trainings from samples to files, on errors that are planted in the samples.
+//! Trainings from samples to files, with synthetic errors.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -12,17 +12,17 @@ use qualitytraining::trainer::{TrainError, Trainer};
 use skeleton::N_PARTS;
 use viewquality::{Network, TileShape, n_evidence};
 
-/// Samples whose parts are as far off as the evidence of the whole pose says (its first number), and as the picture
-/// is bright.
+/// Samples whose errors depend on the first number of the pose's evidence and on the brightness of the
+/// picture.
 fn samples(kind: Kind, n: usize) -> Samples {
     let [height, width] = kind.tile().unwrap_or([8, 8]);
     let [rows, cols] = picture_size(TileShape { height, width });
     let mut dice = Rng::with_seed(7);
     let sample = |nth: usize| {
-        let [told, shown] = [dice.f32(), dice.f32()];
-        let bright = (200.0 * shown) as u8;
+        let [in_evidence, in_picture] = [dice.f32(), dice.f32()];
+        let bright = (200.0 * in_picture) as u8;
         let mut evidence: Vec<f32> = (0..n_evidence(N_PARTS)).map(|_| dice.f32() - 0.5).collect();
-        evidence[N_PARTS * 16] = told;
+        evidence[N_PARTS * 16] = in_evidence;
         Sample {
             group: format!("subject {}", nth % 20),
             source: format!("picture {nth}"),
@@ -31,7 +31,7 @@ fn samples(kind: Kind, n: usize) -> Samples {
                 .collect(),
             evidence,
             height_px: 200.0,
-            errors_px: vec![1.0 + 20.0 * told + 20.0 * shown; N_PARTS],
+            errors_px: vec![1.0 + 20.0 * in_evidence + 20.0 * in_picture; N_PARTS],
         }
     };
     Samples {
@@ -61,11 +61,11 @@ fn trained<'a>(settings: &'a Settings, samples: &'a Samples) -> Trainer<'a> {
     trainer
 }
 
-/// What the file says of samples, run by another program, is what the trainer says.
+/// The file, run by another library, gives the predictions of the trainer.
 fn check_file(network: Kind, n: usize, within: f32) {
     let (settings, samples) = (settings(network), samples(network, n));
     let trainer = if network == Kind::Vgg16 {
-        // Untaught: the weights that it begins with do.
+        // // Untrained: the initial weights are enough.
         Trainer::new(&settings, &samples, &[], None).unwrap()
     } else {
         trained(&settings, &samples)
@@ -76,39 +76,39 @@ fn check_file(network: Kind, n: usize, within: f32) {
     assert_eq!(file.takes_tile(), network.tile().is_some());
     assert_eq!(file.takes_evidence(), network.sees_evidence());
     let some: Vec<&Sample> = samples.all.iter().take(5).collect();
-    for (seen, said) in trainer.predictions(&some) {
+    for (seen, result) in trainer.predictions(&some) {
         let other = file.run(&seen.tile, &seen.evidence).unwrap();
-        for (said, other) in said.iter().zip(other) {
+        for (result, other) in result.iter().zip(other) {
             assert!(
-                (said - other).abs() < within * said.abs().max(1.0),
-                "{said}, {other}"
+                (result - other).abs() < within * result.abs().max(1.0),
+                "{result}, {other}"
             );
         }
     }
 }
 
 #[test]
-fn the_file_of_the_small_network_says_what_the_trainer_says() {
+fn the_file_of_the_small_network_gives_the_predictions_of_the_trainer() {
     check_file(Kind::Small, 40, 1e-4);
 }
 
 #[test]
-fn the_file_of_the_evidence_network_says_what_the_trainer_says() {
+fn the_file_of_the_evidence_network_gives_the_predictions_of_the_trainer() {
     check_file(Kind::Evidence, 40, 1e-4);
 }
 
 #[test]
-fn the_file_of_vgg_16_says_what_the_trainer_says() {
+fn the_file_of_vgg_16_gives_the_predictions_of_the_trainer() {
     check_file(Kind::Vgg16, 21, 1e-4);
 }
 
 #[test]
-fn a_network_learns_what_the_evidence_tells_and_not_what_only_the_picture_shows() {
+fn the_evidence_network_learns_the_errors_in_the_evidence_only() {
     let mut samples = samples(Kind::Evidence, 400);
     for sample in &mut samples.all {
-        let told = sample.evidence[N_PARTS * 16];
+        let in_evidence = sample.evidence[N_PARTS * 16];
         sample.evidence.fill(0.0);
-        sample.evidence[N_PARTS * 16] = told;
+        sample.evidence[N_PARTS * 16] = in_evidence;
     }
     let settings = Settings {
         epochs: 12,
@@ -162,18 +162,18 @@ fn a_checkpoint_of_other_settings_or_samples_is_refused() {
         unit: Unit::Relative,
         ..settings.clone()
     };
-    let said = Trainer::new(&others, &samples, &[], Some(&kept));
-    assert!(matches!(said, Err(TrainError::Other)));
+    let result = Trainer::new(&others, &samples, &[], Some(&kept));
+    assert!(matches!(result, Err(TrainError::Other)));
     let mut changed = samples.clone();
     changed.all[3].errors_px[0] += 1.0;
-    let said = Trainer::new(&settings, &changed, &[], Some(&kept));
-    assert!(matches!(said, Err(TrainError::Other)));
-    let said = Trainer::new(&settings, &samples, &[], Some(&kept[..kept.len() - 1]));
-    assert!(matches!(said, Err(TrainError::Checkpoint(_))));
+    let result = Trainer::new(&settings, &changed, &[], Some(&kept));
+    assert!(matches!(result, Err(TrainError::Other)));
+    let result = Trainer::new(&settings, &samples, &[], Some(&kept[..kept.len() - 1]));
+    assert!(matches!(result, Err(TrainError::Checkpoint(_))));
 }
 
 #[test]
-fn no_group_is_on_both_sides_and_one_group_alone_is_refused() {
+fn groups_are_not_split_and_a_single_group_is_refused() {
     let (settings, mut samples) = (settings(Kind::Evidence), samples(Kind::Evidence, 200));
     let trainer = Trainer::new(&settings, &samples, &[], None).unwrap();
     let validated: Vec<&str> = trainer
@@ -188,12 +188,12 @@ fn no_group_is_on_both_sides_and_one_group_alone_is_refused() {
     assert_eq!(of_these.count(), validated.len());
     assert!(!validated.is_empty() && validated.len() < 120);
     samples.all.iter_mut().for_each(|it| it.group.clear());
-    let said = Trainer::new(&settings, &samples, &[], None);
-    assert!(matches!(said, Err(TrainError::TooFew { .. })));
+    let result = Trainer::new(&settings, &samples, &[], None);
+    assert!(matches!(result, Err(TrainError::TooFew { .. })));
 }
 
 #[test]
-fn weights_that_fit_no_layer_are_refused_and_frozen_ones_stay() {
+fn weights_of_no_layer_are_refused_and_frozen_ones_do_not_change() {
     let samples = samples(Kind::Vgg16, 21);
     let settings = Settings {
         epochs: 1,
@@ -210,6 +210,6 @@ fn weights_that_fit_no_layer_are_refused_and_frozen_ones_stay() {
     assert_eq!(trainer.parameters()[0], first, "the first layer is frozen");
     assert_ne!(trainer.parameters().last().unwrap(), &top, "the top learns");
     first.dims.pop();
-    let said = Trainer::new(&settings, &samples, &[first], None);
-    assert!(matches!(said, Err(TrainError::Weights { name }) if name == "conv1_1.weight"));
+    let result = Trainer::new(&settings, &samples, &[first], None);
+    assert!(matches!(result, Err(TrainError::Weights { name }) if name == "conv1_1.weight"));
 }

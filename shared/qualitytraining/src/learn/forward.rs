@@ -1,4 +1,4 @@
-//! A network run by burn, forwards, so that it can be followed backwards.
+//! The forward pass of a network in burn, recorded for the backward pass.
 
 use burn_tensor::ops::{ConvOptions, MaxPoolOptions};
 use burn_tensor::{Device, Tensor, TensorData, activation, module};
@@ -53,13 +53,13 @@ pub(super) struct Forward<'a> {
     pub(super) device: &'a Device,
     /// Names and sizes.
     pub(super) parameters: &'a [Parameter],
-    /// The same numbers where burn has them, flat.
+    /// The same values as flat tensors.
     pub(super) tensors: &'a [Tensor<1>],
     pub(super) tile: Option<Tensor<4>>,
     pub(super) evidence: Option<Tensor<2>>,
-    /// Width of the tile in its heights.
+    /// Width of the tile in tile heights.
     pub(super) width: f32,
-    /// For what is dropped; `None` while nothing is learnt.
+    /// Random generator for dropout; `None` outside training.
     pub(super) dice: Option<&'a mut Rng>,
     /// Number of the next parameter.
     pub(super) next: usize,

@@ -1,4 +1,4 @@
-//! What is varied stays true of the picture.
+//! Augmented samples stay consistent with the picture.
 
 use viewquality::n_evidence;
 
@@ -9,7 +9,7 @@ const TILE: TileShape = TileShape {
     width: 24,
 };
 
-/// A sample in which every part is a bright dot where the evidence says, and its error is its number.
+/// A sample in which every part is a bright dot at its position in the evidence, and its error is its number.
 fn sample() -> Sample {
     let [rows, cols] = picture_size(TILE);
     let mut sample = Sample {
@@ -40,7 +40,7 @@ fn unknown() -> Vec<f32> {
     vec![0.25; n_evidence(N_PARTS)]
 }
 
-/// Brightness of the first plane where the evidence says that a part is.
+/// Brightness of the first plane at the position of a part in the evidence.
 fn brightness(planes: &[f32], evidence: &[f32], part: usize) -> f32 {
     let place = ["x", "y"].map(|it| evidence[column(part, it).unwrap()] * TILE.height as f32);
     let middle = [TILE.width, TILE.height].map(|it| (it as f32 - 1.0) / 2.0);
@@ -49,7 +49,7 @@ fn brightness(planes: &[f32], evidence: &[f32], part: usize) -> f32 {
 }
 
 #[test]
-fn a_sample_as_it_is_is_the_middle_of_its_picture() {
+fn an_unchanged_sample_is_the_middle_of_its_picture() {
     let sample = sample();
     let [_, cols] = picture_size(TILE);
     let planes = pixels(&sample, TILE, AS_IT_IS);
@@ -61,7 +61,7 @@ fn a_sample_as_it_is_is_the_middle_of_its_picture() {
 }
 
 #[test]
-fn every_part_is_where_the_evidence_says_however_the_tile_lies() {
+fn evidence_and_picture_agree_for_every_position_of_the_tile() {
     let sample = sample();
     for mirrored in [false, true] {
         for (scale, shift) in [(1.0, [0.0, 0.0]), (1.0, [2.0, -3.0]), (0.95, [-1.0, 1.5])] {
@@ -83,7 +83,7 @@ fn every_part_is_where_the_evidence_says_however_the_tile_lies() {
 }
 
 #[test]
-fn a_mirrored_sample_exchanges_errors_and_evidence_and_twice_is_as_it_was() {
+fn mirroring_exchanges_errors_and_evidence_and_is_its_own_inverse() {
     let sample = sample();
     let vary = Vary {
         mirror: 1.0,
@@ -124,7 +124,7 @@ fn a_blur_keeps_the_mean_and_flattens() {
 }
 
 #[test]
-fn nothing_is_varied_where_nothing_may_be() {
+fn without_augmentation_samples_are_unchanged() {
     let sample = sample();
     let still = Vary {
         mirror: 0.0,
