@@ -1,4 +1,4 @@
-//! One frame solved by every version, from single-view solutions and evidence that all share.
+//! Solves one frame with every version, sharing the single-view solutions and the evidence.
 
 mod learn;
 
@@ -19,34 +19,34 @@ use skeleton::{JointMap, PARSE14};
 
 use crate::{Combining, FrameResult, Terms, Version};
 
-/// Everything but the cameras.
+/// The configuration without the cameras.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The model.
     pub model: Arc<Model>,
-    /// Of the single-view step.
+    /// Settings of the single-view step.
     pub view: ViewSettings,
-    /// Of the last step.
+    /// Settings of the skeleton step.
     pub skeleton: SkeletonSettings,
     /// From parts to the joints of `skeleton::PARSE14` that are judged in images; a choice of parts without it.
     pub joint_map: Option<Arc<JointMap>>,
-    /// What is compared.
+    /// The versions to compare.
     pub trials: Vec<Trial>,
 }
 
-/// A version with its settings.
+/// A version and its settings.
 #[derive(Debug, Clone)]
 pub struct Trial {
     /// Which version.
     pub version: Version,
-    /// Of fusion. Thresholds in the unit of the expected errors.
+    /// Settings of fusion. Thresholds in the unit of the expected errors.
     pub fuse: multiview::Settings,
     /// Part-type tables.
     pub tables: PairTables,
 }
 
 impl Trial {
-    /// A version of settings with all terms: those that the version does not have are left out.
+    /// Restricts settings with all terms to the terms of a version.
     pub fn of(version: Version, all: &multiview::Settings, tables: &PairTables) -> Self {
         Self {
             version,
@@ -147,8 +147,8 @@ impl Bench {
         self.plans.iter().map(|it| it.camera())
     }
 
-    /// Solves a frame, on rayon's current pool; every frame on its own, so that the result depends on
-    /// nothing but the images.
+    /// Solves a frame, on rayon's current pool. Frames are independent, so the result depends only on the
+    /// images.
     ///
     /// * `images`: one for each view; `None` for a view that is missing.
     /// * Returns what each version found, in the order of the setup.
@@ -163,32 +163,32 @@ impl Bench {
     ) -> Vec<FrameResult> {
         assert_eq!(images.len(), self.views.len(), "one image per view");
         let mut responses = std::mem::take(&mut self.responses);
-        let seen = self.look(images, &mut responses);
+        let single_views = self.single_views(images, &mut responses);
         let found = {
-            let seen = self.seen(images, &seen, &responses, expected);
+            let evidence = self.evidence(images, &single_views, &responses, expected);
             let trials = self.setup.trials.par_iter().enumerate();
             trials
-                .map(|(nth, it)| self.version(nth, it.version, &seen))
+                .map(|(nth, it)| self.version(nth, it.version, &evidence))
                 .collect()
         };
         self.responses = responses;
         found
     }
 
-    /// Every view alone.
-    fn look(
+    /// Solves every view alone.
+    fn single_views(
         &self,
         images: &[Option<Rgb8View<'_>>],
         responses: &mut [Vec<f32>],
     ) -> Vec<Option<ViewEstimate>> {
         let views = self.views.par_iter().zip(responses).zip(images);
-        let look = |((step, responses), image): ((&ViewStep, &mut Vec<f32>), &Option<_>)| {
+        let solve = |((step, responses), image): ((&ViewStep, &mut Vec<f32>), &Option<_>)| {
             Some(step.run((*image)?, Scope::whole(step.layout()), responses))
         };
-        views.map(look).collect()
+        views.map(solve).collect()
     }
 
-    fn seen<'a>(
+    fn evidence<'a>(
         &'a self,
         images: &[Option<Rgb8View<'_>>],
         found: &'a [Option<ViewEstimate>],
@@ -225,14 +225,15 @@ impl Bench {
         }
     }
 
-    fn version(&self, nth: usize, version: Version, seen: &Evidence<'_>) -> FrameResult {
+    fn version(&self, nth: usize, version: Version, evidence: &Evidence<'_>) -> FrameResult {
         let step = &self.fuse[nth];
-        let answers: Vec<Option<ViewResult>> = seen
+        let answers: Vec<Option<ViewResult>> = evidence
             .answers
             .iter()
             .map(|it| {
                 let mut it = it.clone()?;
-                // Without adaptive selection nothing is expected: the first support is the better score.
+                // // Without adaptive selection there are no expected errors: the candidate with the better
+                // score comes first.
                 it.sigma_px = it.sigma_px.filter(|_| version.terms == Terms::Adaptive);
                 Some(it)
             })
@@ -250,7 +251,7 @@ impl Bench {
         let skeleton = match (version.terms, version.combining) {
             (Terms::Single, _) => last.run(&answers, &[]),
             (_, Combining::Pairs | Combining::Consensus) => {
-                let pairs = self.pairs(step, &answers, seen);
+                let pairs = self.pairs(step, &answers, evidence);
                 let skeleton = last.run(&answers, &pairs);
                 effort.of_pairs(&pairs, &skeleton);
                 skeleton
@@ -260,7 +261,7 @@ impl Bench {
                     Combining::AllViewsMean => Support::Mean,
                     _ => Support::Sum,
                 };
-                match step.all_views(&answers, &seen.evidence, support) {
+                match step.all_views(&answers, &evidence.evidence, support) {
                     Some(all) => {
                         effort.of_all_views(&all);
                         last.run_all_views(&answers, &all)
@@ -276,11 +277,11 @@ impl Bench {
         &self,
         step: &FuseStep,
         answers: &[Option<ViewResult>],
-        seen: &Evidence<'_>,
+        evidence: &Evidence<'_>,
     ) -> Vec<PairResult> {
         let start = step.start(answers);
         let solve = |pair: [usize; 2]| {
-            let [first, second] = pair.map(|it| seen.evidence[it].as_ref());
+            let [first, second] = pair.map(|it| evidence.evidence[it].as_ref());
             step.pair(pair, answers, [first?, second?], &start)
         };
         let pairs = all_pairs(self.views.len()).into_par_iter();
@@ -311,7 +312,7 @@ impl Bench {
     }
 }
 
-/// What a version cost.
+/// The computing effort of a version.
 #[derive(Debug, Default)]
 struct Effort {
     iterations: Vec<u32>,
@@ -321,7 +322,7 @@ struct Effort {
 }
 
 impl Effort {
-    /// Counts the iterations of the highest energy, and the solutions of all that was tried.
+    /// Counts the iterations of the hypothesis with the highest energy, and the solutions of all hypotheses.
     fn of_all_views(&mut self, all: &AllViewsResult) {
         let estimates = all.hypotheses.iter().map(|it| &it.estimate);
         self.solutions = estimates.clone().map(|it| it.iterations.len() as u32).sum();
@@ -336,7 +337,7 @@ impl Effort {
         self.unsettled += u32::from(!converged);
     }
 
-    /// Counts the iterations of what was taken, and the solutions of all that was tried.
+    /// Counts the iterations of the chosen hypothesis, and the solutions of all hypotheses.
     fn of_pairs(&mut self, pairs: &[PairResult], skeleton: &Skeleton) {
         let (mut on, mut n_terms) = (0, 0);
         for pair in pairs {
@@ -358,7 +359,7 @@ impl Effort {
     }
 }
 
-/// The settings of a version: those of all terms, without the ones it does not have.
+/// The settings of a version: those of all terms, without the terms it does not have.
 fn settings_of(all: &multiview::Settings, terms: Terms) -> multiview::Settings {
     let mut settings = all.clone();
     if terms < Terms::Appearance {

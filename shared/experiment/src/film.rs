@@ -5,18 +5,18 @@ use geometry::{Camera, Framing, FramingError, OutSize, upright_roll};
 use kernels::Rgb8View;
 use sequences::Sequence;
 
-/// How frames are made of footage.
+/// How frames are derived from footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmSettings {
     /// Width and height of the frames; the footage's size times `scale`, if not given.
     pub size: Option<[u32; 2]>,
     /// Pixels of a frame per pixel of the footage.
     pub scale: f64,
-    /// Turn frames upright, where the rig knows what is up.
+    /// Rotate frames upright, if the rig knows the vertical.
     pub upright: bool,
 }
 
-/// Why there are no frames.
+/// Why frames cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FilmError {
     /// Footage cannot be read.
@@ -27,7 +27,7 @@ pub enum FilmError {
         /// Why.
         source: FootageError,
     },
-    /// Footage does not go with the calibration.
+    /// Footage does not match the calibration.
     #[error("camera {camera:?}")]
     Framing {
         /// The camera.
@@ -35,7 +35,7 @@ pub enum FilmError {
         /// Why.
         source: FramingError,
     },
-    /// Frames cannot be made.
+    /// Frames cannot be derived.
     #[error("camera {camera:?}")]
     Warp {
         /// The camera.
@@ -140,7 +140,7 @@ impl Film {
 
     /// The images of all views at a frame of the sequence; `None` for a view whose footage has ended.
     ///
-    /// * `index`: frames are read in ascending order; one that has been passed over is not there any more.
+    /// * `index`: in ascending order; skipped frames cannot be read any more.
     ///
     /// # Errors
     ///

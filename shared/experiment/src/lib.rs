@@ -7,7 +7,7 @@
 //!
 //! [`Pictures`] are single pictures of annotated people.
 //!
-//! Solving and scoring are apart: other thresholds and other truths need no second run.
+//! Solving and scoring are separate: other thresholds or another ground truth need no second run.
 #![forbid(unsafe_code)]
 
 mod version;

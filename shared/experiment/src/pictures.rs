@@ -1,28 +1,28 @@
-//! Single pictures of annotated people: the numbers of PARSE and LSP, on one page as those of sequences.
+//! Evaluation on single pictures of annotated people (PARSE, LSP).
 
 use evaluation::{Bootstrap, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate};
 
 use crate::Joints;
 
-/// What was found on the pictures of one data set.
+/// The results on the pictures of one data set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pictures {
     /// Name of the data set.
     pub name: String,
     /// People who could not be used.
     pub n_left_out: usize,
-    /// The true joints, a person each.
+    /// The true joints of every person.
     pub truths: Vec<Joints>,
-    /// For each person what [`Judged`] counts; `None` where nothing was found.
+    /// For each person the detections of [`Judged`]; `None` if there is none.
     pub found: Vec<[Option<Joints>; 2]>,
 }
 
 /// Which detection of a picture is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judged {
-    /// The best one of the picture, which is how PCP is published.
+    /// The best one of the picture, as for published PCP.
     Best,
-    /// The best one that covers the person, which is how PCK is.
+    /// The best one that covers the person, as for published PCK.
     OnPerson,
 }
 
@@ -30,7 +30,7 @@ impl Judged {
     /// Both, in the order of [`Pictures::found`].
     pub const ALL: [Self; 2] = [Self::Best, Self::OnPerson];
 
-    /// In words.
+    /// Its title.
     pub fn title(self) -> &'static str {
         match self {
             Self::Best => "best detection of every image",
@@ -54,7 +54,7 @@ impl Pictures {
         evaluate(self.pairs(which))
     }
 
-    /// How sure they are: pictures are drawn again.
+    /// Their confidence intervals, by resampling pictures.
     pub fn intervals(&self, which: Judged, bootstrap: &Bootstrap) -> Intervals {
         let each: Vec<Report> = self.pairs(which).map(|it| evaluate([it])).collect();
         let over = |count: &dyn Fn(&Report) -> Pcp| {
@@ -85,7 +85,7 @@ impl Pictures {
     }
 }
 
-/// The rules of PCP, and what they are called.
+/// The rules of PCP and their names.
 const RULES: [(PcpRule, &str); 2] = [
     (PcpRule::MeanOfEnds, "mean of ends"),
     (PcpRule::BothEnds, "both ends"),
@@ -164,7 +164,7 @@ mod tests {
         core::array::from_fn(|it| [x + 10.0 * (it % 4) as f64, 25.0 * (it / 4) as f64])
     }
 
-    /// Two of three pictures have their person, of whom one is found elsewhere by the best detection.
+    /// The person is detected on two of three pictures; on one of them the best detection is elsewhere.
     fn pictures() -> Pictures {
         let (here, there) = (Some(person(0.0)), Some(person(500.0)));
         Pictures {
@@ -176,14 +176,14 @@ mod tests {
     }
 
     #[test]
-    fn both_kinds_of_detections_are_counted_apart() {
+    fn both_kinds_of_detections_are_counted_separately() {
         let total = |which| pictures().report(which).pck(0).percent().round();
         assert_eq!(total(Judged::Best), 33.0);
         assert_eq!(total(Judged::OnPerson), 67.0);
     }
 
     #[test]
-    fn intervals_hold_the_number_and_have_no_width_where_all_are_alike() {
+    fn intervals_contain_the_value_and_have_no_width_for_equal_pictures() {
         let bootstrap = Bootstrap::default();
         let it = pictures().intervals(Judged::OnPerson, &bootstrap);
         let [low, high] = it.pcp[0].unwrap();

@@ -1,10 +1,10 @@
-//! How well expected errors tell the true ones: what selection is worth depends on nothing else.
+//! Quality of the expected errors, on which adaptive selection depends.
 
 use evaluation::{area_under_roc, rank_correlation};
 use serde::{Deserialize, Serialize};
 use skeleton::{N_PARTS, PART_NAMES};
 
-/// What was expected of one view, and what was true; one number per part, pixels of the frame.
+/// Expected and true errors of one view; one number per part, pixels of the frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Predicted {
@@ -16,7 +16,7 @@ pub struct Predicted {
     pub error_px: Vec<f32>,
 }
 
-/// What is said of the predictions of a part, or of all parts.
+/// The quality of the predictions of a part, or of all parts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
     /// The part; `mean` of the parts.
@@ -27,7 +27,7 @@ pub struct Judgement {
     pub above: Option<f64>,
     /// Those of them that are switched off, percent.
     pub caught: Option<f64>,
-    /// Those below the threshold that are switched off all the same, percent.
+    /// Those below the threshold that are switched off, percent.
     pub wasted: Option<f64>,
     /// Area under the ROC of "error above the threshold" by the expected error per threshold.
     pub auc: Option<f64>,
@@ -35,9 +35,9 @@ pub struct Judgement {
     pub rank_correlation: Option<f64>,
 }
 
-/// Judges predictions: every part, and the mean of those numbers over the parts that have them.
+/// Evaluates predictions: every part, and the mean over the parts with a value.
 ///
-/// Where thresholds grow with the person, errors are compared per threshold.
+/// Errors are divided by their threshold, since thresholds may depend on the person's size.
 ///
 /// * Returns nothing if no view has thresholds.
 pub fn judge(views: &[&Predicted]) -> Vec<Judgement> {
@@ -99,7 +99,7 @@ fn of_part(name: &str, samples: impl Iterator<Item = (f64, f64)>) -> Judgement {
 mod tests {
     use super::*;
 
-    /// All parts alike.
+    /// A view with the same values for all parts.
     fn view(sigma: f32, tau: f32, error: f32) -> Predicted {
         let all = |it: f32| vec![it; N_PARTS];
         Predicted {
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_tells_nothing() {
+    fn a_constant_is_chance_level() {
         let views: Vec<Predicted> = (1..9).map(|it| view(3.0, 4.0, it as f32)).collect();
         let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(0.5), None));

@@ -1,4 +1,4 @@
-//! The numbers that the paper prints, to stand beside ours.
+//! The numbers published in the paper, for comparison.
 
 use crate::{Combining, Terms, Version};
 
@@ -25,9 +25,9 @@ const PCP3D: [Row; 16] = [
     ("UMPM", "All", "Overall", [73.07, 75.91, 76.37, 80.04]),
 ];
 
-/// What the paper prints for a row of its tables, percent; `None` for what it does not.
+/// The paper's value for a row of its tables, percent; `None` if it has none.
 ///
-/// UMPM's rows are of all people: one subject's sequence stands for its action.
+/// UMPM's rows are of all people: the sequence of one subject represents its action.
 pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -> Option<f64> {
     if version.combining != Combining::Pairs {
         return None;
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_overall_values_are_its_rows_weighted_by_its_frames() {
+    fn the_papers_overall_values_are_means_weighted_by_frames() {
         for column in 0..4 {
             let mut sum = 0.0;
             let mut n = 0.0;
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_printed_is_known() {
+    fn values_outside_the_tables_are_none() {
         let adaptive = Version {
             terms: Terms::Adaptive,
             combining: Combining::Pairs,

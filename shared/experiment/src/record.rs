@@ -1,4 +1,4 @@
-//! What was found, frame by frame, as it is kept on disk so that a run can go on.
+//! Results frame by frame, as they are stored on disk so that a run can be resumed.
 
 use evaluation::Point;
 use serde::{Deserialize, Serialize};
@@ -15,14 +15,14 @@ pub struct Header {
     pub version: u32,
     /// Name of the sequence.
     pub sequence: String,
-    /// All that what was found depends on: a run goes on only with the same.
+    /// All settings that the results depend on: a run is resumed only with the same.
     pub settings: String,
     /// The versions, in the order of [`Record::found`].
     pub versions: Vec<String>,
 }
 
 impl Header {
-    /// A header of the present format.
+    /// A header of the current format.
     pub fn new(sequence: &str, settings: &str, versions: Vec<String>) -> Self {
         Self {
             format: "parallax-eval".to_owned(),
@@ -40,14 +40,14 @@ impl Header {
 pub struct Record {
     /// Number, as the data set counts.
     pub frame: u64,
-    /// What each version found.
+    /// The result of each version.
     pub found: Vec<FrameResult>,
-    /// For each view what a network expected of it, and the truth; empty without a network.
+    /// Expected and true errors of each view; empty without a network.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predicted: Vec<Option<Predicted>>,
 }
 
-/// What one version found in one frame.
+/// The result of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameResult {
@@ -58,9 +58,9 @@ pub struct FrameResult {
     pub views: Vec<Option<Vec<[f64; 2]>>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,
-    /// How many of these had not settled at the end.
+    /// How many of these had not converged at the end.
     pub unsettled: u32,
-    /// Single-view solutions in all, those of assumptions that were given up included.
+    /// Single-view solutions in all, including those of rejected hypotheses.
     pub solutions: u32,
     /// Share of the consistency terms that were switched on, if there were any.
     pub on: Option<f64>,
@@ -69,7 +69,7 @@ pub struct FrameResult {
 /// Why records cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The first line is no header.
+    /// The first line is not a header.
     #[error("line 1 is no header of records")]
     Header(#[source] serde_json::Error),
     /// They come from a run with other settings.
@@ -87,9 +87,9 @@ pub enum RecordError {
 
 /// Reads records.
 ///
-/// A last line that was cut off by the end of a run is left out.
+/// A truncated last line is left out.
 ///
-/// * Returns them with the bytes that they take up, so that a run that goes on can cut off the rest.
+/// * Returns them with their length in bytes, so that a resumed run can cut off the rest.
 ///
 /// # Errors
 ///
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_to_the_last_bit() {
+    fn records_survive_a_round_trip_bit_for_bit() {
         let (got, n_bytes) = read_records(&text(3), &header()).unwrap();
         assert_eq!(got, [record(0), record(1), record(2)]);
         assert_eq!(n_bytes, text(3).len());
@@ -187,7 +187,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_run_that_was_cut_off_goes_on_after_its_last_whole_line(share in 0.0..1.0_f64) {
+        fn a_truncated_run_is_resumed_after_its_last_complete_line(share in 0.0..1.0_f64) {
             let whole = text(4);
             let cut = &whole[..(share * whole.len() as f64) as usize];
             let (records, n_bytes) = read_records(cut, &header()).unwrap();

@@ -1,4 +1,4 @@
-//! One frame of one version against the truth.
+//! Scores the result of one version on one frame.
 
 use evaluation::{Point, aligned, joint_errors, segment_errors, segments};
 use geometry::Camera;
@@ -7,7 +7,7 @@ use sequences::{Frame, Sequence};
 
 use crate::{FrameResult, parse14};
 
-/// How far off one version was in one frame.
+/// The errors of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameScore {
     /// Of the twelve segments, as shares of their length ([`segment_errors`]).
@@ -16,12 +16,12 @@ pub struct FrameScore {
     pub joints_m: Vec<Option<f64>>,
     /// The same after the best alignment; empty where there is none.
     pub aligned_m: Vec<Option<f64>>,
-    /// For each view the 14 joints that were found (if somebody was) and the true ones, pixels of the
-    /// footage; `None` where a true joint is not known or not seen.
+    /// For each view the 14 joints that were found (if any) and the true ones, pixels of the footage; `None`
+    /// if a true joint is unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,
-    /// How many of these had not settled.
+    /// How many of these had not converged.
     pub unsettled: u32,
     /// Single-view solutions in all.
     pub solutions: u32,
@@ -32,7 +32,7 @@ pub struct FrameScore {
 /// The joints of `skeleton::PARSE14` in an image, pixels.
 pub type Joints = [[f64; 2]; 14];
 
-/// Compares what was found with the truth.
+/// Compares a result with the truth.
 ///
 /// * `frame`: of the sequence, the one that was solved.
 pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameScore {

@@ -1,4 +1,4 @@
-//! Everything added up: by sequence, by action over all subjects, by subject, and over all.
+//! Aggregates scores by sequence, by action over all subjects, by subject, and over all.
 
 use evaluation::{Bootstrap, Changes, PcpRule, Report, Share};
 use serde::Serialize;
@@ -14,9 +14,9 @@ const N_GAMMAS: usize = 21;
 /// The histogram of changes: to both sides, pixels, and its bins.
 const REACH_PX: f64 = 50.0;
 const N_BINS: usize = 40;
-/// Changes below it are none, pixels.
+/// Smaller changes count as none, pixels.
 const SAME_PX: f64 = 1.0;
-/// Deteriorations beyond it are counted apart, pixels.
+/// Larger deteriorations are counted separately, pixels.
 const FAR_PX: f64 = 5.0;
 
 /// The scores of one sequence.
@@ -39,19 +39,18 @@ pub struct Summary {
     pub schema_version: u32,
     /// Names of the versions, in the order of [`Group::versions`].
     pub versions: Vec<String>,
-    /// The version that gains and changes of all others are counted against; none where there is none.
+    /// The baseline of the gains and changes; none if there is only one version.
     pub compared_with: Option<String>,
-    /// What the confidence intervals hold.
+    /// Confidence level of the intervals.
     pub confidence: f64,
     /// The sequences, then the groups of them.
     pub groups: Vec<Group>,
-    /// How well expected errors told the true ones: the mean over parts, then each; empty without a
-    /// network.
+    /// Quality of the expected errors: the mean over parts, then each; empty without a network.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Judgement>,
 }
 
-/// Some sequences together, every frame with the same weight.
+/// /// A group of sequences; every frame has the same weight.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
     /// Name of the data set.
@@ -66,14 +65,14 @@ pub struct Group {
     pub versions: Vec<Numbers>,
 }
 
-/// What is said about one version on one group.
+/// The numbers of one version on one group.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Numbers {
     /// Eq. 13 at 0.5, percent of all segments.
     pub pcp3d: Option<f64>,
     /// Its confidence interval over frames.
     pub pcp3d_interval: Option<[f64; 2]>,
-    /// Points more than the first version.
+    /// Gain over the first version, percentage points.
     pub gain: Option<f64>,
     /// Its confidence interval, frame by frame against the first version.
     pub gain_interval: Option<[f64; 2]>,
@@ -95,11 +94,11 @@ pub struct Numbers {
     pub pcp2d: Option<f64>,
     /// Images: PCK at a tenth and a fifth of the person, percent.
     pub pck2d: Option<[f64; 2]>,
-    /// Mean number of single-view solutions until a pair, or all views, settled.
+    /// Mean number of single-view solutions until a pair, or all views, converged.
     pub iterations: Option<f64>,
-    /// How many did not settle, percent.
+    /// How many did not converge, percent.
     pub unsettled: Option<f64>,
-    /// Single-view solutions for each frame, all pairs and assumptions.
+    /// Single-view solutions per frame, over all pairs and hypotheses.
     pub solutions: Option<f64>,
     /// Consistency terms that were switched off, percent.
     pub off: Option<f64>,
@@ -107,7 +106,7 @@ pub struct Numbers {
     pub changes: ChangesOf,
 }
 
-/// What became better and worse.
+/// Improvements and deteriorations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangesOf {
     /// Joints in images that moved towards the truth by more than a pixel, percent.
@@ -116,11 +115,11 @@ pub struct ChangesOf {
     pub deteriorated: f64,
     /// Away from it by more than five pixels.
     pub deteriorated_5px: f64,
-    /// Lower edge (pixels; above 0 is better) and percent; the outermost hold what lies beyond.
+    /// Lower edge (pixels; above 0 is better) and percent; the outermost include everything beyond.
     pub bins: Vec<[f64; 2]>,
 }
 
-/// Adds up.
+/// /// Aggregates scores.
 ///
 /// * `versions`: their names; the first is what the others are compared with.
 pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootstrap) -> Summary {
@@ -199,7 +198,7 @@ fn correct(frame: &FrameScore) -> Share {
     Share::of(judged.map(|it| percent(*it <= GAMMA)))
 }
 
-/// What a frame has more than another, percent.
+/// The gain of a frame over another, percent.
 fn gain(own: &FrameScore, first: &FrameScore) -> Share {
     let (own, first) = (correct(own), correct(first));
     Share {
@@ -273,7 +272,7 @@ fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
         .collect();
     let point = |nth: usize| {
         let gamma = 0.05 * nth as f64;
-        // The steps are not exact in binary, and 0.5 is to agree with the tables.
+        // // The steps are not exact in binary, and 0.5 has to agree with the tables.
         let gamma = (gamma * 100.0).round() / 100.0;
         let n = errors.iter().filter(|it| **it <= gamma).count();
         [gamma, 100.0 * n as f64 / errors.len().max(1) as f64]
@@ -352,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_weigh_frames_and_not_sequences() {
+    fn groups_weight_frames_and_not_sequences() {
         let sequences = [
             measured("S1", "Box", &[[6, 9]; 3]),
             measured("S2", "Box", &[[12, 12]]),
@@ -419,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn without_frames_nothing_is_said() {
+    fn without_frames_there_are_no_numbers() {
         let got = summary(&[measured("S1", "Box", &[])]);
         let it = &got.groups[0].versions[0];
         assert_eq!(

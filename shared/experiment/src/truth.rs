@@ -1,4 +1,4 @@
-//! True joints as the 14 that all sets share, and true positions of the 26 parts.
+//! The 14 true joints that all joint sets share, and true positions of the 26 parts.
 
 use evaluation::Point;
 use skeleton::{JointSet, MIRROR, N_PARTS, PARSE14};
@@ -58,9 +58,9 @@ pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
 /// The true error of every part of a pose, in tenths of the person's size: the longer side of the
 /// rectangle around the true joints.
 ///
-/// What [adaptive selection](crate::Terms::Adaptive) is told where the truth stands in for the network: with
-/// thresholds of 1 a part is switched off that is further off than a tenth of the person. Where the model's left
-/// and right may be exchanged (a person seen from behind), the better of the two readings counts.
+/// Used for [adaptive selection](crate::Terms::Adaptive) with the truth instead of a network: with thresholds
+/// of 1 a part is switched off if its error exceeds a tenth of the person's size. Where the model's left and
+/// right may be exchanged (a person seen from behind), the better of the two readings counts.
 ///
 /// * `centres`: of the 26 parts, pixels.
 /// * `joints`: the true ones of `skeleton::PARSE14`, pixels of the same image.
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn every_part_has_a_place_and_joints_are_themselves() {
+    fn every_part_has_a_position_and_joints_coincide_with_their_parts() {
         let joints = standing();
         let parts = parts(&joints);
         assert!(parts.iter().flatten().all(|it| it.is_finite()));
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_about_a_person_who_is_not_known() {
+    fn unknown_joints_give_no_errors() {
         let mut joints = standing();
         let found = parts(&joints);
         joints[3] = [f64::NAN; 2];

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Which terms tie the views together; each has those before it.
+/// The terms between views; each includes those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Terms {
     /// None: flexible mixtures of parts in every view, then triangulation.
@@ -16,12 +16,12 @@ pub enum Terms {
     Adaptive,
 }
 
-/// How more than two views come together.
+/// How more than two views are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Combining {
-    /// Pairs of views, and the mean of what they find: the paper's way.
+    /// Pairs of views, and the mean of their results, as in the paper.
     Pairs,
-    /// Pairs of views, and what all views can mean together.
+    /// Pairs of views, and a consensus of all views.
     Consensus,
     /// All views at once, the terms of all pairs added up.
     AllViews,
@@ -34,11 +34,11 @@ pub enum Combining {
 pub struct Version {
     /// Which terms.
     pub terms: Terms,
-    /// How views come together.
+    /// How views are combined.
     pub combining: Combining,
 }
 
-/// A text that names no version.
+/// A text that is not a version.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{text:?}: a version is fmp, geometry, appearance or adaptive, and of the last three \
@@ -74,7 +74,7 @@ impl Version {
         combining: Combining::Pairs,
     };
 
-    /// What the paper's tables call it.
+    /// Its title in the paper's tables.
     pub fn title(self) -> String {
         let terms = TERMS.iter().find(|it| it.0 == self.terms);
         let combining = COMBINING.iter().find(|it| it.0 == self.combining);
@@ -84,7 +84,7 @@ impl Version {
 }
 
 impl fmt::Display for Version {
-    /// As it is chosen: `geometry+all-views`.
+    /// Its name in settings: `geometry+all-views`.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let terms = TERMS.iter().find(|it| it.0 == self.terms);
         let combining = COMBINING.iter().find(|it| it.0 == self.combining);
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read() {
+    fn names_are_parsed_back() {
         for (terms, ..) in TERMS {
             for (combining, ..) in COMBINING {
                 let version = Version { terms, combining };
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn other_words_are_refused() {
+    fn other_names_are_refused() {
         for text in ["", "fmp+consensus", "geometry+", "all-views", "Geometry"] {
             assert!(text.parse::<Version>().is_err(), "{text}");
         }

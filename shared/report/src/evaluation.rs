@@ -10,7 +10,7 @@ use figure::{bars, colour, curves, histogram};
 
 pub use pictures::pictures_html;
 
-/// What the page says besides the numbers.
+/// The content of the page.
 #[derive(Debug, Clone)]
 pub struct Page<'a> {
     /// The numbers.
@@ -21,7 +21,7 @@ pub struct Page<'a> {
     pub about: &'a [(String, String)],
 }
 
-/// One page that needs no other file.
+/// One self-contained page.
 pub fn html(page: &Page<'_>) -> String {
     let titles: Vec<String> = page.versions.iter().map(|it| it.title()).collect();
     let mut out = head();
@@ -83,7 +83,7 @@ fn about_table(out: &mut String, about: &[(String, String)]) {
     out.push_str("</table></div>\n");
 }
 
-/// The paper's main tables: PCP3D by group, and what was published.
+/// The paper's main tables: PCP3D by group, with the published values.
 fn scores(out: &mut String, page: &Page<'_>, titles: &[String]) {
     let confidence = 100.0 * page.summary.confidence;
     put(
@@ -186,7 +186,7 @@ fn measures(out: &mut String, group: &Group, titles: &[String]) {
     out.push_str("</table></div>\n");
 }
 
-/// How well the network told the true errors.
+/// Quality of the expected errors.
 fn predictions(out: &mut String, summary: &Summary) {
     if summary.predictions.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! Single views against the truth: what the terms between views are learned from.
+//! Compares single views with the truth: the training data of the consistency terms.
 
 use consistency::{Learner, Pair, ViewObservation};
 use evaluation::Point;
@@ -11,7 +11,7 @@ use super::Bench;
 use crate::{parse14, part_errors_and_facing, projected, size};
 
 impl Bench {
-    /// Solves every view of an instant alone, and lets learners see them.
+    /// Solves every view of an instant alone, and adds them to the learners.
     ///
     /// * `joints`: the true joints of the sequence's joint set, metres.
     /// * `by_name`: learn the pairs of cameras by their names, too.
@@ -28,7 +28,7 @@ impl Bench {
     ) {
         assert_eq!(images.len(), self.views.len(), "one image per view");
         let mut responses = std::mem::take(&mut self.responses);
-        let found = self.look(images, &mut responses);
+        let found = self.single_views(images, &mut responses);
         self.responses = responses;
         let view_answer = |view: usize| {
             let found = found[view].as_ref()?;

@@ -5,7 +5,7 @@ use experiment::{ChangesOf, Group};
 
 use crate::html::{escaped, put};
 
-/// One colour for each version, told apart without red and green alone, on light and on dark.
+/// One colour for each version, distinguishable with colour blindness and on light and dark backgrounds.
 const COLOURS: [&str; 8] = [
     "#d9503f", "#3a86c8", "#2f9e5b", "#9a6bd0", "#d98a00", "#1f9c95", "#d0568f", "#808894",
 ];
@@ -56,7 +56,7 @@ impl Plot {
         Self { width, out }
     }
 
-    fn word(&mut self, x: f64, text: &str) {
+    fn label(&mut self, x: f64, text: &str) {
         let y = TOP + HEIGHT + 16.0;
         let text = escaped(text);
         put(
@@ -86,7 +86,7 @@ impl Plot {
     }
 }
 
-/// A number beside an axis: with as many digits after the point as it takes to be true, two at most.
+/// A label of an axis: with as many decimals as it needs, two at most.
 pub(super) fn tick(value: f64) -> String {
     let text = format!("{value:.2}");
     let short = text.trim_end_matches('0').trim_end_matches('.');
@@ -97,7 +97,7 @@ pub(super) fn tick(value: f64) -> String {
     }
 }
 
-/// The least value at the top of an axis with four steps that can be written so.
+/// The smallest top of an axis with four steps that have such labels.
 pub(super) fn top(most: f64) -> f64 {
     let tenth = 10_f64.powf(most.max(0.01).log10().floor());
     let steps = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -124,7 +124,7 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> String {
             let title = format!("{name}, {title}: {value:.1} %");
             plot.bar([x, x + width], value / 100.0, colour(version), &title);
         }
-        plot.word(LEFT + slot * (part as f64 + 0.5), name);
+        plot.label(LEFT + slot * (part as f64 + 0.5), name);
     }
     plot.end()
 }
@@ -154,14 +154,14 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
     }
     for nth in 0..=4 {
         let share = f64::from(nth) / 4.0;
-        plot.word(LEFT + plot.width * share, &tick(share * most));
+        plot.label(LEFT + plot.width * share, &tick(share * most));
     }
     plot.end()
 }
 
 /// Improvements (to the right) and deteriorations of one version.
 pub(super) fn histogram(changes: &ChangesOf) -> String {
-    // The two bins around nothing would hide all others: they are cut off.
+    // // The two bins around 0 would dwarf all others: they are cut off.
     let far = changes
         .bins
         .iter()
@@ -180,7 +180,7 @@ pub(super) fn histogram(changes: &ChangesOf) -> String {
         let share = f64::from(nth) / 4.0;
         let reach = changes.bins.first().map_or(0.0, |it| it[0].abs());
         let at = reach * (2.0 * share - 1.0);
-        plot.word(LEFT + plot.width * share, &format!("{} px", tick(at)));
+        plot.label(LEFT + plot.width * share, &format!("{} px", tick(at)));
     }
     plot.end()
 }

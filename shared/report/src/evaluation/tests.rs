@@ -1,6 +1,6 @@
 //! The report of made-up numbers.
 
-#![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
+#![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
 use evaluation::{Bootstrap, SEGMENT_NAMES};
 use experiment::{FrameScore, Measured, Pictures, summarise};
@@ -35,7 +35,7 @@ fn made_up() -> (Summary, Vec<Version>) {
 }
 
 #[test]
-fn the_page_holds_every_table_and_figure_and_needs_nothing_else() {
+fn the_page_is_self_contained_with_every_table_and_figure() {
     let (summary, versions) = made_up();
     let about = [("model".to_owned(), "a <b> & c".to_owned())];
     let page = html(&Page {
@@ -84,14 +84,14 @@ fn what_stands_beside_an_axis_is_what_it_means() {
         );
         for nth in 0..=4 {
             let value = top * f64::from(nth) / 4.0;
-            let said: f64 = tick(value).parse().unwrap();
-            assert!((said - value).abs() < 1e-9, "{value} is called {said}");
+            let label: f64 = tick(value).parse().unwrap();
+            assert!((label - value).abs() < 1e-9, "{value} is labelled {label}");
         }
     }
 }
 
 #[test]
-fn the_page_looks_like_that_of_a_run_and_is_no_wider_than_a_telephone() {
+fn the_page_has_the_style_of_a_run_and_fits_a_telephone() {
     let (summary, versions) = made_up();
     let about = [(
         "sequences".to_owned(),
