@@ -1,4 +1,4 @@
-//! How often the types of a part in one view come with those in another.
+//! Co-occurrence counts of the types of a part in two views.
 
 use std::sync::Arc;
 
@@ -17,11 +17,11 @@ use crate::Appearance;
 pub struct Counts {
     /// Of views that see the person from the same side.
     pub same: Vec<Vec<u32>>,
-    /// Of views of which one sees the person's other side: left and right are exchanged.
+    /// Of views on opposite sides of the person: left and right are exchanged.
     pub exchanged: Vec<Vec<u32>>,
 }
 
-/// How many types every part has, and which part is on its other side.
+/// The number of types of every part, and the part on the other side of the body.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
@@ -105,8 +105,8 @@ impl Counts {
 
     /// `p(type in first view, type in second view)` of every part.
     ///
-    /// What was counted, and `weight` more observations of types that have nothing to do with each other: types that
-    /// never came together, and angles never seen, say nothing.
+    /// The counts plus `weight` observations of independent types, so that rare pairs of types and rare
+    /// angles carry little information.
     ///
     /// * `marginals`: how frequent every type of every part is; see [`marginals`].
     pub fn joint(
@@ -153,7 +153,7 @@ impl Counts {
     }
 }
 
-/// How much more often two types come together than by chance, as a logarithm.
+/// Lift of two types: the logarithm of their frequency over that of independent types.
 fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, cols) = (joint.column_sum(), joint.row_sum());
     DMatrix::from_fn(joint.nrows(), joint.ncols(), |a, b| {
@@ -166,7 +166,7 @@ fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// How frequent every type of every part is, over all that was counted; each type counts as seen once more.
+/// The frequency of every type of every part over all counts, with one extra observation of each type.
 pub fn marginals(shape: &Shape, all: &[&Counts]) -> Vec<Vec<f64>> {
     let mut sums: Vec<Vec<f64>> = shape.n_types.iter().map(|&n| vec![1.0; n]).collect();
     for counts in all {

@@ -1,4 +1,4 @@
-//! The file beside a model that holds what was learned about several views.
+//! The file beside a model with the learned consistency parameters.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use skeleton::{JointMap, JointSet};
 
 use crate::counts::{Counts, Shape, marginals};
 
-/// What a consistency file calls itself.
+/// The format name of a consistency file.
 const FORMAT: &str = "parallax-consistency";
 /// The version that is written, and the only one that is read.
 const VERSION: u32 = 1;
 /// Most bins of half the circle.
 const MAX_BINS: usize = 180;
-/// What tables are to be.
+/// The expected size of tables.
 const SIZED: &str = "a matrix of counts for every part, as large as its types";
 
-/// What was learned about several views of a person, for one model.
+/// The consistency parameters of one model.
 ///
 /// As a file it is one object of JSON; all fields must be there, others are refused.
 ///
@@ -39,15 +39,15 @@ pub struct Learned {
     pub format: String,
     /// 1.
     pub version: u32,
-    /// What it belongs to.
+    /// The model that it belongs to.
     pub model: ModelOf,
-    /// What it was learned from.
+    /// The amount of training data.
     pub learned: LearnedFrom,
     /// Weights of the terms.
     pub weights: Weights,
     /// Thresholds of the expected error, one per part, tenths of the person's size.
     pub tau_tenths: Vec<f32>,
-    /// Observations by chance that are added to every table.
+    /// Observations of independent types that are added to every table.
     pub smoothing: f64,
     /// By angle.
     pub ring: Vec<Counts>,
@@ -67,7 +67,7 @@ pub struct ModelOf {
     pub shape: Shape,
 }
 
-/// How much it was learned from.
+/// The amount of training data.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LearnedFrom {
@@ -87,9 +87,9 @@ pub struct Weights {
     pub alpha: f64,
     /// Of the appearance term.
     pub beta: f64,
-    /// Distance beyond which the geometric term grows no more, cells.
+    /// Distance at which the geometric term is capped, cells.
     pub max_distance_cells: Option<f64>,
-    /// What the appearance term looks up.
+    /// The values of the appearance term.
     pub appearance: Appearance,
 }
 
@@ -107,13 +107,13 @@ impl Default for Weights {
     }
 }
 
-/// What the appearance term says about two types.
+/// The value of the appearance term for two types.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Appearance {
-    /// How often they come together: the paper's `p(a, b)`.
+    /// Joint probability: the paper's `p(a, b)`.
     Joint,
-    /// How much more often than by chance: `ln(p(a, b) / (p(a) p(b)))`.
+    /// Lift over chance: `ln(p(a, b) / (p(a) p(b)))`.
     Lift,
 }
 
@@ -133,7 +133,7 @@ pub struct NamedRig {
 pub struct NamedPair {
     /// The two cameras.
     pub cameras: [String; 2],
-    /// What was seen.
+    /// Their counts.
     pub counts: Counts,
 }
 
@@ -147,7 +147,7 @@ pub struct JointWeights {
     pub weights: Vec<Vec<f64>>,
 }
 
-/// Why a text is no consistency file.
+/// Why a text is not a consistency file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// It is not JSON of this layout.
@@ -156,7 +156,7 @@ pub enum FileError {
     /// It is something else, or of another version.
     #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
     Version {
-        /// What it calls itself.
+        /// Its format name.
         format: String,
         /// Its version.
         version: u32,
@@ -166,7 +166,7 @@ pub enum FileError {
     Value {
         /// Where.
         field: String,
-        /// What should stand there.
+        /// The expected value.
         expected: &'static str,
     },
     /// It was learned for another model.
@@ -200,7 +200,7 @@ impl Learned {
         Ok(read)
     }
 
-    /// What [`Self::parse`] reads.
+    /// Writes the text that [`Self::parse`] reads.
     ///
     /// # Errors
     ///
@@ -209,12 +209,12 @@ impl Learned {
         Ok(serde_json::to_string(self)? + "\n")
     }
 
-    /// What a new one begins with.
+    /// Format name and version of a new file.
     pub(crate) fn head() -> (String, u32) {
         (FORMAT.to_owned(), VERSION)
     }
 
-    /// Sees that it goes with a model.
+    /// Checks that it belongs to a model.
     ///
     /// # Errors
     ///

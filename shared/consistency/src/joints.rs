@@ -1,11 +1,11 @@
-//! Where joints lie among parts: the linear map of the paper's section 7, by ridge regression.
+//! Ridge regression of the linear map from parts to joints (the paper's section 7).
 
 use nalgebra::{DMatrix, DVector};
 use skeleton::{JointSet, MIRROR, N_PARTS};
 
 use crate::JointWeights;
 
-/// One person in one picture: the parts as found, named after the side of the body, and a true joint.
+/// One person in one picture: the detected parts, named by the side of the body, and a true joint.
 #[derive(Debug, Clone, Copy)]
 pub struct JointSample<'a> {
     /// Centres of the 26 parts, pixels.
@@ -18,12 +18,12 @@ pub struct JointSample<'a> {
     pub size: f64,
 }
 
-/// Least squares for every joint that is known.
+/// Ridge regression for every known joint.
 ///
-/// A joint is where its own parts are, plus a weighted sum of where all parts are with respect to these:
-/// a map that moves, turns and grows with the person. The weights minimise the squared
-/// error in units of the person's size plus `ridge` per sample times their squares, so that what was seen rarely stays
-/// with the default. Every person counts as its mirror image too.
+/// A joint is the mean of its own parts, plus a weighted sum of all parts relative to it. So the map is
+/// invariant to translation, rotation and scale. The weights minimise the squared error in units of the
+/// person's size plus `ridge` per sample times their squares, so that rare joints stay close to the default.
+/// Every person counts as its mirror image too.
 #[derive(Debug, Clone, Default)]
 pub struct JointFit {
     joints: Vec<Normal>,
@@ -40,7 +40,7 @@ struct Normal {
 }
 
 impl JointFit {
-    /// Takes a sample in.
+    /// /// Adds a sample.
     ///
     /// # Panics
     ///
@@ -81,7 +81,7 @@ impl JointFit {
         }
     }
 
-    /// The map for a set, with rows for all its joints; joints that were not seen keep their default.
+    /// The map for a set, with rows for all its joints; joints without samples keep their default.
     pub fn solve(&self, set: &JointSet, ridge: f64) -> JointWeights {
         let rows = set.joints.iter().map(|it| self.row(it.parts, ridge));
         JointWeights {
@@ -92,7 +92,7 @@ impl JointFit {
 
     fn row(&self, parts: &[usize], ridge: f64) -> Vec<f64> {
         let Some(joint) = self.joints.iter().find(|it| it.parts == parts) else {
-            // The middle of joints that may have been seen one by one.
+            // // The mean of joints that may have samples of their own.
             let n = parts.len() as f64;
             return match parts {
                 [part] => unit(*part),
@@ -112,8 +112,8 @@ impl JointFit {
             .collect()
     }
 
-    /// Mean squared error of the maps that another fit found, in units of the person's size, over the samples of this
-    /// one; `None` without any.
+    /// Mean squared error of another fit's maps on the samples of this one, in units of the person's size;
+    /// `None` without samples.
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
         let n: f64 = self.joints.iter().map(|it| it.n).sum();
         let error = |joint: &Normal| {
@@ -161,7 +161,7 @@ fn default_row(parts: &[usize]) -> Vec<f64> {
     row
 }
 
-/// Six digits are more than pictures tell.
+/// Six digits are more precise than the data.
 fn rounded(weight: f64) -> f64 {
     (weight * 1e6).round() / 1e6
 }
@@ -180,7 +180,7 @@ mod tests {
 
     use super::*;
 
-    /// People anywhere, whose right wrist lies a fifth of the forearm beyond where its part is.
+    /// Random people whose right wrist lies a fifth of the forearm beyond its part.
     fn samples(n: usize, seed: u64) -> Vec<(Vec<[f64; 2]>, [f64; 2])> {
         let mut dice = fastrand::Rng::with_seed(seed);
         let mut person = || {
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_law_is_found_and_mirrored() {
+    fn a_linear_map_is_recovered_and_mirrored() {
         let map = fit(100, 1).solve(&PARSE14, 1e-9);
         let [right, left] = [6, 11].map(|it| &map.weights[it]);
         assert!((right[6] - 1.2).abs() < 1e-3 && (right[4] + 0.2).abs() < 1e-3);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_sum_to_one_so_that_the_map_moves_with_the_person() {
+    fn rows_sum_to_one() {
         for set in JointSet::ALL {
             for row in fit(40, 2).solve(set, 0.01).weights {
                 assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-4);
@@ -224,20 +224,20 @@ mod tests {
     }
 
     #[test]
-    fn joints_that_were_not_seen_keep_their_default() {
+    fn joints_without_samples_keep_their_default() {
         let map = fit(40, 3).solve(&UMPM15, 0.01);
         assert_eq!(map.weights[0], default_row(&[9, 21]));
         assert_eq!(map.weights[2], unit(0));
     }
 
     #[test]
-    fn a_heavy_ridge_is_the_default() {
+    fn a_large_ridge_gives_the_default() {
         let row = &fit(40, 4).solve(&PARSE14, 1e9).weights[6];
         assert!((row[6] - 1.0).abs() < 1e-5, "{}", row[6]);
     }
 
     #[test]
-    fn the_error_on_others_is_that_of_the_law() {
+    fn the_error_on_other_samples_is_small() {
         let (train, test) = (fit(200, 5), fit(200, 6));
         let with = test.error_of(&train, 1e-9).unwrap();
         let without = test.error_of(&JointFit::default(), 1e-9).unwrap();

@@ -1,4 +1,4 @@
-//! From single views and their truth to what views have in common.
+//! Learns the consistency parameters from single views and their ground truth.
 
 use std::f64::consts::PI;
 
@@ -9,16 +9,16 @@ use crate::counts::{Counts, Shape};
 use crate::joints::{JointFit, JointSample};
 use crate::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
 
-/// How to learn.
+/// /// Settings of the learning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Bins of half the circle.
     pub n_bins: usize,
     /// Error up to which the type of a part counts, its parent's too; tenths of the person's size.
     pub max_error: f32,
-    /// Mean error of a person up to which it shows where joints lie among parts, the same unit.
+    /// Mean error of a person up to which it is used for the joint map, the same unit.
     pub max_mean_error: f32,
-    /// Observations by chance added to every table.
+    /// Observations of independent types added to every table.
     pub smoothing: f64,
 }
 
@@ -57,14 +57,14 @@ pub struct Pair<'a> {
     pub views: [&'a ViewObservation; 2],
     /// The angle from the first to the second as seen from the person (`multiview::angle_between`), radians.
     pub angle: Option<f64>,
-    /// What the two cameras are called, where their pair is to be learned by name too.
+    /// Names of the two cameras, if their pair is also learned by name.
     pub cameras: Option<[&'a str; 2]>,
 }
 
 /// Why nothing was learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
-    /// No view was right enough.
+    /// No view was close enough to the truth.
     #[error("of {views} views none is near the truth: nothing can be learned of them")]
     Nothing {
         /// Views seen.
@@ -72,7 +72,7 @@ pub enum LearnError {
     },
 }
 
-/// Learns from one instant after the other; the order does not matter but for rounding in the joints.
+/// Learns from one instant after the other; their order only affects rounding in the joints.
 #[derive(Debug, Clone)]
 pub struct Learner {
     settings: Settings,
@@ -86,7 +86,7 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// Knows nothing yet.
+    /// A learner without data.
     pub fn new(shape: Shape, settings: Settings) -> Self {
         Self {
             ring: vec![Counts::new(&shape); settings.n_bins.max(1)],
@@ -165,7 +165,7 @@ impl Learner {
             .add(&self.shape, part, types, exchanged);
     }
 
-    /// A type says something where its part and the parent, which it is about, are right.
+    /// A type counts if its part and the parent, to which it is relative, are right.
     fn is_right(&self, view: &ViewObservation, part: usize) -> bool {
         let parent = PARENT.get(part).copied().flatten().unwrap_or(part);
         let right = |it: usize| {
@@ -176,18 +176,18 @@ impl Learner {
         right(part) && right(parent)
     }
 
-    /// Counts an instant whose views were taken in.
+    /// Counts an instant whose views were added.
     pub fn end_instant(&mut self) {
         self.from.instants += 1;
     }
 
-    /// What is known about joints.
+    /// The regression of the joints.
     pub fn joints(&self) -> &JointFit {
         &self.joints
     }
 
-    /// How likely the types of others are, given their angle: the mean over all parts of `ln p(a, b) / (p(a) p(b))`,
-    /// by tables of this one; above 0 if the tables know something.
+    /// Mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
+    /// b) / (p(a) p(b))`; above 0 if the tables are informative.
     pub fn lift_on(&self, other: &Self) -> Option<f64> {
         let marginals = crate::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());
         let (mut sum, mut n) = (0.0, 0.0);
@@ -208,9 +208,9 @@ impl Learner {
         (n > 0.0).then(|| sum / n)
     }
 
-    /// All that was learned.
+    /// The learned parameters.
     ///
-    /// * `rig`: what the pairs of cameras that were learned by name belong to.
+    /// * `rig`: the rig of the pairs of cameras that were learned by name.
     ///
     /// # Errors
     ///
@@ -253,7 +253,7 @@ impl Learner {
     }
 }
 
-/// The middle one; of an even number the lower.
+/// The median; of an even number of values the lower one.
 fn median(values: &[f32]) -> f32 {
     let median = Sorted::new(values).lower_median();
     // Four digits are more than pictures tell.

@@ -1,9 +1,9 @@
-//! What several views of a person have in common, learned from people whose joints are known.
+//! Learns the consistency parameters between views from people with known joints.
 //!
-//! The paper's section 5, "Consistency parameters". [`Learner`] takes single views as they were solved, with the
-//! truth ([`ViewObservation`]), and learns from those that are nearly right which part types come together
-//! ([`Counts`]), how far off parts usually are (tau), and where joints lie among parts. [`Learned`] is
-//! the file beside a model that holds it. Pure: nothing here reads a file or a clock.
+//! The paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions with the truth
+//! ([`ViewObservation`]), and learns from those that are nearly right which part types occur together
+//! ([`Counts`]), the median errors of parts (tau), and the map from parts to joints. [`Learned`] is the file
+//! beside a model with the result. Nothing here reads a file or a clock.
 #![forbid(unsafe_code)]
 
 mod counts;

@@ -1,10 +1,10 @@
-//! Weights by cross-validation: which of many settings find held-out people best.
+//! Chooses the weights by cross-validation on held-out people.
 
 use serde::Serialize;
 
 use crate::Weights;
 
-/// The values that are tried.
+/// The grid of values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Weights of the geometric term.
@@ -13,7 +13,7 @@ pub struct Grid {
     pub caps: Vec<Option<f64>>,
     /// Weights of the appearance term: of the paper's joint probabilities.
     pub joint_betas: Vec<f64>,
-    /// The same of logarithms against chance.
+    /// The same for the lift.
     pub lift_betas: Vec<f64>,
 }
 
@@ -28,7 +28,7 @@ impl Default for Grid {
     }
 }
 
-/// How one choice of weights did.
+/// The result of one choice of weights.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
     /// The weights.
@@ -37,11 +37,11 @@ pub struct Point {
     pub area: f64,
     /// PCP3D at 0.5, percent.
     pub pcp3d: f64,
-    /// Mean number of single-view solutions until a pair settled.
+    /// Mean number of single-view solutions until a pair converged.
     pub iterations: f64,
 }
 
-/// What is found about one choice of weights, frame by frame.
+/// Accumulates the results of one choice of weights over frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
     n: u64,
@@ -87,7 +87,7 @@ pub fn best(points: &[Point]) -> Option<&Point> {
 }
 
 impl Grid {
-    /// What is tried first: the geometric term alone.
+    /// The first search: the geometric term alone.
     pub fn geometry(&self) -> Vec<Weights> {
         let of_cap = |cap: &Option<f64>| {
             let alphas = self.alphas.iter();
@@ -97,7 +97,7 @@ impl Grid {
         self.caps.iter().flat_map(of_cap).collect()
     }
 
-    /// What is tried next: the appearance term with the geometric weights that did best, and with those beside them.
+    /// The second search: the appearance term with the best geometric weights and their neighbours.
     pub fn appearance(&self, best: &Weights) -> Vec<Weights> {
         let at = self.alphas.iter().position(|it| *it == best.alpha);
         let at = at.unwrap_or_default();
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn appearance_is_tried_around_the_best_geometry() {
+    fn appearance_is_searched_around_the_best_geometry() {
         let grid = Grid::default();
         let tried = grid.appearance(&without_appearance(0.004, Some(4.0)));
         assert_eq!(tried.len(), 3 * 8);

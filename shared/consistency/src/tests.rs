@@ -1,4 +1,4 @@
-//! Laws of what is learned, and of the file that holds it.
+//! Properties of the learned parameters and their file.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ fn shape() -> Shape {
     }
 }
 
-/// A person whose parts are all of type `types(part)`, found where they are but for `error` tenths.
+/// A person whose parts have type `types(part)` and an error of `error` tenths.
 fn observation(types: impl Fn(usize) -> u8, error: f32, exchanged: bool) -> ViewObservation {
     ViewObservation {
         types: (0..N_PARTS).map(types).collect(),
@@ -40,8 +40,8 @@ fn learned(learner: &Learner) -> Learned {
         .unwrap()
 }
 
-/// Sees two views at an angle, `n` times.
-fn see(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, n: usize) {
+/// Adds two views at an angle, `n` times.
+fn add_views(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, n: usize) {
     for _ in 0..n {
         learner.add_view(views[0], &PARSE14);
         learner.add_view(views[1], &PARSE14);
@@ -62,13 +62,13 @@ fn at(of: &Learned, degrees: f64, part: usize, types: [usize; 2]) -> f64 {
 }
 
 #[test]
-fn types_that_come_together_are_likely_together_at_their_angle_and_back() {
+fn types_seen_together_are_likely_at_their_angle_in_both_directions() {
     let mut learner = learner();
     let (first, second) = (
         observation(|_| 0, 0.1, false),
         observation(|_| 2, 0.1, false),
     );
-    see(&mut learner, [&first, &second], 50.0, 100);
+    add_views(&mut learner, [&first, &second], 50.0, 100);
     let learned = learned(&learner);
     assert!(at(&learned, 50.0, 4, [0, 2]) > 0.8);
     assert!(at(&learned, -50.0, 4, [2, 0]) > 0.8);
@@ -82,18 +82,18 @@ fn the_order_of_two_views_does_not_matter() {
         observation(|it| (it % 2) as u8, 0.1, true),
     ];
     let [mut one, mut other] = [learner(), learner()];
-    see(&mut one, [&views[0], &views[1]], 70.0, 30);
-    see(&mut other, [&views[1], &views[0]], -70.0, 30);
+    add_views(&mut one, [&views[0], &views[1]], 70.0, 30);
+    add_views(&mut other, [&views[1], &views[0]], -70.0, 30);
     assert_eq!(learned(&one).ring, learned(&other).ring);
 }
 
 #[test]
 fn views_from_behind_have_tables_of_their_own() {
     let mut learner = learner();
-    // The right arm is of type 1, the left one of type 2, in either picture's own words.
+    // // The right arm has type 1, the left one type 2, as each picture names the sides.
     let side = |it: usize| if it < 14 { 1 } else { 2 };
     let (front, back) = (observation(side, 0.1, false), observation(side, 0.1, true));
-    see(&mut learner, [&front, &back], 175.0, 100);
+    add_views(&mut learner, [&front, &back], 175.0, 100);
     let learned = learned(&learner);
     let joint = learned.by_angle(Appearance::Joint);
     let joint = joint.at(PI * 0.98).unwrap();
@@ -101,18 +101,18 @@ fn views_from_behind_have_tables_of_their_own() {
     assert!(joint.exchanged.as_ref().unwrap().value(5, 1, 2) > 0.8);
     let lift = learned.by_angle(Appearance::Lift);
     let same = &lift.at(PI * 0.98).unwrap().joint;
-    assert!(same.value(5, 1, 1).abs() < 1e-9, "nothing was seen of it");
+    assert!(same.value(5, 1, 1).abs() < 1e-9, "it was not observed");
 }
 
 #[test]
-fn what_is_far_from_the_truth_teaches_no_types_but_counts_for_tau() {
+fn views_far_from_the_truth_count_for_tau_but_not_for_types() {
     let mut learner = learner();
     let (good, bad) = (
         observation(|_| 0, 0.1, false),
         observation(|_| 1, 3.0, false),
     );
-    see(&mut learner, [&good, &good], 50.0, 2);
-    see(&mut learner, [&bad, &good], 50.0, 3);
+    add_views(&mut learner, [&good, &good], 50.0, 2);
+    add_views(&mut learner, [&bad, &good], 50.0, 3);
     let learned = learned(&learner);
     assert_eq!(learned.rigs[0].pairs[0].counts.total(), 2 * N_PARTS as u64);
     // 7 good views and 3 bad ones.
@@ -120,12 +120,12 @@ fn what_is_far_from_the_truth_teaches_no_types_but_counts_for_tau() {
 }
 
 #[test]
-fn nobody_near_the_truth_teaches_nothing() {
+fn without_views_near_the_truth_nothing_is_learned() {
     let mut learner = learner();
     let bad = observation(|_| 1, 3.0, false);
-    see(&mut learner, [&bad, &bad], 50.0, 3);
-    let said = learner.learned(String::new(), Weights::default(), None, None);
-    assert_eq!(said.unwrap_err(), LearnError::Nothing { views: 6 });
+    add_views(&mut learner, [&bad, &bad], 50.0, 3);
+    let error = learner.learned(String::new(), Weights::default(), None, None);
+    assert_eq!(error.unwrap_err(), LearnError::Nothing { views: 6 });
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn tables_of_a_named_rig_follow_the_cameras() {
         observation(|_| 0, 0.1, false),
         observation(|_| 2, 0.1, false),
     );
-    see(&mut learner, [&first, &second], 50.0, 100);
+    add_views(&mut learner, [&first, &second], 50.0, 100);
     let learned = learned(&learner);
     let tables = learned.of_rig("hall", &["right", "other", "left"], Appearance::Joint);
     let tables = tables.unwrap();
@@ -150,17 +150,17 @@ fn tables_of_a_named_rig_follow_the_cameras() {
 }
 
 #[test]
-fn types_never_seen_together_have_no_lift_where_nothing_is_known() {
+fn unseen_pairs_of_types_have_no_lift_without_data() {
     let mut learner = learner();
     let (first, second) = (
         observation(|_| 0, 0.1, false),
         observation(|_| 2, 0.1, false),
     );
-    see(&mut learner, [&first, &second], 50.0, 100);
+    add_views(&mut learner, [&first, &second], 50.0, 100);
     let tables = learned(&learner).by_angle(Appearance::Lift);
     assert!(
         tables.at(PI * 0.9).is_none(),
-        "an angle never seen has no table"
+        "an angle without data has no table"
     );
     let lift = &tables.at(50.0_f64.to_radians()).unwrap().exchanged;
     let lift = lift.as_ref().unwrap();
@@ -168,13 +168,13 @@ fn types_never_seen_together_have_no_lift_where_nothing_is_known() {
 }
 
 #[test]
-fn tables_know_people_alike_and_not_others() {
+fn the_lift_is_positive_for_similar_people_only() {
     let [mut own, mut alike, mut other] = [learner(), learner(), learner()];
     let person = |it: u8| observation(move |_| it, 0.1, false);
     for [a, b] in [[0, 2], [1, 1], [2, 0]] {
-        see(&mut own, [&person(a), &person(b)], 50.0, 40);
-        see(&mut alike, [&person(a), &person(b)], 50.0, 10);
-        see(&mut other, [&person(a), &person(2 - b)], 50.0, 10);
+        add_views(&mut own, [&person(a), &person(b)], 50.0, 40);
+        add_views(&mut alike, [&person(a), &person(b)], 50.0, 10);
+        add_views(&mut other, [&person(a), &person(2 - b)], 50.0, 10);
     }
     assert!(own.lift_on(&alike).unwrap() > 0.5);
     assert!(own.lift_on(&other).unwrap() < 0.0);
@@ -206,19 +206,19 @@ fn example() -> Learned {
         observation(|it| (it % 3) as u8, 0.1, false),
         observation(|_| 1, 0.2, true),
     ];
-    see(&mut learner, [&views[0], &views[1]], 100.0, 3);
+    add_views(&mut learner, [&views[0], &views[1]], 100.0, 3);
     learned(&learner)
 }
 
 #[test]
-fn what_is_written_is_read_to_the_last_bit() {
+fn the_file_survives_a_round_trip_bit_for_bit() {
     let example = example();
     let text = example.write().unwrap();
     assert_eq!(Learned::parse(&text).unwrap(), example);
 }
 
-/// What is said about the example with one thing changed.
-fn said(change: impl Fn(&mut serde_json::Value)) -> String {
+/// The error for the example with one change.
+fn error_of(change: impl Fn(&mut serde_json::Value)) -> String {
     let mut value = serde_json::to_value(example()).unwrap();
     change(&mut value);
     match Learned::parse(&value.to_string()) {
@@ -230,7 +230,7 @@ fn said(change: impl Fn(&mut serde_json::Value)) -> String {
 #[test]
 fn a_wrong_file_is_refused_with_the_field() {
     use serde_json::json;
-    assert_eq!(said(|_| ()), "fine");
+    assert_eq!(error_of(|_| ()), "fine");
     let cases: [(&str, serde_json::Value, &str); 11] = [
         (
             "/format",
@@ -285,8 +285,8 @@ fn a_wrong_file_is_refused_with_the_field() {
         ),
     ];
     for (at, to, expected) in cases {
-        let said = said(|it| *it.pointer_mut(at).unwrap() = to.clone());
-        assert!(said.contains(expected), "{at}: {said}");
+        let error = error_of(|file| *file.pointer_mut(at).unwrap() = to.clone());
+        assert!(error.contains(expected), "{at}: {error}");
     }
 }
 

@@ -1,8 +1,8 @@
-//! Confidence intervals by drawing frames again.
+//! Confidence intervals by resampling frames (bootstrap).
 
 use statistics::Sorted;
 
-/// What one frame adds to a mean: the sum of its values, and how many they are.
+/// The contribution of one frame to a mean: the sum and the number of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Share {
     /// Sum of the values.
@@ -29,17 +29,17 @@ impl Share {
     }
 }
 
-/// How frames are drawn again.
+/// How frames are resampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
-    /// How often.
+    /// /// Number of resamples.
     pub n_resamples: usize,
     /// The same seed gives the same interval.
     pub seed: u64,
     /// Share of the resamples that lie inside, 0..1.
     pub confidence: f64,
-    /// Consecutive frames that are drawn together. Frames of a film are much like their neighbours:
-    /// drawn one by one they make intervals that are too narrow.
+    /// Consecutive frames that are drawn together. Neighbouring frames are correlated: drawing them one by
+    /// one gives intervals that are too narrow.
     pub block: usize,
 }
 
@@ -76,7 +76,7 @@ impl Bootstrap {
                 }
                 left -= block.min(left);
             }
-            // Frames without a value may be drawn alone, which says nothing.
+            // // A resample may consist of frames without a value; it is skipped.
             if drawn.n > 0.0 {
                 means.push(drawn.sum / drawn.n);
             }
@@ -100,20 +100,20 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_weighs_frames_by_their_values() {
+    fn the_mean_weights_frames_by_their_number_of_values() {
         let frames = [Share::of([1.0, 1.0, 1.0]), Share::of([5.0]), Share::of([])];
         assert_eq!(Share::mean(&frames), Some(2.0));
         assert_eq!(Share::mean(&[Share::of([])]), None);
     }
 
     #[test]
-    fn what_never_changes_has_an_interval_of_no_width() {
+    fn a_constant_has_an_interval_of_no_width() {
         let got = Bootstrap::default().interval(&frames(&[0.75; 40]));
         assert_eq!(got, Some([0.75; 2]));
     }
 
     #[test]
-    fn the_interval_of_a_coin_is_as_wide_as_theory_says() {
+    fn the_interval_of_a_coin_has_the_theoretical_width() {
         let coin: Vec<f64> = (0..400).map(|it| f64::from(it % 2)).collect();
         let settings = Bootstrap {
             n_resamples: 4000,
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_widen_the_interval_of_what_changes_slowly() {
+    fn blocks_widen_the_interval_of_correlated_frames() {
         let slow: Vec<f64> = (0..400).map(|it| f64::from(it / 50 % 2)).collect();
         let width = |block: usize| {
             let settings = Bootstrap {

@@ -1,10 +1,10 @@
-//! What another version makes better and worse: the paper's histogram of improvements and deteriorations.
+//! The paper's histogram of improvements and deteriorations between two versions.
 
-/// Counts of differences of errors, `before - after`: what is above 0 has become better.
+/// Histogram of differences of errors, `before - after`: positive ones are improvements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changes {
     width: f64,
-    /// Of `[edge, edge + width)`; the outermost hold everything beyond.
+    /// Counts of `[edge, edge + width)`; the outermost include everything beyond.
     bins: Vec<usize>,
     improved: usize,
     deteriorated: usize,
@@ -13,10 +13,10 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Begins to count.
+    /// /// An empty histogram.
     ///
     /// * `reach`: the histogram goes from `-reach` to `reach`, in the unit of the errors.
-    /// * `n_bins`: how many there are, at least 2.
+    /// * `n_bins`: number of bins, at least 2.
     /// * `same`: differences that are at most this large count as no change.
     pub fn new(reach: f64, n_bins: usize, same: f64) -> Self {
         let n_bins = n_bins.max(2);
@@ -30,7 +30,7 @@ impl Changes {
         }
     }
 
-    /// Counts an error before and after; passed over if either is not a finite number.
+    /// Counts an error before and after; ignored if either is not finite.
     pub fn add(&mut self, before: f64, after: f64) {
         let gain = before - after;
         if !gain.is_finite() {
@@ -52,17 +52,17 @@ impl Changes {
         counts.map(move |(it, &count)| (edge(it), count))
     }
 
-    /// How many became better.
+    /// Number of improvements.
     pub fn improved(&self) -> usize {
         self.improved
     }
 
-    /// How many became worse.
+    /// Number of deteriorations.
     pub fn deteriorated(&self) -> usize {
         self.deteriorated
     }
 
-    /// How many were counted.
+    /// Number of all counted differences.
     pub fn total(&self) -> usize {
         self.total
     }
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn better_is_to_the_right_and_the_outermost_bins_hold_the_rest() {
+    fn improvements_are_positive_and_the_outermost_bins_include_the_rest() {
         let mut changes = Changes::new(20.0, 4, 0.5);
         for (before, after) in [
             (100.0, 1.0),

@@ -1,4 +1,4 @@
-//! Errors of single joints in three dimensions: distances, and those that are left after the best alignment.
+//! Errors of single joints in three dimensions: distances, before and after the best alignment.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,11 +16,11 @@ pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Opt
     found.iter().zip(truth).map(error).collect()
 }
 
-/// The found joints, turned, moved and scaled to fit the truth best.
+/// The found joints after the best alignment by rotation, translation and scale.
 ///
 /// Minimises the sum of squared distances over all rotations (no mirroring), translations and scales
-/// (Umeyama 1991), over the joints that both have; what remains is the error of the pose, wherever it
-/// stands and however large it is. The mean of these distances is the Procrustes form of the MPJPE.
+/// (Umeyama 1991), over the joints that both have; what remains is the error of the pose regardless of
+/// position and size. The mean of these distances is the Procrustes form of the MPJPE.
 ///
 /// * Returns `None` if fewer than three joints are in both, or those found lie in one place.
 pub fn aligned(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<Vec<Option<Point>>> {
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn two_joints_or_one_place_fix_nothing() {
+    fn two_joints_or_coincident_joints_cannot_be_aligned() {
         let two = points(&[[0.0; 3], [1.0; 3]]);
         assert_eq!(aligned(&two, &two), None);
         let one_place = points(&[[2.0; 3]; 5]);
@@ -107,7 +107,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_pose_that_was_moved_turned_and_scaled_fits_again(
+        fn a_moved_rotated_and_scaled_pose_is_aligned(
             truth in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 4..14),
             axis in prop::array::uniform3(-2.0..2.0_f64),
             shift in prop::array::uniform3(-5.0..5.0_f64),
@@ -122,7 +122,7 @@ mod tests {
         }
 
         #[test]
-        fn no_small_turn_fits_better(
+        fn no_small_rotation_fits_better(
             truth in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 5),
             found in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 5),
             axis in prop::array::uniform3(-0.1..0.1_f64),

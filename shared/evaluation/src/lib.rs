@@ -25,5 +25,5 @@ pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};
 pub use ranks::{area_under_roc, rank_correlation};
 pub use report::{PCK_SHARES, Report, evaluate};
 
-/// A place in space.
+/// A point in space.
 pub type Point = [f64; 3];

@@ -1,7 +1,7 @@
 //! Percentage of correct keypoints in one image.
 
-/// What joints are reported as, with the joints (of `skeleton::PARSE14`) that are averaged: both sides, and the neck
-/// with the top of the head, as Yang & Ramanan's released `eval_pck` does.
+/// The reported groups of joints, with the joints (of `skeleton::PARSE14`) that are averaged: both sides, and
+/// the neck with the top of the head, as Yang & Ramanan's released `eval_pck` does.
 pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
     ("head", [12, 13]),
     ("shoulder", [8, 9]),
@@ -34,10 +34,10 @@ pub fn joints_found<const N: usize>(
     })
 }
 
-/// The best detection of the person that is meant, on an image where others may be found too.
+/// The best detection of the annotated person, on an image where others may be detected too.
 ///
 /// It is the one of the highest score among those whose box covers more than `share` of the true box:
-/// the released evaluation looks for PCK with a `share` of 0.3, on detections before any are suppressed.
+/// the released evaluation uses a `share` of 0.3 for PCK, on detections before non-maximum suppression.
 ///
 /// * `detections`: score and box `[x1, y1, x2, y2]` around all parts, pixels.
 /// * `truth`: the true box, pixels.
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn the_groups_hold_every_joint_once_and_both_sides() {
+    fn the_groups_contain_every_joint_once_and_both_sides() {
         let mut joints: Vec<usize> = PCK_GROUPS.iter().flat_map(|it| it.1).collect();
         joints.sort_unstable();
         assert_eq!(joints, (0..14).collect::<Vec<_>>());
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_detection_elsewhere_is_passed_over() {
+    fn a_better_detection_elsewhere_is_ignored() {
         let truth = [0.0, 0.0, 10.0, 10.0];
         let detections = [
             (3.0, [20.0, 0.0, 30.0, 10.0]),

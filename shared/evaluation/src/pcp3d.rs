@@ -94,7 +94,7 @@ const HUMANEVA20: Ends = [
 
 /// The twelve segments between the joints of a set; `None` for a set that is not known here.
 ///
-/// Where a set names one place twice (the elbow as the end of either arm), its two joints are averaged.
+/// If a set has one point twice (the elbow as the end of both arm segments), its two joints are averaged.
 pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     let ends = match set.name {
         "parse14" => PARSE14,
@@ -141,7 +141,7 @@ pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     Some(std::array::from_fn(segment))
 }
 
-/// How far off every segment is: the mean error of its two ends over its true length.
+/// The error of every segment: the mean error of its two ends over its true length.
 ///
 /// A segment is correct at a threshold `gamma` if this is at most `gamma` (eq. 13), 0.5 by convention.
 ///
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_a_segment_are_the_same_places_in_every_set() {
+    fn the_ends_of_a_segment_are_the_same_points_in_every_set() {
         let ends = |set: &JointSet| {
             let joints = person(set);
             segments(set).unwrap().map(|it| {
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_off_by_the_length_is_exactly_at_the_convention() {
+    fn an_end_with_an_error_of_the_length_is_exactly_at_the_threshold() {
         let set = &skeleton::PARSE14;
         let truth = person(set);
         let segments = segments(set).unwrap();
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_found_is_wrong_and_what_is_not_known_is_not_judged() {
+    fn missing_joints_are_wrong_and_unknown_ones_are_not_judged() {
         let set = &skeleton::PARSE14;
         let (mut found, mut truth) = (person(set), person(set));
         found[6] = None;
@@ -254,7 +254,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn neither_unit_nor_world_changes_a_segment(
+        fn unit_and_translation_do_not_change_the_error(
             shift in prop::array::uniform3(-5.0..5.0_f64),
             off in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 14),
             scale in 0.01..1000.0_f64,

@@ -1,10 +1,10 @@
-//! How well one number tells another: area under the ROC, and rank correlation.
+//! Rank statistics: area under the ROC, and rank correlation.
 
 /// Area under the receiver operating characteristic: the chance that a sample of the class scores above
 /// one that is not of it, ties counting half (Mann and Whitney).
 ///
 /// * `samples`: score, and whether it is of the class.
-/// * Returns `None` unless there are both kinds, or if a score is no number.
+/// * Returns `None` unless there are both kinds, or if a score is NaN.
 pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     let scores: Vec<f64> = samples.iter().map(|it| it.0).collect();
     let ranks = ranks(&scores)?;
@@ -16,7 +16,7 @@ pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
 
 /// Spearman's rank correlation of two numbers, ties with the mean of their ranks.
 ///
-/// * Returns `None` for fewer than two pairs, if either number never changes, or one is no number.
+/// * Returns `None` for fewer than two pairs, if either number is constant, or one is NaN.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let [first, second] = [
         pairs.iter().map(|it| it.0).collect::<Vec<f64>>(),
@@ -32,7 +32,7 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     (scale > 0.0).then(|| product(&first, &second) / scale)
 }
 
-/// Ranks from 1, equal numbers with the mean of theirs; `None` if one is no number.
+/// Ranks from 1, equal numbers with the mean of theirs; `None` if one is NaN.
 fn ranks(values: &[f64]) -> Option<Vec<f64>> {
     if values.iter().any(|it| it.is_nan()) {
         return None;
@@ -58,12 +58,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_score_that_separates_has_all_of_the_area_and_one_that_does_not_half() {
-        let told = [(1.0, false), (2.0, false), (3.0, true), (4.0, true)];
-        assert_eq!(area_under_roc(&told), Some(1.0));
-        let wrong = told.map(|(score, is)| (score, !is));
+    fn a_separating_score_has_area_1_and_a_constant_a_half() {
+        let separating = [(1.0, false), (2.0, false), (3.0, true), (4.0, true)];
+        assert_eq!(area_under_roc(&separating), Some(1.0));
+        let wrong = separating.map(|(score, is)| (score, !is));
         assert_eq!(area_under_roc(&wrong), Some(0.0));
-        let constant = told.map(|(_, is)| (7.0, is));
+        let constant = separating.map(|(_, is)| (7.0, is));
         assert_eq!(area_under_roc(&constant), Some(0.5));
     }
 
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn order_is_all_that_counts_for_rank_correlation() {
+    fn rank_correlation_depends_on_the_order_only() {
         let curved = [(1.0, 1.0), (2.0, 8.0), (3.0, 27.0), (4.0, 1000.0)];
         assert_eq!(rank_correlation(&curved), Some(1.0));
         let falling = curved.map(|(a, b)| (-a, b));
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_changes_tells_nothing() {
+    fn a_constant_has_no_rank_correlation() {
         assert_eq!(rank_correlation(&[(1.0, 1.0), (1.0, 2.0)]), None);
         assert_eq!(rank_correlation(&[(1.0, 1.0)]), None);
         assert_eq!(rank_correlation(&[(f64::NAN, 1.0), (1.0, 2.0)]), None);

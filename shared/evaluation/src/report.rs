@@ -1,11 +1,11 @@
-//! Everything that is counted over the images of a test set, and its table.
+//! Counts over the images of a test set, and their table.
 
 use std::fmt;
 
 use crate::pck::{PCK_GROUPS, joints_found};
 use crate::pcp::{PARSE_STICKS, Pcp, PcpRule, sticks_found};
 
-/// Shares of the person's size that joints are judged by.
+/// PCK thresholds, as shares of the person's size.
 pub const PCK_SHARES: [f64; 2] = [0.1, 0.2];
 
 /// PCP by both rules and PCK at both shares, per stick and per joint.
@@ -19,7 +19,7 @@ pub struct Report {
 
 /// Judges a list of images.
 ///
-/// * `images`: what was found (`None` if nothing was: everything is counted as wrong) and the truth, 14
+/// * `images`: the detection (`None` if there is none: all joints count as wrong) and the truth, 14
 ///   joints in the order of `skeleton::PARSE14` each, pixels.
 pub fn evaluate<'a>(
     images: impl IntoIterator<Item = (Option<&'a [[f64; 2]; 14]>, &'a [[f64; 2]; 14])>,
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_found_is_wrong_everywhere() {
+    fn missing_detections_count_as_wrong() {
         let truth = person();
         let report = evaluate([(Some(&truth), &truth), (None, &truth)]);
         assert_eq!((report.n_images(), report.n_missed()), (2, 1));

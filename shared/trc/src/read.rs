@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_file_says_what_is_missing() {
+    fn the_error_for_an_empty_file_names_what_is_missing() {
         let got = Trc::parse("");
         assert!(
             matches!(got, Err(TrcError::Header { line: 2, .. })),
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_among_numbers_is_named() {
+    fn a_text_among_numbers_is_named() {
         let got = Trc::parse(&FILE.replace("\t5\t6", "\tfive\t6"));
         let text = "five".to_owned();
         let (line, column) = (6, 7);
