@@ -54,7 +54,7 @@ pub struct FrameResult {
     /// Joints of the sequence's joint set, metres; `None` where one could not be triangulated.
     pub joints: Vec<Option<Point>>,
     /// For each view the 14 joints of `skeleton::PARSE14`, pixels of the footage, left and right those of
-    /// the person; `None` where nobody was found.
+    /// the person; `None` where no person was found.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
     /// Single-view solutions of each pair, or of all views at once.
     pub iterations: Vec<u32>,

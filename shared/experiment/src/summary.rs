@@ -24,9 +24,9 @@ const FAR_PX: f64 = 5.0;
 pub struct Measured {
     /// Name of the data set.
     pub dataset: String,
-    /// Who.
+    /// The subject.
     pub subject: String,
-    /// What.
+    /// The action.
     pub action: String,
     /// `[frame][version]`.
     pub scores: Vec<Vec<FrameScore>>,
@@ -55,9 +55,9 @@ pub struct Summary {
 pub struct Group {
     /// Name of the data set.
     pub dataset: String,
-    /// Who; `All` for several.
+    /// The subject; `All` for several.
     pub subject: String,
-    /// What; `Overall` for several.
+    /// The action; `Overall` for several.
     pub action: String,
     /// Frames of each camera.
     pub frames: usize,

@@ -224,10 +224,10 @@ mod tests {
         for change in change {
             let mut samples = samples();
             change(&mut samples.all[1]);
-            let said = Samples::from_bytes(&samples.to_bytes().unwrap()).unwrap_err();
+            let error = Samples::from_bytes(&samples.to_bytes().unwrap()).unwrap_err();
             assert!(
-                matches!(said, StoreError::Sample { sample: 2, .. }),
-                "{said}"
+                matches!(error, StoreError::Sample { sample: 2, .. }),
+                "{error}"
             );
         }
     }

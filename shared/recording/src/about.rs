@@ -1,4 +1,4 @@
-//! What a recording says about itself: of which run it is, and what was left out on purpose.
+//! Metadata of a recording: its run, and what was left out on purpose.
 
 use std::collections::BTreeMap;
 
@@ -6,28 +6,28 @@ use std::collections::BTreeMap;
 pub(crate) const NAME: &str = "parallax";
 /// Name of the metadata record that names the topics by the numbers of their channels.
 pub(crate) const TOPICS: &str = "parallax.topics";
-/// Version of what this crate writes.
+/// Version of the format that this crate writes.
 const FORMAT: &str = "2";
-/// The version before it, which is read, too: only chunks have checksums.
+/// The previous version, which can be read too: only chunks have checksums.
 pub(crate) const OLDER: &str = "1";
 
 /// What was left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Without {
-    /// Frames come without their pixels.
+    /// Frames are recorded without pixels.
     pub pixels: bool,
-    /// Evidence is not there at all.
+    /// Evidence is not recorded.
     pub evidence: bool,
 }
 
-/// Of which run a recording is.
+/// The run of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
     /// Version of the program that wrote it.
     pub version: String,
-    /// The run; stands in the stamp of every message.
+    /// The session in the stamp of every message.
     pub session: u64,
-    /// When it began, nanoseconds since 1970.
+    /// Start time, nanoseconds since 1970.
     pub began_unix_nanos: u64,
     /// The settings of the run, as JSON.
     pub settings: String,
@@ -35,13 +35,13 @@ pub struct About {
     pub without: Without,
 }
 
-/// A recording does not say of which run it is.
+/// The metadata of a recording is missing or invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AboutError {
-    /// Something is not said.
+    /// /// A key is missing.
     #[error("the recording does not say its {0}")]
     Missing(&'static str),
-    /// A number is none.
+    /// /// A value is not a number.
     #[error("the recording's {key} is {got:?}")]
     Value {
         /// Which.
@@ -59,7 +59,7 @@ pub enum AboutError {
 
 impl About {
     pub(crate) fn to_map(&self) -> BTreeMap<String, String> {
-        let yes_or_no = |it: bool| if it { "yes" } else { "no" }.to_owned();
+        let yes_or_no = |value: bool| if value { "yes" } else { "no" }.to_owned();
         let entries = [
             ("format", FORMAT.to_owned()),
             ("version", self.version.clone()),
@@ -105,7 +105,7 @@ impl About {
     }
 }
 
-/// Whether a map is of a recording of format 1, whose maps have no checksum.
+/// Whether a map belongs to a recording of format 1, whose maps have no checksum.
 pub(crate) fn is_older(map: &BTreeMap<String, String>) -> bool {
     map.get("format").is_some_and(|it| it == OLDER) && !map.contains_key(crate::seal::KEY)
 }
@@ -128,12 +128,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_is_read_again() {
+    fn metadata_survives_a_round_trip() {
         assert_eq!(About::from_map(&about().to_map()), Ok(about()));
     }
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn missing_keys_are_named() {
         for key in about().to_map().keys() {
             let mut map = about().to_map();
             map.remove(key);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn another_format_or_a_number_that_is_none_is_refused_with_what_stands_there() {
+    fn another_format_or_an_invalid_number_is_refused_with_its_value() {
         let refused = |key: &str, value: &str| {
             let mut map = about().to_map();
             map.insert(key.to_owned(), value.to_owned());

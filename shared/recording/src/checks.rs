@@ -1,14 +1,13 @@
-//! What stands before every chunk: where each of its messages lies, and the checksum of each.
+//! The record before every chunk: position and checksum of each of its messages.
 //!
-//! MCAP has a checksum for a chunk, so that one changed byte would cost all its messages. This record, one of
-//! those that the format leaves to programs, has a checksum for every message and one of its own. So
-//! a reader knows the messages of a chunk, and the place of the next record, without believing a byte
-//! that was not checked.
+//! MCAP has one checksum per chunk, so that one changed byte would lose all its messages. This private record
+//! has a checksum for every message and one for itself. So a reader gets the messages of a chunk, and the
+//! position of the next record, from checked bytes only.
 
 use crate::Entry;
 use crate::mcap::{Body, Fields, op};
 
-/// What it begins with, by which it is found again after damage.
+/// Its first bytes, by which it is found after damage.
 pub(crate) const TAG: &[u8; 8] = b"pxchecks";
 
 /// The messages of the chunk that follows.
@@ -17,7 +16,7 @@ pub(crate) struct Checks {
     /// Bytes from its own end to where the chunk's records begin, to their end, and to the next record that is
     /// neither the chunk nor one of its indexes.
     pub(crate) ends: [u64; 3],
-    /// Channel, place among the messages of its topic, and message; its offset is from the beginning of the
+    /// Channel, index among the messages of its topic, and entry; its offset counts from the start of the
     /// chunk's records.
     pub(crate) messages: Vec<(u16, u64, Entry)>,
 }
@@ -41,7 +40,7 @@ impl Checks {
         Body::of(inner).u32(checksum).finish(op::CHECKS, out);
     }
 
-    /// Of the fields of a record; none if they are not what was written.
+    /// Reads the fields of a record; none if they are damaged.
     pub(crate) fn read(body: &[u8]) -> Option<Self> {
         let (inner, checksum) = body.split_last_chunk::<4>()?;
         let mut fields = Fields(inner);
@@ -78,7 +77,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_written_is_read_and_what_was_changed_is_not(
+        fn a_record_survives_a_round_trip_and_a_changed_one_is_refused(
             messages in prop::collection::vec(any::<(u16, u64, Option<u32>, [u64; 4], u32)>(), 0..5),
             at in any::<prop::sample::Index>(), change in 1_u8..,
         ) {

@@ -1,21 +1,21 @@
-//! A chunk as other programs read it: its checksum, and the records within.
+//! Reads a chunk as in standard MCAP: its checksum, and its records.
 
 use std::io::{Read, Seek};
 
 use crate::Entry;
+use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::found::Found;
 use crate::mcap::{CHUNK_HEAD_BYTES, MESSAGE_HEAD_BYTES, RECORD_HEAD_BYTES, op};
 
-/// Takes the messages of a chunk, if it is what was written; otherwise it is passed over. Of one that is cut
-/// off, which cannot be checked, what is there is taken.
+/// Reads the messages of a chunk; a damaged one is skipped. A truncated chunk cannot be checked: its complete
+/// records are read.
 ///
-/// * `record`: is given its records that are not messages.
+/// * `record`: called for its records that are not messages.
 pub(crate) fn take<R: Read + Seek>(
     cursor: &mut Cursor<'_, R>,
-    found: &mut Found,
+    found: &mut Contents,
     len: u64,
-    mut record: impl FnMut(&mut Cursor<'_, R>, &mut Found, u8, u64) -> Result<(), Stop>,
+    mut record: impl FnMut(&mut Cursor<'_, R>, &mut Contents, u8, u64) -> Result<(), Stop>,
 ) -> Result<(), Stop> {
     let begin = cursor.at();
     cursor.skip(8 + 8 + 8)?;
@@ -49,10 +49,10 @@ pub(crate) fn take<R: Read + Seek>(
     Ok(())
 }
 
-/// Takes a message.
+/// /// Reads a message.
 pub(crate) fn message<R: Read + Seek>(
     cursor: &mut Cursor<'_, R>,
-    found: &mut Found,
+    found: &mut Contents,
     len: u64,
 ) -> Result<(), Stop> {
     let Some(n_data) = len.checked_sub(MESSAGE_HEAD_BYTES) else {

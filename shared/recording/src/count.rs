@@ -1,9 +1,9 @@
-//! How many messages of a topic were kept and how many were not.
+//! Recorded and lost messages of a topic.
 
 use core::fmt;
 use core::str::FromStr;
 
-/// Name of the metadata record; the last of a file counts.
+/// Name of the metadata record; the last one of a file is valid.
 pub(crate) const NAME: &str = "parallax.counts";
 
 /// Messages of one topic.
@@ -11,7 +11,7 @@ pub(crate) const NAME: &str = "parallax.counts";
 pub struct Count {
     /// Written to the file.
     pub recorded: u64,
-    /// Sent, but not kept: they came faster than they could be taken in or written.
+    /// Sent, but not recorded, since they came faster than they could be received or written.
     pub lost: u64,
 }
 
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_count_is_read_as_it_is_written() {
+    fn a_count_survives_a_round_trip() {
         let count = Count {
             recorded: 12,
             lost: u64::MAX,

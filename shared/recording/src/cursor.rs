@@ -1,19 +1,19 @@
-//! Reading forward in a file whose length is known, so that no length found in it is believed.
+//! Sequential reading of a file of known length, so that every length in it is checked.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-/// Why no more can be read.
+/// Why reading stops.
 #[derive(Debug)]
 pub(crate) enum Stop {
-    /// The file is over in the middle of something.
+    /// The file is truncated.
     Cut,
-    /// What stands there cannot be.
+    /// The content is invalid.
     Damaged(&'static str),
     /// The file cannot be read.
     Io(io::Error),
 }
 
-/// A place in a file.
+/// /// A position in a file.
 pub(crate) struct Cursor<'a, R: Read + Seek> {
     input: BufReader<&'a mut R>,
     at: u64,
@@ -21,7 +21,7 @@ pub(crate) struct Cursor<'a, R: Read + Seek> {
 }
 
 impl<'a, R: Read + Seek> Cursor<'a, R> {
-    /// At the beginning of a file.
+    /// /// At the start of a file.
     pub(crate) fn new(input: &'a mut R) -> io::Result<Self> {
         let end = input.seek(SeekFrom::End(0))?;
         input.seek(SeekFrom::Start(0))?;
@@ -32,7 +32,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         })
     }
 
-    /// Bytes from the beginning.
+    /// Position, bytes from the start.
     pub(crate) fn at(&self) -> u64 {
         self.at
     }
@@ -78,13 +78,13 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         Ok((op, u64::from_le_bytes(self.array()?)))
     }
 
-    /// Goes to a place of the file.
+    /// Moves to a position.
     pub(crate) fn go(&mut self, at: u64) -> io::Result<()> {
         self.at = at;
         self.input.seek(SeekFrom::Start(at)).map(drop)
     }
 
-    /// The checksum of what follows; nothing is passed over.
+    /// The checksum of the following bytes; the position does not change.
     pub(crate) fn checksum(&mut self, mut n: u64) -> Result<u32, Stop> {
         let begin = self.at;
         let mut hasher = crc32fast::Hasher::new();
@@ -97,7 +97,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
         Ok(hasher.finalize())
     }
 
-    /// Passes over all that follows; whether the file ends with these bytes.
+    /// Moves to the end; returns whether the file ends with these bytes.
     pub(crate) fn ends_with(&mut self, bytes: &[u8]) -> Result<bool, Stop> {
         if self.end - self.at < bytes.len() as u64 {
             return Ok(false);
@@ -108,7 +108,7 @@ impl<'a, R: Read + Seek> Cursor<'a, R> {
     }
 }
 
-/// A file that became shorter while it was read is cut, too.
+/// A file that becomes shorter while it is read counts as truncated.
 fn short(error: io::Error) -> Stop {
     if error.kind() == io::ErrorKind::UnexpectedEof {
         Stop::Cut

@@ -1,32 +1,32 @@
-//! What a recording holds, and where.
+//! The contents of a recording and their positions.
 
 use std::collections::BTreeMap;
 
 use crate::{About, AboutError, Count, Kind};
 
-/// Where a message lies, and when it came.
+/// Position and times of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
-    /// When it was taken in, nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
+    /// When it was received, nanoseconds, `CLOCK_MONOTONIC` of the recording machine.
     pub log_time: u64,
     /// When it was sent, by the same clock.
     pub publish_time: u64,
-    /// Where its data begins, bytes from the beginning of the file.
+    /// Offset of its data, bytes from the start of the file.
     pub offset: u64,
-    /// How long it is, bytes.
+    /// Its length, bytes.
     pub len: u64,
-    /// The frame that it is about; none for signs of life, and where the recording does not say it.
+    /// Its frame; none for heartbeats, and if the recording does not contain it.
     pub frame: Option<u64>,
-    /// Of its data, by which it is checked when it is read; none if the recording has none for every message.
+    /// Checksum of its data, compared when it is read; none in recordings without a checksum per message.
     pub checksum: Option<u32>,
 }
 
 /// One topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Track {
-    /// What travels there.
+    /// The type of its messages.
     pub kind: Kind,
-    /// Its messages, as they stand in the file.
+    /// Its messages, in the order of the file.
     pub entries: Vec<Entry>,
 }
 
@@ -35,47 +35,47 @@ pub struct Track {
 pub struct Extent {
     /// Bytes of the file.
     pub file_bytes: u64,
-    /// Where the last whole record ends.
+    /// End of the last complete record.
     pub whole_bytes: u64,
-    /// Whether the file ends as a recording should.
+    /// Whether the file is complete.
     pub is_complete: bool,
-    /// Places where it is not what was written; the first thousand.
+    /// Damaged positions; the first thousand.
     pub damage: Vec<Damage>,
-    /// Messages that are none of their topic's, and were passed over.
+    /// Malformed messages, which were skipped.
     pub n_malformed: u64,
-    /// Messages that were written and are not found, by topic: of each the numbers run on.
+    /// Messages that were written but not found, by topic: gaps in the consecutive numbers.
     pub missing: BTreeMap<String, u64>,
-    /// What its checksums are of.
+    /// What the checksums cover.
     pub checks: Checked,
 }
 
-/// A place where a file is not what was written.
+/// A damaged position in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Damage {
-    /// Where, bytes from the beginning.
+    /// Offset, bytes from the start.
     pub offset: u64,
     /// What is wrong.
     pub what: &'static str,
 }
 
-/// What the checksums of a recording are of.
+/// What the checksums of a recording cover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Checked {
-    /// Every message has its own, and so has all that is said about the run.
+    /// Every message has its own, and so has the metadata.
     #[default]
     Messages,
-    /// Only chunks have, of a megabyte or more: a recording of format 1.
+    /// Only chunks of a megabyte or more: a recording of format 1.
     Chunks,
 }
 
-/// What a file holds.
+/// The contents of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recording {
-    /// What it says about itself.
+    /// Its metadata.
     pub about: Result<About, AboutError>,
-    /// Its topics by name; those that this program does not know are left out.
+    /// Its topics by name, without those that this program does not know.
     pub tracks: BTreeMap<String, Track>,
-    /// What was kept of every topic and what was lost, as far as the file says.
+    /// Recorded and lost messages of every topic, as far as the file contains the counts.
     pub counts: BTreeMap<String, Count>,
     /// How much of it could be read.
     pub extent: Extent,
@@ -88,18 +88,18 @@ impl Recording {
         tracks.map(|it| it.entries.len() as u64).sum()
     }
 
-    /// Messages of all topics that were sent but not kept, as far as the file says.
+    /// Messages of all topics that were sent but not recorded, as far as the file contains the counts.
     pub fn n_lost(&self) -> u64 {
         let lost = self.counts.values().map(|it| it.lost);
         lost.fold(0, u64::saturating_add)
     }
 
-    /// Messages of all topics that were written and are not found.
+    /// Messages of all topics that were written but not found.
     pub fn n_missing(&self) -> u64 {
         self.extent.missing.values().sum()
     }
 
-    /// When the first and the last message were sent, of those that say so; signs of life do not count.
+    /// When the first and the last message with a time were sent, without heartbeats.
     pub fn span(&self) -> Option<[u64; 2]> {
         let stamped = self.tracks.values().filter(|it| it.kind != Kind::Health);
         let times = stamped.flat_map(|it| &it.entries).map(|it| it.publish_time);
@@ -112,7 +112,7 @@ impl Recording {
 }
 
 /// The messages of several topics in the order in which they were sent, each with the number of its
-/// topic. What was sent at one time stands as it was taken in, what has the same times as in the file.
+/// topic. Messages sent at the same time are in the order of reception, then in that of the file.
 pub fn in_order(tracks: &[&Track]) -> Vec<(usize, Entry)> {
     let numbered = tracks.iter().enumerate();
     let mut all: Vec<(usize, Entry)> = numbered
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_sent_first_comes_first_whoever_was_heard_first() {
+    fn messages_are_ordered_by_the_time_of_sending() {
         let (poses, evidence) = (track(&[20, 40], 0), track(&[10, 30], 100));
         let order = in_order(&[&poses, &evidence]);
         let times: Vec<_> = order.iter().map(|it| (it.0, it.1.publish_time)).collect();
@@ -154,7 +154,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nothing_is_lost_and_what_was_sent_at_one_time_stays_in_order(
+        fn all_messages_are_kept_and_equal_times_keep_their_order(
             first in prop::collection::vec(0_u64..4, 0..20),
             second in prop::collection::vec(0_u64..4, 0..20),
         ) {

@@ -1,4 +1,4 @@
-//! What may travel on a topic, how long it is, and how others may read it.
+//! The message types of topics: their sizes and schemas.
 
 use messages::{
     EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
@@ -15,15 +15,15 @@ pub enum Kind {
     ViewPose,
     /// Expected errors of a view.
     ViewQuality,
-    /// Answers of a fusion worker.
+    /// Results of a fusion worker.
     PairPose,
     /// The result.
     Pose3d,
-    /// Signs of life of a process.
+    /// Heartbeats of a process.
     Health,
 }
 
-/// What a schema may refer to.
+/// The types that a schema may refer to.
 const PARTS: [(&str, &str); 7] = [
     ("Stamp", include_str!("../msg/Stamp.msg")),
     ("Timing", include_str!("../msg/Timing.msg")),
@@ -46,7 +46,7 @@ impl Kind {
         Self::Health,
     ];
 
-    /// What travels on a topic; none for one that this version does not know.
+    /// The message type of a topic; none for an unknown one.
     pub fn of_topic(name: &str) -> Option<Self> {
         let family = |name: &str| name.rsplit_once('/').map(|it| it.0.to_owned());
         Self::ALL.into_iter().find(|kind| match kind {
@@ -90,7 +90,7 @@ impl Kind {
         }
     }
 
-    /// Where its status stands, bytes from the beginning; none if it has no stamp either.
+    /// Offset of its status, bytes; none if it has no stamp.
     pub(crate) fn status_at(self) -> Option<usize> {
         match self {
             Self::Frame => Some(core::mem::offset_of!(FrameHeader, status)),
@@ -128,7 +128,7 @@ impl Kind {
         }
     }
 
-    /// Its schema, `ros2msg`: its own definition and all that it refers to.
+    /// Its schema, `ros2msg`: its definition and those of all types that it refers to.
     pub fn schema(self) -> String {
         let mut text = self.own_schema().to_owned();
         let rule = "=".repeat(80);
@@ -158,7 +158,7 @@ impl Kind {
 mod tests {
     use super::*;
 
-    /// Size and alignment of a type in CDR, bytes; an array of any length counts as nothing.
+    /// Size and alignment of a type in CDR, bytes; an array of variable length counts as 0.
     fn size(kind: &str) -> [usize; 2] {
         if let Some((one, n)) = kind.strip_suffix(']').and_then(|it| it.rsplit_once('[')) {
             let [size, alignment] = size(one);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_schema_brings_all_that_it_refers_to_once() {
+    fn a_schema_contains_every_type_that_it_refers_to_once() {
         for kind in Kind::ALL {
             let schema = kind.schema();
             for (name, _) in PARTS {
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_tells_its_kind_and_an_unknown_one_none() {
+    fn the_kind_follows_from_the_topic_and_unknown_topics_have_none() {
         for kind in Kind::ALL {
             assert_eq!(Kind::of_topic(&kind.example()), Some(kind));
         }

@@ -1,9 +1,9 @@
-//! A run as one MCAP file: every message of every topic, found again even where the file was cut off.
+//! A run as one MCAP file with every message of every topic, readable even if the file is truncated.
 //!
-//! The file is MCAP as others write it: chunked, indexed, not compressed. Messages are CDR, little
-//! endian, with ROS 2 schemas (`msg/`), which other programs read too: a `repr(C)` struct without
-//! padding has the layout that CDR asks for. Every message has a checksum, which is compared when it is read, and so
-//! has all that says where messages lie and of which run they are. Nothing here knows files, clocks or threads.
+//! The file is standard MCAP: chunked, indexed, not compressed. Messages are little-endian CDR with ROS 2
+//! schemas (`msg/`), which other programs can read: a `repr(C)` struct without padding has the layout of CDR.
+//! Every message has a checksum, which is compared when it is read; so have the positions of messages and the
+//! metadata. Nothing here uses files, clocks or threads.
 #![forbid(unsafe_code)]
 
 mod kind;
@@ -19,8 +19,8 @@ mod count;
 mod write;
 
 mod chunk;
+mod contents;
 mod cursor;
-mod found;
 mod index;
 mod older;
 mod scan;

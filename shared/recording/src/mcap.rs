@@ -1,11 +1,11 @@
-//! Records of the MCAP format, version 0 (mcap.dev/spec): their numbers, and how their fields lie.
+//! Records of the MCAP format, version 0 (mcap.dev/spec): opcodes and fields.
 
 use std::collections::BTreeMap;
 
-/// What a file begins and ends with.
+/// The magic bytes at the start and the end of a file.
 pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
-/// Kinds of records.
+/// /// Opcodes of records.
 pub(crate) mod op {
     pub(crate) const HEADER: u8 = 0x01;
     pub(crate) const FOOTER: u8 = 0x02;
@@ -20,15 +20,15 @@ pub(crate) mod op {
     pub(crate) const METADATA: u8 = 0x0c;
     pub(crate) const METADATA_INDEX: u8 = 0x0d;
     pub(crate) const DATA_END: u8 = 0x0f;
-    /// Our own, of those that the format leaves to programs; others pass over it.
+    /// A private record of this program; others skip it.
     pub(crate) const CHECKS: u8 = 0x80;
 }
 
-/// Bytes of what every record begins with: its kind and its length.
+/// Bytes of the head of a record: opcode and length.
 pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
-/// Bytes of what a message has before its data.
+/// Bytes of the head of a message.
 pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
-/// Bytes of what a chunk that is not compressed has before its records.
+/// Bytes of the head of an uncompressed chunk.
 pub(crate) const CHUNK_HEAD_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
 
 /// The fields of a record, one after the other.
@@ -91,7 +91,7 @@ impl Body {
     }
 }
 
-/// What is left of the fields of a record; every answer is none where they are too short.
+/// The remaining fields of a record; reading returns none if they are too short.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fields<'a>(pub &'a [u8]);
 
@@ -139,7 +139,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn fields_are_read_as_they_were_written(
+        fn fields_survive_a_round_trip(
             number: u16,
             text: String,
             map in prop::collection::btree_map(any::<String>(), any::<String>(), 0..4),
@@ -162,7 +162,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_fields_or_none(bytes: Vec<u8>) {
+        fn any_bytes_are_read_or_refused(bytes: Vec<u8>) {
             let mut fields = Fields(&bytes);
             let _map = fields.map();
             let _text = fields.text();

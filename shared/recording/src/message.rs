@@ -5,23 +5,23 @@ use messages::{Stamp, Status, Timing};
 
 use crate::Kind;
 
-/// What CDR begins with: little endian, no options.
+/// The head of CDR: little endian, no options.
 pub(crate) const PREAMBLE: [u8; 4] = [0, 1, 0, 0];
 
 const _: () = assert!(
     cfg!(target_endian = "little"),
-    "messages are written as they lie in memory"
+    "messages are written in the layout of memory"
 );
 
-/// The bytes of a message are not those of its kind.
+/// The bytes of a message do not match its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Malformed {
-    /// It is shorter or longer than its kind and its count say.
+    /// Its length does not match its type and its count.
     #[error("a message of {len} bytes, where {expected} are due")]
     Length {
-        /// Bytes that are there.
+        /// Its length, bytes.
         len: u64,
-        /// Bytes that it should have; the least if even the count is missing.
+        /// The expected length, bytes; the smallest one if the count is missing.
         expected: u64,
     },
     /// It is not little-endian CDR.
@@ -31,7 +31,7 @@ pub enum Malformed {
 
 /// Appends a message to `out`.
 ///
-/// * `head`: the struct, [`Kind::head_bytes`] long; what is longer is cut, what is shorter filled up.
+/// * `head`: the struct, [`Kind::head_bytes`] long; truncated or padded to that length.
 /// * `elements`: its array as bytes, if it has one.
 pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     out.extend_from_slice(&PREAMBLE);
@@ -45,7 +45,7 @@ pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     }
 }
 
-/// A message, taken apart.
+/// /// A parsed message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
     /// The struct.
@@ -55,7 +55,7 @@ pub struct Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// Takes a message apart.
+    /// /// Parses a message.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl<'a> Message<'a> {
     }
 }
 
-/// Whether a message of a kind may have this length, as far as can be told without reading it.
+/// Checks the length of a message without reading it.
 pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
     let count = kind.element_bytes().map_or(0, |_| size_of::<u32>());
     let expected = (PREAMBLE.len() + kind.head_bytes() + count) as u64;
@@ -105,19 +105,19 @@ pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
     }
 }
 
-/// What every message begins with, and its status.
+/// Stamp, timing and status of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Envelope {
-    /// Which frame.
+    /// /// Its stamp.
     pub stamp: Stamp,
-    /// When.
+    /// /// Its times.
     pub timing: Timing,
-    /// Whether it carries a result.
+    /// /// Whether it contains a result.
     pub status: Status,
 }
 
 impl Envelope {
-    /// Of a struct; none for signs of life, which have no stamp, and for what is too short.
+    /// Reads it from a struct; none for heartbeats, which have no stamp, and for a struct that is too short.
     pub fn of(kind: Kind, head: &[u8]) -> Option<Self> {
         let at = kind.status_at()?;
         let stamp = head.get(..size_of::<Stamp>())?;
@@ -130,7 +130,7 @@ impl Envelope {
         })
     }
 
-    /// Writes it into a struct of the kind; signs of life, and what is too short, are left alone.
+    /// Writes it into a struct of the type; heartbeats and structs that are too short are not changed.
     pub fn put(&self, kind: Kind, head: &mut [u8]) {
         let Some(at) = kind.status_at().filter(|_| head.len() >= kind.head_bytes()) else {
             return;
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn an_envelope_is_read_where_every_message_has_it_and_written_there() {
+    fn the_envelope_is_read_and_written_in_every_type_of_message() {
         for ((kind, head), (_, other)) in heads(envelope(9)).into_iter().zip(heads(envelope(70))) {
             assert_eq!(Envelope::of(kind, &head), Some(envelope(9)), "{kind:?}");
             let mut changed = head;
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_comes_back_bit_for_bit() {
+    fn evidence_survives_a_round_trip_bit_for_bit() {
         let values = [1.5_f32, f32::NAN, -0.0];
         let (kind, head) = heads(envelope(1)).swap_remove(1);
         let mut data = Vec::new();

@@ -1,9 +1,9 @@
-//! Reading a recording of format 1: record by record, of which only chunks have checksums.
+//! Reads a recording of format 1 record by record; only its chunks have checksums.
 
 use std::io::{Read, Seek};
 
+use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::found::Found;
 use crate::mcap::{Fields, MAGIC, op};
 use crate::scan::{MAX_RECORD_BYTES, metadata};
 use crate::{Checked, Kind, Recording, chunk};
@@ -11,11 +11,11 @@ use crate::{Checked, Kind, Recording, chunk};
 /// Most topics.
 const MAX_TOPICS: usize = 1024;
 
-/// Finds every message, up to where nothing can be understood any more. The cursor stands behind the file's magic.
+/// Finds every message, up to the first invalid record. The cursor is behind the file's magic.
 pub(crate) fn scan<R: Read + Seek>(
     cursor: &mut Cursor<'_, R>,
 ) -> Result<Recording, std::io::Error> {
-    let mut found = Found::new(cursor.end(), Checked::Chunks);
+    let mut found = Contents::new(cursor.end(), Checked::Chunks);
     match records(cursor, &mut found) {
         Ok(is_complete) => found.extent.is_complete = is_complete,
         Err(Stop::Cut) => {}
@@ -25,8 +25,8 @@ pub(crate) fn scan<R: Read + Seek>(
     Ok(found.finish())
 }
 
-/// Whether the file ends as it should.
-fn records<R: Read + Seek>(cursor: &mut Cursor<'_, R>, found: &mut Found) -> Result<bool, Stop> {
+/// Reads all records; returns whether the file is complete.
+fn records<R: Read + Seek>(cursor: &mut Cursor<'_, R>, found: &mut Contents) -> Result<bool, Stop> {
     loop {
         found.extent.whole_bytes = cursor.at();
         let (op, len) = cursor.record_head()?;
@@ -49,7 +49,7 @@ fn records<R: Read + Seek>(cursor: &mut Cursor<'_, R>, found: &mut Found) -> Res
 
 fn record<R: Read + Seek>(
     cursor: &mut Cursor<'_, R>,
-    found: &mut Found,
+    found: &mut Contents,
     op: u8,
     len: u64,
 ) -> Result<(), Stop> {
@@ -72,7 +72,7 @@ fn record<R: Read + Seek>(
 }
 
 /// None if the fields are not those of a channel.
-fn channel(fields: &mut Fields<'_>, found: &mut Found) -> Option<Result<(), Stop>> {
+fn channel(fields: &mut Fields<'_>, found: &mut Contents) -> Option<Result<(), Stop>> {
     let (id, _schema) = (fields.u16()?, fields.u16()?);
     let (topic, encoding) = (fields.text()?, fields.text()?);
     if found.channels.len() >= MAX_TOPICS {

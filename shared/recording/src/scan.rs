@@ -1,45 +1,45 @@
-//! Reading a recording: where every message lies, up to the last whole record.
+//! Scans a recording for the positions of all messages, up to the last complete record.
 //!
-//! Reads the file from its beginning, by the record before each chunk that says what lies in it, and passes over
-//! what messages hold; so it needs no index at the end, and a file that was cut off anywhere is read like any
-//! other. Where something is not what was written, the next record that is, is searched for.
+//! Reads the file from its start, using the record before each chunk that lists its messages, and skips the
+//! contents of messages. So it needs no index at the end, and truncated files are read like complete ones.
+//! After damage it searches for the next valid record.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::checks::{Checks, TAG};
+use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::found::Found;
 use crate::mcap::{Fields, MAGIC, RECORD_HEAD_BYTES, op};
 use crate::seal::unseal;
 use crate::{Checked, Entry, Kind, Message, Recording, about, chunk, message, older};
 
 /// Longest record that is not a message or a chunk, bytes.
 pub(crate) const MAX_RECORD_BYTES: u64 = 16 << 20;
-/// So much is searched at a time, bytes.
+/// Block size of the search, bytes.
 const WINDOW_BYTES: u64 = 1 << 16;
-/// What looks like the beginning of a record and is none, at most.
+/// Most false starts of records in a search.
 const MOST_FALSE_STARTS: u32 = 10_000;
 
 /// A recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// It is something else.
+    /// /// It is another kind of file.
     #[error("this is not an MCAP file")]
     NotMcap,
     /// The file cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] io::Error),
-    /// A message is not what was written.
+    /// A message does not match its checksum.
     #[error("the message at byte {offset} is not what its checksum says")]
     Checksum {
-        /// Where it begins.
+        /// Its offset in the file, bytes.
         offset: u64,
     },
-    /// A message is no longer what it was when the file was scanned.
+    /// A message has changed since the file was scanned.
     #[error("the message at byte {offset} cannot be read")]
     Message {
-        /// Where it begins.
+        /// Its offset in the file, bytes.
         offset: u64,
         /// Why.
         #[source]
@@ -47,12 +47,12 @@ pub enum ReadError {
     },
 }
 
-/// Finds every message of a file. Whatever the file holds, it takes memory only for messages that
-/// are there, 56 bytes each. What messages hold is not read: see [`read`] and [`check`].
+/// Finds every message of a file. For any file content it takes memory only for existing messages, 56 bytes
+/// each. Contents of messages are not read: see [`read`] and [`check`].
 ///
 /// # Errors
 ///
-/// [`ReadError::NotMcap`], [`ReadError::Read`]. A file that is cut off or damaged is no error: see
+/// [`ReadError::NotMcap`], [`ReadError::Read`]. A truncated or damaged file is not an error: see
 /// [`Extent`](crate::Extent).
 pub fn scan<R: Read + Seek>(input: &mut R) -> Result<Recording, ReadError> {
     let mut cursor = Cursor::new(input)?;
@@ -62,7 +62,7 @@ pub fn scan<R: Read + Seek>(input: &mut R) -> Result<Recording, ReadError> {
         _ => return Err(ReadError::NotMcap),
     }
     let mut scan = Scan {
-        found: Found::new(cursor.end(), Checked::Messages),
+        found: Contents::new(cursor.end(), Checked::Messages),
         cursor,
         is_older: false,
         n_false_starts: 0,
@@ -99,20 +99,20 @@ pub fn read<'a, R: Read + Seek>(
     Message::parse(kind, buffer).map_err(|source| ReadError::Message { offset, source })
 }
 
-/// A message that is not what was written.
+/// /// A damaged message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damaged {
     /// Its topic.
     pub topic: String,
-    /// What it is about.
+    /// Its frame.
     pub frame: Option<u64>,
-    /// Where it begins, bytes from the beginning of the file.
+    /// Its offset, bytes from the start of the file.
     pub offset: u64,
 }
 
-/// Reads all messages of some topics, and names those that [`read`] would refuse.
+/// Reads all messages of some topics, and returns those that [`read`] would refuse.
 ///
-/// * `wanted`: whether a topic is looked at.
+/// * `wanted`: whether a topic is checked.
 ///
 /// # Errors
 ///
@@ -142,7 +142,7 @@ pub fn check<R: Read + Seek>(
     Ok(damaged)
 }
 
-/// Name and entries of metadata; none if the fields are not those.
+/// Name and entries of metadata; none if the fields are invalid.
 pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut fields = Fields(body);
     Some((fields.text()?, fields.map()?))
@@ -150,13 +150,13 @@ pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)
 
 struct Scan<'a, R: Read + Seek> {
     cursor: Cursor<'a, R>,
-    found: Found,
+    found: Contents,
     is_older: bool,
     n_false_starts: u32,
 }
 
 impl<R: Read + Seek> Scan<'_, R> {
-    /// Reads all records that are what was written.
+    /// Reads all valid records.
     fn records(&mut self) -> io::Result<()> {
         loop {
             let begin = self.cursor.at();
@@ -168,7 +168,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 Err(Stop::Damaged(what)) => Some(what),
                 Err(Stop::Cut) => None,
             };
-            // A length that was damaged may look like an end.
+            // // A damaged length may look like the end of the file.
             let whole = self.found.extent.whole_bytes;
             let is_found = self.go_to_next(begin + 1)?;
             if let Some(what) =
@@ -183,7 +183,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         }
     }
 
-    /// Reads a record; whether it was the last.
+    /// Reads a record; returns whether it was the last.
     fn record(&mut self) -> Result<bool, Stop> {
         let begin = self.cursor.at();
         let (op, len) = self.cursor.record_head()?;
@@ -192,7 +192,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 let body = self.cursor.bytes(len)?;
                 match Checks::read(&body) {
                     Some(checks) => self.take(checks)?,
-                    // The chunk has a checksum, too.
+                    // // The chunk has a checksum as well.
                     None => self.found.damaged(begin, "what says where messages lie"),
                 }
             }
@@ -227,7 +227,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Takes the messages of a chunk, and passes over it.
+    /// Takes the messages of a chunk from its list, and skips the chunk.
     fn take(&mut self, checks: Checks) -> Result<(), Stop> {
         let base = self.cursor.at();
         let [begin, end, next] = checks.ends;
@@ -247,7 +247,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         self.cursor.skip(next)
     }
 
-    /// Reads what follows the messages: an index, for other programs, and its checksum.
+    /// Reads the end of the file: an index for other programs, and its checksum.
     fn end(&mut self) -> Result<(), Stop> {
         let begin = self.cursor.at();
         let extent = &mut self.found.extent;
@@ -264,15 +264,15 @@ impl<R: Read + Seek> Scan<'_, R> {
         self.cursor.go(begin).map_err(Stop::Io)?;
         let got = self.cursor.checksum(n)?;
         self.cursor.skip(n)?;
-        let said = u32::from_le_bytes(self.cursor.array()?);
-        if got != said {
+        let expected = u32::from_le_bytes(self.cursor.array()?);
+        if got != expected {
             let what = "the index for other programs, which is not needed here";
             self.found.damaged(begin, what);
         }
         Ok(())
     }
 
-    /// Goes to the next record that is what was written; `false` if there is none.
+    /// Moves to the next valid record; `false` if there is none.
     fn go_to_next(&mut self, mut from: u64) -> io::Result<bool> {
         let (least, overlap) = (from, TAG.len() as u64 - 1);
         while from + overlap < self.cursor.end() {
@@ -307,7 +307,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Whether a record begins here that is what was written.
+    /// Whether a valid record starts here.
     fn is_sound(&mut self, begin: u64) -> io::Result<bool> {
         self.cursor.go(begin)?;
         let Some((op, len)) = or_io(self.cursor.record_head())? else {
@@ -327,7 +327,7 @@ impl<R: Read + Seek> Scan<'_, R> {
     }
 }
 
-/// None where the file is over, or what stands there cannot be.
+/// None if the file is truncated or the content invalid.
 fn or_io<T>(it: Result<T, Stop>) -> io::Result<Option<T>> {
     match it {
         Ok(it) => Ok(Some(it)),

@@ -1,10 +1,10 @@
-//! Metadata that says whether it still is what was written.
+//! Metadata with a checksum.
 
 use std::collections::BTreeMap;
 
 use crate::mcap::Body;
 
-/// Its entry in the map.
+/// The key of the checksum in the map.
 pub(crate) const KEY: &str = "checksum";
 
 fn checksum(name: &str, map: &BTreeMap<String, String>) -> String {
@@ -19,11 +19,11 @@ pub(crate) fn seal(name: &str, mut map: BTreeMap<String, String>) -> BTreeMap<St
     map
 }
 
-/// The map without its checksum; none if it is not what was written.
+/// The map without its checksum; none if it is damaged.
 pub(crate) fn unseal(
     name: &str,
     mut map: BTreeMap<String, String>,
 ) -> Option<BTreeMap<String, String>> {
-    let said = map.remove(KEY)?;
-    (said == checksum(name, &map)).then_some(map)
+    let expected = map.remove(KEY)?;
+    (expected == checksum(name, &map)).then_some(map)
 }

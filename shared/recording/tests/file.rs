@@ -1,4 +1,4 @@
-//! Recordings as files: written, cut off anywhere, damaged anywhere, and read again.
+//! Recordings as files: written, truncated, damaged, and read.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::cell::RefCell;
@@ -13,7 +13,7 @@ use recording::{
 };
 
 /// One message of the tests: its topic, when it was sent, and its array.
-type Said = (usize, u64, Vec<u8>);
+type Sent = (usize, u64, Vec<u8>);
 
 fn topics() -> Vec<String> {
     vec![
@@ -36,17 +36,17 @@ fn kind(topic: usize) -> Kind {
     [Kind::Frame, Kind::ViewPose, Kind::Health][topic]
 }
 
-fn data((topic, time, elements): &Said) -> Vec<u8> {
+fn data((topic, time, elements): &Sent) -> Vec<u8> {
     let mut data = Vec::new();
     encode(kind(*topic), &time.to_le_bytes(), elements, &mut data);
     data
 }
 
 /// A file, and the lengths at which every message was whole in it.
-fn written(said: &[Said], flush_every: usize) -> Vec<u8> {
+fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
     let mut file = Vec::new();
     let mut writer = Writer::begin(&mut file, &about(), &topics()).unwrap();
-    for (nth, it) in said.iter().enumerate() {
+    for (nth, it) in sent.iter().enumerate() {
         let entry = Entry {
             log_time: it.1 + 1,
             publish_time: it.1,
@@ -61,8 +61,8 @@ fn written(said: &[Said], flush_every: usize) -> Vec<u8> {
     file
 }
 
-/// What a file holds, in its order, each message checked against what was said.
-fn held(recording: &Recording, file: &[u8], said: &[Said]) -> usize {
+/// Checks the messages of a file, in its order, against the sent ones; returns their number.
+fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
     let mut found = Vec::new();
     for (nth, name) in topics().iter().enumerate() {
         let entries = recording.tracks.get(name).map(|it| &it.entries[..]);
@@ -70,7 +70,7 @@ fn held(recording: &Recording, file: &[u8], said: &[Said]) -> usize {
     }
     found.sort_by_key(|it| it.1.offset);
     let mut buffer = Vec::new();
-    for ((topic, entry), it) in found.iter().zip(said) {
+    for ((topic, entry), it) in found.iter().zip(sent) {
         let message = read(&mut Cursor::new(file), kind(*topic), entry, &mut buffer).unwrap();
         assert_eq!(message.head[..8], it.1.to_le_bytes());
         let expected: &[u8] = if *topic == 0 { &it.2 } else { &[] };
@@ -80,20 +80,20 @@ fn held(recording: &Recording, file: &[u8], said: &[Said]) -> usize {
     found.len()
 }
 
-fn some() -> Vec<Said> {
+fn some() -> Vec<Sent> {
     (0..12)
         .map(|nth| (nth % 3, 10 * nth as u64, vec![nth as u8; 5 + nth]))
         .collect()
 }
 
 #[test]
-fn what_was_written_is_read_with_its_counts() {
-    let (said, file) = (some(), written(&some(), 4));
+fn a_recording_survives_a_round_trip_with_its_counts() {
+    let (sent, file) = (some(), written(&some(), 4));
     let recording = scan(&mut Cursor::new(&file)).unwrap();
     assert_eq!(recording.about, Ok(about()));
     assert!(recording.extent.is_complete);
     assert_eq!(recording.extent.whole_bytes, file.len() as u64);
-    assert_eq!(held(&recording, &file, &said), said.len());
+    assert_eq!(held(&recording, &file, &sent), sent.len());
     let count = |topic: usize| recording.counts[&topics()[topic]];
     let expected = [(4, 9), (4, 0), (4, 1)];
     let expected = expected.map(|(recorded, lost)| Count { recorded, lost });
@@ -107,7 +107,7 @@ fn what_was_written_is_read_with_its_counts() {
 }
 
 #[test]
-fn others_can_read_it_with_its_index_and_its_checksums() {
+fn other_programs_can_read_it_with_index_and_checksums() {
     let file = written(&some(), 4);
     let summary = mcap::Summary::read(&file).unwrap().unwrap();
     assert_eq!(summary.stats.unwrap().message_count, 12);
@@ -129,8 +129,8 @@ fn others_can_read_it_with_its_index_and_its_checksums() {
 }
 
 #[test]
-fn a_file_cut_off_at_any_byte_holds_what_was_whole_in_it() {
-    let (said, file) = (some(), written(&some(), 4));
+fn a_file_truncated_at_any_byte_contains_its_complete_messages() {
+    let (sent, file) = (some(), written(&some(), 4));
     let mut most = 0;
     for n in 0..=file.len() {
         let part = &file[..n];
@@ -150,7 +150,7 @@ fn a_file_cut_off_at_any_byte_holds_what_was_whole_in_it() {
         );
         assert_eq!(extent.file_bytes, n as u64);
         assert!(extent.whole_bytes <= n as u64);
-        let n_held = held(&recording, part, &said);
+        let n_held = held(&recording, part, &sent);
         assert!(
             n_held == most || n_held == most + 1,
             "{n} bytes: {most}, then {n_held}"
@@ -158,11 +158,11 @@ fn a_file_cut_off_at_any_byte_holds_what_was_whole_in_it() {
         most = n_held;
         assert!(most == 0 || recording.about == Ok(about()));
     }
-    assert_eq!(most, said.len());
+    assert_eq!(most, sent.len());
 }
 
 #[test]
-fn what_is_no_recording_is_refused() {
+fn other_files_are_refused() {
     for other in [&b""[..], b"\x89MCAP", b"\x89PNG\r\n\x1a\n and more"] {
         let refused = scan(&mut Cursor::new(other));
         assert!(matches!(refused, Err(ReadError::NotMcap)));
@@ -170,7 +170,7 @@ fn what_is_no_recording_is_refused() {
 }
 
 #[test]
-fn a_topic_that_this_program_does_not_know_cannot_be_written() {
+fn an_unknown_topic_cannot_be_written() {
     let refused = Writer::begin(Vec::new(), &about(), &["frame/v9/0".to_owned()]);
     assert!(matches!(refused, Err(WriteError::Topic(it)) if it == "frame/v9/0"));
 }
@@ -199,14 +199,14 @@ impl Write for Disk {
 }
 
 #[test]
-fn a_full_disk_is_told_with_the_number_and_what_is_there_stays_readable() {
+fn a_full_disk_is_an_error_with_the_size_and_the_file_stays_readable() {
     let disk = Disk {
         file: Rc::default(),
         room: 40_000,
     };
     let mut writer = Writer::begin(disk.clone(), &about(), &topics()).unwrap();
-    let said: Vec<Said> = (0..90).map(|nth| (0, nth, vec![nth as u8; 1000])).collect();
-    let failed = said.iter().try_for_each(|it| {
+    let sent: Vec<Sent> = (0..90).map(|nth| (0, nth, vec![nth as u8; 1000])).collect();
+    let failed = sent.iter().try_for_each(|it| {
         let entry = Entry {
             log_time: it.1 + 1,
             publish_time: it.1,
@@ -220,17 +220,17 @@ fn a_full_disk_is_told_with_the_number_and_what_is_there_stays_readable() {
     assert!(
         matches!(&error, WriteError::Write { source, .. } if source.kind() == io::ErrorKind::StorageFull)
     );
-    let again = writer.write(0, &Entry::default(), &data(&said[0]));
+    let again = writer.write(0, &Entry::default(), &data(&sent[0]));
     assert!(again.is_err(), "no more can be written");
     drop(writer);
     let file = disk.file.borrow().clone();
     assert_eq!(file.len(), 40_000);
     let recording = scan(&mut Cursor::new(&file)).unwrap();
     assert!(!recording.extent.is_complete);
-    assert!(held(&recording, &file, &said) > 20);
+    assert!(held(&recording, &file, &sent) > 20);
 }
 
-fn any_said() -> impl Strategy<Value = Vec<Said>> {
+fn any_sent() -> impl Strategy<Value = Vec<Sent>> {
     let elements = prop::collection::vec(any::<u8>(), 0..40);
     prop::collection::vec((0_usize..3, 0_u64..1000, elements), 0..20)
 }
@@ -239,21 +239,21 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn a_prefix_holds_a_prefix(said in any_said(), flush_every in 1_usize..8, share in 0.0..1.0) {
-        let file = written(&said, flush_every);
+    fn a_prefix_holds_a_prefix(sent in any_sent(), flush_every in 1_usize..8, share in 0.0..1.0) {
+        let file = written(&sent, flush_every);
         let part = &file[..(file.len() as f64 * share) as usize];
         if let Ok(recording) = scan(&mut Cursor::new(part)) {
-            prop_assert!(held(&recording, part, &said) <= said.len());
+            prop_assert!(held(&recording, part, &sent) <= sent.len());
             prop_assert_eq!(recording.extent.n_malformed, 0);
         }
     }
 
     #[test]
-    fn damage_anywhere_is_said_and_what_is_read_is_what_was_written(
-        said in any_said(), flush_every in 1_usize..8,
+    fn damage_is_reported_and_only_undamaged_messages_are_read(
+        sent in any_sent(), flush_every in 1_usize..8,
         at in any::<prop::sample::Index>(), to: [u8; 8], n in 1_usize..9,
     ) {
-        let whole = written(&said, flush_every);
+        let whole = written(&sent, flush_every);
         let mut file = whole.clone();
         let at = at.index(file.len());
         let end = (at + n).min(file.len());
@@ -262,11 +262,11 @@ proptest! {
     }
 
     #[test]
-    fn bytes_that_were_lost_or_came_between_are_said(
-        said in any_said(), flush_every in 1_usize..8,
+    fn removed_and_inserted_bytes_are_reported(
+        sent in any_sent(), flush_every in 1_usize..8,
         [begin, end, other] in any::<[prop::sample::Index; 3]>(),
     ) {
-        let whole = written(&said, flush_every);
+        let whole = written(&sent, flush_every);
         let [begin, end, other] = [begin, end, other].map(|it| it.index(whole.len()));
         let mut file = whole.clone();
         file.splice(begin.min(end)..begin.max(end), whole[other..].iter().copied().take(9));
@@ -277,7 +277,7 @@ proptest! {
 /// Topic, entry and bytes of a message.
 type Given = (String, Vec<Entry>, Vec<u8>);
 
-/// All that a recording gives: what it says about itself, and of every topic the messages that can be read.
+/// Everything read from a recording: its metadata, and the readable messages of every topic.
 fn given(file: &[u8]) -> Option<(Recording, Vec<Given>, usize)> {
     let recording = scan(&mut Cursor::new(file)).ok()?;
     let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();
@@ -297,20 +297,25 @@ fn given(file: &[u8]) -> Option<(Recording, Vec<Given>, usize)> {
     Some((recording, all, damaged.len()))
 }
 
-/// A changed file gives what the whole one gives, or says that it does not; and nothing that was not written.
+/// Checks that a changed file gives the same messages or reports damage, and gives no message that was not
+/// written.
 fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
     let (before, mut all, _) = given(whole).unwrap();
     let Some((after, some, n_damaged)) = given(changed) else {
         return Ok(());
     };
     let extent = &after.extent;
-    let is_said = n_damaged > 0
+    let is_reported = n_damaged > 0
         || !extent.is_complete
         || !extent.damage.is_empty()
         || after.n_missing() > 0
         || after.about != before.about;
     let n_all = all.len();
-    prop_assert!(is_said || some.len() == n_all, "{} of {n_all}", some.len());
+    prop_assert!(
+        is_reported || some.len() == n_all,
+        "{} of {n_all}",
+        some.len()
+    );
     if let Ok(about) = &after.about {
         prop_assert_eq!(Ok(about), before.about.as_ref());
     }
@@ -324,7 +329,7 @@ fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Where a message was found by the checksum of its chunk, its frame and its own checksum are not known.
+/// If a message was found by the checksum of its chunk, its frame and its own checksum are unknown.
 fn same(it: &mut Given, other: &Given) -> bool {
     for (entry, other) in it.1.iter_mut().zip(&other.1) {
         if entry.checksum.is_none() {
@@ -335,9 +340,9 @@ fn same(it: &mut Given, other: &Given) -> bool {
 }
 
 #[test]
-fn one_changed_byte_of_a_message_costs_that_message_only_and_names_it() {
-    let said: Vec<Said> = (0..9).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
-    let mut file = written(&said, 100);
+fn one_changed_byte_loses_only_its_message_which_is_named() {
+    let sent: Vec<Sent> = (0..9).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
+    let mut file = written(&sent, 100);
     let recording = scan(&mut Cursor::new(&file)).unwrap();
     let entry = recording.tracks["frame/v1/0"].entries[4];
     file[entry.offset as usize + 150] ^= 1;
@@ -355,9 +360,9 @@ fn one_changed_byte_of_a_message_costs_that_message_only_and_names_it() {
 }
 
 #[test]
-fn damage_between_two_chunks_costs_none_of_the_chunks_behind_it() {
-    let said: Vec<Said> = (0..30).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
-    let whole = written(&said, 1);
+fn damage_between_two_chunks_loses_no_later_chunk() {
+    let sent: Vec<Sent> = (0..30).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
+    let whole = written(&sent, 1);
     let n = |file: &[u8]| {
         let recording = scan(&mut Cursor::new(file)).unwrap();
         let missing = recording.n_missing();
@@ -373,7 +378,7 @@ fn damage_between_two_chunks_costs_none_of_the_chunks_behind_it() {
         .enumerate()
         .filter(|it| it.1 == b"pxchecks");
     let tags: Vec<usize> = tag.map(|it| it.0).collect();
-    // The length of the record that says where messages lie.
+    // // The length of the record with the positions of messages.
     let mut file = whole.clone();
     file[tags[12] - 8..tags[12]].fill(0xff);
     assert_eq!(n(&file), (29, 1, 1));
@@ -381,7 +386,7 @@ fn damage_between_two_chunks_costs_none_of_the_chunks_behind_it() {
     let mut file = whole.clone();
     file[tags[12] + 20] ^= 1;
     assert_eq!(n(&file), (30, 0, 1));
-    // All of a chunk, and what was said about it.
+    // // A whole chunk, with the record before it.
     let mut file = whole;
     file[tags[12] - 9..tags[14] - 9].fill(0);
     let (held, missing, damage) = n(&file);

@@ -2,7 +2,7 @@
 //! error instead of a signal, and missing shared memory ends the process with a message.
 #![expect(
     unsafe_code,
-    reason = "handlers of signals that say where memory was missing have no safe binding"
+    reason = "signal handlers for memory faults have no safe binding"
 )]
 
 use core::ffi::c_int;

@@ -77,8 +77,8 @@ impl<T: Message> Subscriber<T> {
         self.port.n_publishers()
     }
 
-    /// The names of the ports that may send, one of a dead process until it is cleaned away. Who
-    /// takes its place has another.
+    /// The ids of the publishers, including those of dead processes until they are cleaned up. A
+    /// restarted process has a new id.
     pub fn publishers(&self) -> Vec<u128> {
         self.port.publishers()
     }
@@ -125,8 +125,8 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
         sample.payload().to_vec()
     }
 
-    /// The names of the ports that may send, one of a dead process until it is cleaned away. Who
-    /// takes its place has another.
+    /// The ids of the publishers, including those of dead processes until they are cleaned up. A
+    /// restarted process has a new id.
     pub fn publishers(&self) -> Vec<u128> {
         self.port.publishers()
     }

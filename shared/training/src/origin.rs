@@ -45,14 +45,14 @@ impl Placed {
 pub(crate) enum Origin {
     /// The right pose of a person.
     Right {
-        /// Who.
+        /// The person.
         person: u32,
-        /// Where.
+        /// Its pose.
         pose: Placed,
     },
     /// The difference of the right pose of a person and a wrong one.
     Mistake {
-        /// Who.
+        /// The person.
         person: u32,
         /// The wrong pose.
         pose: Placed,
@@ -61,7 +61,7 @@ pub(crate) enum Origin {
     Background {
         /// Number of the image.
         image: u32,
-        /// Where.
+        /// Its pose.
         pose: Placed,
     },
 }

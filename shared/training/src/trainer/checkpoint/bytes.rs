@@ -5,7 +5,7 @@
 //! | 0..8 | `PLXTRAIN` |
 //! | 8..12 | version, u32, little-endian: 1 |
 //! | 12..20 | length of the payload, u64, little-endian |
-//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it tells every change within one byte |
+//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it detects every change within one byte |
 //! | 28.. | payload: the stamp and the checkpoint, bincode 2, standard configuration |
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};

@@ -1,26 +1,26 @@
-//! What has been found of a recording so far, by the numbers of its channels.
+//! Collects the contents of a recording during a scan, by channel number.
 
 use std::collections::BTreeMap;
 
 use crate::{About, AboutError, Checked, Count, Damage, Entry, Extent, Kind, Recording, Track};
 use crate::{about, count, message};
 
-/// Most places of damage that are remembered.
+/// Most damaged positions that are kept.
 const MOST_DAMAGE: usize = 1000;
 
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct Contents {
     about: Result<About, AboutError>,
     counts: BTreeMap<String, Count>,
     pub(crate) extent: Extent,
-    /// Names of the topics that are known; none for one that this program does not.
+    /// Names of the topics; none for one that this program does not know.
     pub(crate) channels: BTreeMap<u16, Option<String>>,
     messages: BTreeMap<u16, Vec<Entry>>,
-    /// Messages that a channel must have had, and those that were found.
+    /// Expected and found messages of a channel.
     numbers: BTreeMap<u16, [u64; 2]>,
 }
 
-impl Found {
+impl Contents {
     pub(crate) fn new(file_bytes: u64, checks: Checked) -> Self {
         Self {
             about: Err(AboutError::Missing("settings")),
@@ -72,7 +72,7 @@ impl Found {
         }
     }
 
-    /// Puts the messages to their topics.
+    /// Assigns the messages to their topics.
     pub(crate) fn finish(mut self) -> Recording {
         let mut tracks = BTreeMap::new();
         for (channel, name) in &self.channels {
