@@ -4,7 +4,7 @@ use std::cell::Ref;
 
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
-use pipeline::{ViewResult, Support, Views};
+use pipeline::{Support, ViewResult, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};

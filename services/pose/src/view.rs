@@ -141,7 +141,11 @@ impl View<'_> {
         };
         let scope = memory.tracker.scope(layout, at);
         let mut found = self.find(image, scope, &mut memory.responses)?;
-        if self.job.step.needs_full_search(&memory.tracker, &found.estimate) {
+        if self
+            .job
+            .step
+            .needs_full_search(&memory.tracker, &found.estimate)
+        {
             // Its room for evidence goes back first.
             drop(found);
             found = self.find(image, Scope::whole(layout), &mut memory.responses)?;

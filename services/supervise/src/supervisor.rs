@@ -289,10 +289,10 @@ impl Supervisor<'_> {
         let Some(status) = child.try_wait().map_err(SuperviseError::Watch)? else {
             return Ok(());
         };
-        // // Its last messages.
+        // Its last messages.
         self.receive(index, now);
         let watch = &mut self.watches[index];
-        // // A process that was signalled together with the supervisor may end earlier.
+        // A process that was signalled together with the supervisor may end earlier.
         let is_in_order = watch.reports_finished() || self.stop.is_requested();
         if let Some(death) = death_of(status, is_in_order) {
             return self.died(index, death, now);
@@ -308,7 +308,7 @@ impl Supervisor<'_> {
         let watch = &mut self.watches[index];
         let process = watch.spec.name.as_str();
         (self.on_event)(Event::Died { process, death });
-        // // Dropping the child waits for its end, which the clean-up needs.
+        // Dropping the child waits for its end, which the clean-up needs.
         match watch.die(death, &self.plan.policy, now) {
             Sequel::Restart(pause) => {
                 let process = watch.spec.name.as_str();
@@ -390,7 +390,7 @@ impl Supervisor<'_> {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
             let patient = waited < self.plan.policy.grace;
-            // // Two signals at the same time may merge into one, and its sender may be the other process:
+            // Two signals at the same time may merge into one, and its sender may be the other process:
             // repeat ours.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
                 is_repeated = true;

@@ -204,7 +204,7 @@ impl Watch {
         self.iteration.note(health.n_loops, now);
         if self.iteration.count > 0 && self.at_work_since.is_none() {
             self.at_work_since = Some(now);
-            // // It could not receive messages before.
+            // It could not receive messages before.
             self.received.at = now;
         }
         self.received.note(health.n_received, now);
@@ -249,7 +249,7 @@ impl Watch {
         } else if still <= policy.hang_limit {
             None
         } else if silent > still / 2 {
-            // // A stopped process makes no iterations either; report the missing heartbeats.
+            // A stopped process makes no iterations either; report the missing heartbeats.
             Some(Death::Silent { still: silent })
         } else {
             Some(Death::Hung { still })
@@ -273,7 +273,7 @@ impl Watch {
     /// Notes a death, and decides what follows.
     pub(crate) fn die(&mut self, death: Death, policy: &Policy, now: Instant) -> Sequel {
         self.past = self.past.and(self.current.take().as_ref());
-        // // An input that was usable before may be usable again; other processes still have it.
+        // An input that was usable before may be usable again; other processes still have it.
         if !self.has_worked
             && let Death::Exit { status } = death
             && let Some(kind) = ExitKind::of_status(status).filter(|kind| kind.is_permanent())
@@ -401,7 +401,7 @@ mod tests {
     fn the_work_of_an_iteration_is_the_processor_time_until_the_next() {
         let mut work = Work::default();
         let millis = Duration::from_millis;
-        // // The start-up does not count as an iteration.
+        // The start-up does not count as an iteration.
         work.note(900, true, true);
         work.note(1000, false, false);
         assert_eq!(

@@ -68,7 +68,7 @@ fn a_sender_that_waits_for_a_killed_receiver_continues() {
         ],
     );
     case.plan.policy.max_restarts = 0;
-    // // The sink has the messages that were sent before the dam blocked the sender.
+    // The sink has the messages that were sent before the dam blocked the sender.
     let run = case.run(kill_once("dam", "-9", |event| {
         is_line(event, "dam", "holding")
     }));
@@ -178,10 +178,10 @@ fn a_stopped_process_is_detected() {
             ("source", "send 1000000 1 1", Role::Essential),
         ],
     );
-    // // Only the state of the process can show it.
+    // Only the state of the process can show it.
     case.plan.policy.silence_limit = Duration::from_mins(10);
     case.plan.policy.hang_limit = Duration::from_mins(10);
-    // // Late enough for it to have sent a heartbeat.
+    // Late enough for it to have sent a heartbeat.
     let mut freeze = kill_once("source", "-STOP", |event| {
         is_line(event, "source", "sent 512")
     });
@@ -255,7 +255,7 @@ fn a_long_computation_is_awaited() {
             ("source", "send 3 1 1", Role::Essential),
         ],
     );
-    // // A failed process, finished ones, and a computation that is longer than the idle limit.
+    // A failed process, finished ones, and a computation that is longer than the idle limit.
     case.plan.policy.max_restarts = 0;
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("thinker"), []);
@@ -396,7 +396,7 @@ fn a_run_without_any_view_left_fails() {
 #[test]
 fn a_process_that_never_starts_its_main_loop_is_killed() {
     let mut case = Case::new(Delivery::Realtime, &[("mute", "idle", Role::Essential)]);
-    // // A program that runs but sends no heartbeat.
+    // A program that runs but sends no heartbeat.
     case.plan.executable = "/bin/sleep".into();
     case.plan.policy.startup_limit = Duration::from_millis(200);
     case.plan.policy.max_restarts = 0;
@@ -426,7 +426,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
     let pids: Vec<u32> = (0..2)
         .map(|_| lines.next().unwrap().unwrap().parse().unwrap())
         .collect();
-    // // Both have started: their files exist.
+    // Both have started: their files exist.
     assert!(pids.iter().all(|&pid| is_alive(pid)), "{pids:?}");
     supervisor.kill().unwrap();
     supervisor.wait().unwrap();
@@ -437,7 +437,7 @@ fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
 #[test]
 fn full_shared_memory_is_an_error_with_the_numbers_instead_of_sigbus() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
-    // // A file system of 8 megabytes, mounted for this process only.
+    // A file system of 8 megabytes, mounted for this process only.
     let script = format!(
         "mount -t tmpfs -o size=8m tmpfs /dev/shm || exit 99; exec {} fill {}",
         env!("CARGO_BIN_EXE_supervise-dummy"),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::ViewPlan;
-use pipeline::{ViewResult, PairResult, Skeleton, SkeletonStep, Views};
+use pipeline::{PairResult, Skeleton, SkeletonStep, ViewResult, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use stage::{Frame, Item, Stage};
 use wire::WireError;

@@ -92,7 +92,7 @@ impl JointFit {
 
     fn row(&self, parts: &[usize], ridge: f64) -> Vec<f64> {
         let Some(joint) = self.joints.iter().find(|it| it.parts == parts) else {
-            // // The mean of joints that may have samples of their own.
+            // The mean of joints that may have samples of their own.
             let n = parts.len() as f64;
             return match parts {
                 [part] => unit(*part),

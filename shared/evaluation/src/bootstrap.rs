@@ -76,7 +76,7 @@ impl Bootstrap {
                 }
                 left -= block.min(left);
             }
-            // // A resample may consist of frames without a value; it is skipped.
+            // A resample may consist of frames without a value; it is skipped.
             if drawn.n > 0.0 {
                 means.push(drawn.sum / drawn.n);
             }

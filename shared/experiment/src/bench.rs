@@ -232,7 +232,7 @@ impl Bench {
             .iter()
             .map(|it| {
                 let mut it = it.clone()?;
-                // // Without adaptive selection there are no expected errors: the candidate with the better
+                // Without adaptive selection there are no expected errors: the candidate with the better
                 // score comes first.
                 it.sigma_px = it.sigma_px.filter(|_| version.terms == Terms::Adaptive);
                 Some(it)

@@ -272,7 +272,7 @@ fn curve(frames: &[&FrameScore]) -> Vec<[f64; 2]> {
         .collect();
     let point = |nth: usize| {
         let gamma = 0.05 * nth as f64;
-        // // The steps are not exact in binary, and 0.5 has to agree with the tables.
+        // The steps are not exact in binary, and 0.5 has to agree with the tables.
         let gamma = (gamma * 100.0).round() / 100.0;
         let n = errors.iter().filter(|it| **it <= gamma).count();
         [gamma, 100.0 * n as f64 / errors.len().max(1) as f64]

@@ -132,7 +132,7 @@ impl Meter {
             view,
             histogram,
         } = self.rows.get(index)?;
-        // // The histogram returns the upper end of a bucket, which may exceed the longest duration.
+        // The histogram returns the upper end of a bucket, which may exceed the longest duration.
         let at = |quantile| histogram.value_at_quantile(quantile).min(histogram.max());
         Some(MetricsRow {
             span: *span,

@@ -379,7 +379,7 @@ fn inputs_of(samples: &[&Sample], tile: [usize; 2]) -> Inputs {
         let middle = mean(&|it| f64::from(it.evidence[at]));
         let squared = mean(&|it| (f64::from(it.evidence[at]) - middle).powi(2));
         means.push(middle as f32);
-        // // A nearly constant value carries no information and is not scaled up.
+        // A nearly constant value carries no information and is not scaled up.
         deviations.push(squared.sqrt().max(0.05) as f32);
     }
     Inputs {

@@ -148,7 +148,7 @@ fn pixels(sample: &Sample, tile: TileShape, place: Place) -> Vec<f32> {
     for row in 0..tile.height {
         let (y, v) = at(row, tile.height, place.shift[1], rows);
         for col in 0..tile.width {
-            // // A mirrored tile is moved in the opposite direction.
+            // A mirrored tile is moved in the opposite direction.
             let (from, shift) = if place.mirrored {
                 (tile.width - 1 - col, -place.shift[0])
             } else {

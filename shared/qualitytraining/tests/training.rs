@@ -65,7 +65,7 @@ fn trained<'a>(settings: &'a Settings, samples: &'a Samples) -> Trainer<'a> {
 fn check_file(network: Kind, n: usize, within: f32) {
     let (settings, samples) = (settings(network), samples(network, n));
     let trainer = if network == Kind::Vgg16 {
-        // // Untrained: the initial weights are enough.
+        // Untrained: the initial weights are enough.
         Trainer::new(&settings, &samples, &[], None).unwrap()
     } else {
         trained(&settings, &samples)

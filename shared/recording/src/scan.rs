@@ -168,7 +168,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 Err(Stop::Damaged(what)) => Some(what),
                 Err(Stop::Cut) => None,
             };
-            // // A damaged length may look like the end of the file.
+            // A damaged length may look like the end of the file.
             let whole = self.found.extent.whole_bytes;
             let is_found = self.go_to_next(begin + 1)?;
             if let Some(what) =
@@ -192,7 +192,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 let body = self.cursor.bytes(len)?;
                 match Checks::read(&body) {
                     Some(checks) => self.take(checks)?,
-                    // // The chunk has a checksum as well.
+                    // The chunk has a checksum as well.
                     None => self.found.damaged(begin, "what says where messages lie"),
                 }
             }

@@ -378,7 +378,7 @@ fn damage_between_two_chunks_loses_no_later_chunk() {
         .enumerate()
         .filter(|it| it.1 == b"pxchecks");
     let tags: Vec<usize> = tag.map(|it| it.0).collect();
-    // // The length of the record with the positions of messages.
+    // The length of the record with the positions of messages.
     let mut file = whole.clone();
     file[tags[12] - 8..tags[12]].fill(0xff);
     assert_eq!(n(&file), (29, 1, 1));
@@ -386,7 +386,7 @@ fn damage_between_two_chunks_loses_no_later_chunk() {
     let mut file = whole.clone();
     file[tags[12] + 20] ^= 1;
     assert_eq!(n(&file), (30, 0, 1));
-    // // A whole chunk, with the record before it.
+    // A whole chunk, with the record before it.
     let mut file = whole;
     file[tags[12] - 9..tags[14] - 9].fill(0);
     let (held, missing, damage) = n(&file);

@@ -121,7 +121,7 @@ fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
     publisher.wait_for_subscribers(1, Duration::from_mins(1));
     let mut own = vec![0.0; len];
     let mut micros: Vec<f64> = Vec::new();
-    // // The first ones wait for the other process to start.
+    // The first ones wait for the other process to start.
     while micros.len() < rounds + 50 {
         let begin = Instant::now();
         write(&publisher, len, copies.then_some(&own));

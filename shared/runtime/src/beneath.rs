@@ -33,7 +33,7 @@ pub(crate) fn file_in(directory: impl AsFd, name: &str) -> Result<File, Errno> {
 
 /// Reads a file in a directory, at most `most` bytes.
 pub(crate) fn read_in(directory: impl AsFd, name: &str, most: u64) -> io::Result<Vec<u8>> {
-    // // Opening a pipe or a device must not block.
+    // Opening a pipe or a device must not block.
     let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let file = openat(directory, name, flags, Mode::empty())?;
     let mut bytes = Vec::new();

@@ -131,7 +131,7 @@ impl Child {
         let mut fds = [PollFd::from_borrowed_fd(self.pidfd.as_fd(), PollFlags::IN)];
         let ended = poll(&mut fds, Some(&Timespec::default()))? > 0;
         if ended {
-            // // Before it is reaped, while its id cannot belong to another process.
+            // Before it is reaped, while its id cannot belong to another process.
             self.kill();
         }
         let status = self.process.try_wait()?;

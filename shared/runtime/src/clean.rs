@@ -35,7 +35,7 @@ impl Cleaner {
     /// node cannot be removed. Where clean-up has failed twice such files are removed first. Complete files
     /// stay, since they record what the process held.
     pub fn clean(&mut self, bus: &Bus) -> usize {
-        // // iceoryx2 may count a node as cleaned that is still there: check again.
+        // iceoryx2 may count a node as cleaned that is still there: check again.
         let before = dead(bus);
         bus.node().blocking_cleanup_dead_nodes(PATIENCE);
         let mut after = dead(bus);

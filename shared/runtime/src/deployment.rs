@@ -127,7 +127,7 @@ impl DeploymentPlan {
                 Limits::new(view.n_workers.max(1), LARGE_BUFFER, self.held),
                 view.evidence_values,
             );
-            // // One chunk to write while others are read. These are by far the largest messages: a queued
+            // One chunk to write while others are read. These are by far the largest messages: a queued
             // one would cost as much memory again without saving time.
             topics.push(evidence.with_few_chunks(1 + self.held));
             // Poses and expected errors: quality, triangulate, fusion and the recorders.
@@ -144,7 +144,7 @@ impl DeploymentPlan {
             ));
         }
         for worker in 0..self.n_workers {
-            // // Fusion of all views at once sends a message for every view but one at a time.
+            // Fusion of all views at once sends a message for every view but one at a time.
             let small = self.small(1 + self.n_recorders);
             let buffer = small.buffer.max(self.views.len());
             topics.push(TopicPlan::messages::<PairPose>(
@@ -265,7 +265,7 @@ mod tests {
             .iter()
             .find(|it| it.topic() == "evidence/v3/0")
             .unwrap();
-        // // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
+        // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
         let chunk = 40_000_000 + 1152;
         assert_eq!(evidence.pool_bytes(), 7 * chunk);
     }

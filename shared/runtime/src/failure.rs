@@ -153,7 +153,7 @@ impl Failure {
     /// Reports to standard error and turns into the exit status.
     pub fn exit(&self) -> ExitCode {
         if self.report(&mut io::stderr().lock()).is_err() {
-            // // The failure cannot be reported.
+            // The failure cannot be reported.
         }
         ExitCode::from(self.kind.status())
     }

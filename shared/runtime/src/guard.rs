@@ -38,7 +38,7 @@ const WRONG_MEMORY: &[u8] = b"error: a process has used memory that is not there
 /// A signal handler cannot be installed.
 pub fn guard_process() -> io::Result<()> {
     umask(umask(OTHERS) | OTHERS);
-    // // SAFETY: ignoring a signal has no precondition.
+    // SAFETY: ignoring a signal has no precondition.
     let before = unsafe { libc::signal(SIGXFSZ, SIG_IGN) };
     if before == libc::SIG_ERR {
         return Err(io::Error::last_os_error());
@@ -53,10 +53,10 @@ fn handle(signal: c_int) -> io::Result<()> {
     // SAFETY: all zeros is a value of this structure of numbers, flags and an address.
     let mut action: sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     action.sa_sigaction = end as *const () as usize;
-    // // The stack may have overflowed; the standard library gives every thread an alternative one for
+    // The stack may have overflowed; the standard library gives every thread an alternative one for
     // handlers.
     action.sa_flags = SA_SIGINFO | SA_ONSTACK;
-    // // SAFETY: the structure is initialised, and the handler is async-signal-safe.
+    // SAFETY: the structure is initialised, and the handler is async-signal-safe.
     let outcome = unsafe { sigaction(signal, &raw const action, core::ptr::null_mut()) };
     if outcome == 0 {
         Ok(())
@@ -72,9 +72,9 @@ extern "C" fn end(signal: c_int, _info: *mut libc::siginfo_t, _context: *mut lib
     } else {
         WRONG_MEMORY
     };
-    // // SAFETY: standard error stays open for the life of the process.
+    // SAFETY: standard error stays open for the life of the process.
     let stderr = unsafe { BorrowedFd::borrow_raw(libc::STDERR_FILENO) };
-    // // A failure cannot be reported.
+    // A failure cannot be reported.
     rustix::io::write(stderr, text).ok();
     signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
 }

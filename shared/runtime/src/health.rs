@@ -79,7 +79,7 @@ impl Health {
             began_at_nanos: now_nanos(),
             meter: Mutex::default(),
         });
-        // // Ports cannot move to another thread, so the thread creates its own.
+        // Ports cannot move to another thread, so the thread creates its own.
         let (result_sender, result_receiver) = mpsc::sync_channel(1);
         let parts = bus.parts();
         let process = launch.process.clone();
@@ -325,6 +325,6 @@ fn spin() -> ! {
 fn cpu_millis() -> u32 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;
-    // // The high bits do not matter: only differences are used.
+    // The high bits do not matter: only differences are used.
     (millis & i64::from(u32::MAX)) as u32
 }

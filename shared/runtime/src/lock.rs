@@ -96,7 +96,7 @@ impl Namespace {
     /// [`LockError`].
     pub fn acquire(&self) -> Result<DeploymentLock, LockError> {
         let (root, file) = lock_file(self)?;
-        // // The previous run may have removed its marker file in the meantime.
+        // The previous run may have removed its marker file in the meantime.
         root.mark(self).map_err(BusError::from)?;
         private::shared_memory(self).map_err(BusError::from)?;
         let config = self.config().map_err(BusError::from)?;

@@ -39,7 +39,7 @@ pub fn init_logging(process: &str, level: Level) {
 
 /// Makes iceoryx2 log through `tracing` instead of to standard error.
 pub(crate) fn adopt_transport_log() {
-    // // False if it is set already.
+    // False if it is set already.
     set_logger(&FromTransport);
 }
 

@@ -167,7 +167,7 @@ impl Mapping<'_> {
             self.len
         };
         let address = core::ptr::with_exposed_provenance_mut(self.address);
-        // // SAFETY: the range is the start of a shared mapping that iceoryx2 made in this process a moment
+        // SAFETY: the range is the start of a shared mapping that iceoryx2 made in this process a moment
         // ago and keeps for the life of the publisher that the caller holds; MADV_POPULATE_WRITE changes no
         // byte of it.
         let result = unsafe { madvise(address, len, Advice::LinuxPopulateWrite) };

@@ -171,7 +171,7 @@ impl Namespace {
             .ok()
             .ok_or_else(refused)?;
         config.global.set_root_path(&root);
-        // // Only the supervisor cleans up after dead processes ([`crate::Cleaner`]).
+        // Only the supervisor cleans up after dead processes ([`crate::Cleaner`]).
         config.global.service.cleanup_dead_nodes_on_open = false;
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;

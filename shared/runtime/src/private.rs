@@ -170,7 +170,7 @@ impl Root {
                 .contains(&name.as_bytes())
         };
         let n_files = names.len() - names.iter().filter(is_known).count();
-        // // Another run may have written the marker file in the meantime: it does so first.
+        // Another run may have written the marker file in the meantime: it does so first.
         if n_files > 0 && !is_marked(&self.root, namespace) {
             return Err(PrivacyError::Unmarked {
                 path: namespace.root().to_owned(),
@@ -228,7 +228,7 @@ fn open_or_make(base: &OwnedFd, name: &str) -> Result<OwnedFd, Errno> {
         return opened;
     }
     match mkdirat(base, name, DIRECTORY) {
-        // // The umask may have removed owner permissions that the next step needs.
+        // The umask may have removed owner permissions that the next step needs.
         Ok(()) => chmodat(base, name, DIRECTORY, AtFlags::empty())?,
         Err(Errno::EXIST) => {}
         Err(error) => return Err(error),
@@ -317,7 +317,7 @@ pub(crate) fn shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         let is_file = FileType::from_raw_mode(found.st_mode) == FileType::RegularFile;
         if is_file && found.st_mode & OTHERS != 0 {
-            // // The file belongs to this user, and only this user may replace it there.
+            // The file belongs to this user, and only this user may replace it there.
             return chmodat(memory, name, FILE, AtFlags::empty());
         }
         Ok(())
@@ -340,7 +340,7 @@ fn each_segment(
     act: impl Fn(&OwnedFd, &std::ffi::CStr, &Stat) -> Result<(), Errno>,
 ) -> Result<(), PrivacyError> {
     let directory = Path::new(SHARED_MEMORY);
-    // // `/dev/shm` belongs to the system and may be a symbolic link.
+    // `/dev/shm` belongs to the system and may be a symbolic link.
     let memory = OwnedFd::from(
         fs::File::open(directory).map_err(|source| PrivacyError::File {
             path: directory.to_owned(),
@@ -360,7 +360,7 @@ fn each_segment(
             Err(error) => Err(error),
         };
         match done {
-            // // Removed by another process that has ended.
+            // Removed by another process that has ended.
             Ok(()) | Err(Errno::NOENT) => {}
             Err(error) => return Err(failed(&path)(error)),
         }

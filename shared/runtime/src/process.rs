@@ -127,7 +127,7 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
         end_with(supervisor)?;
     }
     raise_file_limit();
-    // // Before other threads start, since they inherit the scheduling of this one.
+    // Before other threads start, since they inherit the scheduling of this one.
     for denied in launch.scheduling.apply() {
         tracing::warn!(hint = denied.hint(), "{denied}; going on without");
     }
@@ -153,7 +153,7 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
 fn end_with(supervisor: u32) -> Result<(), Failure> {
     let set = set_parent_process_death_signal(Some(Signal::KILL));
     set.map_err(|error| Failure::new(ExitKind::Run, error))?;
-    // // The supervisor may have died before the call above.
+    // The supervisor may have died before the call above.
     let parent = getppid().map_or(0, |pid| Pid::as_raw(Some(pid)));
     if parent == supervisor as i32 {
         Ok(())

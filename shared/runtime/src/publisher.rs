@@ -247,7 +247,7 @@ impl<E: Message, H: Header> Port<E, H> {
     fn open(bus: &Bus, topic: &str) -> Result<Self, PortError> {
         let messages = service::open_messages::<E, H>(bus.node(), topic)?;
         let extras = service::extras(&messages);
-        // // The listener is created first: subscribers that see the publisher must find it.
+        // The listener is created first: subscribers that see the publisher must find it.
         let ready = match extras.delivery {
             Delivery::Realtime => None,
             Delivery::Lossless => Some(bus.listener(&service::ready_name(topic))?),
@@ -308,7 +308,7 @@ impl<E: Message, H: Header> Port<E, H> {
             return Err(SendError::Stuck { topic, waited });
         }
         self.progress.tick();
-        // // Chunks held by a dead receiver are released when the connections are updated.
+        // Chunks held by a dead receiver are released when the connections are updated.
         if let Err(error) = self.publisher.update_connections() {
             tracing::debug!(topic = %self.topic, ?error, "cannot update the connections");
         }
@@ -334,12 +334,12 @@ impl<E: Message, H: Header> Port<E, H> {
         if let Some(notifier) = &self.notifier
             && let Err(error) = notifier.notify()
         {
-            // // Receivers check their buffers from time to time in any case.
+            // Receivers check their buffers from time to time in any case.
             tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
         }
         let topic = || Arc::clone(&self.topic);
         sent.map_err(|source| match source {
-            // // A signal also interrupts a wait inside iceoryx2, which reports an internal error.
+            // A signal also interrupts a wait inside iceoryx2, which reports an internal error.
             _ if self.stop.is_requested() => SendError::Stopped { topic: topic() },
             IoxSendError::UnableToDeliver => SendError::Stuck {
                 topic: topic(),
@@ -379,7 +379,7 @@ impl<E: Message, H: Header> Port<E, H> {
                 return ready;
             }
             self.progress.tick();
-            // // Wakes earlier subscribers, so that they connect.
+            // Wakes earlier subscribers, so that they connect.
             if let Some(notifier) = &self.notifier
                 && let Err(error) = notifier.notify()
             {

@@ -58,10 +58,10 @@ pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
         source: error.into(),
     };
     for name in beneath::names(&opened).map_err(unreadable)? {
-        // // Other names cannot be those of a deployment.
+        // Other names cannot be those of a deployment.
         let namespace = name.to_str().ok();
         let namespace = namespace.and_then(|name| Namespace::below(name, base).ok());
-        // // A link to a directory is no deployment either.
+        // A link to a directory is no deployment either.
         let directory = beneath::directory_in(&opened, name.as_bytes());
         if let Some((namespace, directory)) = namespace.zip(directory.ok()) {
             let is_marked = private::is_marked(&directory, &namespace);
@@ -144,7 +144,7 @@ mod tests {
         let base = base();
         let lives = Namespace::below("lives", base.path()).unwrap();
         let lock = lives.acquire().unwrap();
-        // // A killed supervisor leaves its lock file and others.
+        // A killed supervisor leaves its lock file and others.
         let dead = base.path().join("dead");
         let marked = Namespace::below("dead", base.path()).unwrap();
         private::Root::open(&marked).unwrap();
@@ -175,7 +175,7 @@ mod tests {
         let photos = base.path().join("photos");
         fs::create_dir(&photos).unwrap();
         fs::write(photos.join("one.jpg"), "x").unwrap();
-        // // The marker of another deployment does not count.
+        // The marker of another deployment does not count.
         let other = Namespace::below("other", base.path()).unwrap();
         private::Root::open(&other).unwrap();
         let mark = other.root().join("parallax-deployment");

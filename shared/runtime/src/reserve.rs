@@ -53,7 +53,7 @@ extern "C" fn ftruncate(fd: RawFd, len: libc::off_t) -> c_int {
     if fd < 0 {
         return failed(Errno::BADF);
     }
-    // // SAFETY: the caller keeps the descriptor open during the call, as the contract of `ftruncate` asks.
+    // SAFETY: the caller keeps the descriptor open during the call, as the contract of `ftruncate` asks.
     let fd = unsafe { BorrowedFd::borrow_raw(fd) };
     let Ok(len) = u64::try_from(len) else {
         return failed(Errno::INVAL);
@@ -76,16 +76,16 @@ fn take(fd: BorrowedFd<'_>, len: u64) -> Result<(), Errno> {
         return Ok(());
     }
     match fallocate(fd, FallocateFlags::KEEP_SIZE, 0, len) {
-        // // Not every kernel supports this; then pages are allocated when first used.
+        // Not every kernel supports this; then pages are allocated when first used.
         Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(()),
         taken => taken,
     }
 }
 
 fn failed(error: Errno) -> c_int {
-    // // SAFETY: the location belongs to the calling thread and is always valid.
+    // SAFETY: the location belongs to the calling thread and is always valid.
     let location = unsafe { libc::__errno_location() };
-    // // SAFETY: as above; there is no other reference to it.
+    // SAFETY: as above; there is no other reference to it.
     unsafe { location.write(error.raw_os_error()) };
     -1
 }
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn an_invalid_descriptor_is_refused() {
-        // // SAFETY: the descriptor is invalid, so nothing is changed.
+        // SAFETY: the descriptor is invalid, so nothing is changed.
         let outcome = unsafe { libc::ftruncate(-1, 5) };
         let error = std::io::Error::last_os_error();
         assert_eq!((outcome, error.raw_os_error()), (-1, Some(libc::EBADF)));

@@ -111,7 +111,7 @@ impl RealTime {
         let parameters = libc::sched_param {
             sched_priority: i32::from(self.priority),
         };
-        // // SAFETY: the call only reads `parameters`, which is alive, and changes the scheduling of the
+        // SAFETY: the call only reads `parameters`, which is alive, and changes the scheduling of the
         // calling thread (0).
         let status = unsafe { libc::sched_setscheduler(0, policy, &raw const parameters) };
         (status != 0).then(|| Denied::RealTime {
@@ -130,7 +130,7 @@ fn keep_to(asked: &[usize]) -> Option<Denied> {
     for &core in asked.iter().filter(|core| **core < MAX_CORES) {
         wanted.set(core);
     }
-    // // The system uses the cores that exist and that the process's group may use, if there are any.
+    // The system uses the cores that exist and that the process's group may use, if there are any.
     let refusal = sched_setaffinity(None, &wanted).err();
     let allowed = own_cores().unwrap_or_default();
     let are_all = asked.iter().all(|core| allowed.contains(core));
@@ -154,13 +154,13 @@ pub fn own_cores() -> io::Result<Vec<usize>> {
 /// Locks every page that is or will be used into memory.
 fn lock_memory() -> Option<Denied> {
     if let Some(limit_bytes) = memory_limit() {
-        // // With a limit it would succeed now, and a later allocation would fail.
+        // With a limit it would succeed now, and a later allocation would fail.
         return Some(Denied::Memory {
             limit_bytes: Some(limit_bytes),
             source: io::ErrorKind::PermissionDenied.into(),
         });
     }
-    // // On fault: locks only the used chunks of a pool.
+    // On fault: locks only the used chunks of a pool.
     let flags = MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT;
     mlockall(flags).err().map(|error| Denied::Memory {
         limit_bytes: None,

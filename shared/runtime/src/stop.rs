@@ -107,7 +107,7 @@ impl Stop {
                 if sender(info) == Some(supervisor) {
                     inner.raise(signal);
                 } else if inner.unasked.swap(signal as usize, Ordering::AcqRel) == 0 {
-                    // // SAFETY: `alarm` has no precondition and is async-signal-safe.
+                    // SAFETY: `alarm` has no precondition and is async-signal-safe.
                     unsafe { libc::alarm(UNASKED_SECONDS) };
                 }
             })?;
@@ -115,7 +115,7 @@ impl Stop {
         let inner = Arc::clone(&stop.inner);
         on_signal(SIGALRM, move |_| {
             let unasked = inner.unasked.load(Ordering::Acquire);
-            // // On failure the process continues; nothing else can be done here.
+            // On failure the process continues; nothing else can be done here.
             if unasked != 0 && !inner.requested.load(Ordering::Acquire) {
                 emulate_default_handler(unasked as i32).ok();
             }
@@ -158,7 +158,7 @@ impl Inner {
 
     fn wake(&self) {
         self.requested.store(true, Ordering::Release);
-        // // A full socket is readable already.
+        // A full socket is readable already.
         rustix::io::write(&self.writer, &[1]).ok();
     }
 
@@ -175,7 +175,7 @@ impl Inner {
 
 /// Installs a signal handler for the life of the process.
 fn on_signal(signal: i32, handler: impl Fn(&siginfo_t) + Send + Sync + 'static) -> io::Result<()> {
-    // // SAFETY: the handlers of this file are async-signal-safe (see [`Inner`]): they neither allocate nor
+    // SAFETY: the handlers of this file are async-signal-safe (see [`Inner`]): they neither allocate nor
     // lock.
     unsafe { register_sigaction(signal, handler) }.map(drop)
 }
@@ -185,7 +185,7 @@ fn sender(info: &siginfo_t) -> Option<u32> {
     if info.si_code > 0 {
         return None;
     }
-    // // SAFETY: signals sent by processes carry the sender (sigaction(2): codes that are not positive).
+    // SAFETY: signals sent by processes carry the sender (sigaction(2): codes that are not positive).
     let pid = unsafe { info.si_pid() };
     u32::try_from(pid).ok()
 }

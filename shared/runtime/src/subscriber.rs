@@ -111,7 +111,7 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
             match self.receive() {
                 Ok(Some(sample)) => latest = Some(sample),
                 Ok(None) => return Ok(latest),
-                // // A newer one was sent since the last check.
+                // A newer one was sent since the last check.
                 Err(ReceiveError::TooManyHeld { .. }) if latest.is_some() => latest = None,
                 Err(error) => return Err(error),
             }
@@ -202,7 +202,7 @@ impl<E: Message, H: Header> Port<E, H> {
             Delivery::Lossless => Some(bus.notifier(&service::ready_name(topic))?),
         };
         if waiter.spins() {
-            // // A spinning waiter needs no wake-up.
+            // A spinning waiter needs no wake-up.
             waiter.poll_without_pause();
         } else if extras.wakes {
             waiter.watch(bus.listener(topic)?);
@@ -229,18 +229,18 @@ impl<E: Message, H: Header> Port<E, H> {
 
     /// Connects to the existing publishers.
     fn connect(&self) {
-        // // Listed before connecting, so that only connected publishers are acknowledged: a new one may
+        // Listed before connecting, so that only connected publishers are acknowledged: a new one may
         // appear in between.
         let publishers = self.publishers();
         match self.subscriber.update_connections() {
             Ok(()) => self.acknowledge(publishers),
-            // // Connecting is tried again at the next receive.
+            // Connecting is tried again at the next receive.
             Err(error) => tracing::debug!(topic = %self.topic, %error, "cannot connect"),
         }
     }
 
     fn receive(&self) -> Result<Option<IoxSample<ipc::Service, [E], H>>, ReceiveError> {
-        // // Listed before connecting, as in `connect`.
+        // Listed before connecting, as in `connect`.
         let publishers = self.ready.as_ref().map(|_| self.publishers());
         let topic = || Arc::clone(&self.topic);
         let sample = self.subscriber.receive().map_err(|source| match source {

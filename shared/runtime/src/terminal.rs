@@ -68,7 +68,7 @@ impl Keys {
             return Ok(None);
         }
         let mut key = [0];
-        // // Unbuffered: the buffer of standard input would hide further keys from `poll`.
+        // Unbuffered: the buffer of standard input would hide further keys from `poll`.
         match rustix::io::read(&stdin, &mut key)? {
             0 => Err(io::ErrorKind::UnexpectedEof.into()),
             _ => Ok(Some(key[0])),

@@ -89,7 +89,7 @@ impl TopicPlan {
         limits: Limits,
         max_len: usize,
     ) -> Self {
-        // // iceoryx2's `payload_alignment` would align every element.
+        // iceoryx2's `payload_alignment` would align every element.
         const { assert!(align_of::<H>() == CACHE_LINE && size_of::<H>().is_multiple_of(CACHE_LINE)) };
         Self {
             topic,

@@ -204,7 +204,7 @@ impl Waiter {
 }
 
 fn fd_of(listener: &Listener<ipc::Service>) -> BorrowedFd<'_> {
-    // // SAFETY: the number is not kept beyond this function, as `native_handle` requires.
+    // SAFETY: the number is not kept beyond this function, as `native_handle` requires.
     let fd = unsafe { listener.file_descriptor().native_handle() };
     // SAFETY: the listener owns the descriptor and keeps it open while it is borrowed.
     unsafe { BorrowedFd::borrow_raw(fd) }

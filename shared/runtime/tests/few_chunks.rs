@@ -104,7 +104,7 @@ fn chunks_of_a_dropped_receiver_are_released() {
     let (publisher, subscriber) = full(&deployment, SOON);
     let held = subscriber.receive().unwrap().unwrap();
     drop((held, subscriber));
-    // // There is no receiver, but both chunks can be used again.
+    // There is no receiver, but both chunks can be used again.
     for value in [3, 4] {
         assert_eq!(send(&publisher, value).unwrap(), 0);
     }
@@ -148,7 +148,7 @@ fn with_realtime_delivery_a_sender_never_waits_and_unused_chunks_are_not_mapped(
         held = subscriber.latest().unwrap();
         assert_eq!(held.as_ref().unwrap().payload()[LEN - 1], value);
     }
-    // // Of the nine chunks the last released ones are used again.
+    // Of the nine chunks the last released ones are used again.
     let in_use = mapped(&deployment);
     assert!(
         in_use < 4 * LEN,

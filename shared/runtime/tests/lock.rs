@@ -40,7 +40,7 @@ fn files_of_a_killed_run_are_removed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let namespace = namespace(base.path());
     let leftover = format!("/dev/shm/{}123.data", namespace.prefix());
-    // // Files that a killed run leaves: its directory has the marker file.
+    // Files that a killed run leaves: its directory has the marker file.
     std::mem::forget(namespace.acquire().unwrap());
     fs::remove_file(namespace.root().join("lock")).unwrap();
     fs::write(&leftover, "x").unwrap();

@@ -156,14 +156,14 @@ fn files_of_another_user_at_the_paths_of_a_deployment_are_named() {
         return;
     }
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
-    // // At the parent directory of a user's deployments.
+    // At the parent directory of a user's deployments.
     chown(base.path(), Some(OTHER), None).unwrap();
     let own = namespace(base.path());
     let Err(LockError::Bus(error)) = own.acquire() else {
         panic!("it is below another user's");
     };
     assert_foreign(&error, base.path(), OTHER);
-    // // With a name of the deployment's shared memory.
+    // With a name of the deployment's shared memory.
     chown(base.path(), Some(0), None).unwrap();
     let leftover = PathBuf::from(format!("/dev/shm/{}7.data", own.prefix()));
     fs::write(&leftover, "x").unwrap();
@@ -184,7 +184,7 @@ fn a_file_instead_of_the_directory_is_named() {
     fs::write(namespace.root(), "x").unwrap();
     let error = namespace.acquire().unwrap_err();
     assert!(error.to_string().contains("is not a directory"), "{error}");
-    // // A symbolic link is not followed either.
+    // A symbolic link is not followed either.
     fs::remove_file(namespace.root()).unwrap();
     symlink(base.path(), namespace.root()).unwrap();
     let error = namespace.acquire().unwrap_err();
@@ -220,7 +220,7 @@ fn census(path: &Path) -> Vec<(PathBuf, u32)> {
 fn a_link_instead_of_the_base_is_never_followed() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let home = home(base.path(), "t");
-    // // At the parent directory of a user's deployments; created by another user, if this test runs as root.
+    // At the parent directory of a user's deployments; created by another user, if this test runs as root.
     let link = base.path().join("px");
     symlink(&home, &link).unwrap();
     let owner = if is_root() {
@@ -270,7 +270,7 @@ fn a_base_that_others_may_write_is_closed() {
     let own = namespace(base.path());
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o755);
-    // // With the sticky bit, as in /tmp, it is safe.
+    // With the sticky bit, as in /tmp, it is safe.
     fs::set_permissions(base.path(), Permissions::from_mode(0o1777)).unwrap();
     drop(own.acquire().unwrap());
     assert_eq!(mode(), 0o1777);

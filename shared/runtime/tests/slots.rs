@@ -148,6 +148,6 @@ fn cleaner() {
 #[expect(clippy::print_stdout, reason = "the parent process reads it")]
 fn wait_to_be_killed() {
     println!("ready");
-    // // Longer than the test takes; the process ends even if the test fails.
+    // Longer than the test takes; the process ends even if the test fails.
     sleep(Duration::from_mins(1));
 }

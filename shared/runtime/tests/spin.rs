@@ -52,7 +52,7 @@ fn a_spinning_receiver_gets_all_messages() {
                 .unwrap();
             let (mut received, begin) = (Vec::new(), Instant::now());
             while received.len() < 100 && begin.elapsed() < WATCHDOG {
-                // // It does not sleep, so the reason for returning is always time.
+                // It does not sleep, so the reason for returning is always time.
                 assert_eq!(waiter.wait(WATCHDOG).unwrap(), Woken::Time);
                 if let Some(sample) = port.receive().unwrap() {
                     received.push(sample.payload()[0]);

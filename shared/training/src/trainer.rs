@@ -215,7 +215,7 @@ impl<'a> Trainer<'a> {
     /// Places all people again, and replaces their examples.
     fn place(&mut self, round: usize) -> Result<(), TrainError> {
         let placed = self.best_placements(round < self.settings.fixed_rounds)?;
-        // // Most people keep their placement, or nearly so: their shares are a good start.
+        // Most people keep their placement, or nearly so: their shares are a good start.
         let mut shares = vec![0.0; self.plan.n_people()];
         for (origin, share) in self.machine.entries() {
             if let Origin::Right { person, .. } = origin {
@@ -259,7 +259,7 @@ impl<'a> Trainer<'a> {
     fn forget(&mut self) {
         let features = self.bytes() - self.machine.bytes();
         let room = (self.settings.cache_mib << 20).saturating_sub(features);
-        // // A right pose without a share may need one later, and would not be found again.
+        // A right pose without a share may need one later, and would not be found again.
         let may_go = |it: &Origin| !matches!(it, Origin::Right { .. });
         self.machine.forget(self.settings.room, room, may_go);
         let image = |it: &Origin| match it {

@@ -123,7 +123,7 @@ fn joint_to_message(joint: &Result<Triangulated, TriangulateError>) -> Joint3d {
                 status: Status::OK,
             }
         }
-        // // All other errors mean that too few views could be used.
+        // All other errors mean that too few views could be used.
         Err(_) => Joint3d {
             status: Status::TOO_FEW_VIEWS,
             ..Joint3d::default()
@@ -239,7 +239,7 @@ mod tests {
         assert!(refused(
             |message| message.views[0].centres_px[1][0] = f64::INFINITY
         ));
-        // // Entries that were not found are not checked.
+        // Entries that were not found are not checked.
         assert!(!refused(|message| message.joints[1].in_world[0] = f64::NAN));
         assert!(!refused(
             |message| message.views[1].centres_px[0][0] = f64::NAN

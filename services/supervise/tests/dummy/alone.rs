@@ -67,7 +67,10 @@ pub(crate) fn fill(base: &Path) -> ExitCode {
         7_000_000,
     );
     let preflight = preflight(core::slice::from_ref(&plan));
-    print_line(&preflight.map_or_else(|error| causes::in_one_line(&error), |()| "it fits".to_owned()));
+    print_line(&preflight.map_or_else(
+        |error| causes::in_one_line(&error),
+        |()| "it fits".to_owned(),
+    ));
     match without_preflight(base, &plan) {
         Ok(text) => {
             print_line(&text);

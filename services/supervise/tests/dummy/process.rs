@@ -149,7 +149,7 @@ fn hold(service: &Service) -> Result<(), Failure> {
     let subscriber = service
         .bus()
         .slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter)?;
-    // // Connected, like a process that dies during its work.
+    // Connected, like a process that dies during its work.
     while subscriber.receive()?.is_none() {
         waiter.wait(SOON)?;
     }
@@ -170,7 +170,7 @@ fn die_in_loan(service: &Service) -> Result<(), Failure> {
         loan.payload_mut().fill(frame as u8);
         loan.header_mut().stamp.frame = frame;
         loan.send()?;
-        // // One at a time, so that no frame is replaced.
+        // One at a time, so that no frame is replaced.
         std::thread::sleep(SOON);
     }
     let mut loan = publisher.loan(publisher.max_len())?;

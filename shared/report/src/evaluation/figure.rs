@@ -161,7 +161,7 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
 
 /// Improvements (to the right) and deteriorations of one version.
 pub(super) fn histogram(changes: &ChangesOf) -> String {
-    // // The two bins around 0 would dwarf all others: they are cut off.
+    // The two bins around 0 would dwarf all others: they are cut off.
     let far = changes
         .bins
         .iter()

@@ -194,7 +194,7 @@ impl Trainer<'_> {
         }
         let found = self.visit_all(images, |&image| {
             let picture = self.background(image)?;
-            // // The ones in the working set may all score best, as each may keep some slack.
+            // The ones in the working set may all score best, as each may keep some slack.
             let n_held = n_held.get(&image).copied().unwrap_or(0);
             let poses = miner.search(&picture, -1.0, self.settings.per_image + n_held);
             let origins = poses.iter().map(|it| Origin::Background {

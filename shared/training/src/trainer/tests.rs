@@ -277,7 +277,7 @@ fn without_backgrounds_nothing_is_trained() {
 #[test]
 fn people_stay_in_the_working_set_however_well_they_are_separated() {
     let (album, watch) = (figures(), Quiet::endless());
-    // // Almost no example without a share is kept.
+    // Almost no example without a share is kept.
     let settings = Settings {
         room: 0.0,
         cache_mib: 1,
