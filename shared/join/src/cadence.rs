@@ -1,27 +1,25 @@
-//! Selects which frames a stage processes when it cannot keep up, such that all stages select the
-//! same frames.
+//! Which frames a stage processes when it cannot process all, so that all stages choose the same ones.
 
-/// Number of slow, or quick, results in a row before the stride changes.
+/// Consecutive frames that must be too slow, or fast, before the stride changes.
 const N_SLOW: u32 = 3;
-const N_QUICK: u32 = 8;
-/// The stride is halved only if a result takes less than this share of the time that is then
-/// available.
-const IDLE: f64 = 0.7;
+const N_FAST: u32 = 8;
+/// Largest share of the available time that a frame may need for the stride to be halved.
+const HALVING_LOAD: f64 = 0.7;
 /// Largest stride.
-const MOST: u64 = 1 << 16;
+const MAX_STRIDE: u64 = 1 << 16;
 
-/// Chooses the stride of the processed frames in realtime delivery.
+/// Chooses how many frames to skip where the latest frame wins.
 ///
-/// If every stage processed the newest frame whenever it is idle, the stages would process
-/// different frames, and their results could not be joined. So a stage processes every n-th frame,
-/// with n a power of two that follows from its processing time. The frames of the slowest stage are
-/// then processed by all other stages too, without communication between them.
+/// If every stage processed the newest frame whenever it is idle, stages would process different frames, and their
+/// messages could not be joined. So a stage processes every n-th frame only. n is a power of two and follows from the
+/// measured processing time. The frames of the slowest stage are then among those of all others, without any
+/// communication between stages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cadence {
     stride: u64,
     n_slow: u32,
-    n_quick: u32,
-    /// Number and capture time of the frame before, nanoseconds.
+    n_fast: u32,
+    /// The previous frame that was processed, and its capture time.
     last: Option<(u64, u64)>,
 }
 
@@ -30,7 +28,7 @@ impl Default for Cadence {
         Self {
             stride: 1,
             n_slow: 0,
-            n_quick: 0,
+            n_fast: 0,
             last: None,
         }
     }
@@ -39,24 +37,24 @@ impl Default for Cadence {
 impl Cadence {
     /// Whether a frame is to be processed.
     ///
-    /// * `nth`: its number among the frames in use, the same in all stages.
+    /// * `nth`: its position among the frames that the deployment uses; the same in all stages.
     pub fn takes(&self, nth: u64) -> bool {
         nth.is_multiple_of(self.stride)
     }
 
-    /// The stride: number of frames from one processed frame to the next.
+    /// Distance between the frames that are processed.
     pub fn stride(&self) -> u64 {
         self.stride
     }
 
-    /// Records that a frame was processed, and adapts the stride.
+    /// Notes that a frame was processed.
     ///
-    /// * `captured_at_nanos`: capture time, which gives the time between frames.
-    /// * `busy_nanos`: processing time.
-    pub fn answered(&mut self, nth: u64, captured_at_nanos: u64, busy_nanos: u64) {
+    /// * `captured_at_nanos`: gives the time between frames.
+    /// * `busy_nanos`: the processing time.
+    pub fn processed(&mut self, nth: u64, captured_at_nanos: u64, busy_nanos: u64) {
         let last = self.last.replace((nth, captured_at_nanos));
         let Some((frames, nanos)) = last.and_then(|(frame, at)| {
-            let frames = nth.checked_sub(frame).filter(|step| *step > 0)?;
+            let frames = nth.checked_sub(frame).filter(|n| *n > 0)?;
             Some((frames, captured_at_nanos.saturating_sub(at).max(1)))
         }) else {
             return;
@@ -68,18 +66,18 @@ impl Cadence {
         } else {
             0
         };
-        self.n_quick = if needed < IDLE * (self.stride / 2) as f64 {
-            self.n_quick + 1
+        self.n_fast = if needed < HALVING_LOAD * (self.stride / 2) as f64 {
+            self.n_fast + 1
         } else {
             0
         };
         if self.n_slow >= N_SLOW {
-            let least = needed.ceil().min(MOST as f64) as u64;
-            self.stride = least.next_power_of_two().max(self.stride);
+            let smallest = needed.ceil().min(MAX_STRIDE as f64) as u64;
+            self.stride = smallest.next_power_of_two().max(self.stride);
             self.n_slow = 0;
-        } else if self.n_quick >= N_QUICK {
+        } else if self.n_fast >= N_FAST {
             self.stride /= 2;
-            self.n_quick = 0;
+            self.n_fast = 0;
         }
     }
 }
@@ -90,8 +88,7 @@ mod tests {
 
     use super::*;
 
-    /// Simulates frames 100 ns apart with a fixed processing time, and returns the processed
-    /// frames.
+    /// The frames that are processed, of frames 100 ns apart that take `busy` ns each.
     fn taken(cadence: &mut Cadence, frames: core::ops::Range<u64>, busy: u64) -> Vec<u64> {
         let mut free_at = 0;
         let mut taken = Vec::new();
@@ -99,7 +96,7 @@ mod tests {
             let now = nth * 100;
             if now >= free_at && cadence.takes(nth) {
                 free_at = now + busy;
-                cadence.answered(nth, now, busy);
+                cadence.processed(nth, now, busy);
                 taken.push(nth);
             }
         }
@@ -107,13 +104,13 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_stage_processes_every_frame() {
+    fn a_fast_stage_takes_every_frame() {
         let mut cadence = Cadence::default();
         assert_eq!(taken(&mut cadence, 0..50, 80), (0..50).collect::<Vec<_>>());
     }
 
     #[test]
-    fn a_slow_stage_processes_every_nth_frame_with_n_a_power_of_two() {
+    fn a_slow_stage_takes_every_nth_frame_with_n_a_power_of_two() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 250);
         assert_eq!(cadence.stride(), 4);
@@ -121,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn one_slow_result_does_not_change_the_stride() {
+    fn one_slow_frame_does_not_change_the_stride() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..5, 50);
         taken(&mut cadence, 5..6, 700);
@@ -130,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_that_becomes_faster_processes_more_frames_again() {
+    fn a_stage_that_becomes_faster_takes_more_frames_again() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 350);
         assert_eq!(cadence.stride(), 4);
@@ -139,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stride_stays_if_the_stage_could_barely_process_twice_as_many_frames() {
+    fn the_stride_is_not_halved_without_a_margin() {
         let mut cadence = Cadence::default();
         taken(&mut cadence, 0..20, 105);
         assert_eq!(cadence.stride(), 2);
@@ -148,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_frame_numbers_and_times_keep_the_stride_in_range() {
+    fn numbers_out_of_order_or_range_are_tolerated() {
         let mut cadence = Cadence::default();
         for (nth, at, busy) in [
             (5, 9, 9),
@@ -156,15 +153,15 @@ mod tests {
             (3, 1, u64::MAX),
             (u64::MAX, 0, u64::MAX),
         ] {
-            cadence.answered(nth, at, busy);
+            cadence.processed(nth, at, busy);
         }
-        cadence.answered(0, u64::MAX, 0);
-        assert!(cadence.stride() <= MOST);
+        cadence.processed(0, u64::MAX, 0);
+        assert!(cadence.stride() <= MAX_STRIDE);
     }
 
     proptest! {
         #[test]
-        fn the_frames_of_the_slower_stage_are_a_subset_of_those_of_the_faster(
+        fn the_frames_of_a_slower_stage_are_among_those_of_a_faster_one(
             busy in prop::array::uniform2(1_u64..5000),
         ) {
             let [mut one, mut other] = [Cadence::default(), Cadence::default()];

@@ -1,29 +1,28 @@
-//! The last message of each sender, for frames that are not to wait for this sender.
+//! The last messages of each input, for frames that did not wait for it.
 
 use std::collections::VecDeque;
 
-/// Number of messages kept per sender; a sender may be ahead of the frame that is being joined.
+/// Messages kept per input: an input may be ahead of the frame that is being processed.
 const KEPT: usize = 4;
 
-/// Keeps the last messages of several senders for a limited time.
+/// Keeps the last messages of several inputs while they are fresh.
 #[derive(Debug)]
 pub struct Last<T> {
-    of_input: Vec<VecDeque<Entry<T>>>,
+    of_input: Vec<VecDeque<Message<T>>>,
     max_age_nanos: u64,
 }
 
 #[derive(Debug)]
-struct Entry<T> {
+struct Message<T> {
     frame: u64,
     captured_at: u64,
     item: T,
 }
 
 impl<T> Last<T> {
-    /// Starts without messages.
+    /// Makes an empty store.
     ///
-    /// * `max_age_nanos`: the largest difference in capture time between a frame and a message used
-    ///   for it.
+    /// * `max_age_nanos`: largest difference of capture times at which a message is used for a later frame.
     pub fn new(n_inputs: usize, max_age_nanos: u64) -> Self {
         Self {
             of_input: (0..n_inputs).map(|_| VecDeque::new()).collect(),
@@ -31,32 +30,34 @@ impl<T> Last<T> {
         }
     }
 
-    /// Stores a message about a frame; frames may come in any order.
+    /// Keeps the message of an input about a frame; frames may come in any order.
     ///
     /// * `captured_at`: when the frame was captured, nanoseconds.
     pub fn keep(&mut self, input: usize, frame: u64, captured_at: u64, item: T) {
-        let Some(entries) = self.of_input.get_mut(input) else {
+        let Some(messages) = self.of_input.get_mut(input) else {
             return;
         };
-        let at = entries.partition_point(|entry| entry.frame < frame);
-        let entry = Entry {
+        let at = messages.partition_point(|message| message.frame < frame);
+        let message = Message {
             frame,
             captured_at,
             item,
         };
-        entries.insert(at, entry);
-        if entries.len() > KEPT {
-            entries.pop_front();
+        messages.insert(at, message);
+        if messages.len() > KEPT {
+            messages.pop_front();
         }
     }
 
-    /// The latest stored message about this frame or an earlier one, if it is recent enough, and
-    /// its age in frames.
+    /// The latest message about this frame or an earlier one, if it is fresh, and its age in frames.
     pub fn of(&self, input: usize, frame: u64, captured_at: u64) -> Option<(u64, &T)> {
-        let entries = self.of_input.get(input)?;
-        let entry = entries.iter().rev().find(|entry| entry.frame <= frame)?;
-        let age = captured_at.saturating_sub(entry.captured_at);
-        (age <= self.max_age_nanos).then_some((frame - entry.frame, &entry.item))
+        let messages = self.of_input.get(input)?;
+        let latest = messages
+            .iter()
+            .rev()
+            .find(|message| message.frame <= frame)?;
+        let age = captured_at.saturating_sub(latest.captured_at);
+        (age <= self.max_age_nanos).then_some((frame - latest.frame, &latest.item))
     }
 }
 
@@ -65,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_message_is_used_for_later_frames_until_it_is_too_old() {
+    fn the_last_message_is_used_for_later_frames_while_it_is_fresh() {
         let mut last = Last::new(2, 100);
         assert_eq!(last.of(0, 5, 50), None);
         last.keep(0, 3, 30, 'a');
@@ -73,7 +74,7 @@ mod tests {
         assert_eq!(last.of(0, 4, 40), Some((0, &'b')));
         assert_eq!(last.of(0, 6, 140), Some((2, &'b')));
         assert_eq!(last.of(0, 7, 141), None, "too old");
-        assert_eq!(last.of(1, 4, 40), None, "another sender");
+        assert_eq!(last.of(1, 4, 40), None, "another input");
     }
 
     #[test]
@@ -81,13 +82,13 @@ mod tests {
         let mut last = Last::new(1, 100);
         last.keep(0, 8, 80, 'c');
         assert_eq!(last.of(0, 7, 70), None);
-        last.keep(0, 6, 60, 'a'); // arrives late
+        last.keep(0, 6, 60, 'a'); // out of order
         assert_eq!(last.of(0, 7, 70), Some((1, &'a')));
         assert_eq!(last.of(0, 9, 90), Some((1, &'c')));
     }
 
     #[test]
-    fn old_messages_are_dropped() {
+    fn the_oldest_messages_are_discarded() {
         let mut last = Last::new(1, 1000);
         for frame in 0..10 {
             last.keep(0, frame, frame, frame);

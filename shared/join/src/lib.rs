@@ -1,9 +1,8 @@
-//! Joins the messages of several inputs by frame, with a bounded wait.
+//! Joins the messages of several inputs about one frame, and never waits for ever.
 //!
-//! A frame is complete once every input has sent its message, or will not send it any more: it has
-//! sent a later frame, it has ended, or it has been silent for too long and counts as down. Nothing
-//! here reads a clock: the caller passes the time, so that every rule can be tested without
-//! waiting.
+//! A frame is complete once every input has sent its message about it, or is not expected to any more: it has sent one
+//! about a later frame, its stream has ended, or it has been silent for too long and counts as down. Nothing here reads
+//! a clock: the caller passes the time, so every rule is tested without waiting.
 #![forbid(unsafe_code)]
 
 mod cadence;
@@ -14,57 +13,58 @@ use std::collections::BTreeMap;
 pub use cadence::Cadence;
 pub use last::Last;
 
-/// The joined messages of one frame.
+/// The messages of all inputs about one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Joined<T> {
-    /// Index of the frame.
+    /// Number of the frame.
     pub frame: u64,
-    /// One entry per input; `None` if its message did not arrive in time.
+    /// One entry per input; `None` where no message came in time.
     pub items: Vec<Option<T>>,
 }
 
-/// The outcome of [`Joiner::push`].
+/// What happened to a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Push {
-    /// The message was accepted and waits for the other inputs.
+    /// It was accepted and waits for the other inputs.
     Taken,
-    /// Its frame has already been returned, or its input has already sent that frame.
+    /// Its frame has been returned already, or the input has already sent a message about it.
     Late,
     /// Too many frames are pending.
     Full,
 }
 
-/// Largest number of pending frames: hours of frames, or the sign of a sender with wrong frame
-/// numbers.
-const MOST_PENDING: usize = 1 << 16;
+/// Most pending frames: more would be hours of frames, or a sender with wrong frame numbers.
+const MAX_PENDING: usize = 1 << 16;
 
-/// Collects messages by frame and returns the frames in order.
+/// Collects messages by frame, and returns frames in order.
 #[derive(Debug)]
 pub struct Joiner<T> {
     inputs: Vec<Input>,
     pending: BTreeMap<u64, Slot<T>>,
     patience_nanos: u64,
     alive_patience_nanos: u64,
-    /// All frames below this number have been returned.
+    /// Frames below this have been returned.
     next_frame: u64,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Input {
     last_frame: Option<u64>,
-    heard_at: Option<u64>,
+    received_at: Option<u64>,
     alive_at: Option<u64>,
     ended: bool,
     down: bool,
-    /// Longest time that a frame waits for this input.
+    /// How long a frame waits for it at most.
     deadline: Option<u64>,
 }
 
 impl Input {
-    /// Whether it has been silent for too long. `patience`: without a sign of life, and with one.
+    /// Whether it has been silent for too long.
+    ///
+    /// * `patience`: without a living sender, and with one.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
         let elapsed = |at: u64| now.saturating_sub(at);
-        let silence = elapsed(began_at.max(self.heard_at.unwrap_or(0)));
+        let silence = elapsed(began_at.max(self.received_at.unwrap_or(0)));
         let absence = silence.min(self.alive_at.map_or(u64::MAX, elapsed));
         let is_overdue = self
             .deadline
@@ -80,7 +80,7 @@ struct Slot<T> {
 }
 
 impl<T> Joiner<T> {
-    /// Creates a joiner for a number of inputs.
+    /// A joiner of `n_inputs` inputs.
     ///
     /// * `patience_nanos`: how long an input may be silent while others wait for it.
     pub fn new(n_inputs: usize, patience_nanos: u64) -> Self {
@@ -93,8 +93,8 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// As [`Self::new`], for lossless delivery: an input whose process is alive may take ten times
-    /// as long, because it is computing.
+    /// As [`Self::new`], for lossless delivery: an input whose sender is known to be alive may take ten times as long,
+    /// because the sender is still computing.
     pub fn lossless(n_inputs: usize, patience_nanos: u64) -> Self {
         Self {
             alive_patience_nanos: patience_nanos.saturating_mul(10),
@@ -102,39 +102,37 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Sets a deadline for an input: no frame waits longer for it, even if its sender is alive. For
-    /// inputs that are optional.
-    pub fn hurry(&mut self, input: usize, deadline_nanos: u64) {
+    /// Makes an input optional: no frame waits for it longer than `deadline_nanos`, even if its sender is alive.
+    pub fn set_deadline(&mut self, input: usize, deadline_nanos: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.deadline = Some(deadline_nanos);
         }
     }
 
-    /// Records a sign of life of an input's sender that carries no frame.
+    /// Notes that the sender of an input is alive, though it has sent no message.
     pub fn alive(&mut self, input: usize, now: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.alive_at = Some(now);
         }
     }
 
-    /// Accepts a message.
+    /// Takes a message.
     ///
-    /// * `input`: index of the input; a message with an index out of range is rejected as late.
-    /// * `now`: time of a monotonic clock, nanoseconds.
+    /// * `input`: below the number of inputs; a message of any other is [`Push::Late`].
+    /// * `now`: nanoseconds of a clock that never goes back.
     pub fn push(&mut self, input: usize, frame: u64, item: T, now: u64) -> Push {
         let n = self.inputs.len();
-        let Some(sender) = self.inputs.get_mut(input) else {
+        let Some(state) = self.inputs.get_mut(input) else {
             return Push::Late;
         };
-        sender.heard_at = Some(now);
-        sender.down = false;
-        // Not the maximum: after one frame number far ahead, the input is waited for again once its
-        // numbers are right.
-        sender.last_frame = Some(frame);
+        state.received_at = Some(now);
+        state.down = false;
+        // Not the largest: after one wrong frame number far ahead, later frames wait for this input again.
+        state.last_frame = Some(frame);
         if frame < self.next_frame {
             return Push::Late;
         }
-        if self.pending.len() >= MOST_PENDING && !self.pending.contains_key(&frame) {
+        if self.pending.len() >= MAX_PENDING && !self.pending.contains_key(&frame) {
             return Push::Full;
         }
         let slot = self.pending.entry(frame).or_insert_with(|| Slot {
@@ -148,7 +146,7 @@ impl<T> Joiner<T> {
         Push::Taken
     }
 
-    /// Records that an input has ended.
+    /// Notes the end of an input's stream.
     pub fn end(&mut self, input: usize) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.ended = true;
@@ -157,15 +155,14 @@ impl<T> Joiner<T> {
 
     /// The earliest pending frame, if it is complete.
     ///
-    /// Call this until it returns `None`: several frames may be complete. An input that is given up
-    /// is not waited for again until its next message.
+    /// Call it until it returns `None`: several frames may have become complete at once. Frames do not wait for an input
+    /// that is down until it sends again.
     pub fn next(&mut self, now: u64) -> Option<Joined<T>> {
         let (&frame, slot) = self.pending.first_key_value()?;
         let patience = [self.patience_nanos, self.alive_patience_nanos];
         for (input, item) in self.inputs.iter_mut().zip(&slot.items) {
-            let past =
-                input.ended || input.down || input.last_frame.is_some_and(|last| last > frame);
-            if item.is_some() || past {
+            let is_past = input.last_frame.is_some_and(|last| last > frame);
+            if item.is_some() || input.ended || input.down || is_past {
                 continue;
             }
             if input.silent_since(slot.began_at, now, patience) {
@@ -182,7 +179,7 @@ impl<T> Joiner<T> {
         })
     }
 
-    /// The latest complete frame that is wanted, and the number of other frames that were skipped.
+    /// The latest complete frame that is wanted, and how many others were skipped.
     ///
     /// * `wants`: whether a frame is to be processed.
     pub fn latest(
@@ -191,35 +188,35 @@ impl<T> Joiner<T> {
         wants: impl Fn(&Joined<T>) -> bool,
     ) -> (Option<Joined<T>>, u64) {
         let mut latest = None;
-        let mut n_passed = 0;
+        let mut n_skipped = 0;
         while let Some(later) = self.next(now) {
-            let passed = if wants(&later) {
+            let has_skipped = if wants(&later) {
                 latest.replace(later).is_some()
             } else {
                 true
             };
-            n_passed += u64::from(passed);
+            n_skipped += u64::from(has_skipped);
         }
-        (latest, n_passed)
+        (latest, n_skipped)
     }
 
-    /// Whether an input is not waited for because it has been silent for too long.
+    /// Whether frames do not wait for an input because it has been silent for too long.
     pub fn is_down(&self, input: usize) -> bool {
         self.inputs.get(input).is_some_and(|input| input.down)
     }
 
-    /// Number of frames that wait for inputs.
+    /// Frames that wait for a message.
     pub fn n_pending(&self) -> usize {
         self.pending.len()
     }
 
-    /// Whether the stream is over: all inputs have ended, or at least one has and the others have
-    /// been silent for too long, and every frame has been returned.
+    /// Whether no frame will follow: every frame was returned, and all inputs have ended, or at least one has and the
+    /// others have been silent for too long.
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
-        let silent = |input: &Input| {
+        let is_silent = |input: &Input| {
             input
-                .heard_at
+                .received_at
                 .is_some_and(|at| input.silent_since(at, now, patience))
         };
         self.pending.is_empty()
@@ -227,7 +224,7 @@ impl<T> Joiner<T> {
             && self
                 .inputs
                 .iter()
-                .all(|input| input.ended || input.down || silent(input))
+                .all(|input| input.ended || input.down || is_silent(input))
     }
 }
 
@@ -240,10 +237,8 @@ mod tests {
     fn frames<T>(joiner: &mut Joiner<T>, now: u64) -> Vec<(u64, Vec<bool>)> {
         std::iter::from_fn(|| joiner.next(now))
             .map(|joined| {
-                (
-                    joined.frame,
-                    joined.items.iter().map(Option::is_some).collect(),
-                )
+                let is_there = joined.items.iter().map(Option::is_some).collect();
+                (joined.frame, is_there)
             })
             .collect()
     }
@@ -259,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_with_one_wrong_frame_number_is_waited_for_again() {
+    fn after_one_wrong_frame_number_frames_wait_for_the_input_again() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(1, u64::MAX, (), 0);
         joiner.push(0, 0, (), 0);
@@ -276,18 +271,18 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_pending_frames_is_limited() {
+    fn the_number_of_pending_frames_is_bounded() {
         let mut joiner = Joiner::new(2, 100);
-        for frame in 0..MOST_PENDING as u64 {
+        for frame in 0..MAX_PENDING as u64 {
             assert_eq!(joiner.push(1, frame, (), 0), Push::Taken);
         }
         assert_eq!(joiner.push(1, 1 << 20, (), 0), Push::Full);
         assert_eq!(joiner.push(0, 5, (), 0), Push::Taken, "a pending frame");
-        assert_eq!(joiner.n_pending(), MOST_PENDING);
+        assert_eq!(joiner.n_pending(), MAX_PENDING);
     }
 
     #[test]
-    fn an_input_that_has_sent_a_later_frame_is_not_waited_for() {
+    fn a_frame_does_not_wait_for_an_input_that_is_past_it() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.push(1, 1, (), 0);
@@ -295,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_input_is_down_until_its_next_message() {
+    fn a_silent_input_is_down_until_it_sends_again() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 10);
         assert_eq!(frames(&mut joiner, 109), []);
@@ -309,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_sends_slowly_is_waited_for() {
+    fn a_frame_waits_for_a_slow_input_that_still_sends() {
         let mut joiner = Joiner::new(2, 100);
         for frame in 0..4 {
             joiner.push(0, frame, (), 0);
@@ -323,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn in_lossless_delivery_a_live_input_may_take_ten_times_as_long() {
+    fn a_lossless_join_waits_longer_for_a_living_sender() {
         let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         for now in (0..1000).step_by(50) {
@@ -336,13 +331,13 @@ mod tests {
     #[test]
     fn no_frame_waits_for_an_optional_input_past_its_deadline() {
         let mut joiner = Joiner::lossless(2, 1000);
-        joiner.hurry(1, 30);
+        joiner.set_deadline(1, 30);
         joiner.push(0, 0, 'a', 0);
         joiner.alive(1, 29);
         assert_eq!(frames(&mut joiner, 29), []);
         joiner.alive(1, 30);
         assert_eq!(frames(&mut joiner, 30), [(0, vec![true, false])]);
-        // It is not waited for again until its next message, even if that is late.
+        // No frame waits for it until it sends again; a late message is enough.
         joiner.push(0, 1, 'b', 40);
         assert_eq!(frames(&mut joiner, 40), [(1, vec![true, false])]);
         assert_eq!(joiner.push(1, 0, 'c', 45), Push::Late);
@@ -352,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn in_lossless_delivery_an_input_without_sign_of_life_gets_the_normal_patience() {
+    fn a_lossless_join_waits_less_long_without_a_living_sender() {
         let mut joiner = Joiner::lossless(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.alive(1, 50);
@@ -361,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_for_a_returned_frame_is_late() {
+    fn a_message_about_a_returned_frame_is_late() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 5, (), 0);
         joiner.push(1, 6, (), 0);
@@ -372,29 +367,29 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_frame_skips_earlier_ones() {
+    fn latest_skips_earlier_frames() {
         let mut joiner = Joiner::new(1, 100);
         for frame in 0..3 {
             joiner.push(0, frame, frame, 0);
         }
-        let (got, n_passed) = joiner.latest(0, |_| true);
-        assert_eq!((got.unwrap().frame, n_passed), (2, 2));
+        let (got, n_skipped) = joiner.latest(0, |_| true);
+        assert_eq!((got.unwrap().frame, n_skipped), (2, 2));
     }
 
     #[test]
-    fn unwanted_frames_are_skipped() {
+    fn latest_skips_frames_that_are_not_wanted() {
         let mut joiner = Joiner::new(1, 100);
         for frame in 0..5 {
             joiner.push(0, frame, frame, 0);
         }
-        let (got, n_passed) = joiner.latest(0, |joined| joined.frame == 3);
-        assert_eq!((got.unwrap().frame, n_passed), (3, 4));
+        let (got, n_skipped) = joiner.latest(0, |joined| joined.frame == 3);
+        assert_eq!((got.unwrap().frame, n_skipped), (3, 4));
         joiner.push(0, 5, 5, 0);
         assert_eq!(joiner.latest(0, |_| false), (None, 1));
     }
 
     #[test]
-    fn the_stream_is_over_when_all_inputs_have_ended_and_all_frames_are_returned() {
+    fn it_is_over_when_all_inputs_have_ended_and_all_frames_are_returned() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.end(0);
@@ -405,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_that_died_before_its_end_does_not_keep_the_stream_open() {
+    fn an_input_that_fell_silent_before_its_end_does_not_prevent_the_end() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.push(1, 0, (), 0);
@@ -416,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stream_is_not_over_before_any_input_has_ended() {
+    fn it_is_not_over_before_an_input_has_ended() {
         let mut joiner: Joiner<()> = Joiner::new(2, 100);
         assert!(!joiner.is_over(u64::MAX));
         joiner.push(0, 0, (), 0);
@@ -426,17 +421,17 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_message_is_returned_once_in_frame_order_or_is_late(
+        fn every_accepted_message_is_returned_once_in_frame_order(
             events in prop::collection::vec((0_usize..3, 0_u64..8, 0_u64..40), 0..60),
         ) {
             let mut joiner = Joiner::new(3, 50);
-            let (mut now, mut taken, mut given, mut last) = (0, 0, 0, None);
+            let (mut now, mut taken, mut returned, mut last) = (0, 0, 0, None);
             let mut drain = |joiner: &mut Joiner<u64>, now: u64| {
                 while let Some(joined) = joiner.next(now) {
                     assert!(last < Some(joined.frame), "in order");
                     last = Some(joined.frame);
                     assert!(joined.items.iter().flatten().all(|item| *item == joined.frame));
-                    given += joined.items.iter().flatten().count();
+                    returned += joined.items.iter().flatten().count();
                 }
             };
             for (input, frame, pause) in events {
@@ -446,7 +441,7 @@ mod tests {
             }
             drain(&mut joiner, now + 1000);
             prop_assert_eq!(joiner.n_pending(), 0);
-            prop_assert_eq!(given, taken);
+            prop_assert_eq!(returned, taken);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Topics of any kind, as bytes: what `record` receives and `replay` sends.
+//! Topics of any message type, as bytes: what `record` receives and `replay` sends.
 
 mod receiver;
 mod sender;

@@ -1,10 +1,10 @@
-//! What a stage needs of its process: the session, the clock, and where counts go.
+//! What a stage needs from its process: the session, the clock and the counters.
 
 use messages::{Cause, Refusal};
 use runtime::{Health, Service, now_nanos};
 use wire::{Expected, WireError};
 
-/// Where a stage counts what happens. A process reports these counts in its heartbeats.
+/// The counters of a stage. A process reports them in its heartbeats.
 pub trait Account {
     /// Counts a message that was received and accepted.
     fn received(&self);
@@ -28,7 +28,7 @@ impl Account for Health {
     }
 }
 
-/// The session, the clock and the account of a stage. Tests bring their own.
+/// The session, the clock and the counters of a stage. Tests provide their own.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
     session: u64,
@@ -45,7 +45,7 @@ impl core::fmt::Debug for Context<'_> {
 }
 
 impl<'a> Context<'a> {
-    /// * `now`: nanoseconds of a clock that never goes back.
+    /// * `now`: nanoseconds of a monotonic clock.
     pub fn new(session: u64, now: &'a dyn Fn() -> u64, account: &'a dyn Account) -> Self {
         Self {
             session,
@@ -54,7 +54,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Of a process.
+    /// The context of a process.
     pub fn of(service: &'a Service) -> Self {
         Self::new(service.session(), &now_nanos, service.health())
     }
@@ -64,14 +64,14 @@ impl<'a> Context<'a> {
         (self.now)()
     }
 
-    /// Where counts go.
+    /// The counters.
     pub fn account(&self) -> &'a dyn Account {
         self.account
     }
 
-    /// What a message is checked against.
+    /// The expected values of a message.
     ///
-    /// * `view`: of the topic; a worker's number for a topic of pairs.
+    /// * `view`: the view of the topic, or the worker's number for a topic of pairs.
     pub fn expected(&self, view: usize) -> Expected {
         Expected {
             session: self.session,

@@ -1,4 +1,4 @@
-//! One frame on its way through a stage.
+//! One frame in a stage.
 
 use std::cell::Cell;
 
@@ -8,20 +8,20 @@ use messages::{Stamp, Timing};
 /// A decoded message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Item<T> {
-    /// Of the message.
+    /// Stamp of the message.
     pub stamp: Stamp,
-    /// Of the message.
+    /// Timing of the message.
     pub timing: Timing,
-    /// What it means.
+    /// The decoded content.
     pub value: T,
 }
 
-/// What a stage does for one frame: the stamp of its messages, and the times that they are measured by.
+/// The stamp of the messages that a stage sends for one frame, and the times for its latency figures.
 #[derive(Debug)]
 pub struct Turn {
     stamp: Stamp,
     received_at: Cell<u64>,
-    /// When the last message that belongs to the frame was sent.
+    /// When the last input message of the frame was sent.
     last_sent_at: Option<u64>,
 }
 
@@ -34,7 +34,7 @@ impl Turn {
         }
     }
 
-    /// The stamp of the messages to be sent; the view is still 0.
+    /// The stamp of the messages to be sent; [`crate::Output::send`] sets the view.
     pub fn stamp(&self) -> &Stamp {
         &self.stamp
     }
@@ -71,12 +71,12 @@ impl<T> Frame<'_, T> {
         self.number
     }
 
-    /// For the messages to be sent.
+    /// Stamp and times for the messages to be sent.
     pub fn turn(&self) -> &Turn {
         &self.turn
     }
 
-    /// The message of a slot, if it came in time.
+    /// The message of a slot, if it was received in time.
     pub fn item(&self, slot: usize) -> Option<&Item<T>> {
         self.items.get(slot)?.as_ref()
     }
@@ -86,9 +86,9 @@ impl<T> Frame<'_, T> {
         self.items.get_mut(slot)?.take()
     }
 
-    /// The message of an optional input, else its last one while that is fresh; and how many frames old it is.
+    /// The message of an optional input, or the input's last one while that is fresh; and its age in frames.
     ///
-    /// * `captured_at`: of the view's frame, nanoseconds.
+    /// * `captured_at`: capture time of the view's frame, nanoseconds.
     pub fn latest(&self, slot: usize, captured_at: u64) -> Option<(u64, &T)> {
         match self.item(slot) {
             Some(item) => Some((0, &item.value)),

@@ -34,7 +34,7 @@ struct Inner<E: Element, H: BulkHeader> {
     shelf: RefCell<Shelf<Sample<E, H>>>,
 }
 
-/// A sample with its frame number, if one waits.
+/// The oldest waiting sample with its frame number.
 type Received<E, H> = Result<Option<(u64, Sample<E, H>)>, ReceiveError>;
 
 /// Bulk inputs of any type.
@@ -77,7 +77,7 @@ impl<E: Element, H: BulkHeader> Held<E, H> {
 }
 
 impl<E: Element, H: BulkHeader> Inner<E, H> {
-    /// The oldest sample that waits and is of this view and session; others are counted.
+    /// The oldest waiting sample of this view and session; others are counted.
     fn receive(&self, context: &Context<'_>) -> Received<E, H> {
         while let Some(sample) = self.subscriber.receive()? {
             match (self.check)(&sample, &context.expected(self.view)) {

@@ -20,7 +20,7 @@ pub(crate) struct Rules {
     pub(crate) skips: Option<u64>,
 }
 
-/// What a frame of one slot waits for at most, and how long the slot's last message serves instead.
+/// An optional input: frames wait for it until `deadline` at most.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Optional {
     pub(crate) slot: usize,
@@ -36,7 +36,7 @@ pub(crate) struct Inbox<'a, T> {
 }
 
 impl<'a, T> Inbox<'a, T> {
-    /// * `remember`: by slot, how a value is copied that serves later frames; for at most `max_age`.
+    /// * `remember`: by slot, how a value is copied if it may be used for later frames, for at most `max_age`.
     pub(crate) fn new(
         inputs: Vec<Box<dyn Input<T> + 'a>>,
         rules: Rules,
@@ -52,7 +52,7 @@ impl<'a, T> Inbox<'a, T> {
         };
         if rules.delivery == Delivery::Realtime {
             for input in optional {
-                joiner.hurry(input.slot, nanos(input.deadline));
+                joiner.set_deadline(input.slot, nanos(input.deadline));
             }
         }
         Self {
@@ -68,7 +68,7 @@ impl<'a, T> Inbox<'a, T> {
         }
     }
 
-    /// Receives all that waits on all inputs.
+    /// Receives all waiting messages of all inputs.
     pub(crate) fn poll(&mut self, context: &Context<'_>) -> Result<(), ReceiveError> {
         for input in &mut self.inputs {
             input.poll(context, &mut self.joins)?;
@@ -76,7 +76,7 @@ impl<'a, T> Inbox<'a, T> {
         Ok(())
     }
 
-    /// Discards all that waits on all inputs.
+    /// Discards all waiting messages of all inputs.
     pub(crate) fn drain(&self) -> Result<(), ReceiveError> {
         self.inputs.iter().try_for_each(|input| input.drain())
     }
@@ -99,7 +99,7 @@ impl<'a, T> Inbox<'a, T> {
         if let Some(step) = self.skip_step() {
             let nth = stamp.frame / step;
             self.cadence
-                .answered(nth, stamp.captured_at_nanos, busy_nanos);
+                .processed(nth, stamp.captured_at_nanos, busy_nanos);
         }
     }
 
@@ -111,7 +111,7 @@ impl<'a, T> Inbox<'a, T> {
             .map(|step| step.max(1))
     }
 
-    /// What is remembered of every slot.
+    /// The last messages of every slot.
     pub(crate) fn last(&self) -> &Last<T> {
         &self.joins.last
     }

@@ -4,8 +4,8 @@ use join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 
-/// Most frames that are lost at once; a larger gap is a sender's error.
-const MOST_LOST: u64 = 1 << 16;
+/// Largest gap that counts as lost frames; a larger one is a wrong frame number.
+const MAX_GAP: u64 = 1 << 16;
 
 /// Chooses and counts the frames of one view as they come.
 #[derive(Debug)]
@@ -18,14 +18,14 @@ pub(crate) struct Intake {
     last_frame: Option<u64>,
 }
 
-/// How far a view has come; kept in a file, for the next epoch of the process.
+/// The progress of a view; kept in a file for the next epoch of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Past {
     /// Number of the frame that is expected next.
     next: u64,
     /// Frames that the camera has dropped.
     n_dropped: u64,
-    /// The epoch of the camera's process, whose count begins at 0 in each.
+    /// The epoch of the capture process; its count begins at 0 in every epoch.
     camera_epoch: u32,
 }
 
@@ -35,7 +35,7 @@ impl Past {
         [self.next, self.n_dropped, self.camera_epoch.into()]
     }
 
-    /// The same from three numbers.
+    /// From three numbers.
     pub(crate) fn from_numbers([next, n_dropped, camera_epoch]: [u64; 3]) -> Self {
         Self {
             next,
@@ -58,13 +58,12 @@ impl Intake {
         }
     }
 
-    /// How far it has come.
+    /// The progress so far.
     pub(crate) fn past(&self) -> Past {
         self.past
     }
 
-    /// Whether a frame is to be processed: not one that was sent again for another receiver, and not one that there is no
-    /// time for.
+    /// Whether a frame is to be processed: not if it was sent again for another receiver, and not if the cadence skips it.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
         self.last_frame != Some(frame)
@@ -73,11 +72,11 @@ impl Intake {
                 || self.cadence.takes(self.nth(frame)))
     }
 
-    /// The number of frames before this one, or before the end, that never came and that the camera did not drop.
+    /// Frames before this one (or before the end of stream) that were not received and that capture did not drop.
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
         let skipped = nth.saturating_sub(self.past.next);
-        if skipped > MOST_LOST {
+        if skipped > MAX_GAP {
             return 0;
         }
         let is_same_camera = header.stamp.epoch == self.past.camera_epoch;
@@ -86,13 +85,13 @@ impl Intake {
         } else {
             0
         };
-        let left_out = header.n_dropped.saturating_sub(before);
+        let dropped = header.n_dropped.saturating_sub(before);
         self.past = Past {
             next: (nth + 1).max(self.past.next),
             n_dropped: header.n_dropped,
             camera_epoch: header.stamp.epoch,
         };
-        skipped.saturating_sub(left_out)
+        skipped.saturating_sub(dropped)
     }
 
     /// Notes that a frame was processed, and how long that took.
@@ -101,13 +100,13 @@ impl Intake {
         self.last_frame = Some(frame);
         let stride = self.cadence.stride();
         self.cadence
-            .answered(self.nth(frame), header.stamp.captured_at_nanos, busy_nanos);
+            .processed(self.nth(frame), header.stamp.captured_at_nanos, busy_nanos);
         if self.delivery == Delivery::Realtime && self.cadence.stride() != stride {
             tracing::info!(frame, every = self.cadence.stride(), "another cadence");
         }
     }
 
-    /// Which of the frames that are used a frame is.
+    /// Position of a frame among the frames that are used.
     pub(crate) fn nth(&self, frame: u64) -> u64 {
         frame.saturating_sub(self.start_frame) / self.frame_step
     }
@@ -139,7 +138,7 @@ mod tests {
     #[test]
     fn every_frame_is_processed_dropped_by_the_camera_or_lost() {
         let mut intake = intake(Delivery::Realtime);
-        // 0 and 1 are lost, the camera leaves 3 and 4 out, 5 is lost, 7 and 8 are lost before the end.
+        // 0 and 1 are lost, the camera drops 3 and 4, 5 is lost, 7 and 8 are lost before the end.
         assert_eq!(intake.n_lost_before(&header(2, 0)), 2);
         assert_eq!(intake.n_lost_before(&header(6, 2)), 1);
         assert_eq!(intake.n_lost_before(&header(9, 2)), 2);
@@ -151,7 +150,7 @@ mod tests {
         assert_eq!(first.n_lost_before(&header(20, 18)), 2);
         let past = Past::from_numbers(first.past().numbers());
         let mut second = Intake::new(Delivery::Realtime, [6, 3], past);
-        // 21 is what the first held when it was killed; 22 the camera left out; 23 and 24 nobody saw.
+        // 21 was held by the first process when it was killed; the camera dropped 22; 23 and 24 were not received.
         assert_eq!(second.n_lost_before(&header(25, 19)), 3);
         assert_eq!(second.n_lost_before(&header(26, 19)), 0);
     }
@@ -159,20 +158,20 @@ mod tests {
     #[test]
     fn a_restarted_camera_counts_from_0() {
         let mut intake = intake(Delivery::Realtime);
-        let again = |nth, n_dropped| {
+        let restarted = |nth, n_dropped| {
             let mut header = header(nth, n_dropped);
             header.stamp.epoch = 1;
             header
         };
         assert_eq!(intake.n_lost_before(&header(4, 4)), 0);
-        // The new life has left out five: 5 to 9.
-        assert_eq!(intake.n_lost_before(&again(10, 5)), 0);
-        assert_eq!(intake.n_lost_before(&again(12, 5)), 1);
-        assert_eq!(intake.n_lost_before(&again(14, 6)), 0);
+        // The new epoch has dropped five: 5 to 9.
+        assert_eq!(intake.n_lost_before(&restarted(10, 5)), 0);
+        assert_eq!(intake.n_lost_before(&restarted(12, 5)), 1);
+        assert_eq!(intake.n_lost_before(&restarted(14, 6)), 0);
     }
 
     #[test]
-    fn a_wrong_frame_number_once_costs_no_count() {
+    fn one_wrong_frame_number_does_not_count_as_lost_frames() {
         let mut intake = intake(Delivery::Lossless);
         assert_eq!(intake.n_lost_before(&header(0, 0)), 0);
         intake.processed(&header(0, 0), 1);

@@ -1,4 +1,4 @@
-//! The joiner of a stage, and what is remembered of each input.
+//! The joiner of a stage, and the last messages of each input.
 
 use join::{Joiner, Last, Push};
 use messages::{Cause, Stamp, Status};
@@ -6,14 +6,14 @@ use messages::{Cause, Stamp, Status};
 use crate::slots::Slots;
 use crate::{Context, Item};
 
-/// How a value of a slot is copied that serves later frames; none if it does not.
+/// How a value of a slot is copied if it may be used for later frames; none if it may not.
 pub(crate) type Copier<T> = Option<fn(&T) -> T>;
 
-/// The joiner, and what is remembered of each slot.
+/// The joiner, and the last messages of each slot.
 pub(crate) struct Joins<T> {
     pub(crate) joiner: Joiner<Item<T>>,
     pub(crate) last: Last<T>,
-    /// By slot: copies a value that is remembered.
+    /// By slot: how a value is copied into `last`.
     pub(crate) remember: Vec<Copier<T>>,
     pub(crate) end: Option<Stamp>,
 }
@@ -41,7 +41,7 @@ impl<T> Joins<T> {
         if let Some(Some(copy)) = self.remember.get(slot)
             && status == Status::OK
         {
-            // It may come too late for its own frame, and in time for the next.
+            // It may be too late for its own frame and in time for the next one.
             let value = copy(&item.value);
             self.last
                 .keep(slot, stamp.frame, stamp.captured_at_nanos, value);

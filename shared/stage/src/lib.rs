@@ -1,19 +1,18 @@
 //! The loop of every service: wait, receive, check, join, compute, send, account, end.
 //!
 //! A service declares its inputs and outputs on a [`Stage`] and gives the step that turns one frame into messages. The
-//! stage alone knows when a frame is complete, what the end of a stream means, how lateness is counted, and how a process
-//! ends. Every message is checked and decoded once, when it is received.
+//! stage decides when a frame is complete, handles late messages and the end of streams, and ends the process. Every message is checked and decoded once, when it is received.
 //!
 //! | input | method | a frame waits for it |
 //! |---|---|---|
 //! | one sender for each view | [`Stage::view_input`] | yes |
 //! | one sender for several slots: a worker and its pairs | [`Stage::pair_inputs`] | yes |
-//! | welcome, not necessary: expected errors | [`Stage::optional_input`] | up to a deadline; then the last value serves while it is fresh |
+//! | optional: expected errors | [`Stage::optional_input`] | up to a deadline; then the last value is used while it is fresh |
 //! | bulk data, read where it lies in shared memory | [`Stage::hold_evidence`], [`Stage::hold_frames`] | no |
 //! | a stream of bulk data, one sample a frame | [`Stage::run_stream`] | - |
 //!
 //! A service that makes its frames itself has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A
-//! service that takes every message as it comes uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as
+//! service that handles messages as they are received uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as
 //! bytes.
 #![forbid(unsafe_code)]
 

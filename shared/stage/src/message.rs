@@ -6,12 +6,12 @@ use messages::{
 
 /// A message with a stamp, a timing and a status.
 pub trait Stamped: Copy {
-    /// What refusals call it.
+    /// Its name in log messages about refused messages.
     const NAME: &'static str;
 
     /// Session, frame, capture time, view, epoch.
     fn stamp(&self) -> &Stamp;
-    /// When its sender received and sent.
+    /// When its sender received its input and sent it.
     fn timing(&self) -> &Timing;
     /// Whether it carries a result, or is the end of the stream.
     fn status(&self) -> Status;
@@ -60,7 +60,7 @@ stamped! {
 
 /// The header of bulk data.
 pub trait BulkHeader: runtime::Header {
-    /// What refusals call it.
+    /// Its name in log messages about refused messages.
     const NAME: &'static str;
 
     /// Session, frame, capture time, view, epoch.

@@ -29,9 +29,9 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Self { service, publisher }
     }
 
-    /// Sends a message of a frame; returns when, nanoseconds.
+    /// Sends a message about a frame; returns the send time, nanoseconds.
     ///
-    /// * `view`: of its stamp: the view or the pair; 0 for all views.
+    /// * `view`: for its stamp: the view or the pair; 0 for a message about all views.
     ///
     /// # Errors
     ///
@@ -51,7 +51,7 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Ok(sent_at_nanos)
     }
 
-    /// The same, and notes where the time of the frame went.
+    /// As [`Self::send`], and records the latencies of the frame.
     ///
     /// # Errors
     ///
@@ -62,9 +62,9 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
         Ok(())
     }
 
-    /// Notes where the time of a message went that has just been sent.
+    /// Records the latencies of a message that has just been sent.
     ///
-    /// * `waited`: how long the frame waited before, if it is not noted otherwise, nanoseconds.
+    /// * `waited`: how long the frame waited in this process, if that is not recorded elsewhere, nanoseconds.
     pub fn account(&self, turn: &Turn, sent_at: u64, waited: Option<u64>) {
         self.service.health().passed(&Passage {
             waiting: waited,
@@ -80,13 +80,13 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
 pub(crate) enum EndStamp {
     /// The session alone.
     Session,
-    /// That of the input's end: it tells how many frames the footage of a view had.
+    /// That of the input's end of stream, which gives the number of frames of the view.
     Input,
 }
 
-/// An output of any message type, as the stage sees it.
+/// An output of any message type.
 pub(crate) trait Outgoing {
-    /// Waits for the receivers; how many there are, and how many are expected.
+    /// Waits for the receivers; returns how many are connected, and how many are expected.
     fn wait(&self, patience: Duration) -> [usize; 2];
     fn n_connected(&self) -> usize;
     /// Sends the end of the stream, if this topic has one.
@@ -124,7 +124,7 @@ impl<M: Message + Stamped> Outgoing for Messages<M> {
     }
 }
 
-/// Arrays; their end is sent with the messages that they belong to.
+/// Arrays. They have no end of stream of their own: they belong to messages that have one.
 pub(crate) struct Arrays<E: Element, H: Header> {
     pub(crate) publisher: Rc<SlicePublisher<E, H>>,
     pub(crate) n_receivers: usize,

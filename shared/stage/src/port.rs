@@ -8,7 +8,7 @@ use crate::{Context, Stamped};
 
 /// Where messages come from: a subscriber, or a list in tests.
 pub trait Receive<M> {
-    /// The oldest message that waits.
+    /// The oldest waiting message.
     ///
     /// # Errors
     ///
@@ -29,12 +29,12 @@ impl<M: Message> Receive<M> for Subscriber<M> {
     }
 }
 
-/// Whose messages a topic carries.
+/// The sender of a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sender {
-    /// One view's.
+    /// A process of one view.
     View(usize),
-    /// One fusion worker's; pairs are dealt to the workers in turn.
+    /// A fusion worker; pairs are assigned to workers in turn.
     Worker {
         /// Its number.
         worker: usize,
@@ -46,7 +46,7 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// Checks the session, the sender and the times of a message. The end of a worker's stream names no pair.
+    /// Checks the session, the sender and the times of a message. The end of a worker's stream carries the worker's number instead of a pair.
     pub(crate) fn check<M: Stamped>(
         self,
         message: &M,
@@ -67,7 +67,7 @@ impl Sender {
     }
 }
 
-/// The receiving end of a topic: gives the messages of this session and sender; others are counted and logged.
+/// The receiving end of a topic. Returns the messages of this session and sender; others are counted and logged.
 #[derive(Debug)]
 pub struct Port<R> {
     receiver: R,
@@ -101,7 +101,7 @@ impl<R> Port<R> {
         Self { receiver, sender }
     }
 
-    /// The oldest message that waits and is accepted, the end of the stream included.
+    /// The oldest waiting message that is accepted, including the end of the stream.
     ///
     /// # Errors
     ///
@@ -127,7 +127,7 @@ impl<R> Port<R> {
         self.receiver.n_senders()
     }
 
-    /// Discards what waits, so that no sender waits for room.
+    /// Discards all waiting messages, so that no sender waits for room.
     ///
     /// # Errors
     ///

@@ -1,10 +1,10 @@
 //! Bulk samples that are held until the frame comes that needs them.
 
-/// Frames that are held at the same time where the latest wins: three that wait, and one that is being received.
+/// Frames that are held at the same time where the latest frame wins: three that wait, and one that is being received.
 pub const HELD_REALTIME: usize = 4;
 
-/// A frame number this far ahead of the current frame is a sender's error, frames of the footage that are used.
-const FAR: u64 = 4096;
+/// A frame number this far ahead of the current frame is a sender's error; in frames that are used.
+const MAX_AHEAD: u64 = 4096;
 
 /// Samples of one topic with their frame numbers.
 #[derive(Debug)]
@@ -15,8 +15,8 @@ pub(crate) struct Shelf<S> {
 }
 
 impl<S> Shelf<S> {
-    /// * `capacity`: 1 to receive a sample only when the one before has been released, because its sender waits for it;
-    ///   else all that come are received, and those kept that are likeliest to be needed.
+    /// * `capacity`: with 1, a sample is received only when the previous one has been released, because its sender waits
+    ///   for that; with more, all samples are received, and those most likely to be needed are kept.
     /// * `frame_step`: distance between the frames used.
     pub(crate) fn new(capacity: usize, frame_step: u64) -> Self {
         Self {
@@ -26,9 +26,9 @@ impl<S> Shelf<S> {
         }
     }
 
-    /// Receives what waits, as far as there is room.
+    /// Receives waiting samples while there is room.
     ///
-    /// * `receive`: the oldest sample that waits.
+    /// * `receive`: returns the oldest waiting sample.
     pub(crate) fn fill<E>(
         &mut self,
         mut receive: impl FnMut() -> Result<Option<(u64, S)>, E>,
@@ -56,7 +56,7 @@ impl<S> Shelf<S> {
         frame: u64,
         mut receive: impl FnMut() -> Result<Option<(u64, S)>, E>,
     ) -> Result<(), E> {
-        let wanted = frame..=frame.saturating_add(FAR.saturating_mul(self.frame_step));
+        let wanted = frame..=frame.saturating_add(MAX_AHEAD.saturating_mul(self.frame_step));
         self.held.retain(|(held, _)| wanted.contains(held));
         while self.capacity == 1 && self.held.is_empty() {
             match receive()? {
@@ -80,8 +80,8 @@ impl<S> Shelf<S> {
     }
 }
 
-/// Which of several frames is released first. A slow stage takes every n-th frame, n a power of two: so it is the frame
-/// that is divided by the smallest power, and of these the oldest.
+/// Index of the frame that is released first. A slow stage processes every n-th frame, n a power of two: so it is the
+/// frame divisible by the smallest power of two, and the oldest of several.
 fn least_needed(steps: &[u64]) -> usize {
     let keys = steps.iter().enumerate();
     let least = keys.min_by_key(|(_, step)| (step.trailing_zeros(), **step));
@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
 
-    /// A topic on which these frames wait.
+    /// A topic with these waiting frames.
     fn topic(
         frames: impl IntoIterator<Item = u64>,
     ) -> impl FnMut() -> Result<Option<(u64, char)>, Infallible> {
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn with_capacity_1_the_next_sample_is_received_when_the_one_before_is_released() {
+    fn with_capacity_1_a_sample_is_received_when_the_previous_one_is_released() {
         let mut shelf = Shelf::new(1, 1);
         let mut receive = topic(0..5);
         shelf.fill(&mut receive).unwrap();
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn with_more_capacity_all_are_received_and_the_likeliest_kept() {
+    fn with_more_capacity_all_are_received_and_the_most_likely_needed_kept() {
         let mut shelf = Shelf::new(4, 1);
         shelf.fill(topic(0..7)).unwrap();
         let held: Vec<u64> = (0..7).filter(|frame| shelf.of(*frame).is_some()).collect();
@@ -139,7 +139,7 @@ mod tests {
     fn a_frame_number_far_ahead_is_released() {
         let mut shelf = Shelf::new(1, 2);
         shelf.fill(topic([u64::MAX])).unwrap();
-        shelf.advance(4, topic([4 + 2 * FAR + 2, 4])).unwrap();
+        shelf.advance(4, topic([4 + 2 * MAX_AHEAD + 2, 4])).unwrap();
         assert!(shelf.of(4).is_some());
     }
 }

@@ -54,7 +54,7 @@ impl<T> fmt::Debug for Stage<'_, T> {
 impl<'a, T: 'a> Stage<'a, T> {
     /// A stage without inputs and outputs.
     ///
-    /// * `patience`: how long an input may be silent while others wait for it, and how long receivers are waited for.
+    /// * `patience`: how long an input may be silent while others wait for it, and how long the stage waits for receivers.
     pub fn new(service: &'a Service, patience: Duration) -> Self {
         Self {
             service,
@@ -70,7 +70,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         }
     }
 
-    /// Lets the stage skip frames where the latest frame wins and it cannot keep up.
+    /// Allows the stage to skip frames where the latest frame wins and it cannot keep up.
     ///
     /// * `frame_step`: distance between the frames used.
     pub fn skip_when_behind(&mut self, frame_step: u64) {
@@ -79,7 +79,7 @@ impl<'a, T: 'a> Stage<'a, T> {
 
     /// Adds the topic of a view; every frame waits for it. Returns its slot.
     ///
-    /// * `decode`: what a message means; an error is counted and logged, and the message is dropped.
+    /// * `decode`: decodes a message; a message with an error is dropped, counted and logged.
     ///
     /// # Errors
     ///
@@ -95,10 +95,10 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(slot)
     }
 
-    /// Adds the topic of a view whose messages are welcome but not necessary. Where the latest frame wins, no frame waits
-    /// for them longer than `deadline`; the last value then serves while it is fresh ([`Frame::latest`]).
+    /// Adds the topic of a view whose messages are optional. Where the latest frame wins, no frame waits for them longer
+    /// than `deadline`; the last value is then used while it is fresh ([`Frame::latest`]).
     ///
-    /// * `max_age`: beyond which a value is not used, from capture to capture; the same for all optional inputs.
+    /// * `max_age`: largest difference of capture times at which a value is used; the same for all optional inputs.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl<'a, T: 'a> Stage<'a, T> {
     }
 
     /// Adds the topics of all fusion workers: one slot for each pair, in the order of pairs. A worker sends for its pairs,
-    /// which are dealt in turn. Returns the slot of the first pair.
+    /// which are assigned in turn. Returns the slot of the first pair.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(())
     }
 
-    /// Holds the evidence of a view where it lies: one frame, released when that frame has been processed.
+    /// Holds the evidence of a view in shared memory: one frame, released when that frame has been processed.
     ///
     /// * `frame_step`: distance between the frames used.
     ///
@@ -194,7 +194,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(held)
     }
 
-    /// Holds the frames of a view where they lie: one where nothing may be lost, else up to [`HELD_REALTIME`].
+    /// Holds the frames of a view in shared memory: one with lossless delivery, else up to [`HELD_REALTIME`].
     ///
     /// # Errors
     ///
@@ -282,7 +282,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(publisher)
     }
 
-    /// Waits until the receivers of all outputs are there, but not for ever.
+    /// Waits until the receivers of all outputs are connected, or patience has run out.
     pub fn wait_for_receivers(&self) {
         let patience = self.service.patience_at_start(self.patience);
         for output in &self.outgoing {
@@ -294,9 +294,9 @@ impl<'a, T: 'a> Stage<'a, T> {
         tracing::info!("begins");
     }
 
-    /// Processes every frame until all inputs have ended, or the process is to stop; then sends the end of the stream.
+    /// Processes every frame until all inputs have ended, or a stop is requested; then sends the end of the stream.
     ///
-    /// * `step`: turns the messages of one frame into messages.
+    /// * `step`: processes the messages of one frame, and sends its results.
     ///
     /// # Errors
     ///
@@ -316,13 +316,13 @@ impl<'a, T: 'a> Stage<'a, T> {
         let remember = core::mem::take(&mut self.remember);
         let mut inbox = Inbox::new(inputs, rules, &self.optional, remember, self.max_age);
         while self.waiter.wait(TICK)? != Woken::Stop {
-            self.listen(&mut inbox, &context)?;
+            self.receive(&mut inbox, &context)?;
             while let Some(joined) = inbox.next(&context) {
                 self.process(&mut inbox, joined, &context, &mut step)?;
                 if self.service.stop().is_requested() {
                     return Ok(());
                 }
-                self.listen(&mut inbox, &context)?;
+                self.receive(&mut inbox, &context)?;
             }
             if inbox.is_over(now_nanos()) {
                 return self.end(&inbox);
@@ -331,7 +331,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(())
     }
 
-    fn listen(&self, inbox: &mut Inbox<'_, T>, context: &Context<'_>) -> Result<(), Failure> {
+    fn receive(&self, inbox: &mut Inbox<'_, T>, context: &Context<'_>) -> Result<(), Failure> {
         for held in &self.held {
             held.fill(context)?;
         }
@@ -353,8 +353,8 @@ impl<'a, T: 'a> Stage<'a, T> {
             held.fill(context)?;
             held.advance(frame, context)?;
         }
-        let here = || items.iter().flatten();
-        let captured = here().map(|item| item.stamp.captured_at_nanos).min();
+        let received = || items.iter().flatten();
+        let captured = received().map(|item| item.stamp.captured_at_nanos).min();
         let stamp = Stamp {
             session: self.service.session(),
             frame,
@@ -362,14 +362,14 @@ impl<'a, T: 'a> Stage<'a, T> {
             view: 0,
             epoch: self.service.epoch(),
         };
-        let last_sent_at = here().map(|item| item.timing.sent_at_nanos).max();
+        let last_sent_at = received().map(|item| item.timing.sent_at_nanos).max();
         step(&mut Frame {
             number: frame,
             turn: Turn::new(stamp, received_at, last_sent_at),
             items,
             last: inbox.last(),
         })?;
-        // Room for the next, whatever its sender has left undone: it may have died half-way.
+        // Room for the next sample, even if its sender has died before it sent the matching message.
         for held in &self.held {
             held.advance(frame.saturating_add(1), context)?;
         }
@@ -387,14 +387,14 @@ impl<'a, T: 'a> Stage<'a, T> {
                 Ok(())
             },
             || {
-                // An input that was given up as silent may send again; it must not wait for room here.
+                // An input that counted as down may send again; its sender must not wait for room here.
                 let drained = self.held.iter().try_for_each(|held| held.drain());
                 drained.and_then(|()| inbox.drain())
             },
         )
     }
 
-    /// Sends the end of the stream, and again to every receiver that was restarted, until the process is to stop.
+    /// Sends the end of the stream, and again to every receiver that was restarted, until a stop is requested.
     ///
     /// * `send_end`: sends it on all outputs.
     ///

@@ -19,19 +19,19 @@ pub struct Range {
 /// A frame of a stream.
 #[derive(Debug)]
 pub struct StreamFrame {
-    /// Which of the frames that are used this is, from 0.
+    /// Its position among the frames that are used, from 0.
     pub nth: u64,
-    /// Pixels and header, where they lie.
+    /// Pixels and header, in shared memory.
     pub sample: Sample<u8, FrameHeader>,
-    /// For the messages to be sent.
+    /// Stamp and times for the messages to be sent.
     pub turn: Turn,
 }
 
 impl Stage<'_, ()> {
-    /// Processes the frames of a view until the footage ends or the process is to stop; then sends the end of the stream.
+    /// Processes the frames of a view until the footage ends or a stop is requested; then sends the end of the stream.
     ///
-    /// Where the latest frame wins, frames that there is no time for are skipped and counted. A restarted process counts
-    /// the frames that were lost with its earlier life.
+    /// Where the latest frame wins, frames are skipped and counted if there is no time for them. A restarted process
+    /// counts the frames that were lost since its previous epoch.
     ///
     /// # Errors
     ///

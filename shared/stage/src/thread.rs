@@ -1,4 +1,4 @@
-//! The thread of a service that writes, so that no sender waits for the disk.
+//! A thread that writes files, so that no sender waits for the disk.
 
 use core::time::Duration;
 use std::thread::{Builder, JoinHandle};
@@ -16,14 +16,14 @@ impl WriterThread {
     ///
     /// # Errors
     ///
-    /// [`ExitKind::Run`] if the system has no thread for it.
+    /// [`ExitKind::Run`] if the thread cannot be started.
     pub fn start(write: impl FnOnce() + Send + 'static) -> Result<Self, Failure> {
         let builder = Builder::new().name("writer".to_owned());
         let handle = builder.spawn(write).or_fail(ExitKind::Run)?;
         Ok(Self { handle })
     }
 
-    /// Waits until everything is written; the sending end of the queue must have been dropped. The heartbeats go on.
+    /// Waits until everything is written; heartbeats continue. The sending end of the queue must have been dropped.
     ///
     /// # Errors
     ///

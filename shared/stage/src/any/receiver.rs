@@ -1,4 +1,4 @@
-//! Receives a topic of any kind as bytes.
+//! Receives a topic of any message type as bytes.
 
 use bytemuck::{bytes_of, cast_slice};
 use messages::{
@@ -7,22 +7,22 @@ use messages::{
 use recording::{Envelope, Kind, encode};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
 
-/// A message as bytes, and what its envelope tells.
+/// A message as bytes, and the fields of its envelope.
 #[derive(Debug)]
 pub struct Received {
     /// Its session.
     pub session: u64,
     /// Its frame; 0 for heartbeats.
     pub frame: u64,
-    /// When it was sent.
+    /// When it was sent, nanoseconds; 0 if unknown.
     pub sent_at: u64,
     /// Whether it carries a result; heartbeats always do.
     pub status: Status,
-    /// Heartbeats: the epoch of the process, and how many messages it has sent in it.
+    /// Heartbeats only: the epoch of the process, and how many messages it has sent in this epoch.
     pub life: Option<[u64; 2]>,
-    /// Poses: whether evidence was sent with them.
+    /// Poses of a view: whether evidence was sent with them.
     pub has_evidence: bool,
-    /// The message as it is written into a recording; none if there was no room for it.
+    /// The message as it is written into a recording; none if there is no room for it.
     pub data: Option<Vec<u8>>,
 }
 
@@ -31,7 +31,7 @@ pub struct Received {
 pub struct Receiver {
     kind: Kind,
     port: Port,
-    /// Arrays are omitted.
+    /// Whether arrays are omitted.
     heads_only: bool,
 }
 
@@ -82,9 +82,9 @@ impl Receiver {
         self.kind
     }
 
-    /// Takes the oldest message that waits, if one does.
+    /// The oldest waiting message.
     ///
-    /// * `room`: whether there is room for so many bytes.
+    /// * `room`: whether there is room for a number of bytes.
     ///
     /// # Errors
     ///
@@ -95,28 +95,34 @@ impl Receiver {
     ) -> Result<Option<Received>, ReceiveError> {
         let of = |head: &[u8], elements: &[u8]| Some(self.received(head, elements, room));
         Ok(match &self.port {
-            Port::Frame(it) => it
+            Port::Frame(port) => port
                 .receive()?
-                .and_then(|it| of(bytes_of(it.header()), it.payload())),
-            Port::Evidence(it) => it
+                .and_then(|sample| of(bytes_of(sample.header()), sample.payload())),
+            Port::Evidence(port) => port
                 .receive()?
-                .and_then(|it| of(bytes_of(it.header()), cast_slice(it.payload()))),
-            Port::ViewPose(it) => it.receive()?.and_then(|it| {
-                let received = of(bytes_of(&it), &[])?;
+                .and_then(|sample| of(bytes_of(sample.header()), cast_slice(sample.payload()))),
+            Port::ViewPose(port) => port.receive()?.and_then(|pose| {
+                let received = of(bytes_of(&pose), &[])?;
                 Some(Received {
-                    has_evidence: it.evidence_bytes > 0,
+                    has_evidence: pose.evidence_bytes > 0,
                     ..received
                 })
             }),
-            Port::ViewQuality(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
-            Port::PairPose(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
-            Port::Pose3d(it) => it.receive()?.and_then(|it| of(bytes_of(&it), &[])),
-            Port::Health(it) => it.receive()?.and_then(|it| {
-                let received = of(bytes_of(&it), &[])?;
+            Port::ViewQuality(port) => port
+                .receive()?
+                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::PairPose(port) => port
+                .receive()?
+                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::Pose3d(port) => port
+                .receive()?
+                .and_then(|message| of(bytes_of(&message), &[])),
+            Port::Health(port) => port.receive()?.and_then(|heartbeat| {
+                let received = of(bytes_of(&heartbeat), &[])?;
                 Some(Received {
-                    session: it.session,
-                    sent_at: it.at_nanos,
-                    life: Some([u64::from(it.epoch), it.n_sent]),
+                    session: heartbeat.session,
+                    sent_at: heartbeat.at_nanos,
+                    life: Some([u64::from(heartbeat.epoch), heartbeat.n_sent]),
                     ..received
                 })
             }),
@@ -133,10 +139,10 @@ impl Receiver {
             data
         });
         Received {
-            session: envelope.map_or(0, |it| it.stamp.session),
-            frame: envelope.map_or(0, |it| it.stamp.frame),
-            sent_at: envelope.map_or(0, |it| it.timing.sent_at_nanos),
-            status: envelope.map_or(Status::OK, |it| it.status),
+            session: envelope.map_or(0, |envelope| envelope.stamp.session),
+            frame: envelope.map_or(0, |envelope| envelope.stamp.frame),
+            sent_at: envelope.map_or(0, |envelope| envelope.timing.sent_at_nanos),
+            status: envelope.map_or(Status::OK, |envelope| envelope.status),
             life: None,
             has_evidence: false,
             data,

@@ -1,4 +1,4 @@
-//! Sends bytes on a topic of any kind.
+//! Sends bytes on a topic of any message type.
 
 use core::time::Duration;
 
@@ -50,12 +50,12 @@ impl Sender {
     /// See [`SlicePublisher::wait_for_subscribers`].
     pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
         match &self.port {
-            Port::Frame(it) => it.wait_for_subscribers(n, limit),
-            Port::Evidence(it) => it.wait_for_subscribers(n, limit),
-            Port::ViewPose(it) => it.wait_for_subscribers(n, limit),
-            Port::ViewQuality(it) => it.wait_for_subscribers(n, limit),
-            Port::PairPose(it) => it.wait_for_subscribers(n, limit),
-            Port::Pose3d(it) => it.wait_for_subscribers(n, limit),
+            Port::Frame(port) => port.wait_for_subscribers(n, limit),
+            Port::Evidence(port) => port.wait_for_subscribers(n, limit),
+            Port::ViewPose(port) => port.wait_for_subscribers(n, limit),
+            Port::ViewQuality(port) => port.wait_for_subscribers(n, limit),
+            Port::PairPose(port) => port.wait_for_subscribers(n, limit),
+            Port::Pose3d(port) => port.wait_for_subscribers(n, limit),
             Port::Health => 0,
         }
     }
@@ -63,24 +63,24 @@ impl Sender {
     /// Processes that are subscribed.
     pub fn n_connected(&self) -> usize {
         match &self.port {
-            Port::Frame(it) => it.n_connected(),
-            Port::Evidence(it) => it.n_connected(),
-            Port::ViewPose(it) => it.n_connected(),
-            Port::ViewQuality(it) => it.n_connected(),
-            Port::PairPose(it) => it.n_connected(),
-            Port::Pose3d(it) => it.n_connected(),
+            Port::Frame(port) => port.n_connected(),
+            Port::Evidence(port) => port.n_connected(),
+            Port::ViewPose(port) => port.n_connected(),
+            Port::ViewQuality(port) => port.n_connected(),
+            Port::PairPose(port) => port.n_connected(),
+            Port::Pose3d(port) => port.n_connected(),
             Port::Health => 0,
         }
     }
 
-    /// Sends a message in another envelope. One without its array is sent with one element of zero.
+    /// Sends a message with another envelope. A message without its array is sent with one element of value 0.
     ///
     /// # Errors
     ///
     /// [`SendError`].
-    pub fn send(&self, message: &Message<'_>, it: &Envelope) -> Result<(), SendError> {
+    pub fn send(&self, message: &Message<'_>, envelope: &Envelope) -> Result<(), SendError> {
         let mut head = message.head.to_vec();
-        it.put(self.kind, &mut head);
+        envelope.put(self.kind, &mut head);
         match &self.port {
             Port::Frame(port) => array(port, &head, message.elements),
             Port::Evidence(port) => array(port, &head, message.elements),
@@ -97,14 +97,14 @@ impl Sender {
     /// # Errors
     ///
     /// [`SendError`].
-    pub fn end(&self, it: &Envelope) -> Result<(), SendError> {
+    pub fn end(&self, envelope: &Envelope) -> Result<(), SendError> {
         let head = match self.kind {
             Kind::Evidence | Kind::Health => return Ok(()),
             kind => vec![0; kind.head_bytes()],
         };
         let end = Envelope {
             status: Status::END,
-            ..*it
+            ..*envelope
         };
         let message = Message {
             head: &head,
