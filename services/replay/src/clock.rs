@@ -1,4 +1,4 @@
-//! From the times of a recording to those of the run that it is replayed in.
+//! Converts the times of a recording to those of the run in which it is replayed.
 
 use messages::{Stamp, Timing};
 use recording::Envelope;
@@ -6,90 +6,89 @@ use recording::Envelope;
 /// How fast a recording is replayed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// As fast as it can be read and taken.
+    /// As fast as it can be read and received.
     Max,
-    /// So many times as fast as it was recorded; above 0.
+    /// A multiple of the recorded speed; above 0.
     Times(f64),
 }
 
-/// The two clocks, and how they belong together.
+/// The clock of the recording and the clock of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clock {
-    /// When the first message of the recording was sent, by its clock, nanoseconds.
+    /// Send time of the first message, by the clock of the recording, nanoseconds.
     pub recorded: u64,
-    /// From the first message to the last, nanoseconds.
+    /// Time from the first message to the last, nanoseconds.
     pub length: u64,
-    /// When the run was planned, by this machine's clock.
+    /// When the run was planned, by this machine's clock, nanoseconds.
     pub planned: u64,
-    /// How fast.
+    /// Replay speed.
     pub pace: Pace,
 }
 
-/// With a clock running, the first message goes out this much after the run was planned.
+/// At a given speed, the first message is sent this long after the run was planned.
 const LEAD_NANOS: u64 = 2_000_000_000;
 
 impl Clock {
-    /// When the first message is to be sent, by this machine's clock, if somebody paces.
+    /// When the first message is to be sent, by this machine's clock, at a given speed.
     fn begin(&self) -> u64 {
         self.planned.saturating_add(LEAD_NANOS)
     }
 
-    /// When a message is to be sent; at once if nobody paces.
+    /// When a message is to be sent, by this machine's clock; 0 at [`Pace::Max`].
     ///
-    /// * `sent_at`: when it was sent.
+    /// * `sent_at`: when it was sent, by the clock of the recording.
     pub(crate) fn due(&self, sent_at: u64) -> u64 {
         match self.pace {
             Pace::Max => 0,
             Pace::Times(times) => {
                 let since = sent_at.saturating_sub(self.recorded) as f64 / times;
-                // A float that is too large, or none, becomes the nearest integer.
+                // The conversion saturates; NaN becomes 0.
                 self.begin().saturating_add(since as u64)
             }
         }
     }
 
-    /// A message's envelope in this run.
+    /// The envelope of a message in this run.
     ///
-    /// Times of capture move by the same amount for all messages, so that what depends on the time
-    /// between two frames stays as it was, and so far that nothing is sent before it was captured, even if
-    /// it is replayed faster than it was recorded. When a message was sent is now; what it took to compute
-    /// stays.
+    /// All capture times are shifted by the same amount, so that the times between frames stay the same. The shift is such
+    /// that no message is sent before its frame was captured, even if it is replayed faster than it was recorded. The send
+    /// time is `now`; the computing time stays.
     ///
     /// * `session`: of this run.
-    /// * `epoch`: how often this process has been restarted, in addition to what it stands in for.
-    /// * `now`: of this machine's clock.
-    pub(crate) fn rebase(&self, it: &Envelope, [session, epoch, now]: [u64; 3]) -> Envelope {
-        let took = it
-            .timing
+    /// * `epoch`: restarts of this process; added to the recorded epoch.
+    /// * `now`: this machine's clock, nanoseconds.
+    pub(crate) fn rebase(&self, recorded: &Envelope, [session, epoch, now]: [u64; 3]) -> Envelope {
+        let timing = recorded.timing;
+        let computing = timing
             .sent_at_nanos
-            .saturating_sub(it.timing.received_at_nanos);
+            .saturating_sub(timing.received_at_nanos);
         Envelope {
             stamp: Stamp {
                 session,
-                captured_at_nanos: self.moved(it.stamp.captured_at_nanos),
-                epoch: it.stamp.epoch.saturating_add(epoch as u32),
-                ..it.stamp
+                captured_at_nanos: self.shifted(recorded.stamp.captured_at_nanos),
+                epoch: recorded.stamp.epoch.saturating_add(epoch as u32),
+                ..recorded.stamp
             },
             timing: Timing {
-                received_at_nanos: now.saturating_sub(took),
+                received_at_nanos: now.saturating_sub(computing),
                 sent_at_nanos: now,
             },
-            status: it.status,
+            status: recorded.status,
         }
     }
 
-    fn moved(&self, time: u64) -> u64 {
+    fn shifted(&self, time: u64) -> u64 {
         let (first, ahead) = match self.pace {
             Pace::Max => (self.planned, self.length),
             Pace::Times(times) if times > 1.0 => {
-                let left = (self.length as f64 / times) as u64;
-                (self.begin(), self.length.saturating_sub(left))
+                let replayed = (self.length as f64 / times) as u64;
+                (self.begin(), self.length.saturating_sub(replayed))
             }
             Pace::Times(_) => (self.begin(), 0),
         };
         let first = i128::from(first) - i128::from(ahead);
-        let moved = i128::from(time) - i128::from(self.recorded) + first;
-        u64::try_from(moved.max(0)).unwrap_or(u64::MAX)
+        let shifted = i128::from(time) - i128::from(self.recorded) + first;
+        u64::try_from(shifted.max(0)).unwrap_or(u64::MAX)
     }
 }
 
@@ -110,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn twice_as_fast_takes_half_the_time() {
+    fn at_double_speed_messages_are_sent_in_half_the_time() {
         let due = |pace| clock(pace).due(1400);
         let first = 50_000 + LEAD_NANOS;
         assert_eq!(due(Pace::Times(1.0)), first + 400);
@@ -139,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_is_of_this_run_and_sent_now_and_took_what_it_took() {
+    fn a_replayed_message_has_the_session_and_send_time_of_this_run_and_its_own_computing_time() {
         let got = clock(Pace::Max).rebase(&envelope(990, [1100, 1130]), [7, 1, 80_000]);
         let mut expected = envelope(49_490, [79_970, 80_000]);
         (expected.stamp.session, expected.stamp.epoch) = (7, 4);
@@ -148,16 +147,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_time_between_two_frames_stays(
+        fn the_time_between_two_frames_stays_the_same(
             [first, second] in prop::array::uniform2(0_u64..1 << 60), pace in 0.1..10.0,
         ) {
             let clock = Clock { recorded: 0, length: 1 << 60, planned: 1 << 61, pace: Pace::Times(pace) };
-            let captured = |it| clock.rebase(&envelope(it, [0, 0]), [0; 3]).stamp.captured_at_nanos;
+            let captured = |time| clock.rebase(&envelope(time, [0, 0]), [0; 3]).stamp.captured_at_nanos;
             prop_assert_eq!(captured(first).abs_diff(captured(second)), first.abs_diff(second));
         }
 
         #[test]
-        fn nothing_is_sent_before_it_was_captured(
+        fn no_message_is_sent_before_its_frame_was_captured(
             at in 0_u64..1 << 40, ago in 0_u64..1 << 30, pace in prop_oneof![
                 Just(Pace::Max), (0.1..10.0).prop_map(Pace::Times)
             ],
@@ -172,7 +171,7 @@ mod tests {
         }
 
         #[test]
-        fn any_times_are_taken(
+        fn any_times_are_accepted(
             [recorded, length, now]: [u64; 3], time: u64, timing: [u64; 2], pace in 1e-9..1e9,
         ) {
             let clock = Clock { recorded, length, planned: now, pace: Pace::Times(pace) };

@@ -1,8 +1,10 @@
-//! Stands in for a process of a deployment: sends what the process once sent.
+//! Replaces a process of a deployment: sends the messages that the process sent when they were recorded.
 #![forbid(unsafe_code)]
 
 mod clock;
+mod job;
 mod service;
 
 pub use clock::Pace;
-pub use service::{Job, Line, run};
+pub use job::{Job, Output};
+pub use service::run;

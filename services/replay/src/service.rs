@@ -1,49 +1,24 @@
-//! The loop: read a message, wait until it is due, send it in an envelope of this run.
+//! The loop: read a message, wait until it is due, send it with an envelope of this run.
 
 use core::time::Duration;
 use std::fs::File;
-use std::path::PathBuf;
 
 use messages::{Cause, Stamp, Status, Timing};
 use recording::{Entry, Envelope, ReadError, Recording, Track, in_order};
-use runtime::{
-    ExitKind, Failure, OrFail as _, Place, SendError, Service, Waiter, Woken, now_nanos,
-};
-
-use crate::Pace;
-use crate::clock::Clock;
+use runtime::{ExitKind, Failure, OrFail as _, Place, SendError, Service, Woken, now_nanos};
+use stage::Stage;
 use stage::any::Sender;
 
-/// What the process has to do.
-#[derive(Debug)]
-pub struct Job {
-    /// The recording.
-    pub file: PathBuf,
-    /// What the process that it stands in for sends. The first says when it is over.
-    pub lines: Vec<Line>,
-    /// How fast.
-    pub pace: Pace,
-    /// Distance between the frames used, for the end of a recording that lacks it.
-    pub frame_step: u64,
-    /// How long receivers are waited for.
-    pub patience: Duration,
-}
+use crate::clock::Clock;
+use crate::job::{Job, Output};
 
-/// A topic.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
-    /// Its name.
-    pub topic: String,
-    /// Processes that take its messages; with none, nothing is sent there.
-    pub n_consumers: usize,
-}
-
-/// Sends what the recording holds of some topics, in the order in which it was sent, then its end. A message that is
-/// not what was written is left out: who starts the replay has named it.
+/// Sends the recorded messages of some topics in the order in which they were sent, then the end of the stream.
+///
+/// A damaged message is left out: the command that starts a replay has reported it.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the recording cannot be read, or lacks a topic; and what the transport says.
+/// [`ExitKind::Input`] if the recording cannot be read, or lacks a topic; and what the transport reports.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut file = File::open(&job.file).or_fail(ExitKind::Input)?;
     let recording = recording::scan(&mut file).or_fail(ExitKind::Input)?;
@@ -52,24 +27,24 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let order = in_order(&tracks);
     service
         .health()
-        .set_total(tracks.first().map_or(0, |it| it.entries.len() as u64));
-    let speaker = Speaker::open(service, job, &tracks, &recording)?;
-    speaker.wait_for_all();
+        .set_total(tracks.first().map_or(0, |track| track.entries.len() as u64));
+    let playback = Playback::open(service, job, &tracks, &recording)?;
+    playback.wait_for_receivers();
     let mut place = Place::of(service.bus());
     let noted = place.noted().filter(|_| service.epoch() > 0);
     let [begin]: [u64; 1] = noted.unwrap_or([0]);
     let mut buffer = Vec::new();
     let mut end = None;
-    for (nth, (line, entry)) in (0_u64..).zip(&order).skip(begin as usize) {
-        if speaker.waiter.wait(Duration::ZERO)? == Woken::Stop || !speaker.wait_until_due(entry)? {
+    for (nth, (output, entry)) in (0_u64..).zip(&order).skip(begin as usize) {
+        if playback.stage.wait(Duration::ZERO)? == Woken::Stop || !playback.wait_until_due(entry)? {
             return Ok(());
         }
-        let kind = tracks[*line].kind;
+        let kind = tracks[*output].kind;
         let message = match recording::read(&mut file, kind, entry, &mut buffer) {
             Ok(message) => message,
             Err(error @ ReadError::Read(_)) => return Err(error).or_fail(ExitKind::Input),
             Err(error) => {
-                let (topic, frame) = (speaker.topic(*line), entry.frame);
+                let (topic, frame) = (playback.topic(*output), entry.frame);
                 tracing::debug!(%error, topic, frame, "damaged: left out");
                 service.health().dropped(Cause::Malformed, 1);
                 continue;
@@ -85,29 +60,33 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
             end = Some(envelope);
             continue;
         }
-        speaker.say(*line, &message, &envelope)?;
+        playback.send(*output, &message, &envelope)?;
         if let Err(error) = place.note([nth + 1]) {
             tracing::debug!(%error, "cannot note the place in the recording");
         }
     }
-    let end = end.unwrap_or_else(|| after(&order, &tracks, &mut file, job.frame_step));
-    speaker.end(&end)
+    let end = end.unwrap_or_else(|| end_after(&order, &tracks, &mut file, job.frame_step));
+    playback.end(&end)
 }
 
-/// The tracks of the lines that anybody takes, in their order.
+/// The outputs that have receivers.
+fn received(job: &Job) -> impl Iterator<Item = &Output> {
+    job.outputs.iter().filter(|output| output.n_receivers > 0)
+}
+
+/// The tracks of the outputs that have receivers, in their order.
 fn tracks<'a>(job: &Job, recording: &'a Recording) -> Result<Vec<&'a Track>, Failure> {
-    let lines = job.lines.iter().filter(|it| it.n_consumers > 0);
-    let tracks = lines.map(|it| {
-        recording.tracks.get(&it.topic).ok_or_else(|| {
-            let message = format!("{} holds nothing of {}", job.file.display(), it.topic);
+    let tracks = received(job).map(|output| {
+        recording.tracks.get(&output.topic).ok_or_else(|| {
+            let message = format!("{} holds nothing of {}", job.file.display(), output.topic);
             Failure::new(ExitKind::Input, message)
         })
     });
     tracks.collect()
 }
 
-/// The end of a recording that lacks it: the frame after the last of the first line.
-fn after(
+/// The end of stream for a recording that lacks it: one frame step after the last frame of the first output.
+fn end_after(
     order: &[(usize, Entry)],
     tracks: &[&Track],
     file: &mut File,
@@ -118,41 +97,43 @@ fn after(
         timing: Timing::default(),
         status: Status::END,
     };
-    let last = order.iter().rev().find(|it| it.0 == 0);
+    let last = order.iter().rev().find(|(output, _)| *output == 0);
     if let (Some((_, entry)), Some(track)) = (last, tracks.first()) {
         let mut buffer = Vec::new();
         let read = recording::read(file, track.kind, entry, &mut buffer).ok();
-        if let Some(it) = read.and_then(|it| Envelope::of(track.kind, it.head)) {
-            end.stamp = it.stamp;
-            end.stamp.frame = it.stamp.frame.saturating_add(frame_step);
+        if let Some(last) = read.and_then(|message| Envelope::of(track.kind, message.head)) {
+            end.stamp = last.stamp;
+            end.stamp.frame = last.stamp.frame.saturating_add(frame_step);
         }
     }
     end
 }
 
-struct Speaker<'a> {
+/// The outputs of the process, and the clock that they are replayed by.
+struct Playback<'a> {
     service: &'a Service,
     job: &'a Job,
+    stage: Stage<'a, ()>,
+    /// By output that has receivers.
     senders: Vec<Sender>,
     clock: Clock,
-    waiter: Waiter,
 }
 
-impl<'a> Speaker<'a> {
+impl<'a> Playback<'a> {
     fn open(
         service: &'a Service,
         job: &'a Job,
         tracks: &[&Track],
         recording: &Recording,
     ) -> Result<Self, Failure> {
-        let lines = job.lines.iter().filter(|it| it.n_consumers > 0);
-        let senders = lines
+        let senders = received(job)
             .zip(tracks)
-            .map(|(line, track)| Sender::open(service.bus(), track.kind, &line.topic));
+            .map(|(output, track)| Sender::open(service.bus(), track.kind, &output.topic));
         let [recorded, ended] = recording.span().unwrap_or([0; 2]);
         Ok(Self {
             service,
             job,
+            stage: Stage::new(service, job.patience),
             senders: senders.collect::<Result<_, _>>()?,
             clock: Clock {
                 recorded,
@@ -160,24 +141,22 @@ impl<'a> Speaker<'a> {
                 planned: service.session(),
                 pace: job.pace,
             },
-            waiter: service.bus().waiter(),
         })
     }
 
-    fn topic(&self, line: usize) -> &str {
-        let mut lines = self.job.lines.iter().filter(|it| it.n_consumers > 0);
-        lines.nth(line).map_or("", |it| &it.topic)
+    fn topic(&self, output: usize) -> &str {
+        let output = received(self.job).nth(output);
+        output.map_or("", |output| &output.topic)
     }
 
-    fn wait_for_all(&self) {
+    fn wait_for_receivers(&self) {
         let patience = self.service.patience_at_start(self.job.patience);
-        let lines = self.job.lines.iter().filter(|it| it.n_consumers > 0);
-        for (line, sender) in lines.zip(&self.senders) {
-            let n = sender.wait_for_subscribers(line.n_consumers, patience);
-            if n < line.n_consumers {
-                let expected = line.n_consumers;
+        for (output, sender) in received(self.job).zip(&self.senders) {
+            let expected = output.n_receivers;
+            let n = sender.wait_for_subscribers(expected, patience);
+            if n < expected {
                 tracing::warn!(
-                    topic = line.topic,
+                    topic = output.topic,
                     n,
                     expected,
                     "beginning without all receivers"
@@ -186,7 +165,7 @@ impl<'a> Speaker<'a> {
         }
     }
 
-    /// `false` if the process was asked to stop.
+    /// Waits until a message is due; `false` on a stop request.
     fn wait_until_due(&self, entry: &Entry) -> Result<bool, Failure> {
         let due = self.clock.due(entry.publish_time);
         loop {
@@ -194,27 +173,27 @@ impl<'a> Speaker<'a> {
             if left == 0 {
                 return Ok(true);
             }
-            if self.waiter.wait(Duration::from_nanos(left))? == Woken::Stop {
+            if self.stage.wait(Duration::from_nanos(left))? == Woken::Stop {
                 return Ok(false);
             }
         }
     }
 
-    fn rebased(&self, it: &Envelope) -> Envelope {
+    fn rebased(&self, recorded: &Envelope) -> Envelope {
         let (session, epoch) = (self.service.session(), self.service.epoch());
         self.clock
-            .rebase(it, [session, u64::from(epoch), now_nanos()])
+            .rebase(recorded, [session, u64::from(epoch), now_nanos()])
     }
 
-    fn say(
+    fn send(
         &self,
-        line: usize,
+        output: usize,
         message: &recording::Message<'_>,
         envelope: &Envelope,
     ) -> Result<(), Failure> {
         let health = self.service.health();
-        match self.senders[line].send(message, &self.rebased(envelope)) {
-            Ok(()) if line == 0 => health.sent(envelope.stamp.frame),
+        match self.senders[output].send(message, &self.rebased(envelope)) {
+            Ok(()) if output == 0 => health.sent(envelope.stamp.frame),
             Ok(()) => {}
             Err(error @ SendError::TooLong { .. }) => {
                 tracing::warn!(%error, frame = envelope.stamp.frame, "left out");
@@ -225,17 +204,16 @@ impl<'a> Speaker<'a> {
         Ok(())
     }
 
-    fn end(&self, it: &Envelope) -> Result<(), Failure> {
-        let say = || -> Result<(), Failure> {
-            let end = self.rebased(it);
+    /// Sends the end of the stream on all outputs, then waits for the stop request.
+    fn end(&self, end: &Envelope) -> Result<(), Failure> {
+        let send_end = || -> Result<(), Failure> {
+            let end = self.rebased(end);
             for sender in &self.senders {
                 sender.end(&end)?;
             }
             Ok(())
         };
-        say()?;
-        self.service.health().finished();
         let n_connected = || self.senders.first().map_or(0, Sender::n_connected);
-        self.waiter.linger(n_connected, say)
+        self.stage.end_with(n_connected, send_end)
     }
 }

@@ -292,23 +292,23 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
         .or_fail(ExitKind::Config)?;
     let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
     let audience = Audience::new(resolved, &dealing);
-    let line = |topic: String, n_consumers: usize| replay::Line { topic, n_consumers };
-    let lines = match stage {
-        Stage::Capture => vec![line(topic::frame(own.index), audience.of_frames())],
+    let output = |topic: String, n_receivers: usize| replay::Output { topic, n_receivers };
+    let outputs = match stage {
+        Stage::Capture => vec![output(topic::frame(own.index), audience.of_frames())],
         Stage::Pose => vec![
-            line(topic::view_pose(own.index), audience.of_poses()),
-            line(topic::evidence(own.index), audience.of_evidence(own.index)),
+            output(topic::view_pose(own.index), audience.of_poses()),
+            output(topic::evidence(own.index), audience.of_evidence(own.index)),
         ],
-        Stage::Quality => vec![line(
+        Stage::Quality => vec![output(
             topic::view_quality(own.index),
             audience.of_qualities(),
         )],
-        Stage::Fuse => vec![line(topic::pair_pose(own.index), audience.of_pairs())],
-        Stage::Triangulate => vec![line(topic::pose3d(), audience.of_results())],
+        Stage::Fuse => vec![output(topic::pair_pose(own.index), audience.of_pairs())],
+        Stage::Triangulate => vec![output(topic::pose3d(), audience.of_results())],
     };
     let job = replay::Job {
         file: it.file.clone(),
-        lines,
+        outputs,
         pace: it.speed.map_or(replay::Pace::Max, replay::Pace::Times),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         patience: resolved.patience(),
