@@ -1,4 +1,4 @@
-//! Waits until a frame is due, warps it into shared memory, sends.
+//! Waits until a frame is due, warps it into shared memory, sends it.
 
 use core::time::Duration;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::job::Job;
 use crate::supply::{Step, Supply};
 use crate::{Mode, Pace};
 
-/// Real-time footage begins this much later than the run, so that every process is there.
+/// Real-time footage begins this long after the run, so that every process has started.
 const LEAD_NANOS: u64 = 2_000_000_000;
 
 /// One camera, and the topic of its frames.
@@ -26,9 +26,9 @@ pub(crate) struct Camera<'a> {
     pacer: Pacer,
     place: Place,
     n_dropped: u64,
-    /// Fewer than the job's receivers once some did not come in time.
+    /// Receivers that the camera waits for: fewer than the job's once some did not connect in time.
     n_expected: usize,
-    /// Why there is no picture at the moment, if there is none.
+    /// Why the last frame had no picture, if it had none.
     trouble: Option<Status>,
 }
 
@@ -40,8 +40,8 @@ impl<'a> Camera<'a> {
     ) -> Result<Self, Failure> {
         let mut stage = Stage::new(service, job.patience);
         let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
-        let [width, height] = job.framing.out_size().map(|it| it as usize);
-        // Beside a rotated picture there is nothing; beside another its border is repeated, as in the reference program.
+        let [width, height] = job.framing.out_size().map(|side| side as usize);
+        // The area outside a rotated picture is black; otherwise the border is repeated, as in the reference program.
         let fill = if job.framing.roll() == 0.0 {
             Fill::Replicate
         } else {
@@ -68,7 +68,7 @@ impl<'a> Camera<'a> {
         })
     }
 
-    /// Waits for the receivers, then skips what an earlier epoch of this process has sent.
+    /// Waits for the receivers, then skips the frames that earlier epochs of this process have sent. Returns how many.
     pub(crate) fn resume(&mut self, supply: &mut Supply) -> u64 {
         let patience = self.service.patience_at_start(self.job.patience);
         let n = self
@@ -89,7 +89,7 @@ impl<'a> Camera<'a> {
         supply.skip(sent)
     }
 
-    /// Logs once that the camera gives no pictures, and once that it does again.
+    /// Logs once when the camera stops giving pictures, and once when it gives them again.
     pub(crate) fn log_trouble(&mut self, frame: u64, step: Step) {
         let trouble = match step {
             Step::Nothing(status) => Some(status),
@@ -99,15 +99,15 @@ impl<'a> Camera<'a> {
             return;
         }
         let view = self.job.view;
-        if let Some(it) = trouble {
-            tracing::warn!(view, frame, cause = it.reason(), "without a picture");
+        if let Some(status) = trouble {
+            tracing::warn!(view, frame, cause = status.reason(), "without a picture");
         } else {
             tracing::info!(view, frame, "pictures again");
         }
         self.trouble = trouble;
     }
 
-    /// Waits until frame `at` is due; where frames may be dropped, skips those that are past.
+    /// Waits until frame `at` is due; where frames may be dropped, skips those that are overdue.
     ///
     /// Returns how many were skipped.
     pub(crate) fn wait_until_due(&mut self, supply: &mut Supply, at: u64) -> Result<u64, Failure> {
@@ -127,7 +127,7 @@ impl<'a> Camera<'a> {
         Ok(n)
     }
 
-    /// Sends a frame; where nothing may be lost, again to a receiver that was restarted.
+    /// Sends a frame; with lossless delivery, sends it again if a receiver was restarted.
     pub(crate) fn send_frame(
         &mut self,
         index: u64,
@@ -180,7 +180,7 @@ impl<'a> Camera<'a> {
         Ok(())
     }
 
-    /// Sends that there is no picture of a frame, and why; or that there are no more frames.
+    /// Sends a frame without a picture, with the cause; or the end of the stream.
     pub(crate) fn send_empty(&self, frame: u64, status: Status) -> Result<(), Failure> {
         let mut loan = self.publisher.loan(1)?;
         loan.payload_mut().fill(0);
@@ -208,14 +208,14 @@ impl<'a> Camera<'a> {
         }
     }
 
-    /// Notes where a restarted process is to continue.
+    /// Notes where a restarted process continues.
     pub(crate) fn note(&mut self, n_sent: u64) {
         if let Err(error) = self.place.note([n_sent]) {
             tracing::debug!(%error, "cannot note the place in the footage");
         }
     }
 
-    /// Sends that the footage is over, and how many frames it had.
+    /// Sends the end of the stream, which carries the number of frames.
     pub(crate) fn end(&self, n_frames: u64) -> Result<(), Failure> {
         let beyond = self.job.source.start + n_frames * self.job.source.step;
         let n_connected = || self.publisher.n_connected();

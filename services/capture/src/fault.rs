@@ -1,22 +1,22 @@
-//! What is to go wrong with a camera on purpose, and when.
+//! Simulated faults of a camera, and when they happen.
 
 use core::fmt;
 use core::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// What goes wrong.
+/// A kind of simulated fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultKind {
     /// The camera is gone.
     Unplug,
-    /// The picture stays as it is.
+    /// The picture does not change any more.
     Freeze,
-    /// Every frame says the time of the one before the fault.
+    /// Every frame has the time of the last one before the fault.
     Repeat,
     /// The clock goes backwards.
     Back,
-    /// The clock jumps an hour ahead, at every frame.
+    /// The clock jumps ahead by an hour at every frame.
     Jump,
     /// Every second frame is left out.
     Slow,
@@ -24,7 +24,7 @@ pub enum FaultKind {
     Size,
     /// Pictures cannot be decoded.
     Damage,
-    /// The process computes for ever, and hears nothing any more.
+    /// The process is stuck in a computation, and does not react to anything.
     Spin,
 }
 
@@ -43,15 +43,15 @@ impl FaultKind {
 
     /// Its name in settings.
     pub fn name(self) -> &'static str {
-        let found = Self::ALL.iter().find(|it| it.0 == self);
-        found.map_or("", |it| it.1)
+        let found = Self::ALL.iter().find(|(kind, _)| *kind == self);
+        found.map_or("", |(_, name)| name)
     }
 }
 
-/// Something that goes wrong during some frames.
+/// A fault during a range of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// What.
+    /// The kind.
     pub kind: FaultKind,
     /// The first frame, counted from 0 in the footage.
     pub from: u64,
@@ -59,14 +59,14 @@ pub struct Fault {
     pub count: u64,
 }
 
-/// A text that names no faults.
+/// A text that is not a list of faults.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{text:?} is no fault: expected KIND@FROM+COUNT, for example freeze@30+20, KIND one of {}",
     FaultKind::ALL.map(|it| it.1).join(", ")
 )]
 pub struct FaultError {
-    /// What was said.
+    /// The text.
     pub text: String,
 }
 
@@ -83,25 +83,23 @@ pub struct FaultError {
 pub struct Faults(Vec<Fault>);
 
 impl Faults {
-    /// Whether nothing goes wrong.
+    /// Whether there are no faults.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// What goes wrong with a frame of the footage: the first that is named, if several do.
+    /// The fault of a frame of the footage; the first in the list if there are several.
     pub fn at(&self, frame: u64) -> Option<Fault> {
-        let is_now = |it: &&Fault| frame >= it.from && frame - it.from < it.count;
+        let is_now = |fault: &&Fault| frame >= fault.from && frame - fault.from < fault.count;
         self.0.iter().find(is_now).copied()
     }
 
-    /// What goes wrong in a life of the process: it spins in its first one only, since the next may begin with the
-    /// same frame.
-    ///
-    /// * `epoch`: how often it had been restarted.
+    /// The faults of one epoch of the process. [`FaultKind::Spin`] happens in epoch 0 only, because a restarted process may
+    /// begin with the same frame.
     #[must_use]
-    pub fn of_life(&self, epoch: u32) -> Self {
-        let lasts = |it: &&Fault| epoch == 0 || it.kind != FaultKind::Spin;
-        Self(self.0.iter().filter(lasts).copied().collect())
+    pub fn of_epoch(&self, epoch: u32) -> Self {
+        let happens = |fault: &&Fault| epoch == 0 || fault.kind != FaultKind::Spin;
+        Self(self.0.iter().filter(happens).copied().collect())
     }
 }
 
@@ -156,9 +154,15 @@ impl From<Faults> for String {
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (nth, it) in self.0.iter().enumerate() {
+        for (nth, fault) in self.0.iter().enumerate() {
             let comma = if nth > 0 { ", " } else { "" };
-            write!(f, "{comma}{}@{}+{}", it.kind.name(), it.from, it.count)?;
+            write!(
+                f,
+                "{comma}{}@{}+{}",
+                fault.kind.name(),
+                fault.from,
+                fault.count
+            )?;
         }
         Ok(())
     }
@@ -171,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fault_lasts_as_long_as_it_says() {
+    fn a_fault_lasts_for_its_number_of_frames() {
         let faults: Faults = "freeze@3+2, slow@4+9".parse().unwrap();
         let at = |frame| faults.at(frame).map(|it| it.kind.name());
         assert_eq!(
@@ -187,14 +191,14 @@ mod tests {
         );
         assert_eq!(Faults::default().at(0), None);
         let once: Faults = "spin@3+1, slow@4+9".parse().unwrap();
-        let in_life = |epoch| once.of_life(epoch).to_string();
-        assert_eq!([0, 1].map(in_life), ["spin@3+1, slow@4+9", "slow@4+9"]);
+        let in_epoch = |epoch| once.of_epoch(epoch).to_string();
+        assert_eq!([0, 1].map(in_epoch), ["spin@3+1, slow@4+9", "slow@4+9"]);
         let for_ever: Faults = format!("unplug@1+{}", u64::MAX).parse().unwrap();
         assert!(for_ever.at(u64::MAX).is_some());
     }
 
     #[test]
-    fn what_is_no_fault_is_refused_with_an_example() {
+    fn an_invalid_fault_is_refused_with_an_example() {
         for text in [
             "melt@3+2",
             "freeze",
@@ -204,10 +208,10 @@ mod tests {
             "freeze@3+2,",
             "freeze@3+2 slow@1+1",
         ] {
-            let said = text.parse::<Faults>().unwrap_err().to_string();
+            let error = text.parse::<Faults>().unwrap_err().to_string();
             assert!(
-                said.contains("freeze@30+20") && said.contains("unplug"),
-                "{text}: {said}"
+                error.contains("freeze@30+20") && error.contains("unplug"),
+                "{text}: {error}"
             );
         }
         assert!(" ".parse::<Faults>().unwrap().is_empty());
@@ -215,16 +219,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read(all in prop::collection::vec((0..FaultKind::ALL.len(), 0..u64::MAX, 1..u64::MAX), 0..4)) {
+        fn faults_survive_a_round_trip_through_text(all in prop::collection::vec((0..FaultKind::ALL.len(), 0..u64::MAX, 1..u64::MAX), 0..4)) {
             let fault = |(kind, from, count): (usize, u64, u64)| Fault { kind: FaultKind::ALL[kind].0, from, count };
             let faults = Faults(all.into_iter().map(fault).collect());
             prop_assert_eq!(faults.to_string().parse::<Faults>().unwrap(), faults);
         }
 
         #[test]
-        fn any_text_is_read_or_refused(text in "[a-z@+0-9, ]{0,30}") {
-            if let Ok(it) = text.parse::<Faults>() {
-                prop_assert_eq!(it.to_string().parse::<Faults>().unwrap(), it);
+        fn any_text_is_parsed_or_refused(text in "[a-z@+0-9, ]{0,30}") {
+            if let Ok(faults) = text.parse::<Faults>() {
+                prop_assert_eq!(faults.to_string().parse::<Faults>().unwrap(), faults);
             }
         }
     }

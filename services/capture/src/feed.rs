@@ -1,4 +1,4 @@
-//! Where pictures come from: footage, or a scene that is made while it runs.
+//! The source of pictures: footage, or a scene that is rendered during the run.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use scene::{Address, AddressError, Scene, SceneError, View};
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
 pub enum FeedError {
-    /// The footage, or which of its frames.
+    /// The footage cannot be used.
     #[error(transparent)]
     Footage(#[from] FootageError),
-    /// The address of a scene.
+    /// The address of a scene is invalid.
     #[error("{address}")]
     Address {
         /// As the user wrote it.
@@ -19,7 +19,7 @@ pub enum FeedError {
         /// What is wrong with it.
         source: AddressError,
     },
-    /// The scene of an address.
+    /// The scene of an address cannot be made.
     #[error("{address}")]
     Scene {
         /// As the user wrote it.
@@ -29,17 +29,16 @@ pub enum FeedError {
     },
 }
 
-/// What is known of a camera's pictures before the first.
+/// The properties of a camera's pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedInfo {
     /// Size of every picture.
     pub size: Size,
-    /// Frames that will be handed out.
+    /// Number of frames.
     pub n_frames: u64,
-    /// Frames handed out per second of the scene, where it is known.
+    /// Frames per second of the scene, where it is known.
     pub frame_rate_hz: Option<f64>,
-    /// What the orientation tag of the first image asks for, which is not done: a calibration speaks of pixels as
-    /// they are stored.
+    /// The orientation tag of the first image. It is not applied: a calibration refers to the pixels as stored.
     pub turn: Turn,
 }
 
@@ -66,13 +65,13 @@ pub struct Stage {
 }
 
 impl Feed {
-    /// What is known of a camera's pictures; a scene is not made for it.
+    /// The properties of a camera's pictures, without making a scene.
     ///
     /// # Errors
     ///
     /// [`FeedError`].
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
-        if !Address::is_address(&spec.path) {
+        if !Address::is_one(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
         }
         let address = address(spec)?;
@@ -81,19 +80,22 @@ impl Feed {
             .settings
             .rig
             .rig()
-            .map_err(|it| in_scene(it.into()))?;
+            .map_err(|error| in_scene(error.into()))?;
         let camera = scene::camera_of(&rig, &address.camera).map_err(in_scene)?;
-        let [width, height] = rig.cameras()[camera].intrinsics.size.map(|it| it as usize);
+        let [width, height] = rig.cameras()[camera]
+            .intrinsics
+            .size
+            .map(|side| side as usize);
         info(spec, &address, Size::new(width, height))
     }
 
-    /// Opens the pictures. A scene is put together here, which takes about a second.
+    /// Opens the source. Making a scene takes about a second.
     ///
     /// # Errors
     ///
     /// [`FeedError`].
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
-        if !Address::is_address(&spec.path) {
+        if !Address::is_one(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)));
         }
         let address = address(spec)?;
@@ -113,7 +115,7 @@ impl Feed {
         })))
     }
 
-    /// What is known of the pictures.
+    /// The properties of the pictures.
     pub fn info(&self) -> FeedInfo {
         match self {
             Self::Footage(source) => FeedInfo {
@@ -126,7 +128,7 @@ impl Feed {
         }
     }
 
-    /// The next frame, in a buffer of the feed's own; `None` at the end, and ever after.
+    /// The next frame, in a buffer of the feed; `None` at the end.
     ///
     /// # Errors
     ///
@@ -138,7 +140,7 @@ impl Feed {
         }
     }
 
-    /// The pixels of the frame that was handed out last; see [`Source::pixels`].
+    /// The pixels of the last frame; see [`Source::pixels`].
     pub fn pixels(&self) -> &[u8] {
         match self {
             Self::Footage(source) => source.pixels(),
@@ -146,7 +148,7 @@ impl Feed {
         }
     }
 
-    /// Whether it is one picture again and again, which nobody would call frozen.
+    /// Whether the source is a single image that repeats, which does not count as frozen.
     pub fn is_still(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
@@ -154,7 +156,7 @@ impl Feed {
         }
     }
 
-    /// Whether it is decoded from a video, which leaves out what cannot be decoded.
+    /// Whether the source is a video: a decoder leaves out frames that it cannot decode.
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
@@ -162,7 +164,7 @@ impl Feed {
         }
     }
 
-    /// Passes over the next `n` frames, and returns how many there were.
+    /// Skips the next `n` frames; returns how many there were.
     ///
     /// # Errors
     ///
@@ -172,7 +174,7 @@ impl Feed {
             Self::Footage(source) => source.skip(n),
             Self::Scene(stage) => {
                 let n = n.min(stage.n_left);
-                stage.pass(n);
+                stage.skip(n);
                 Ok(n)
             }
         }
@@ -180,7 +182,7 @@ impl Feed {
 }
 
 impl Stage {
-    fn pass(&mut self, n: u64) {
+    fn skip(&mut self, n: u64) {
         self.n_left -= n;
         self.index = self.index.saturating_add(n.saturating_mul(self.step));
     }
@@ -190,14 +192,14 @@ impl Stage {
             return None;
         }
         let index = self.index;
-        let seen = self.view.picture(index, &mut self.rgb);
+        let picture = self.view.picture(index, &mut self.rgb);
         tracing::trace!(
             index,
-            seconds = seen.seconds,
-            repeated = seen.repeated,
+            seconds = picture.seconds,
+            repeated = picture.repeated,
             "made a picture"
         );
-        self.pass(1);
+        self.skip(1);
         Some(FrameView {
             index,
             time_s: Some(index as f64 / self.rate_hz),
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_hands_out_frames_as_footage_does() {
+    fn frames_of_a_scene_are_selected_like_those_of_footage() {
         let whole = frames(&SourceSpec::new(PATH), 0);
         assert_eq!(whole.len(), 10);
         let part = SourceSpec {
@@ -263,15 +265,22 @@ mod tests {
         let info = Feed::look(&part).unwrap();
         assert_eq!((info.n_frames, info.frame_rate_hz), (3, Some(20.0 / 3.0)));
         assert_eq!(info.size, Size::new(640, 480));
-        let picked: Vec<_> = [1, 4, 7].map(|it| whole[it].clone()).into();
+        let picked: Vec<_> = [1, 4, 7].map(|index| whole[index].clone()).into();
         assert_eq!(frames(&part, 0), picked);
         assert_eq!(frames(&part, 2), picked[2..]);
         assert_eq!(frames(&part, 9), []);
     }
 
     #[test]
-    fn what_cannot_be_opened_says_why() {
-        let refused = |spec: &SourceSpec| causes::in_one_line(&Feed::look(spec).unwrap_err());
+    fn a_source_that_cannot_be_opened_is_an_error_with_the_cause() {
+        let refused = |spec: &SourceSpec| {
+            let error: &dyn std::error::Error = &Feed::look(spec).unwrap_err();
+            let causes = core::iter::successors(Some(error), |it| it.source());
+            causes
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(": ")
+        };
         let path = |path: &str| SourceSpec::new(path);
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));

@@ -1,32 +1,32 @@
-//! Looks at what a camera gives, frame by frame: does its picture change, does its clock run?
+//! Checks the frames of a camera: does the picture change, does the clock run?
 
 use messages::Status;
 
-/// A time may differ from what follows from the frame before by so much: a recording may have gaps, and
-/// a camera that was slow for a moment is no clock that jumped.
+/// Largest difference between a frame's time and the one expected from the previous frame. Recordings have gaps, and a
+/// camera may be slow for a moment: neither is a clock jump.
 const JUMP_S: f64 = 2.0;
 
-/// Remembers of a camera's last frame what it takes to judge the next one. Reads no clock.
+/// Keeps what it needs of a camera's last frame to check the next one. Reads no clock.
 #[derive(Debug)]
 pub(crate) struct Guard {
     /// Repetitions from which on a picture is frozen; 0 for never.
     frozen_after: u32,
     /// Frames of the footage per second.
     rate_hz: Option<f64>,
-    last_print: Option<u64>,
+    last_hash: Option<u64>,
     n_same: u32,
     /// Index and time of the last frame.
     last: Option<(u64, f64)>,
 }
 
 impl Guard {
-    /// * `frozen_after`: repetitions from which on a picture is called frozen; 0 for never.
+    /// * `frozen_after`: repetitions from which on a picture counts as frozen; 0 for never.
     /// * `rate_hz`: frames of the footage (not only of those used) per second.
     pub(crate) fn new(frozen_after: u32, rate_hz: Option<f64>) -> Self {
         Self {
             frozen_after,
             rate_hz,
-            last_print: None,
+            last_hash: None,
             n_same: 0,
             last: None,
         }
@@ -35,17 +35,17 @@ impl Guard {
     /// What is wrong with a frame, if anything is.
     ///
     /// * `index`: in the footage.
-    /// * `time_s`: what the camera says, seconds.
+    /// * `time_s`: timestamp of the camera, seconds.
     /// * `pixels`: of any size.
-    pub(crate) fn look(
+    pub(crate) fn check(
         &mut self,
         index: u64,
         time_s: Option<f64>,
         pixels: &[u8],
     ) -> Option<Status> {
-        // Both look at every frame, whatever the other finds.
+        // Both checks must see every frame.
         let of_picture = self.picture(pixels);
-        let of_clock = time_s.and_then(|it| self.clock(index, it));
+        let of_clock = time_s.and_then(|time_s| self.clock(index, time_s));
         of_clock.or(of_picture)
     }
 
@@ -53,13 +53,13 @@ impl Guard {
         if self.frozen_after == 0 {
             return None;
         }
-        let print = Some(fingerprint(pixels));
-        self.n_same = if self.last_print == print {
+        let hash = Some(fingerprint(pixels));
+        self.n_same = if self.last_hash == hash {
             self.n_same.saturating_add(1)
         } else {
             0
         };
-        self.last_print = print;
+        self.last_hash = hash;
         (self.n_same >= self.frozen_after).then_some(Status::FROZEN)
     }
 
@@ -67,7 +67,7 @@ impl Guard {
         let (last_index, last_s) = self.last.replace((index, time_s))?;
         let passed_s = time_s - last_s;
         let n_frames = index.saturating_sub(last_index) as f64;
-        let expected_s = self.rate_hz.map_or(passed_s, |it| n_frames / it);
+        let expected_s = self.rate_hz.map_or(passed_s, |rate_hz| n_frames / rate_hz);
         if passed_s == 0.0 {
             Some(Status::TIME_REPEATED)
         } else if passed_s < 0.0 {
@@ -80,8 +80,7 @@ impl Guard {
     }
 }
 
-/// A number made of all bytes, to tell pictures apart: four sums of products side by side, so that it
-/// costs less than a copy would.
+/// A hash of all bytes, to tell pictures apart: four independent lanes, so that it costs less than a copy.
 fn fingerprint(bytes: &[u8]) -> u64 {
     const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut lanes = [1, 2, 3, 4].map(|it: u64| it.wrapping_mul(PRIME));
@@ -106,24 +105,24 @@ mod tests {
 
     use super::*;
 
-    /// What is said of pictures of one colour each, at 10 Hz.
+    /// The results for pictures of one colour each, at 10 Hz.
     fn of_pictures(frozen_after: u32, colours: &[u8]) -> Vec<Option<Status>> {
         let mut guard = Guard::new(frozen_after, Some(10.0));
         let frames = colours.iter().enumerate();
-        let look = |(index, colour): (usize, &u8)| {
-            guard.look(index as u64, Some(index as f64 * 0.1), &[*colour; 50])
+        let check = |(index, colour): (usize, &u8)| {
+            guard.check(index as u64, Some(index as f64 * 0.1), &[*colour; 50])
         };
-        frames.map(look).collect()
+        frames.map(check).collect()
     }
 
-    /// What is said of times of frames at 10 Hz whose pictures change.
+    /// The results for timestamps at 10 Hz with changing pictures.
     fn of_times(times_s: &[f64]) -> Vec<Option<Status>> {
         let mut guard = Guard::new(2, Some(10.0));
         let frames = times_s.iter().enumerate();
-        let look = |(index, time_s): (usize, &f64)| {
-            guard.look(index as u64, Some(*time_s), &[index as u8; 50])
+        let check = |(index, time_s): (usize, &f64)| {
+            guard.check(index as u64, Some(*time_s), &[index as u8; 50])
         };
-        frames.map(look).collect()
+        frames.map(check).collect()
     }
 
     #[test]
@@ -135,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn times_must_follow_from_one_another() {
+    fn repeated_decreasing_and_jumping_timestamps_are_faults() {
         let [same, back, jump] = [
             Status::TIME_REPEATED,
             Status::TIME_WENT_BACK,
@@ -150,7 +149,7 @@ mod tests {
             of_times(&[0.0, 0.1, 0.05, 0.0, 0.4]),
             [None, None, back, back, None]
         );
-        // The new time is as good as the old one, once it runs.
+        // After a jump the clock counts as good again.
         assert_eq!(
             of_times(&[0.0, 0.1, 3600.0, 3600.1, 0.4, 0.5]),
             [None, None, jump, None, back, None]
@@ -159,28 +158,28 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_were_passed_over_are_no_jump() {
+    fn skipped_frames_are_not_a_clock_jump() {
         let mut guard = Guard::new(0, Some(10.0));
-        assert_eq!(guard.look(0, Some(0.0), &[]), None);
-        assert_eq!(guard.look(500, Some(50.0), &[]), None);
-        assert_eq!(guard.look(501, None, &[]), None, "no clock");
-        assert_eq!(guard.look(510, Some(51.0), &[]), None);
+        assert_eq!(guard.check(0, Some(0.0), &[]), None);
+        assert_eq!(guard.check(500, Some(50.0), &[]), None);
+        assert_eq!(guard.check(501, None, &[]), None, "no clock");
+        assert_eq!(guard.check(510, Some(51.0), &[]), None);
     }
 
     #[test]
-    fn a_bad_clock_is_told_before_a_frozen_picture() {
+    fn a_bad_clock_is_reported_before_a_frozen_picture() {
         let mut guard = Guard::new(1, Some(10.0));
-        guard.look(0, Some(0.0), &[7; 9]);
+        guard.check(0, Some(0.0), &[7; 9]);
         assert_eq!(
-            guard.look(1, Some(0.0), &[7; 9]),
+            guard.check(1, Some(0.0), &[7; 9]),
             Some(Status::TIME_REPEATED)
         );
-        assert_eq!(guard.look(2, Some(0.2), &[7; 9]), Some(Status::FROZEN));
+        assert_eq!(guard.check(2, Some(0.2), &[7; 9]), Some(Status::FROZEN));
     }
 
     proptest! {
         #[test]
-        fn pictures_that_differ_in_one_byte_are_told_apart(
+        fn pictures_that_differ_in_one_byte_have_different_hashes(
             mut bytes in prop::collection::vec(any::<u8>(), 1..200), at in any::<prop::sample::Index>(), by in 1_u8..,
         ) {
             let before = fingerprint(&bytes);
@@ -193,7 +192,7 @@ mod tests {
         }
 
         #[test]
-        fn a_camera_that_works_is_never_accused(
+        fn a_working_camera_has_no_faults(
             n in 1_usize..100, rate_hz in 0.5..200.0, jitter in 0.0..0.4, step in 1_u64..5,
         ) {
             let mut guard = Guard::new(1, Some(rate_hz));
@@ -202,7 +201,7 @@ mod tests {
                 let late = if nth % 2 == 0 { jitter } else { 0.0 };
                 let time_s = (index as f64 + late) / rate_hz;
                 let pixels = [nth as u8, (nth >> 8) as u8];
-                prop_assert_eq!(guard.look(index, Some(time_s), &pixels), None);
+                prop_assert_eq!(guard.check(index, Some(time_s), &pixels), None);
             }
         }
     }

@@ -14,18 +14,18 @@ pub struct Job {
     pub view: usize,
     /// The footage.
     pub source: SourceSpec,
-    /// What goes wrong with it on purpose.
+    /// Faults that are simulated.
     pub faults: Faults,
-    /// Repetitions from which on a picture is called frozen; 0 for never.
+    /// Repetitions from which on a picture counts as frozen; 0 for never.
     pub frozen_after: u32,
     /// From the footage to the frames of the pipeline.
     pub framing: Framing,
     /// Whether frames may be dropped.
     pub mode: Mode,
-    /// How fast frames are handed out.
+    /// How fast frames are sent.
     pub pace: Pace,
-    /// Processes that take the frames.
+    /// Processes that receive the frames.
     pub n_consumers: usize,
-    /// How long they are waited for.
+    /// How long the process waits for them.
     pub patience: Duration,
 }

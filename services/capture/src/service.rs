@@ -7,17 +7,17 @@ use crate::camera::Camera;
 use crate::job::Job;
 use crate::supply::{Step, Supply};
 
-/// Sends the footage of one view, then its end.
+/// Sends the footage of one view, then the end of the stream.
 ///
-/// A frame that has no picture, or one that something is wrong with, is sent without pixels and says why
+/// A frame without a picture, or with a faulty one, is sent without pixels; its status gives the cause
 /// ([`messages::Status::CAMERA_FAULTS`]).
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the footage cannot be opened, and what the transport says.
+/// [`ExitKind::Input`] if the footage cannot be opened, and what the transport reports.
 pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let is_live = job.pace == Pace::Realtime;
-    let faults = job.faults.of_life(service.epoch());
+    let faults = job.faults.of_epoch(service.epoch());
     let supply = Supply::open(&job.source, &faults, is_live, job.frozen_after);
     let mut supply = supply.or_fail(ExitKind::Input)?;
     service.health().set_total(supply.info().n_frames);

@@ -1,4 +1,4 @@
-//! One picture after the other from a camera that may fail: opened again when it comes back, and looked at.
+//! The pictures of a camera that may fail: it is reopened when it is back, and every frame is checked.
 
 #[cfg(test)]
 mod tests;
@@ -10,12 +10,12 @@ use crate::fault::{Fault, FaultKind, Faults};
 use crate::feed::{Feed, FeedError, FeedInfo};
 use crate::guard::Guard;
 
-/// A camera that is gone is looked for again after so long, nanoseconds.
+/// Time between attempts to reopen a camera, nanoseconds.
 const PAUSE_NANOS: u64 = 500_000_000;
-/// Footage that nobody paces cannot come back by itself: it is given up after so many failures in a row.
-const MOST_FAILURES: u32 = 3;
+/// Footage without a clock cannot recover: it is abandoned after this many consecutive failures.
+const MAX_FAILURES: u32 = 3;
 
-/// What there is of a frame.
+/// The outcome of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Step {
     /// Its picture: [`Supply::pixels`].
@@ -26,38 +26,38 @@ pub(crate) enum Step {
     End,
 }
 
-/// The frames of a camera in their order, every one of which is answered.
+/// The frames of a camera in order; every one has an outcome.
 #[derive(Debug)]
 pub(crate) struct Supply {
     spec: SourceSpec,
     faults: Faults,
     info: FeedInfo,
-    /// Whether the frames are those of a clock, so that a camera may come back.
+    /// Whether frames follow a clock, so that a camera may come back.
     is_live: bool,
     feed: Option<Feed>,
-    /// Which frame comes next, of those that are used.
+    /// Position of the next frame among those that are used.
     at: u64,
     /// Index of a frame that has been read before its turn, and its time.
     early: Option<(u64, Option<f64>)>,
-    /// A picture that stays, while it does.
+    /// The picture that is repeated while the camera is frozen.
     held: Option<Vec<u8>>,
     guard: Guard,
-    /// Why there is no picture, once there is none.
+    /// Why there is no picture, after a failure.
     cause: Status,
     n_failures: u32,
     retry_at: u64,
-    is_given_up: bool,
+    is_abandoned: bool,
 }
 
 impl Supply {
     /// Opens the footage or makes the scene.
     ///
-    /// * `is_live`: a clock runs, and a camera that is gone may come back.
+    /// * `is_live`: frames follow a clock, and a camera that is gone may come back.
     /// * `frozen_after`: see [`crate::Config::frozen_after`].
     ///
     /// # Errors
     ///
-    /// [`FeedError`]: a camera that is not there at the beginning is a mistake in the deployment.
+    /// [`FeedError`]: a camera that cannot be opened at the start is an error of the deployment.
     pub(crate) fn open(
         spec: &SourceSpec,
         faults: &Faults,
@@ -66,7 +66,7 @@ impl Supply {
     ) -> Result<Self, FeedError> {
         let feed = Feed::open(spec)?;
         let info = feed.info();
-        let rate_hz = info.frame_rate_hz.map(|it| it * spec.step as f64);
+        let rate_hz = info.frame_rate_hz.map(|rate_hz| rate_hz * spec.step as f64);
         let frozen_after = if feed.is_still() { 0 } else { frozen_after };
         Ok(Self {
             spec: spec.clone(),
@@ -81,16 +81,16 @@ impl Supply {
             cause: Status::NO_FRAME,
             n_failures: 0,
             retry_at: 0,
-            is_given_up: false,
+            is_abandoned: false,
         })
     }
 
-    /// What is known of the pictures.
+    /// The properties of the pictures.
     pub(crate) fn info(&self) -> FeedInfo {
         self.info
     }
 
-    /// Index in the footage of the frame that comes next.
+    /// Index in the footage of the next frame.
     pub(crate) fn index(&self) -> u64 {
         self.index_of(self.at)
     }
@@ -100,17 +100,17 @@ impl Supply {
         self.spec.start.saturating_add(offset)
     }
 
-    /// The picture that [`Self::step`] has found, RGB, row major.
+    /// The picture of the last [`Self::step`], RGB, row major.
     pub(crate) fn pixels(&self) -> &[u8] {
         let fresh = || self.feed.as_ref().map_or(&[][..], Feed::pixels);
         self.held.as_deref().unwrap_or_else(fresh)
     }
 
-    /// Passes over the next `n` frames, and returns how many there were.
+    /// Skips the next `n` frames; returns how many there were.
     pub(crate) fn skip(&mut self, n: u64) -> u64 {
         let n = n.min(self.info.n_frames.saturating_sub(self.at));
         for _ in 0..n {
-            if let Err(error) = self.pass() {
+            if let Err(error) = self.skip_one() {
                 self.lose(&error, 0);
             }
             self.at += 1;
@@ -120,14 +120,14 @@ impl Supply {
 
     /// Goes on to the next frame.
     ///
-    /// * `now`: nanoseconds, to tell when a camera is looked for again.
+    /// * `now`: nanoseconds; decides when a camera is reopened.
     pub(crate) fn step(&mut self, now: u64) -> Step {
         if self.at >= self.info.n_frames {
             return Step::End;
         }
         let index = self.index();
         let step = match self.read(index, now) {
-            Ok(Some(given)) => self.judge(index, given),
+            Ok(Some(read)) => self.check(index, read),
             Ok(None) => Step::Nothing(self.cause),
             Err(error) => {
                 self.lose(&error, now);
@@ -141,17 +141,17 @@ impl Supply {
         step
     }
 
-    fn judge(&mut self, index: u64, given: Given) -> Step {
-        match given {
-            Given::Time(time_s) => {
+    fn check(&mut self, index: u64, read: Read) -> Step {
+        match read {
+            Read::Picture(time_s) => {
                 // Not `self.pixels()`, which would borrow the guard as well.
                 let fresh = self.feed.as_ref().map_or(&[][..], Feed::pixels);
                 let pixels = self.held.as_deref().unwrap_or(fresh);
-                let wrong = self.guard.look(index, time_s, pixels);
+                let wrong = self.guard.check(index, time_s, pixels);
                 wrong.map_or(Step::Picture, Step::Nothing)
             }
-            Given::LeftOut => {
-                // A camera leaves frames out for want of time, a decoder those that it cannot read.
+            Read::LeftOut => {
+                // A camera leaves out frames when it is slow, a video decoder when it cannot decode them.
                 let is_video = self.feed.as_ref().is_some_and(Feed::is_video);
                 let cause = if is_video {
                     Status::DAMAGED
@@ -160,27 +160,27 @@ impl Supply {
                 };
                 Step::Nothing(cause)
             }
-            Given::Over => Step::End,
+            Read::Over => Step::End,
         }
     }
 
-    /// What the camera gives; nothing while it is gone.
-    fn read(&mut self, index: u64, now: u64) -> Result<Option<Given>, FootageError> {
+    /// Reads the next frame; `None` while the camera is gone.
+    fn read(&mut self, index: u64, now: u64) -> Result<Option<Read>, FootageError> {
         let fault = self.faults.at(index);
-        if fault.is_some_and(|it| it.kind == FaultKind::Spin) {
+        if fault.is_some_and(|fault| fault.kind == FaultKind::Spin) {
             spin();
         }
-        if let Some(error) = fault.and_then(|it| self.failure(it)) {
+        if let Some(error) = fault.and_then(|fault| self.failure(fault)) {
             return Err(error);
         }
-        if self.feed.is_none() && !self.open_again(now)? {
+        if self.feed.is_none() && !self.reopen(now)? {
             return Ok(None);
         }
-        match fault.map(|it| it.kind) {
+        match fault.map(|fault| fault.kind) {
             Some(FaultKind::Freeze) if self.pixels().len() == self.info.size.rgb_bytes() => {
                 return self.freeze().map(Some);
             }
-            Some(FaultKind::Slow) if self.is_odd(fault, index) => self.pass()?,
+            Some(FaultKind::Slow) if self.is_odd(fault, index) => self.skip_one()?,
             _ => {}
         }
         self.held = None;
@@ -189,37 +189,37 @@ impl Supply {
             None => self.next_of_feed()?,
         };
         let Some((found, time_s)) = next else {
-            if fault.is_some_and(|it| it.kind == FaultKind::Slow) {
-                return Ok(Some(Given::LeftOut));
+            if fault.is_some_and(|fault| fault.kind == FaultKind::Slow) {
+                return Ok(Some(Read::LeftOut));
             }
             return self.at_end().map(Some);
         };
         self.n_failures = 0;
         if found > index {
             self.early = Some((found, time_s));
-            return Ok(Some(Given::LeftOut));
+            return Ok(Some(Read::LeftOut));
         }
-        Ok(Some(Given::Time(self.told(fault, index, time_s))))
+        Ok(Some(Read::Picture(self.timestamp(fault, index, time_s))))
     }
 
     fn next_of_feed(&mut self) -> Result<Option<(u64, Option<f64>)>, FootageError> {
         let Some(feed) = &mut self.feed else {
             return Ok(None);
         };
-        Ok(feed.next_frame()?.map(|it| (it.index, it.time_s)))
+        Ok(feed.next_frame()?.map(|frame| (frame.index, frame.time_s)))
     }
 
-    /// Footage that ends before its time ends; of a live camera that is a failure.
-    fn at_end(&self) -> Result<Given, FootageError> {
+    /// The source has ended early; with a live camera this is a failure.
+    fn at_end(&self) -> Result<Read, FootageError> {
         if !self.is_live {
-            return Ok(Given::Over);
+            return Ok(Read::Over);
         }
         Err(FootageError::NotFound {
             path: self.spec.path.clone(),
         })
     }
 
-    /// The failure that a fault is, if it is one.
+    /// The error that a simulated fault causes, if it causes one.
     fn failure(&self, fault: Fault) -> Option<FootageError> {
         let path = || self.spec.path.clone();
         match fault.kind {
@@ -246,20 +246,20 @@ impl Supply {
     }
 
     fn is_odd(&self, fault: Option<Fault>, index: u64) -> bool {
-        fault.is_some_and(|it| (index - it.from) / self.spec.step % 2 == 1)
+        fault.is_some_and(|fault| (index - fault.from) / self.spec.step % 2 == 1)
     }
 
-    /// Passes a frame by and stays with the last picture.
-    fn freeze(&mut self) -> Result<Given, FootageError> {
+    /// Skips a frame and keeps the last picture.
+    fn freeze(&mut self) -> Result<Read, FootageError> {
         if self.held.is_none() {
             self.held = Some(self.pixels().to_vec());
         }
-        self.pass()?;
-        Ok(Given::Time(None))
+        self.skip_one()?;
+        Ok(Read::Picture(None))
     }
 
-    /// Passes over the frame that comes next.
-    fn pass(&mut self) -> Result<(), FootageError> {
+    /// Skips the next frame of the feed.
+    fn skip_one(&mut self) -> Result<(), FootageError> {
         let index = self.index();
         match self.early {
             Some((found, _)) if found > index => {}
@@ -273,8 +273,8 @@ impl Supply {
         Ok(())
     }
 
-    /// The time that the camera says, under a fault of its clock.
-    fn told(&self, fault: Option<Fault>, index: u64, time_s: Option<f64>) -> Option<f64> {
+    /// The timestamp of a frame, with a simulated fault of the clock.
+    fn timestamp(&self, fault: Option<Fault>, index: u64, time_s: Option<f64>) -> Option<f64> {
         let rate_hz = self.info.frame_rate_hz? * self.spec.step as f64;
         let at = |index: u64| index as f64 / rate_hz;
         let Some(Fault { kind, from, .. }) = fault else {
@@ -289,9 +289,9 @@ impl Supply {
         }
     }
 
-    /// Opens the footage again where the next frame is; `false` if that is to wait.
-    fn open_again(&mut self, now: u64) -> Result<bool, FootageError> {
-        if self.is_given_up || (self.is_live && now < self.retry_at) {
+    /// Reopens the source at the next frame; `false` if it is not yet time for that.
+    fn reopen(&mut self, now: u64) -> Result<bool, FootageError> {
+        if self.is_abandoned || (self.is_live && now < self.retry_at) {
             return Ok(false);
         }
         let spec = SourceSpec {
@@ -302,7 +302,7 @@ impl Supply {
         let feed = match Feed::open(&spec) {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
-            // A scene that could be made once can be made again, but for its files.
+            // A scene that was made once can be made again, unless its files are gone.
             Err(FeedError::Address { address, .. } | FeedError::Scene { address, .. }) => {
                 return Err(FootageError::NotFound { path: address });
             }
@@ -315,7 +315,7 @@ impl Supply {
         Ok(true)
     }
 
-    /// Notes that the camera has failed: what it would give next nobody knows.
+    /// Notes a failure and closes the source: its next frame is unknown.
     fn lose(&mut self, error: &FootageError, now: u64) {
         let cause = cause_of(error);
         if self.feed.is_some() || self.cause != cause {
@@ -330,12 +330,12 @@ impl Supply {
         self.retry_at = now + PAUSE_NANOS;
         let is_on_purpose = self.faults.at(self.index()).is_some();
         self.n_failures = self.n_failures.saturating_add(u32::from(!is_on_purpose));
-        let is_too_often = !self.is_live && self.n_failures >= MOST_FAILURES;
-        self.is_given_up |= is_too_often || matches!(error, FootageError::VideoTruncated { .. });
+        let is_too_often = !self.is_live && self.n_failures >= MAX_FAILURES;
+        self.is_abandoned |= is_too_often || matches!(error, FootageError::VideoTruncated { .. });
     }
 }
 
-/// Never comes back, as a process that hangs in a computation.
+/// Never returns, like a process that is stuck in a computation.
 fn spin() -> ! {
     tracing::warn!("computing for ever, on purpose");
     loop {
@@ -343,14 +343,14 @@ fn spin() -> ! {
     }
 }
 
-/// What a camera gives that is there.
+/// What was read from a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Given {
-    /// A picture, and the time that the camera says of it, seconds.
-    Time(Option<f64>),
-    /// It has gone on to a later frame.
+enum Read {
+    /// A picture, and its timestamp, seconds.
+    Picture(Option<f64>),
+    /// The frame is missing: the camera is at a later one already.
     LeftOut,
-    /// Nothing any more.
+    /// The end of the footage.
     Over,
 }
 

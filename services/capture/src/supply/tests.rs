@@ -1,4 +1,4 @@
-//! Cameras that fail in every way there is a name for.
+//! Every simulated fault, and real failures.
 
 use std::path::Path;
 
@@ -28,12 +28,12 @@ fn save(folder: &Path, nth: u8, size: Size) {
     Canvas::new(size, [nth, 0, 0]).save_png(&file).unwrap();
 }
 
-/// What becomes of every frame: its picture by its colour, or in words why there is none.
+/// The outcome of every frame: the colour of its picture, or why there is none.
 fn all(supply: &mut Supply) -> Vec<String> {
     let mut all = Vec::new();
     loop {
         let index = supply.index();
-        // Half a second from frame to frame: a camera that is gone is looked for at every one.
+        // Half a second between frames: reopening is tried at every frame.
         match supply.step((index + 1) * PAUSE_NANOS) {
             Step::Picture => {
                 assert_eq!(supply.pixels().len(), SIZE.rgb_bytes());
@@ -49,7 +49,7 @@ fn open(spec: &SourceSpec, faults: &str, is_live: bool) -> Supply {
     Supply::open(spec, &faults.parse().unwrap(), is_live, 2).unwrap()
 }
 
-/// What becomes of eight frames under a fault.
+/// The outcomes of eight frames with faults.
 fn under(faults: &str) -> Vec<String> {
     let (_folder, spec) = images(8);
     let [live, recorded] = [true, false].map(|is_live| all(&mut open(&spec, faults, is_live)));
@@ -58,7 +58,7 @@ fn under(faults: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_fault_costs_its_frames_and_no_others() {
+fn a_fault_affects_its_own_frames_only() {
     let cases = [
         (
             "unplug@2+3",
@@ -82,7 +82,7 @@ fn every_fault_costs_its_frames_and_no_others() {
             "jump@2+2",
             "0, 1, clock jumped, clock jumped, timestamp went back, 5, 6, 7",
         ),
-        // The picture is held, and called frozen from its second repetition on.
+        // The picture repeats, and counts as frozen from its second repetition on.
         (
             "freeze@2+3",
             "0, 1, 1, frozen picture, frozen picture, 5, 6, 7",
@@ -98,7 +98,7 @@ fn every_fault_costs_its_frames_and_no_others() {
 }
 
 #[test]
-fn a_picture_that_was_never_there_cannot_freeze() {
+fn without_a_previous_picture_a_freeze_has_no_effect() {
     assert_eq!(under("freeze@0+2")[..3], ["0", "0", "2"]);
     assert_eq!(
         under("unplug@1+2, freeze@3+2")[1..5],
@@ -107,7 +107,7 @@ fn a_picture_that_was_never_there_cannot_freeze() {
 }
 
 #[test]
-fn files_that_are_bad_cost_their_own_frames() {
+fn bad_files_affect_their_own_frames_only() {
     let (folder, spec) = images(6);
     save(folder.path(), 2, Size::new(6, 4));
     std::fs::write(folder.path().join("003.png"), "no picture").unwrap();
@@ -116,7 +116,7 @@ fn files_that_are_bad_cost_their_own_frames() {
 }
 
 #[test]
-fn recorded_footage_that_fails_again_and_again_is_given_up_but_a_camera_is_not() {
+fn recorded_footage_is_abandoned_after_repeated_failures_and_a_camera_is_not() {
     let (folder, spec) = images(7);
     for nth in 1..5 {
         save(folder.path(), nth, Size::new(6, 4));
@@ -129,7 +129,7 @@ fn recorded_footage_that_fails_again_and_again_is_given_up_but_a_camera_is_not()
 }
 
 #[test]
-fn a_camera_that_is_gone_is_not_looked_for_at_every_frame() {
+fn reopening_a_camera_is_not_tried_at_every_frame() {
     let (folder, spec) = images(6);
     std::fs::write(folder.path().join("001.png"), "no picture").unwrap();
     let mut supply = open(&spec, "", true);
@@ -144,7 +144,7 @@ fn a_camera_that_is_gone_is_not_looked_for_at_every_frame() {
 }
 
 #[test]
-fn one_image_may_be_shown_for_ever() {
+fn a_single_image_repeats_without_being_frozen() {
     let (folder, _) = images(1);
     let spec = SourceSpec {
         count: Some(20),
@@ -168,7 +168,7 @@ fn every_nth_frame_is_counted_by_its_index() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
-    fn every_frame_is_answered_once_whatever_goes_wrong(
+    fn every_frame_has_one_outcome_with_any_faults(
         kinds in prop::collection::vec((0..8_usize, 0..12_u64, 1..8_u64), 0..4),
         skips in prop::collection::vec(0..3_u64, 12), is_live: bool,
     ) {
@@ -184,7 +184,7 @@ proptest! {
             if step == Step::Picture {
                 let colour = u64::from(supply.pixels()[0]);
                 prop_assert!(colour <= n, "a picture of the future");
-                let is_late = kinds.iter().any(|it| it.0 == 1);
+                let is_late = kinds.iter().any(|(kind, ..)| *kind == 1);
                 prop_assert!(colour == n || is_late, "{colour} for {n}");
             }
             n += u64::from(step != Step::End);
