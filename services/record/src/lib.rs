@@ -1,4 +1,4 @@
-//! Every message of a deployment into one file.
+//! Writes every message of a deployment into one file.
 #![forbid(unsafe_code)]
 
 mod queue;

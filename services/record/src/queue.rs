@@ -1,4 +1,4 @@
-//! What waits to be written: bounded by its bytes; what does not fit is counted.
+//! The queue of messages to be written. Its size in bytes is bounded; messages that do not fit are counted.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -7,17 +7,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use recording::Entry;
 
-/// Messages that may wait, however small.
-const MOST_MESSAGES: usize = 1 << 14;
+/// Most messages in the queue, whatever their size.
+const MAX_MESSAGES: usize = 1 << 14;
 
 /// A message on its way to the file.
 #[derive(Debug)]
 pub(crate) struct Item {
     /// The number of its topic.
     pub topic: usize,
-    /// When it came and was sent.
+    /// When it was received and sent.
     pub entry: Entry,
-    /// What goes into the file.
+    /// The bytes to be written.
     pub data: Vec<u8>,
 }
 
@@ -31,19 +31,19 @@ struct Shared {
 }
 
 impl Shared {
-    fn came(&self, n_bytes: usize) {
+    fn add(&self, n_bytes: usize) {
         self.n_bytes.fetch_add(n_bytes as u64, Ordering::AcqRel);
         self.n_items.fetch_add(1, Ordering::AcqRel);
     }
 
-    fn went(&self, n_bytes: usize) {
+    fn remove(&self, n_bytes: usize) {
         self.n_bytes.fetch_sub(n_bytes as u64, Ordering::AcqRel);
         self.n_items.fetch_sub(1, Ordering::AcqRel);
     }
 
     fn lost(&self, topic: usize, n: u64) {
-        if let Some(it) = self.lost.get(topic) {
-            it.fetch_add(n, Ordering::Relaxed);
+        if let Some(count) = self.lost.get(topic) {
+            count.fetch_add(n, Ordering::Relaxed);
         }
     }
 }
@@ -53,7 +53,7 @@ impl Shared {
 pub(crate) struct Inlet {
     sender: Sender<Item>,
     shared: Arc<Shared>,
-    most_bytes: u64,
+    max_bytes: u64,
 }
 
 /// The receiving end, of the writing thread.
@@ -65,9 +65,9 @@ pub(crate) struct Outlet {
 
 /// Makes a queue.
 ///
-/// * `most_bytes`: that may wait; one message may be larger, alone.
-pub(crate) fn queue(n_topics: usize, most_bytes: u64) -> (Inlet, Outlet) {
-    let (sender, receiver) = bounded(MOST_MESSAGES);
+/// * `max_bytes`: largest total; a single larger message is accepted if the queue is empty.
+pub(crate) fn queue(n_topics: usize, max_bytes: u64) -> (Inlet, Outlet) {
+    let (sender, receiver) = bounded(MAX_MESSAGES);
     let shared = Arc::new(Shared {
         n_bytes: AtomicU64::new(0),
         n_items: AtomicU64::new(0),
@@ -77,19 +77,19 @@ pub(crate) fn queue(n_topics: usize, most_bytes: u64) -> (Inlet, Outlet) {
     let inlet = Inlet {
         sender,
         shared: Arc::clone(&shared),
-        most_bytes,
+        max_bytes,
     };
     (inlet, Outlet { receiver, shared })
 }
 
 impl Inlet {
-    /// Whether a message of so many bytes may come in.
+    /// Whether there is room for a message of `n_bytes`.
     pub(crate) fn has_room(&self, n_bytes: usize) -> bool {
         let waiting = self.shared.n_bytes.load(Ordering::Acquire);
         let n_items = self.shared.n_items.load(Ordering::Acquire);
         !self.is_broken()
-            && n_items < MOST_MESSAGES as u64
-            && (waiting == 0 || waiting + n_bytes as u64 <= self.most_bytes)
+            && n_items < MAX_MESSAGES as u64
+            && (waiting == 0 || waiting + n_bytes as u64 <= self.max_bytes)
     }
 
     /// Whether the file cannot be written any more.
@@ -97,32 +97,32 @@ impl Inlet {
         self.shared.is_broken.load(Ordering::Acquire)
     }
 
-    /// Hands a message on; `false` if there is no room, and then it is counted.
+    /// Adds a message; `false` if there is no room, and then it is counted.
     pub(crate) fn push(&self, item: Item) -> bool {
         let (topic, n_bytes) = (item.topic, item.data.len());
-        self.shared.came(n_bytes);
-        let taken = self.sender.try_send(item).is_ok();
-        if !taken {
-            self.shared.went(n_bytes);
+        self.shared.add(n_bytes);
+        let is_added = self.sender.try_send(item).is_ok();
+        if !is_added {
+            self.shared.remove(n_bytes);
             self.lost(topic, 1);
         }
-        taken
+        is_added
     }
 
-    /// Counts messages that were not kept.
+    /// Counts lost messages.
     pub(crate) fn lost(&self, topic: usize, n: u64) {
         self.shared.lost(topic, n);
     }
 
-    /// Messages of a topic that were not kept.
+    /// Lost messages of a topic.
     pub(crate) fn n_lost(&self, topic: usize) -> u64 {
-        let it = self.shared.lost.get(topic);
-        it.map_or(0, |it| it.load(Ordering::Relaxed))
+        let count = self.shared.lost.get(topic);
+        count.map_or(0, |count| count.load(Ordering::Relaxed))
     }
 }
 
 impl Outlet {
-    /// The next message; none after `limit`. An error once all is written and no more will come.
+    /// The next message; `None` after `limit`. An error when the queue is empty and closed.
     pub(crate) fn next(&self, limit: Duration) -> Result<Option<Item>, ()> {
         match self.receiver.recv_timeout(limit) {
             Ok(item) => Ok(Some(item)),
@@ -131,22 +131,22 @@ impl Outlet {
         }
     }
 
-    /// Makes room: a message has been written.
+    /// Frees the room of a message that has been written.
     pub(crate) fn written(&self, item: &Item) {
-        self.shared.went(item.data.len());
+        self.shared.remove(item.data.len());
     }
 
-    /// Makes room: a message cannot be written, and no other will be.
+    /// Frees the room of a message that could not be written; no more messages will be written.
     pub(crate) fn lose(&self, item: &Item) {
         self.shared.is_broken.store(true, Ordering::Release);
-        self.shared.went(item.data.len());
+        self.shared.remove(item.data.len());
         self.shared.lost(item.topic, 1);
     }
 
-    /// Messages of every topic that were not kept.
+    /// Lost messages by topic.
     pub(crate) fn lost(&self) -> Vec<u64> {
         let lost = self.shared.lost.iter();
-        lost.map(|it| it.load(Ordering::Relaxed)).collect()
+        lost.map(|count| count.load(Ordering::Relaxed)).collect()
     }
 }
 
@@ -163,29 +163,32 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_wait_are_bounded_and_come_free_as_they_are_written() {
+    fn the_bytes_in_the_queue_are_bounded_until_they_are_written() {
         let (inlet, outlet) = queue(1, 100);
-        assert!(inlet.has_room(1_000_000), "alone, any message may come");
+        assert!(
+            inlet.has_room(1_000_000),
+            "a single message may be of any size"
+        );
         assert!(inlet.push(item(0, 60)));
         assert!(inlet.has_room(40) && !inlet.has_room(41));
-        let it = outlet.next(Duration::ZERO).unwrap().unwrap();
+        let item = outlet.next(Duration::ZERO).unwrap().unwrap();
         assert!(!inlet.has_room(41), "it is not written yet");
-        outlet.written(&it);
+        outlet.written(&item);
         assert!(inlet.has_room(101));
     }
 
     #[test]
-    fn what_does_not_fit_is_counted_for_its_topic() {
+    fn messages_that_do_not_fit_are_counted_by_topic() {
         let (inlet, outlet) = queue(2, u64::MAX);
-        let n = MOST_MESSAGES + 3;
+        let n = MAX_MESSAGES + 3;
         let n_kept = (0..n).filter(|_| inlet.push(item(1, 1))).count();
         assert!(!inlet.has_room(0));
-        assert_eq!(n_kept, MOST_MESSAGES);
+        assert_eq!(n_kept, MAX_MESSAGES);
         assert_eq!(outlet.lost(), [0, 3]);
     }
 
     #[test]
-    fn once_the_file_cannot_be_written_there_is_no_room_and_what_waits_is_counted() {
+    fn after_a_write_error_there_is_no_room_and_waiting_messages_are_counted() {
         let (inlet, outlet) = queue(2, 100);
         assert!(inlet.push(item(0, 1)) && inlet.push(item(1, 1)));
         outlet.lose(&outlet.next(Duration::ZERO).unwrap().unwrap());
@@ -195,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_comes_after_the_last() {
+    fn a_closed_queue_ends_after_its_last_message() {
         let (inlet, outlet) = queue(1, 100);
         assert!(inlet.push(item(0, 1)));
         drop(inlet);

@@ -1,14 +1,14 @@
-//! How many messages were sent that never came: what their senders report, less what came.
+//! Counts lost messages: those that senders report, less those received.
 
 use std::collections::BTreeMap;
 
-/// What was sent and what came of one topic.
+/// The numbers of messages sent and received on one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Sent {
     /// By epoch of the sender.
     reported: BTreeMap<u64, u64>,
-    n_came: u64,
-    /// Of these lost, what was counted before.
+    n_received: u64,
+    /// Lost messages that [`Self::lost`] has returned before.
     n_known: u64,
 }
 
@@ -16,23 +16,23 @@ impl Sent {
     /// Takes a report of the sender.
     ///
     /// * `epoch`: of the sender.
-    /// * `n_sent`: what it has sent in that epoch.
+    /// * `n_sent`: messages sent in that epoch.
     pub(crate) fn reported(&mut self, epoch: u64, n_sent: u64) {
         let reported = self.reported.entry(epoch).or_default();
         *reported = n_sent.max(*reported);
     }
 
-    /// One came.
-    pub(crate) fn came(&mut self) {
-        self.n_came += 1;
+    /// Counts a received message.
+    pub(crate) fn received(&mut self) {
+        self.n_received += 1;
     }
 
-    /// How many have been lost since the last time this was asked.
+    /// Messages lost since the last call.
     ///
-    /// Ask where nothing is on its way any more: what was sent and has not come yet looks lost.
+    /// Call it when no message is in flight: a message that was sent and is not received yet counts as lost.
     pub(crate) fn lost(&mut self) -> u64 {
         let sent = self.reported.values().copied().fold(0, u64::saturating_add);
-        let lost = sent.saturating_sub(self.n_came);
+        let lost = sent.saturating_sub(self.n_received);
         let new = lost.saturating_sub(self.n_known);
         self.n_known = self.n_known.max(lost);
         new
@@ -44,10 +44,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_sent_and_did_not_come_is_lost_once() {
+    fn messages_that_were_not_received_count_as_lost_once() {
         let mut sent = Sent::default();
         for _ in 0..7 {
-            sent.came();
+            sent.received();
         }
         sent.reported(0, 9);
         assert_eq!((sent.lost(), sent.lost()), (2, 0));
@@ -63,9 +63,9 @@ mod tests {
     }
 
     #[test]
-    fn what_came_before_its_sender_reported_it_is_not_lost() {
+    fn messages_received_before_they_were_reported_are_not_lost() {
         let mut sent = Sent::default();
-        sent.came();
+        sent.received();
         assert_eq!(sent.lost(), 0);
     }
 }

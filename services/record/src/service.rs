@@ -1,7 +1,7 @@
-//! Receives every message at once, and leaves the writing to a thread of its own.
+//! Receives every message at once; a thread of its own writes them.
 //!
-//! Where the latest frame wins, no sender waits for the disk: what does not fit into the queue is counted. Where nothing
-//! may be lost, senders wait while the queue is full, but not for ever.
+//! With realtime delivery no sender waits for the disk: messages that do not fit into the queue are dropped and counted.
+//! With lossless delivery senders wait while the queue is full, but not for ever.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -15,12 +15,12 @@ use stage::any::{Received, Receiver};
 
 use crate::queue::{Inlet, Item, queue};
 use crate::sent::Sent;
-use crate::topics::{Channel, Topics, told_by};
+use crate::topics::{Channel, Topics, counted_by};
 use crate::writer::{Task, create, file_of_life, write_all};
 
-/// How long room in the queue is waited for where nothing may be lost.
+/// Longest wait for room in the queue, with lossless delivery.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);
-/// After the last result, the last heartbeats take this long.
+/// How long the process waits for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
 /// What the process has to do.
@@ -28,7 +28,7 @@ const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 pub struct Job {
     /// The recording.
     pub file: PathBuf,
-    /// Of which run; the session is that of the service.
+    /// Description of the run; its session is replaced by that of the service.
     pub about: About,
     /// The topics of the deployment.
     pub topics: Topics,
@@ -36,16 +36,16 @@ pub struct Job {
     pub queue_bytes: u64,
 }
 
-/// Writes every message, until the last result has come or the process is to stop.
+/// Writes every message, until the last result has been received or a stop is requested.
 ///
 /// # Errors
 ///
-/// [`ExitKind::Input`] if the file cannot be made, and what the transport reports.
+/// [`ExitKind::Input`] if the file cannot be created, and what the transport reports.
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let epoch = service.epoch();
     if epoch > 0 && is_complete(&file_of_life(&job.file, epoch - 1)) {
-        // Killed after its work was done.
+        // The process was killed after the recording was complete.
         return rest(service, &waiter, &[]);
     }
     let kind = if epoch == 0 {
@@ -88,7 +88,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     drop(inlet);
     thread.finish(service)?;
     if !is_over {
-        // Told to end before the run did: what the file holds is whole, but it is not all.
+        // A stop was requested before the end of the run: the file is valid, but not complete.
         return Ok(());
     }
     rest(service, &waiter, &receivers)
@@ -101,8 +101,8 @@ fn is_complete(file: &std::path::Path) -> bool {
     recording::scan(&mut file).is_ok_and(|recording| recording.extent.is_complete)
 }
 
-/// Reports that all is done, and waits for the stop request. Messages are still received and discarded: where nothing may
-/// be lost a sender waits for room, and for its receivers before it begins.
+/// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded: with
+/// lossless delivery a sender waits for room, and for its receivers before it begins.
 fn rest(service: &Service, waiter: &Waiter, receivers: &[Receiver]) -> Result<(), Failure> {
     service.health().finished();
     while waiter.wait(Duration::from_millis(50))? != Woken::Stop {
@@ -118,8 +118,8 @@ struct Recorder<'a> {
     inlet: &'a Inlet,
     receivers: Vec<Receiver>,
     sent: Vec<Sent>,
-    /// By topic: the topics that its messages tell of.
-    tells_of: Vec<Vec<usize>>,
+    /// By topic: the topics whose messages it counts.
+    counts: Vec<Vec<usize>>,
     n_evidence: Vec<u64>,
     is_over: bool,
 }
@@ -143,9 +143,9 @@ impl<'a> Recorder<'a> {
             inlet,
             receivers,
             sent: vec![Sent::default(); channels.len()],
-            tells_of: channels
+            counts: channels
                 .iter()
-                .map(|channel| told_by(channel, channels))
+                .map(|channel| counted_by(channel, channels))
                 .collect(),
             n_evidence: vec![0; channels.len()],
             is_over: false,
@@ -163,7 +163,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Whether there is room for so many bytes; where nothing may be lost, waits for it.
+    /// Whether there is room for a number of bytes; waits for it with lossless delivery.
     fn has_room(&self, n_bytes: usize) -> bool {
         let begin = Instant::now();
         while !self.inlet.has_room(n_bytes) {
@@ -206,16 +206,16 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Notes what a message tells of other topics, and that it came itself.
+    /// Counts a message, and takes what it reports about other topics.
     fn note(&mut self, topic: usize, kind: Kind, message: &Received) {
         if let Some([epoch, n_sent]) = message.life {
-            for &other in &self.tells_of[topic] {
+            for &other in &self.counts[topic] {
                 self.sent[other].reported(epoch, n_sent);
             }
         }
         if message.has_evidence {
             self.n_evidence[topic] += 1;
-            for &other in &self.tells_of[topic] {
+            for &other in &self.counts[topic] {
                 self.sent[other].reported(0, self.n_evidence[topic]);
             }
         }
@@ -225,11 +225,11 @@ impl<'a> Recorder<'a> {
             _ => message.status != Status::END,
         };
         if counts {
-            self.sent[topic].came();
+            self.sent[topic].received();
         }
     }
 
-    /// Counts what was sent and never came, and logs how many messages of every topic are not in the file.
+    /// Counts messages that were sent and not received, and logs how many messages of every topic are not in the file.
     fn settle(&mut self, channels: &[Channel]) {
         for (topic, channel) in channels.iter().enumerate() {
             let missed = self.sent[topic].lost();

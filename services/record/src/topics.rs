@@ -1,9 +1,9 @@
-//! The topics of a deployment, and what their messages tell of other topics.
+//! The topics of a deployment, and which topics report the number of messages of other topics.
 
 use messages::topic;
 use recording::{Kind, Without};
 
-/// What decides the topics of a deployment.
+/// The properties of a deployment that determine its topics.
 #[derive(Debug, Clone)]
 pub struct Topics {
     /// Number of views.
@@ -21,12 +21,12 @@ pub struct Topics {
 pub(crate) struct Channel {
     pub(crate) kind: Kind,
     pub(crate) name: String,
-    /// None where the heartbeats of its sender do not count this topic.
+    /// `None` if the heartbeats of its sender do not count this topic.
     sender: Option<String>,
 }
 
 impl Topics {
-    /// All topics, heartbeats first: a message that a heartbeat counts has been received by then, if it came at all.
+    /// All topics, heartbeats first: when a heartbeat has been read, every message that it counts can be received.
     pub(crate) fn channels(&self, without: Without) -> Vec<Channel> {
         let mut channels = Vec::new();
         let mut add = |kind, name, sender| channels.push(Channel { kind, name, sender });
@@ -61,21 +61,23 @@ impl Topics {
     }
 }
 
-/// The topics that a topic tells of: heartbeats count what their process sent, and poses announce their evidence.
-pub(crate) fn told_by(it: &Channel, channels: &[Channel]) -> Vec<usize> {
-    let is_told = |other: &Channel| match it.kind {
+/// Indices of the topics whose messages a topic counts: heartbeats count the messages of their process, and poses announce
+/// their evidence.
+pub(crate) fn counted_by(counter: &Channel, channels: &[Channel]) -> Vec<usize> {
+    let is_counted = |other: &Channel| match counter.kind {
         Kind::Health => {
             let sender = other.sender.as_ref();
-            sender.is_some_and(|sender| topic::health(sender) == it.name)
+            sender.is_some_and(|sender| topic::health(sender) == counter.name)
         }
         Kind::ViewPose => {
             let view = |name: &str| name.rsplit('/').next().map(str::to_owned);
-            other.kind == Kind::Evidence && view(&other.name) == view(&it.name)
+            other.kind == Kind::Evidence && view(&other.name) == view(&counter.name)
         }
         _ => false,
     };
     let numbered = channels.iter().enumerate();
-    numbered.filter(|it| is_told(it.1)).map(|it| it.0).collect()
+    let counted = numbered.filter(|(_, channel)| is_counted(channel));
+    counted.map(|(index, _)| index).collect()
 }
 
 #[cfg(test)]
@@ -96,28 +98,30 @@ mod tests {
     fn every_topic_is_recorded_with_its_kind() {
         let all = channels(Without::default());
         assert_eq!(all.len(), 3 + 2 * 4 + 1 + 1);
-        for it in &all {
-            assert_eq!(Kind::of_topic(&it.name), Some(it.kind));
+        for channel in &all {
+            assert_eq!(Kind::of_topic(&channel.name), Some(channel.kind));
         }
         let without = channels(Without {
             evidence: true,
             pixels: true,
         });
-        assert!(without.iter().all(|it| it.kind != Kind::Evidence));
+        assert!(without.iter().all(|channel| channel.kind != Kind::Evidence));
         assert_eq!(without.len(), all.len() - 2);
     }
 
     #[test]
-    fn heartbeats_tell_of_the_topics_of_their_process_and_poses_of_their_evidence() {
+    fn heartbeats_count_the_topics_of_their_process_and_poses_their_evidence() {
         let all = channels(Without::default());
-        let told = |name: &str| {
-            let it = all.iter().find(|it| it.name == name).unwrap();
-            let told = told_by(it, &all).into_iter();
-            told.map(|it| all[it].name.clone()).collect::<Vec<_>>()
+        let counted = |name: &str| {
+            let counter = all.iter().find(|channel| channel.name == name).unwrap();
+            let counted = counted_by(counter, &all).into_iter();
+            counted
+                .map(|index| all[index].name.clone())
+                .collect::<Vec<_>>()
         };
-        assert_eq!(told(&topic::health("pose-1")), [topic::view_pose(1)]);
-        assert_eq!(told(&topic::health("fuse-0")), [topic::pair_pose(0)]);
-        assert_eq!(told(&topic::view_pose(1)), [topic::evidence(1)]);
-        assert_eq!(told(&topic::health("results")), Vec::<String>::new());
+        assert_eq!(counted(&topic::health("pose-1")), [topic::view_pose(1)]);
+        assert_eq!(counted(&topic::health("fuse-0")), [topic::pair_pose(0)]);
+        assert_eq!(counted(&topic::view_pose(1)), [topic::evidence(1)]);
+        assert_eq!(counted(&topic::health("results")), Vec::<String>::new());
     }
 }

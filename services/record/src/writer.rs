@@ -1,4 +1,4 @@
-//! The thread that writes.
+//! The thread that writes the file.
 
 use core::time::Duration;
 use std::fs::{File, OpenOptions};
@@ -11,12 +11,10 @@ use recording::{About, WriteError, Writer};
 
 use crate::queue::Outlet;
 
-/// What came is in the file so much later at most.
+/// Longest time from a message's arrival until it is in the file.
 const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 
-/// The file that a life of the process writes: a restarted one takes another, beside the first.
-///
-/// * `epoch`: how often it has been restarted.
+/// The file of an epoch of the process: a restarted process writes another file in the same folder.
 pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     if epoch == 0 {
         return file.to_owned();
@@ -25,7 +23,7 @@ pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     file.with_extension(format!("{epoch}.{ending}"))
 }
 
-/// Makes a file that is not there yet, for its owner only: it shows people. It is locked as long as it is written.
+/// Creates a new file, readable by its owner only because it shows people. It is locked while it is being written.
 pub(crate) fn create(file: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     let made = options
@@ -39,17 +37,17 @@ pub(crate) fn create(file: &Path) -> io::Result<File> {
     Ok(made)
 }
 
-/// What is to be written.
+/// The file, and its first entries.
 pub(crate) struct Task {
     pub file: File,
     pub about: About,
     pub topics: Vec<String>,
 }
 
-/// Writes until no more comes. When the file cannot be written any more, what comes is counted.
+/// Writes messages until the queue is closed. After a write error, messages are counted as lost.
 pub(crate) fn write_all(task: Task, outlet: &Outlet) {
     let begun = Writer::begin(task.file, &task.about, &task.topics);
-    let mut writer = begun.inspect_err(tell).ok();
+    let mut writer = begun.inspect_err(log_error).ok();
     let mut flushed = Instant::now();
     while let Ok(item) = outlet.next(FLUSH_PERIOD) {
         let Some(open) = &mut writer else {
@@ -70,7 +68,7 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
             (Some(item), Ok(())) => outlet.written(&item),
             (None, Ok(())) => {}
             (item, Err(error)) => {
-                tell(&error);
+                log_error(&error);
                 if let Some(item) = item {
                     outlet.lose(&item);
                 }
@@ -81,11 +79,11 @@ pub(crate) fn write_all(task: Task, outlet: &Outlet) {
     if let Some(writer) = writer
         && let Err(error) = writer.finish(&outlet.lost())
     {
-        tell(&error);
+        log_error(&error);
     }
 }
 
-fn tell(error: &WriteError) {
+fn log_error(error: &WriteError) {
     let source = core::error::Error::source(error);
     let why = source.map(ToString::to_string).unwrap_or_default();
     tracing::error!(%error, why, "the recording ends here; what it holds can be read");
@@ -96,14 +94,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_life_writes_a_file_of_its_own() {
+    fn every_epoch_has_a_file_of_its_own() {
         let file = Path::new("out/run.mcap");
         assert_eq!(file_of_life(file, 0), file);
         assert_eq!(file_of_life(file, 2), Path::new("out/run.2.mcap"));
     }
 
     #[test]
-    fn a_file_that_is_there_is_not_overwritten() {
+    fn an_existing_file_is_not_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("run.mcap");
         create(&file).unwrap();
