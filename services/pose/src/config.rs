@@ -4,7 +4,7 @@ use fmp::{Precision, TrackSettings};
 use pipeline::{EvidenceWindow, ViewSettings};
 use serde::{Deserialize, Serialize};
 
-/// The single-view solver, and what it hands on.
+/// The single-view solver, and what it sends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
@@ -104,17 +104,17 @@ impl Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number of levels, or \"all\"")]
 pub enum Window {
-    /// So many levels either side of every candidate's own.
+    /// A number of levels on either side of every candidate's level.
     Levels(u16),
-    /// All of them.
+    /// All levels.
     All(All),
 }
 
-/// The word `all`.
+/// The value `all`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum All {
-    /// Everything.
+    /// All levels.
     All,
 }
 
@@ -128,15 +128,16 @@ mod tests {
     }
 
     #[test]
-    fn less_precision_is_had_by_its_name_only() {
-        let of = |text: &str| toml::from_str::<Config>(text).map(|it| it.settings().precision);
+    fn reduced_precision_must_be_requested_by_name() {
+        let of =
+            |text: &str| toml::from_str::<Config>(text).map(|config| config.settings().precision);
         assert_eq!(of("search = \"tracked\""), Ok(Precision::F32));
         assert_eq!(of("precision = \"bf16\""), Ok(Precision::Bf16));
         of("precision = \"f16\"").unwrap_err();
     }
 
     #[test]
-    fn who_asks_for_tracking_by_name_gets_its_defaults() {
+    fn tracking_without_other_settings_has_its_defaults() {
         let config: Config = toml::from_str("search = \"tracked\"").unwrap();
         assert_eq!(config.settings().track, Some(TrackSettings::default()));
     }

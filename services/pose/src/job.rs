@@ -11,16 +11,16 @@ pub struct Job {
     pub view: usize,
     /// The single-view step.
     pub step: ViewStep,
-    /// Processes that take the candidates.
+    /// Processes that receive the candidates.
     pub n_pose_consumers: usize,
-    /// Processes that take the evidence.
+    /// Processes that receive the evidence.
     pub n_evidence_consumers: usize,
     /// First frame that is used.
     pub start_frame: u64,
     /// Distance between the frames used.
     pub frame_step: u64,
-    /// Frames of the footage a second, where it is known: how far a pose may have moved.
+    /// Frame rate of the footage, if known; limits how far a pose may have moved.
     pub frame_rate_hz: Option<f64>,
-    /// How long they are waited for.
+    /// How long the process waits for receivers.
     pub patience: Duration,
 }

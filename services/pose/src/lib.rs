@@ -1,4 +1,4 @@
-//! Frames in, single-view candidates and their evidence out.
+//! Receives frames, sends single-view candidates and their evidence.
 #![forbid(unsafe_code)]
 
 mod config;

@@ -7,7 +7,7 @@ use stage::{Range, Stage};
 use crate::job::Job;
 use crate::view::{Memory, View};
 
-/// Searches every frame of one view, until the footage ends or the process is to stop.
+/// Searches every frame of one view, until the footage ends or a stop is requested.
 ///
 /// # Errors
 ///

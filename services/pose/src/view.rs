@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use fmp::{FrameTime, Scope, Tracker};
+use fmp::{Moment, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
 use metrics::Passage;
@@ -41,7 +41,7 @@ impl View<'_> {
     pub(crate) fn process(&self, frame: StreamFrame, memory: &mut Memory) -> Result<(), Failure> {
         let StreamFrame { nth, sample, turn } = frame;
         let outcome = self.solve(&sample, nth, memory)?;
-        // The frame goes back to the camera before any receiver is waited for.
+        // The frame is released before the process waits for any receiver.
         drop(sample);
         let message = match &outcome {
             Ok(found) => self.message(found)?,
@@ -52,7 +52,7 @@ impl View<'_> {
         };
         let solved = now_nanos();
         let loan_nanos = outcome.as_ref().map_or(0, |found| found.loan_nanos);
-        // The evidence is sent first: a receiver of the candidates may count on it.
+        // The evidence is sent first: a receiver of the candidates may rely on it.
         if let Ok(found) = outcome
             && let Some(loan) = found.evidence
         {
@@ -91,7 +91,7 @@ impl View<'_> {
         Ok(())
     }
 
-    /// The candidates, how they were looked for, and how much goes with them.
+    /// The candidates, the search mode, and the size of their evidence.
     fn message(&self, found: &Found<'_>) -> Result<ViewPose, Failure> {
         let layout = self.job.step.layout();
         let Found {
@@ -135,23 +135,19 @@ impl View<'_> {
             }
         };
         let rate = self.job.frame_rate_hz;
-        let at = FrameTime {
+        let at = Moment {
             frame: nth,
-            seconds: rate.map(|it| header.stamp.frame as f64 / it),
+            seconds: rate.map(|rate| header.stamp.frame as f64 / rate),
         };
         let scope = memory.tracker.scope(layout, at);
         let mut found = self.find(image, scope, &mut memory.responses)?;
-        if self
-            .job
-            .step
-            .needs_full_search(&memory.tracker, &found.estimate)
-        {
-            // Its room for evidence goes back first.
+        if self.job.step.gives_up(&memory.tracker, &found.estimate) {
+            // Its memory for evidence is released first.
             drop(found);
             found = self.find(image, Scope::whole(layout), &mut memory.responses)?;
         }
         let step = &self.job.step;
-        step.update(&mut memory.tracker, at, &found.estimate);
+        step.follow(&mut memory.tracker, at, &found.estimate);
         Ok(Ok(found))
     }
 
