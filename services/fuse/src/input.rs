@@ -1,10 +1,10 @@
-//! What the messages that fusion receives mean.
+//! The decoded messages that fusion receives.
 
 use fmp::Pose;
 use messages::ViewQuality;
 use wire::WireError;
 
-/// What a message means.
+/// A decoded message.
 #[derive(Debug, Clone)]
 pub(crate) enum Input {
     Candidates(Vec<Pose>),
@@ -18,7 +18,7 @@ pub(crate) struct Errors {
     pub(crate) tau_px: Option<Vec<f32>>,
 }
 
-/// Reads the expected errors of a view.
+/// Decodes the expected errors of a view.
 pub(crate) fn expected_errors(message: &ViewQuality, n_parts: usize) -> Result<Errors, WireError> {
     Ok(Errors {
         sigma_px: wire::sigma_from_message(message, n_parts)?,

@@ -11,9 +11,9 @@ use pipeline::{FuseStep, Views};
 pub struct Job {
     /// The worker.
     pub worker: usize,
-    /// What the views are solved in.
+    /// Whether views are solved in pairs or all at once.
     pub views: Views,
-    /// Its pairs: their index in the deployment, and their views. All views at once read the views of these.
+    /// Its pairs: index in the deployment, and views. If all views are solved at once: the views of these pairs.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: Arc<FuseStep>,
@@ -21,9 +21,9 @@ pub struct Job {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.
     pub has_quality: bool,
-    /// How long a frame waits for expected errors where the latest wins.
+    /// How long a frame waits for expected errors where the latest frame wins.
     pub quality_deadline: Duration,
-    /// How old the last ones of a view may be to be used instead.
+    /// Largest age of the last expected errors of a view that may be used instead.
     pub quality_max_age: Duration,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,

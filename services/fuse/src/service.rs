@@ -9,7 +9,7 @@ use messages::{ViewPose, topic};
 use runtime::{Failure, Service};
 use stage::Stage;
 
-/// Fuses every frame, until the footage of all views ends or the process is to stop.
+/// Fuses every frame, until the footage of all views ends or a stop is requested.
 ///
 /// # Errors
 ///
@@ -43,7 +43,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         evidence,
         output: stage.output(&topic::pair_pose(job.worker), job.n_consumers)?,
     };
-    // A pair may be settled at once or after many solutions; the work of a level is always alike.
+    // A pair may need one solution or many, but the work per pyramid level is always similar.
     let step = Arc::clone(&job.step);
     service.progress().follow(move || step.n_sweeps());
     stage.run(|frame| worker.fuse(frame))

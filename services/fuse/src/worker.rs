@@ -12,7 +12,7 @@ use wire::{EvidenceView, WireError};
 use crate::input::Input;
 use crate::job::Job;
 
-/// What is known of a frame.
+/// The inputs of one frame.
 struct FrameViews<'a> {
     turn: &'a Turn,
     answers: Vec<Option<ViewResult>>,
@@ -22,7 +22,7 @@ struct FrameViews<'a> {
 }
 
 impl FrameViews<'_> {
-    /// Bit `v` is set if the pose of view `v` came in time.
+    /// Bit `v` is set if the poses of view `v` were received in time.
     fn present(&self) -> u32 {
         let answers = self.answers.iter().enumerate();
         let present = answers.filter(|(_, answer)| answer.is_some());
@@ -190,7 +190,7 @@ impl Worker<'_> {
         })
     }
 
-    /// Sends a message with the expected errors of its two views; returns when.
+    /// Sends a message with the expected errors of its two views; returns the send time, nanoseconds.
     fn send(
         &self,
         frame: &FrameViews<'_>,
