@@ -1,4 +1,4 @@
-//! The answers of the pairs in, joints in the world out.
+//! Receives the poses of pairs, sends joints in the world.
 #![forbid(unsafe_code)]
 
 mod config;

@@ -16,10 +16,10 @@ use wire::WireError;
 pub struct Job {
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
-    /// What the views are solved in.
+    /// Whether views are solved in pairs or all at once.
     pub views: Views,
-    /// The pairs of the deployment; for all views at once each view beside the first. They are dealt to the workers in
-    /// turn.
+    /// The pairs of the deployment; if all views are solved at once: the first view with each other one. They are assigned
+    /// to the workers in turn.
     pub pairs: Vec<[usize; 2]>,
     /// Number of fusion workers.
     pub n_workers: usize,
@@ -29,9 +29,9 @@ pub struct Job {
     pub patience: Duration,
 }
 
-/// Triangulates every frame, until all inputs end or the process is to stop.
+/// Triangulates every frame, until all inputs end or a stop is requested.
 ///
-/// * `step`: remembers the facing of the frame before.
+/// * `step`: keeps the facing of the previous frame.
 ///
 /// # Errors
 ///
@@ -65,14 +65,14 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
     })
 }
 
-/// What a message means.
+/// A decoded message.
 #[derive(Debug)]
 enum Input {
     Candidates(Vec<Pose>),
     Pair(Box<PairInput>),
 }
 
-/// What a worker found for a pair, and the expected errors that it knew of both views.
+/// The poses of a pair, and the expected errors of both views that its worker used.
 #[derive(Debug)]
 struct PairInput {
     views: [usize; 2],
@@ -95,7 +95,7 @@ fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     })
 }
 
-/// The single-view poses with the expected errors that fusion knew: the latest where its workers knew different ones.
+/// The single-view poses with the expected errors that fusion used: the latest if workers used different ones.
 fn view_answers(
     frame: &mut Frame<'_, Input>,
     n_views: usize,
@@ -123,8 +123,8 @@ fn view_answers(
     (0..n_views).map(answer).collect()
 }
 
-/// The skeleton of what was fused and of what the views found alone. A pair counts only if both its views came: one may
-/// have been used whose own poses are missing here.
+/// The skeleton from the fused and the single-view poses. A pair is used only if the single-view poses of both views were
+/// received here too.
 fn skeleton(
     solved: Views,
     views: &[Option<ViewResult>],
