@@ -1,4 +1,4 @@
-//! Collects what is published about a frame until its result comes.
+//! Collects the messages about a frame until its result is received.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,35 +7,35 @@ use messages::{FrameHeader, MAX_VIEWS, PairPose, Pose3d, Status, ViewPose, ViewQ
 use crate::missing::Voice;
 use crate::{Absent, FrameRecord, Missing, Picture, ViewRecord};
 
-/// Frames that are kept while their results are awaited; beyond it the oldest are forgotten.
-const MOST_FRAMES: usize = 512;
+/// Most frames that wait for their results; the oldest are discarded first.
+const MAX_FRAMES: usize = 512;
 
-/// So many frames in a row may have no result, hours of them; a result beyond is of a sender that counts wrong.
-const MOST_ABSENT: u64 = 1 << 20;
+/// Most consecutive frames without a result (hours of them); a result further ahead has a wrong frame number.
+const MAX_ABSENT: u64 = 1 << 20;
 
-/// Pairs of as many views as a rig may have.
-const MOST_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
+/// Most pairs of a frame.
+const MAX_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 
-/// What was said about frames whose results have not come yet.
+/// The messages about frames whose results have not been received yet.
 #[derive(Debug)]
 pub(crate) struct Gather {
     frames: BTreeMap<u64, Parts>,
     voices: Vec<Voice>,
-    /// The latest life of the process that sends results.
+    /// The latest epoch of the process that sends results.
     epoch: u32,
     /// The first frame that has no line yet.
     next: u64,
     frame_step: u64,
-    /// Whether an earlier recorder was killed, and this one has heard no result yet.
+    /// Whether an earlier epoch of this process was killed, and no result has been received since.
     is_resumed: bool,
 }
 
 /// What a result settles.
 #[derive(Debug)]
 pub(crate) struct Settled {
-    /// Frames before it that have none, in their order.
+    /// Frames before it without a result, in order.
     pub(crate) absent: Vec<Absent>,
-    /// Its own.
+    /// The record of its frame.
     pub(crate) record: FrameRecord,
 }
 
@@ -47,7 +47,7 @@ struct Parts {
 
 impl Gather {
     /// * `next`: the first frame that has no line yet.
-    /// * `is_resumed`: whether an earlier recorder was killed.
+    /// * `is_resumed`: whether an earlier epoch of this process was killed.
     pub(crate) fn new(n_views: usize, next: u64, frame_step: u64, is_resumed: bool) -> Self {
         Self {
             frames: BTreeMap::new(),
@@ -59,7 +59,7 @@ impl Gather {
         }
     }
 
-    /// Notes who is there to answer for a view: the ports of its capture and of its pose process.
+    /// Notes the ports of a view's capture and pose processes that are connected.
     pub(crate) fn answerers(&mut self, view: usize, ports: [Vec<u128>; 2]) {
         if let Some(voice) = self.voices.get_mut(view) {
             voice.answerers(ports);
@@ -74,9 +74,9 @@ impl Gather {
         if header.status == Status::END {
             return;
         }
-        if let Some(it) = self.view(view, header.stamp.frame) {
-            it.frame = Some(*header);
-            it.picture = picture;
+        if let Some(record) = self.view(view, header.stamp.frame) {
+            record.frame = Some(*header);
+            record.picture = picture;
         }
     }
 
@@ -87,30 +87,30 @@ impl Gather {
         if pose.status == Status::END {
             return;
         }
-        if let Some(it) = self.view(view, pose.stamp.frame) {
-            it.pose = Some(*pose);
+        if let Some(record) = self.view(view, pose.stamp.frame) {
+            record.pose = Some(*pose);
         }
     }
 
     pub(crate) fn quality(&mut self, view: usize, quality: &ViewQuality) {
-        if let Some(it) = self.view(view, quality.stamp.frame) {
-            it.quality = Some(*quality);
+        if let Some(record) = self.view(view, quality.stamp.frame) {
+            record.quality = Some(*quality);
         }
     }
 
     pub(crate) fn pair(&mut self, pair: &PairPose) {
         let pairs = &mut self.parts(pair.stamp.frame).pairs;
-        if pairs.len() < MOST_PAIRS {
+        if pairs.len() < MAX_PAIRS {
             pairs.push(*pair);
         }
     }
 
-    /// The record of a frame whose result has come; earlier ones will get none any more. None if the frame has been
-    /// settled already: who sends results was killed and says once more what it had said.
+    /// The record of a frame whose result has been received; earlier frames get no result any more. `None` if the frame has
+    /// been settled already: a restarted sender may send a result again.
     pub(crate) fn result(&mut self, pose3d: &Pose3d) -> Option<Settled> {
         let frame = pose3d.stamp.frame;
         let n_before = frame.checked_sub(self.next)?;
-        if n_before / self.frame_step > MOST_ABSENT {
+        if n_before / self.frame_step > MAX_ABSENT {
             return None;
         }
         let is_first = pose3d.stamp.epoch > self.epoch;
@@ -133,32 +133,36 @@ impl Gather {
         Some(Settled { absent, record })
     }
 
-    /// The frames behind the last result, once no more will come: as far as the footage of any view goes.
+    /// The frames after the last result when the stream has ended, up to the end of the longest footage.
     pub(crate) fn rest(&mut self) -> Vec<Absent> {
         let end = self.voices.iter().filter_map(Voice::end).max();
-        let most = self.next.saturating_add(MOST_ABSENT * self.frame_step);
+        let most = self.next.saturating_add(MAX_ABSENT * self.frame_step);
         self.absent(end.unwrap_or(0).min(most), false)
     }
 
-    /// Frames up to another that have no result, and why.
+    /// Frames before `end` without a result, and why.
     ///
-    /// * `is_lost`: who sends results has been restarted since the last one.
+    /// * `is_lost`: whether the process that sends results has been restarted since the last one.
     fn absent(&mut self, end: u64, is_lost: bool) -> Vec<Absent> {
         let is_resumed = core::mem::take(&mut self.is_resumed);
         let mut absent = Vec::new();
         for frame in (self.next..end).step_by(self.frame_step as usize) {
             let parts = self.frames.remove(&frame);
-            let said = |view: usize| parts.as_ref().and_then(|it| it.views[view].pose.as_ref());
+            let pose = |view: usize| {
+                parts
+                    .as_ref()
+                    .and_then(|parts| parts.views[view].pose.as_ref())
+            };
             let voices = self.voices.iter_mut().enumerate();
             let views: Vec<Missing> = voices
-                .map(|(view, it)| it.settle(frame, said(view), is_lost))
+                .map(|(view, voice)| voice.settle(frame, pose(view), is_lost))
                 .collect();
             let reason = if is_resumed {
                 "recorder lost".to_owned()
             } else if is_lost {
                 Missing::Lost.reason().to_owned()
             } else {
-                in_short(&views)
+                summary(&views)
             };
             absent.push(Absent {
                 frame,
@@ -174,7 +178,7 @@ impl Gather {
     }
 
     fn parts(&mut self, frame: u64) -> &mut Parts {
-        while self.frames.len() > MOST_FRAMES {
+        while self.frames.len() > MAX_FRAMES {
             self.frames.pop_first();
         }
         let empty = self.empty();
@@ -190,8 +194,8 @@ impl Gather {
 }
 
 /// The reasons of all views, each once.
-fn in_short(views: &[Missing]) -> String {
-    let reasons: BTreeSet<&str> = views.iter().map(|it| it.reason()).collect();
+fn summary(views: &[Missing]) -> String {
+    let reasons: BTreeSet<&str> = views.iter().map(|missing| missing.reason()).collect();
     reasons.into_iter().collect::<Vec<_>>().join(", ")
 }
 
@@ -213,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_takes_what_was_said_about_its_frame() {
+    fn a_result_has_the_messages_about_its_frame() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.pose(0, &pose(3));
         gather.pose(1, &pose(4));
@@ -228,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_no_part_in_a_result_is_asked_why() {
+    fn a_view_that_is_missing_from_a_result_has_a_reason() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.pose(0, &pose(3));
         gather.pose(1, &pose(4));
@@ -248,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn who_repeats_an_answer_for_ever_fills_no_memory() {
+    fn the_number_of_pairs_of_a_frame_is_bounded() {
         let mut gather = Gather::new(1, 0, 1, false);
         for _ in 0..1000 {
             gather.pair(&PairPose::default());
@@ -257,38 +261,38 @@ mod tests {
     }
 
     #[test]
-    fn frames_whose_results_never_come_are_forgotten() {
+    fn frames_whose_results_are_never_received_are_discarded() {
         let mut gather = Gather::new(1, 0, 1, false);
         for frame in 0..10_000 {
             gather.pose(0, &pose(frame));
         }
-        assert!(gather.frames.len() <= MOST_FRAMES + 1);
+        assert!(gather.frames.len() <= MAX_FRAMES + 1);
     }
 
     fn reasons(absent: &[Absent]) -> Vec<(u64, &str)> {
         absent
             .iter()
-            .map(|it| (it.frame, it.reason.as_str()))
+            .map(|absent| (absent.frame, absent.reason.as_str()))
             .collect()
     }
 
     #[test]
-    fn every_frame_without_a_result_says_why_and_none_is_settled_twice() {
+    fn every_frame_without_a_result_has_a_reason_and_none_is_settled_twice() {
         let mut gather = Gather::new(2, 0, 2, false);
         for frame in [0, 4, 8] {
             gather.pose(0, &pose(frame));
         }
         gather.pose(1, &pose(8));
-        // Frame 2 was passed over by both, frame 4 answered by one and passed over by the other.
+        // Frame 2 was dropped by both views, frame 4 by one.
         let got = gather.result(&pose3d(6)).unwrap();
         let expected = [(0, "dropped, late"), (2, "dropped"), (4, "dropped, late")];
         assert_eq!(reasons(&got.absent), expected);
         assert_eq!(got.absent[2].views, [Missing::Late, Missing::Dropped]);
-        assert!(gather.result(&pose3d(6)).is_none(), "once more");
+        assert!(gather.result(&pose3d(6)).is_none(), "again");
         assert!(gather.result(&pose3d(4)).is_none(), "earlier");
         let mut again = pose3d(6);
         again.stamp.epoch = 1;
-        assert!(gather.result(&again).is_none(), "by the next life");
+        assert!(gather.result(&again).is_none(), "again by the next epoch");
         let mut next = pose3d(12);
         next.stamp.epoch = 1;
         let got = gather.result(&next).unwrap();
@@ -298,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_behind_the_last_result_are_told_as_far_as_footage_goes() {
+    fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.result(&pose3d(0)).unwrap();
         for (view, end) in [(0, 3), (1, 2)] {
@@ -311,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restarted_recorder_says_what_it_missed_and_no_frame_number_is_believed() {
+    fn a_restarted_process_lists_the_frames_it_missed_and_rejects_a_wrong_frame_number() {
         let mut gather = Gather::new(1, 38, 1, true);
         assert!(gather.result(&pose3d(u64::MAX)).is_none());
         let got = gather.result(&pose3d(40)).unwrap();

@@ -7,11 +7,11 @@ use crate::{Config, Scene};
 /// What the process has to do.
 #[derive(Debug)]
 pub struct Job {
-    /// What the numbers in messages mean.
+    /// Names and geometry that the messages refer to by number.
     pub scene: Scene,
-    /// What to leave behind.
+    /// Which files to write.
     pub config: Config,
-    /// Where.
+    /// The output folder.
     pub output: PathBuf,
     /// First frame of the footage that is used.
     pub start_frame: u64,

@@ -1,7 +1,7 @@
-//! Receives everything at once, and writes it on a thread of its own.
+//! Receives every message at once; a thread of its own writes the files.
 //!
-//! A sender may wait for its receivers, so this process never lets one wait: it copies what comes and queues it. If the
-//! disk cannot keep up, the newest results are missed and counted.
+//! Senders wait for slow receivers, so this process never makes one wait: it copies every message into a queue. If the disk
+//! cannot keep up, the newest results are dropped and counted.
 
 use core::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::job::Job;
 use crate::writer::Writer;
 use crate::{Folder, FrameRecord, Picture};
 
-/// Writes what is published, until the footage ends or the process is to stop.
+/// Writes what is published, until the footage ends or a stop is requested.
 ///
 /// # Errors
 ///
@@ -23,7 +23,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let ports = Ports::open(service, &job, &mut waiter)?;
     if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
-        // Killed after its work was done: to begin again would empty the files.
+        // The process was killed after its work was complete; starting over would empty the files.
         return ports.rest(service, &waiter);
     }
     let [n_views, n_joints] = [job.scene.views.len(), job.scene.joints.joints.len()];
@@ -35,7 +35,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     while !is_over && waiter.wait(Duration::from_millis(50))? != Woken::Stop {
         ports.receive_inputs(&context, &mut gather, &writer)?;
         while let Some(pose3d) = ports.pose3d.receive::<Pose3d>(&context)? {
-            // What a result was made of was sent before it: it has all come by now.
+            // The inputs of a result were sent before it, so they can all be received now.
             ports.receive_inputs(&context, &mut gather, &writer)?;
             if pose3d.status == Status::END {
                 writer.rest(gather.rest());
@@ -51,21 +51,21 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     }
     writer.finish(service)?;
     if !is_over {
-        // Told to end before the footage did: what was written is whole, but it is not all.
+        // A stop was requested before the end of the footage: the files are valid, but not complete.
         return Ok(());
     }
     ports.rest(service, &waiter)
 }
 
-/// Hands a result, and the frames before it that have none, to the writing thread.
+/// Passes a result, and the frames before it without one, to the writing thread.
 fn take(service: &Service, pose3d: &Pose3d, gather: &mut Gather, writer: &Writer) {
     let health = service.health();
     let Some(settled) = gather.result(pose3d) else {
-        // A frame has one line.
+        // The frame has its line already.
         health.dropped(Cause::Late, 1);
         return;
     };
-    note_times(service, &settled.record);
+    record_latency(service, &settled.record);
     if writer.write(settled) {
         health.sent(pose3d.stamp.frame);
     } else {
@@ -74,9 +74,8 @@ fn take(service: &Service, pose3d: &Pose3d, gather: &mut Gather, writer: &Writer
     health.queued(writer.n_waiting());
 }
 
-/// How old a result was when it was sent, over all and of every view that has a part in it; and how
-/// long ago that was.
-fn note_times(service: &Service, record: &FrameRecord) {
+/// Records the latency of a result, overall and for every view that was used, and how long it waited in this process.
+fn record_latency(service: &Service, record: &FrameRecord) {
     let (health, pose3d) = (service.health(), &record.pose3d);
     if pose3d.status != Status::OK {
         return;
@@ -85,8 +84,8 @@ fn note_times(service: &Service, record: &FrameRecord) {
     let since = |captured_at: u64| sent_at.saturating_sub(captured_at);
     let captured_at = pose3d.stamp.captured_at_nanos;
     health.spent(Span::END_TO_END, None, since(captured_at));
-    for (view, it) in record.views.iter().enumerate() {
-        if let Some(frame) = it.frame.filter(|_| it.missing.is_none()) {
+    for (view, of_view) in record.views.iter().enumerate() {
+        if let Some(frame) = of_view.frame.filter(|_| of_view.missing.is_none()) {
             let captured_at = frame.stamp.captured_at_nanos;
             health.spent(Span::END_TO_END, Some(view), since(captured_at));
         }
@@ -140,7 +139,7 @@ impl Ports {
         Ok(ports)
     }
 
-    /// Receives all that waits, but for results.
+    /// Receives all waiting messages except results.
     fn receive_inputs(
         &self,
         context: &Context<'_>,
@@ -185,8 +184,8 @@ impl Ports {
         Ok(())
     }
 
-    /// Reports that all is done, and waits for the stop request. Messages are still received and discarded: where nothing
-    /// may be lost a sender waits for room, such as a replay that sends more than the results need.
+    /// Reports that the work is finished, and waits for the stop request. Messages are still received and discarded: with
+    /// lossless delivery a sender waits for room, such as a replay that sends more than the results need.
     fn rest(&self, service: &Service, waiter: &Waiter) -> Result<(), Failure> {
         service.health().finished();
         while waiter.wait(Duration::from_millis(50))? != Woken::Stop {

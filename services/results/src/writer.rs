@@ -15,20 +15,20 @@ use crate::{Absent, Folder, FrameRecord, Output};
 /// Results that may wait to be written.
 const QUEUE: usize = 256;
 
-/// What is to be written: frames without a result, and then one that has it.
-struct Lot {
+/// What is to be written: frames without a result, then one with a result.
+struct Batch {
     absent: Vec<Absent>,
     record: Option<FrameRecord>,
 }
 
 /// The writing thread, and the sending end of its queue.
 pub(crate) struct Writer {
-    queue: Sender<Lot>,
+    queue: Sender<Batch>,
     thread: WriterThread,
     n_missed: Arc<AtomicU64>,
     n_written: Arc<AtomicU64>,
-    n_handed_on: Cell<u64>,
-    /// The first frame that had no line when it began.
+    n_queued: Cell<u64>,
+    /// The first frame without a line when the process started.
     pub(crate) next: u64,
     overlay_every: u64,
     start_frame: u64,
@@ -38,7 +38,7 @@ pub(crate) struct Writer {
 impl Writer {
     pub(crate) fn start(job: Job, service: &Service) -> Result<Self, Failure> {
         let (session, resume) = (service.session(), service.epoch() > 0);
-        // What was writable when the run began and is no longer does not stop the others.
+        // A folder that became unwritable during the run must not end the other processes.
         let kind = if resume {
             ExitKind::Run
         } else {
@@ -49,19 +49,19 @@ impl Writer {
         let output = Output::begin(job.scene, &job.config, job.n_workers, folder);
         let output = output.or_fail(kind)?;
         let next = output.next_frame().unwrap_or(job.start_frame);
-        let (queue, lots) = bounded(QUEUE);
+        let (queue, batches) = bounded(QUEUE);
         let n_missed = Arc::new(AtomicU64::new(0));
         let missed = Arc::clone(&n_missed);
         let n_written = Arc::new(AtomicU64::new(0));
         let written = Arc::clone(&n_written);
         let thread =
-            WriterThread::start(move || write_all(output, &lots, [&missed, &written], session))?;
+            WriterThread::start(move || write_all(output, &batches, [&missed, &written], session))?;
         Ok(Self {
             queue,
             thread,
             n_missed,
             n_written,
-            n_handed_on: Cell::new(0),
+            n_queued: Cell::new(0),
             next,
             overlay_every,
             start_frame: job.start_frame,
@@ -75,12 +75,12 @@ impl Writer {
         self.overlay_every > 0 && nth.is_multiple_of(self.overlay_every)
     }
 
-    /// Hands a record on; `false` if it was missed, because too many wait already.
+    /// Queues a record; `false` if it was dropped because the queue is full.
     pub(crate) fn write(&self, Settled { absent, record }: Settled) -> bool {
         let record = Some(record);
-        match self.queue.try_send(Lot { absent, record }) {
+        match self.queue.try_send(Batch { absent, record }) {
             Ok(()) => {
-                self.n_handed_on.set(self.n_handed_on.get() + 1);
+                self.n_queued.set(self.n_queued.get() + 1);
                 true
             }
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
@@ -90,10 +90,10 @@ impl Writer {
         }
     }
 
-    /// Hands on frames that have no result, behind all others; waits for room, for nothing follows.
+    /// Queues the frames without a result after the last one; waits for room because nothing follows.
     pub(crate) fn rest(&self, absent: Vec<Absent>) {
         let record = None;
-        if let Err(error) = self.queue.send(Lot { absent, record }) {
+        if let Err(error) = self.queue.send(Batch { absent, record }) {
             tracing::debug!(%error, "the writing thread is gone");
         }
     }
@@ -101,7 +101,7 @@ impl Writer {
     /// Results that wait to be written.
     pub(crate) fn n_waiting(&self) -> usize {
         let written = self.n_written.load(Ordering::Relaxed);
-        self.n_handed_on.get().saturating_sub(written) as usize
+        self.n_queued.get().saturating_sub(written) as usize
     }
 
     /// Waits until everything is written.
@@ -113,11 +113,11 @@ impl Writer {
 
 fn write_all(
     mut output: Output,
-    lots: &Receiver<Lot>,
+    batches: &Receiver<Batch>,
     [n_missed, n_written]: [&AtomicU64; 2],
     session: u64,
 ) {
-    while let Ok(Lot { absent, record }) = lots.recv() {
+    while let Ok(Batch { absent, record }) = batches.recv() {
         output.absent(&absent);
         let Some(record) = record else { continue };
         output.frame(&record);
