@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_camera_has_its_own_name_unless_it_is_called_another() {
+    fn a_camera_has_its_own_name_in_the_table_unless_another_is_set() {
         let config = Config {
             views: BTreeMap::from([("left".to_owned(), "C1".to_owned())]),
             ..Config::default()
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_counted_as_the_file_says() {
+    fn frame_numbers_of_the_table_follow_from_offset_and_step() {
         let config = Config {
             frame_offset: 80,
             frame_step: 4,

@@ -8,7 +8,7 @@ use kernels::Rgb8View;
 use messages::{FrameHeader, ViewPose, ViewQuality, topic};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Stage};
-use viewquality::{ForecastInput, Forecaster, Predictor};
+use viewquality::{Forecaster, Predictor, Seen};
 use wire::WireError;
 
 /// What one view's process has to do.
@@ -22,9 +22,9 @@ pub struct Job {
     pub frame_scale: f32,
     /// Distance between the frames used, at least 1.
     pub frame_step: u64,
-    /// Processes that take the expected errors.
+    /// Processes that receive the expected errors.
     pub n_consumers: usize,
-    /// How long they are waited for.
+    /// How long the process waits for them.
     pub patience: Duration,
 }
 
@@ -33,13 +33,13 @@ pub struct Job {
 pub enum Source {
     /// A table, in pixels of the footage.
     Table(Predictor),
-    /// A network that looks at the frames.
-    Network(Box<Looking>),
+    /// A network that is run on the frames.
+    Network(Box<NetworkSource>),
 }
 
-/// A network, and what it needs to know of the view.
+/// A network, and the model and pyramid of the view.
 #[derive(Debug)]
-pub struct Looking {
+pub struct NetworkSource {
     /// The network.
     pub forecaster: Forecaster,
     /// The model of the person.
@@ -48,7 +48,7 @@ pub struct Looking {
     pub layout: Arc<Layout>,
 }
 
-/// Predicts the expected errors of every frame of one view, until the footage ends or the process is to stop.
+/// Predicts the expected errors of every frame of one view, until the footage ends or a stop is requested.
 ///
 /// # Errors
 ///
@@ -73,14 +73,14 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
                 let sample = frames.of(frame.number());
                 let picture = (frame.number(), sample.as_deref());
                 match candidates(network, &pose.value) {
-                    Ok(read) => predict(network, read, picture, frame_scale)?,
+                    Ok(candidates) => predict(network, candidates, picture, frame_scale)?,
                     Err(error) => {
                         Context::of(service).refuse("view-pose", &error);
-                        nothing()?
+                        no_prediction()?
                     }
                 }
             }
-            (Source::Network(_), None) => nothing()?,
+            (Source::Network(_), None) => no_prediction()?,
         };
         message.took_nanos = now_nanos() - frame.turn().received_at();
         output.send_and_account(frame.turn(), view, message)
@@ -98,64 +98,64 @@ fn from_table(
     wire::sigma_to_message(sigma_px.as_deref()).or_fail(ExitKind::Run)
 }
 
-/// The message that there is no prediction.
-fn nothing() -> Result<ViewQuality, Failure> {
+/// The message without a prediction.
+fn no_prediction() -> Result<ViewQuality, Failure> {
     wire::sigma_to_message(None).or_fail(ExitKind::Run)
 }
 
 /// The candidates of a view, and how well the parts of the first one fit.
-type Read = (Vec<Pose>, Vec<LocalScore>);
+type Candidates = (Vec<Pose>, Vec<LocalScore>);
 
-fn candidates(looking: &Looking, pose: &ViewPose) -> Result<Read, WireError> {
-    let candidates = wire::candidates_from_message(pose, &looking.model, &looking.layout)?;
-    let scores = wire::local_from_message(pose, looking.model.n_parts())?;
+fn candidates(source: &NetworkSource, pose: &ViewPose) -> Result<Candidates, WireError> {
+    let candidates = wire::candidates_from_message(pose, &source.model, &source.layout)?;
+    let scores = wire::local_from_message(pose, source.model.n_parts())?;
     Ok((candidates, scores))
 }
 
-/// Runs the network on the best candidate, on the frame where it lies in shared memory. What cannot be
-/// predicted is said to be so, and why goes to the log: a view is worth more than its expected errors.
+/// Runs the network on the best candidate, on the frame in shared memory. If that fails, the message has no prediction and
+/// the cause is logged: fusion can still use the view without its expected errors.
 fn predict(
-    looking: &mut Looking,
-    (candidates, scores): Read,
+    source: &mut NetworkSource,
+    (candidates, scores): Candidates,
     (frame_number, frame): (u64, Option<&Sample<u8, FrameHeader>>),
     frame_scale: f32,
 ) -> Result<ViewQuality, Failure> {
-    let (model, layout) = (&looking.model, &looking.layout);
+    let (model, layout) = (&source.model, &source.layout);
     if candidates.is_empty() {
-        return nothing();
+        return no_prediction();
     }
     let Some(frame) = frame else {
         tracing::debug!(frame_number, "the frame is gone");
-        return nothing();
+        return no_prediction();
     };
     let [width, height] = layout.image_size;
     let header = frame.header();
-    let is_known = [header.width as usize, header.height as usize] == [width, height];
+    let has_expected_size = [header.width as usize, header.height as usize] == [width, height];
     let image = match Rgb8View::new(width, height, frame.payload()) {
-        Ok(image) if is_known => image,
+        Ok(image) if has_expected_size => image,
         _ => {
             tracing::warn!(frame_number, "a frame of another size");
-            return nothing();
+            return no_prediction();
         }
     };
-    let input = ForecastInput {
+    let seen = Seen {
         image,
         on: (model, layout),
         candidates: &candidates,
         scores: &scores,
         frame_scale: f64::from(frame_scale),
     };
-    let forecast = match looking.forecaster.run(&input) {
+    let forecast = match source.forecaster.run(&seen) {
         Ok(forecast) => forecast,
         Err(error) => {
             tracing::warn!(frame_number, %error, "no prediction");
-            return nothing();
+            return no_prediction();
         }
     };
     let sigma = Some(forecast.sigma_px.as_slice());
     let mut message = wire::sigma_to_message(sigma).or_fail(ExitKind::Run)?;
     wire::tau_to_message(&mut message, &forecast.tau_px).or_fail(ExitKind::Run)?;
-    message.network = looking.forecaster.network().fingerprint();
-    message.tile = forecast.tile.rectangle().map(|it| it as f32);
+    message.network = source.forecaster.network().fingerprint();
+    message.tile = forecast.tile.rectangle().map(|side| side as f32);
     Ok(message)
 }

@@ -163,7 +163,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let prepared = Prepared::new(resolved)?;
     let network = inputs::own_network(&resolved.deployment.quality, prepared.model.n_parts())?;
     let source = match network {
-        Some(network) => quality::Source::Network(Box::new(quality::Looking {
+        Some(network) => quality::Source::Network(Box::new(quality::NetworkSource {
             forecaster: Forecaster::new(network),
             model: Arc::clone(&prepared.model),
             layout: Arc::new(prepared.views[view].plan.layout().clone()),
