@@ -1,11 +1,11 @@
-//! What is wrong with an input is said with its file and its field, and nothing is left behind.
+//! Errors in inputs name the file and the field, and nothing is left behind.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 
 mod mistakes;
+mod notices;
 mod settings;
-mod told;
 
 use std::fs;
 
@@ -17,7 +17,7 @@ const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 const RUN: &[&str] = &["run", "deployment.toml"];
 const DETECT: &[&str] = &["detect", "it.png", "--model", "model.plx", "--json"];
 
-/// One way to break a good deployment of two views, `a` and `b`, of two frames.
+/// One way to break a valid deployment of two views, `a` and `b`, with two frames each.
 struct Row {
     what: &'static str,
     broken: fn(&Case),
@@ -135,7 +135,7 @@ fn footage() {
 }
 
 #[test]
-fn an_image_of_another_size_costs_its_frame_and_is_named() {
+fn an_image_of_another_size_is_named_and_affects_its_own_frame_only() {
     let case = Case::new("sizes", &[3; 2], PLAIN);
     picture(90, 128).save(case.path("b/0001.png")).unwrap();
     let ended = case.run();
@@ -408,7 +408,7 @@ fn single_images() {
 }
 
 #[test]
-fn every_kind_of_pixel_works() {
+fn every_pixel_format_works() {
     let case = Case::new("kinds", &[1; 2], PLAIN);
     let rgb = picture(96, 128);
     let kinds = [
@@ -462,7 +462,7 @@ fn replace_line(case: &Case, key: &str, line: &str) {
 /// A model of two parts in the authors' text format.
 ///
 /// * `parents`: from 1, 0 for the root.
-/// * `filter_rows`: what the header says; it is one.
+/// * `filter_rows`: the value in the header; the right one is 1.
 fn model(parents: &str, filter_rows: usize) -> String {
     let weights = "0.1 ".repeat(32);
     format!(

@@ -29,7 +29,7 @@ const SERIES: [&str; 6] = [
 ];
 
 #[test]
-fn two_processes_see_every_message_at_the_same_place_and_copy_nothing() {
+fn two_processes_read_every_message_at_the_same_place_without_copying() {
     let case = Case::new("transport", &[1; 2], "");
     let more = ["--record", "record.md"];
     let (ended, report) = bench(&case, &[&SERIES[..], &more].concat());
@@ -71,7 +71,7 @@ fn two_processes_see_every_message_at_the_same_place_and_copy_nothing() {
 }
 
 #[test]
-fn a_hop_that_takes_longer_than_was_asked_for_is_a_missed_limit() {
+fn a_hop_that_takes_longer_than_the_limit_is_a_missed_limit() {
     let case = Case::new("limit", &[1; 2], "");
     let more = ["--spin", "--max-polled-us", "0.001"];
     let (ended, report) = bench(&case, &[&SERIES[..], &more].concat());
@@ -85,7 +85,7 @@ fn a_hop_that_takes_longer_than_was_asked_for_is_a_missed_limit() {
 }
 
 #[test]
-fn a_deployment_is_measured_whole_and_with_a_dead_camera() {
+fn a_deployment_is_measured_with_all_cameras_and_with_a_dead_one() {
     let case = Case::new("latency", &[60; 3], PACED);
     let words = [
         "latency",
@@ -117,7 +117,7 @@ fn a_deployment_is_measured_whole_and_with_a_dead_camera() {
 }
 
 #[test]
-fn more_cameras_than_there_are_cannot_be_measured() {
+fn measuring_more_cameras_than_exist_is_refused() {
     let case = Case::new("views", &[2; 2], "");
     let (ended, _) = bench(&case, &["scale", "deployment.toml", "--views", "3"]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
@@ -128,7 +128,7 @@ fn more_cameras_than_there_are_cannot_be_measured() {
     );
 }
 
-/// What a process says that its ports copied, bytes.
+/// The bytes that the ports of a process have copied, from its log.
 fn copied_bytes(stderr: &str, process: &str) -> usize {
     let said = format!(" {process}: ports have done their work copied_bytes=");
     let found = stderr.lines().find_map(|it| it.split_once(&said));
@@ -148,7 +148,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     for view in 0..2 {
         let camera = copied_bytes(&ended.stderr, &format!("capture-{view}"));
         assert_eq!(camera, 0, "it sends nothing but pixels");
-        // The end of the footage is a message as well.
+        // The end of the stream is a message as well.
         let sent = (N_FRAMES + 1) * size_of::<ViewPose>();
         let pose = copied_bytes(&ended.stderr, &format!("pose-{view}"));
         let most = sent + 4 * size_of::<ViewPose>();
@@ -167,7 +167,7 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     let fuse = copied_bytes(&ended.stderr, "fuse-0");
     let read = 2 * (N_FRAMES + 1) * size_of::<ViewPose>();
     let sent = (N_FRAMES + 1) * size_of::<PairPose>();
-    // The end may be said more than once.
+    // The end of the stream may be sent more than once.
     let most = read + sent + 8 * size_of::<ViewPose>();
     assert!(
         (read + sent..=most).contains(&fuse),

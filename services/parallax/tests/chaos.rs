@@ -1,4 +1,4 @@
-//! Chaos on a short deployment: real processes, real kills, the verdicts and the exit codes.
+//! `parallax chaos` on a short deployment: real processes, real kills, verdicts and exit codes.
 
 use crate::common;
 
@@ -7,10 +7,10 @@ use std::fs;
 use common::{Case, Ended, PACED};
 use serde_json::{Value, json};
 
-/// Two seconds of results are enough; a machine that is busy may take its time.
+/// Two seconds of results are enough; generous limits for a loaded machine.
 const PATIENT: [&str; 4] = ["--max-return-ms", "60000", "--max-pause-ms", "60000"];
 
-/// Tries scenarios on a planted deployment; how that ended, and `chaos.json`.
+/// Runs scenarios on a small deployment; returns its exit, and `chaos.json`.
 fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
     let plain = [
         "chaos",
@@ -68,9 +68,9 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
     assert_eq!(
         supervisor["run"]["restarts"],
         json!([]),
-        "nobody was struck"
+        "no process was killed"
     );
-    // Where nothing may be lost a recorder that stands still is waited for, and nothing is.
+    // With lossless delivery senders wait for a suspended results process, and nothing is lost.
     let limits = stall["limits"].as_array().unwrap().iter();
     let written = limits.clone().find(|it| it["what"] == "results written");
     assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");
@@ -82,8 +82,8 @@ fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
 }
 
 #[test]
-fn where_the_latest_wins_who_computes_for_ever_is_found_out_by_the_work_of_its_frames() {
-    // The clock alone would leave it alone for ten minutes.
+fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
+    // The time limit alone would detect it after ten minutes.
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
     let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
     let case = Case::new("chaos-spin", &[240; 3], &patient);
@@ -93,13 +93,13 @@ fn where_the_latest_wins_who_computes_for_ever_is_found_out_by_the_work_of_its_f
     for it in scenarios {
         let measured = &it["measured"];
         let expected = json!([{ "process": measured["process"], "restarts": 1 }]);
-        // On a busy machine the footage may be over before it is back.
+        // On a loaded machine the footage may end before the process is back.
         assert_eq!(it["run"]["restarts"], expected, "{it:#}");
     }
 }
 
 #[test]
-fn a_failing_camera_is_named_counted_and_back_and_a_stalled_recorder_holds_nobody_up() {
+fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
     let case = Case::new("chaos-camera", &[160; 3], &live);
     let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);
@@ -142,12 +142,12 @@ fn a_failing_camera_is_named_counted_and_back_and_a_stalled_recorder_holds_nobod
     assert_eq!(
         stall["run"]["restarts"],
         json!([]),
-        "nobody takes it for hung"
+        "it must not count as hung"
     );
 }
 
 #[test]
-fn what_did_not_hold_is_named_and_has_an_exit_code_of_its_own() {
+fn a_missed_limit_of_a_scenario_is_named_and_has_its_own_exit_code() {
     let case = Case::new("chaos-missed", &[40; 2], PACED);
     let (ended, report) = chaos(&case, "kill-fuse", &["--max-return-ms", "0"]);
     assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
@@ -158,7 +158,7 @@ fn what_did_not_hold_is_named_and_has_an_exit_code_of_its_own() {
 }
 
 #[test]
-fn scenarios_are_listed_and_those_that_cannot_be_are_refused() {
+fn scenarios_are_listed_and_impossible_ones_refused() {
     let case = Case::new("chaos-list", &[2; 2], PACED);
     let ended = case.start(&["chaos", "--list"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

@@ -1,4 +1,4 @@
-//! The demo, as a new user starts it, but shorter: real processes, a real kill, the report.
+//! The demo as a new user starts it, but shorter: real processes, a real kill, the report.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -9,10 +9,10 @@ use std::sync::{Mutex, PoisonError};
 use common::{Case, Ended};
 use serde_json::{Value, json};
 
-/// Two demos at once would share the cores that each needs for itself.
+/// Two demos at the same time would compete for cores.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Runs a short demo in a folder of its own; the folder, how it ended, and `report.json`.
+/// Runs a short demo in a folder of its own; returns the folder, its exit, and `report.json`.
 fn demo(name: &str, more: &[&str]) -> (Case, Ended, Value) {
     let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let case = Case::new(name, &[1, 1], "");
@@ -32,8 +32,8 @@ fn missed(report: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
-    // Patient: a machine that is busy may take its time, and may find no skeleton in time.
+fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
+    // Generous limits: a loaded machine is slow, and may have no skeleton in time.
     let patient = ["--max-return-ms", "30000", "--max-pause-ms", "20000"];
     let short = ["--frames", "30", "--rate", "1.5", "--min-pcp3d", "5"];
     let lenient = ["--min-results", "5", "--min-skeletons", "10"];
@@ -64,7 +64,7 @@ fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
     assert_eq!(report["run"]["restarts"], restarts);
     let accuracy = &report["accuracy"]["all"];
     let [pcp3d, mpjpe] = ["pcp3d_percent", "mpjpe_mm"].map(|key| number(&accuracy[key]));
-    // Of the frames that have a skeleton: how many have one is the machine's matter.
+    // Only of frames with a skeleton: how many have one depends on the machine.
     let found = 1.0 - number(&accuracy["lost_percent"]) / 100.0;
     assert!((35.0..=100.0).contains(&(pcp3d / found)), "{accuracy:#}");
     assert!((5.0..400.0).contains(&mpjpe), "{accuracy:#}");
@@ -83,7 +83,7 @@ fn a_killed_camera_comes_back_and_the_report_says_what_it_cost() {
     a_killed_camera_was_lost_and_not_late(&case, killed);
 }
 
-/// The lines of a file of the demo's results.
+/// The lines of a results file of the demo.
 fn lines(case: &Case, name: &str) -> Vec<Value> {
     let text = fs::read_to_string(case.path("demo/run").join(name)).unwrap();
     let lines = text.lines().map(serde_json::from_str);
@@ -132,7 +132,7 @@ fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
 }
 
 #[test]
-fn a_missed_limit_has_an_exit_code_of_its_own_and_is_named() {
+fn a_missed_limit_of_the_demo_is_named_and_has_its_own_exit_code() {
     let impossible = ["--frames", "12", "--no-kill", "--min-pcp3d", "101"];
     let (case, ended, report) = demo("demo-missed", &impossible);
     assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
@@ -142,7 +142,7 @@ fn a_missed_limit_has_an_exit_code_of_its_own_and_is_named() {
         (&json!(false), &Value::Null)
     );
     assert_eq!(report["run"]["restarts"], json!([]), "nobody was killed");
-    // The machine was measured before and after; the slower of the two is told, and what it gives the cameras.
+    // The machine is measured before and after; the slower result is reported, with the resulting frame rate.
     let machine = &report["machine"];
     let [frame_ms, rate_hz, slowness] =
         ["frame_ms", "rate_hz", "slowness"].map(|key| machine[key].as_f64().unwrap());

@@ -1,4 +1,4 @@
-//! Photographs and clips as people have them: large, turned by a tag, some of them broken.
+//! Photographs and clips as users have them: large, with an orientation tag, some damaged.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -30,7 +30,7 @@ fn detect(case: &Case, more: &[&str]) -> (Ended, Vec<Value>) {
     (ended, lines)
 }
 
-/// Tells whoever looks at a picture that it is to be turned by 90 degrees to the right.
+/// Adds the orientation tag for a rotation by 90 degrees to the right.
 fn tagged(mut encoder: impl ImageEncoder, image: &DynamicImage) {
     // TIFF header, one entry: orientation (0x0112), one short, 6.
     let exif = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
@@ -47,7 +47,7 @@ fn tagged(mut encoder: impl ImageEncoder, image: &DynamicImage) {
 }
 
 #[test]
-fn a_broken_file_is_named_and_the_others_are_searched() {
+fn a_damaged_file_is_named_and_the_others_are_searched() {
     let (case, picture) = case("detect-broken", 3);
     let mut jpeg = Cursor::new(Vec::new());
     picture
@@ -64,7 +64,7 @@ fn a_broken_file_is_named_and_the_others_are_searched() {
     for words in ["0001.jpg", "0002.bmp", "absent.png", "3 of 6 files"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // Where there is nothing else, the input is wrong, as ever.
+    // Without any other file, it is an input error.
     for files in [&["a/0001.jpg"][..], &["a/0001.jpg", "absent.png"]] {
         let (ended, lines) = detect(&case, files);
         assert_eq!(
@@ -77,7 +77,7 @@ fn a_broken_file_is_named_and_the_others_are_searched() {
 }
 
 #[test]
-fn a_picture_is_searched_as_people_see_it() {
+fn a_picture_is_searched_with_its_orientation_tag_applied() {
     let (case, picture) = case("detect-turned", 1);
     let stored = DynamicImage::from(imageops::rotate270(&picture.to_rgb8()));
     let mut bytes = Vec::new();
@@ -109,7 +109,7 @@ fn a_picture_is_searched_as_people_see_it() {
         ended.stdout
     );
 
-    // A calibration speaks of pixels as they are stored: there the tag is not obeyed, and that is said.
+    // A calibration refers to the pixels as stored: a deployment does not apply the tag, and reports that.
     fs::copy(case.path("turned.png"), case.path("a/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     for words in ["orientation tag", "camera \"a\"", "as they are stored"] {
@@ -118,7 +118,7 @@ fn a_picture_is_searched_as_people_see_it() {
 }
 
 #[test]
-fn a_large_picture_is_searched_at_a_size_that_is_said() {
+fn a_large_picture_is_searched_at_a_reported_smaller_size() {
     let (case, picture) = case("detect-large", 1);
     let large = imageops::resize(&picture.to_rgb8(), 384, 512, imageops::FilterType::Nearest);
     large.save(case.path("large.png")).unwrap();

@@ -1,4 +1,4 @@
-//! `parallax eval`, and `parallax train consistency` before it, as a user starts them: what they leave behind, go on with, and refuse.
+//! `parallax eval`, and `parallax train consistency` before it, as a user starts them: their files, continuation after an interruption, and refusals.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use common::{Case, Ended, PLAIN, planted};
 use serde_json::Value;
 
-/// Three views of a planted figure that walks, described as a sequence of `n_frames` whose truth is known.
+/// Three views of a synthetic walking figure, as a sequence of `n_frames` with ground truth.
 fn case(n_frames: usize, n_true: usize) -> Case {
     let case = Case::new("eval", &[n_frames; 3], PLAIN);
     let markers: Vec<String> = (0..14).map(|it| format!("M{it}")).collect();
@@ -35,7 +35,7 @@ fn case(n_frames: usize, n_true: usize) -> Case {
     case
 }
 
-/// Two people who do not exist, seen once by three cameras each.
+/// Two synthetic people, each in one frame of three cameras.
 fn two_people() -> Case {
     let case = Case::new("consistency", &[1; 2], PLAIN);
     let who = ["synth", "people", "--rig", "ring:3", "--subjects", "1-2"];
@@ -91,7 +91,7 @@ fn people(case: &Case) -> &'static str {
 }
 
 #[test]
-fn single_pictures_are_judged_as_model_judge_does() {
+fn single_pictures_are_evaluated_as_by_model_judge() {
     let case = case(3, 3);
     let people = people(&case);
     let who = [people, "--only", "2-8", "--json"];
@@ -124,7 +124,7 @@ fn single_pictures_are_judged_as_model_judge_does() {
 }
 
 #[test]
-fn options_of_sequences_are_refused_for_single_pictures_and_the_other_way_round() {
+fn options_of_sequences_are_refused_for_single_pictures_and_vice_versa() {
     let case = case(1, 1);
     let people = people(&case);
     for (words, expected) in [
@@ -142,7 +142,7 @@ fn options_of_sequences_are_refused_for_single_pictures_and_the_other_way_round(
 }
 
 #[test]
-fn a_report_holds_every_version_and_goes_on_where_it_was_cut_off() {
+fn a_report_has_every_version_and_is_continued_after_an_interruption() {
     let case = case(3, 3);
     let ended = eval(&case, &["--oracle", "--json", "--quiet"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -170,7 +170,7 @@ fn a_report_holds_every_version_and_goes_on_where_it_was_cut_off() {
     assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
     assert!(again.stderr.contains("--resume"), "{}", again.stderr);
 
-    // As kill -9 leaves it: one whole frame, and half of another.
+    // As after kill -9: one complete frame, and half of another.
     let kept = fs::read_to_string(poses(&case)).unwrap();
     let lines: Vec<&str> = kept.lines().collect();
     let half = &lines[2][..lines[2].len() / 2];
@@ -186,7 +186,7 @@ fn a_report_holds_every_version_and_goes_on_where_it_was_cut_off() {
 }
 
 #[test]
-fn footage_that_ends_before_the_truth_is_told() {
+fn footage_that_ends_before_the_ground_truth_is_reported() {
     let case = case(2, 4);
     let ended = eval(&case, &["--versions", "fmp"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -195,7 +195,7 @@ fn footage_that_ends_before_the_truth_is_told() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused() {
+fn impossible_evaluations_are_refused() {
     let case = case(1, 1);
     case.write("wrong.toml", "alhpa = 1\n");
     case.write("beyond.toml", "alpha = -1\n");
@@ -220,7 +220,7 @@ fn what_cannot_be_done_is_refused() {
 }
 
 #[test]
-fn what_views_have_in_common_is_learned_and_used() {
+fn consistency_between_views_is_learned_and_used() {
     let case = two_people();
     let out = ["--out", "a.consistency", "--rig", "hall", "--tries", "1"];
     let ended = learn(&case, &[&out[..], &["--json", "--quiet"]].concat());
@@ -241,7 +241,7 @@ fn what_views_have_in_common_is_learned_and_used() {
 }
 
 #[test]
-fn what_is_learned_does_not_depend_on_the_number_of_threads() {
+fn learned_consistency_does_not_depend_on_the_number_of_threads() {
     let case = two_people();
     let learned = ["1", "3"].map(|threads| {
         let out = format!("{threads}.consistency");
@@ -256,7 +256,7 @@ fn what_is_learned_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn a_consistency_file_that_cannot_be_used_is_refused() {
+fn an_unusable_consistency_file_is_refused() {
     let case = case(1, 1);
     case.write("wrong.consistency", "{\"format\": \"x\", \"version\": 1}");
     case.write("learned.toml", "tau = \"learned\"\n");

@@ -1,4 +1,4 @@
-//! What is left of a run of real processes when one of them is stopped or killed.
+//! Runs of real processes in which one process is suspended, terminated or killed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -13,17 +13,18 @@ use serde_json::{Value, json};
 
 const N_FRAMES: u64 = 80;
 
-/// What became of a run of three views one process of which got a signal after ten frames.
-struct Struck {
+/// The outcome of a run of three views in which one process got a signal after ten frames.
+struct Signalled {
     lines: Vec<Value>,
     summary: Value,
-    said: String,
+    stderr: String,
 }
 
-impl Struck {
-    /// It is over, it says that it lost something, and nothing of it is left.
+impl Signalled {
+    /// Runs to the end; checks the exit code, the restart, and that nothing is left behind.
     ///
-    /// * `victim`: as on its command line, for example `pose --index 1`.
+    /// * `name`: of the signal.
+    /// * `victim`: the process, as on its command line, for example `pose --index 1`.
     fn new(more: &str, name: &str, victim: &str) -> Self {
         let process = victim.replace(" --index ", "-");
         let case = Case::new(&process, &[N_FRAMES as usize; 3], more);
@@ -40,7 +41,7 @@ impl Struck {
         Self {
             lines: case.lines("pose3d.jsonl"),
             summary: report["recorded"]["summary"].clone(),
-            said: ended.stderr,
+            stderr: ended.stderr,
         }
     }
 
@@ -51,12 +52,10 @@ impl Struck {
 
     fn assert_every_frame(&self) {
         let expected: Vec<u64> = (0..N_FRAMES).collect();
-        assert_eq!(self.frames(), expected, "{}", self.said);
+        assert_eq!(self.frames(), expected, "{}", self.stderr);
     }
 
-    /// Frames without a result say why, are few, and are counted.
-    ///
-    /// * `n`: there are fewer of them.
+    /// Checks that frames without a result have one of the expected reasons, are counted, and are fewer than `n`.
     fn assert_reasons(&self, expected: &[&str], n: usize) {
         let without = self.lines.iter().filter(|it| it["status"] == "no result");
         let reasons: Vec<&str> = without.map(|it| it["reason"].as_str().unwrap()).collect();
@@ -68,8 +67,8 @@ impl Struck {
         assert_eq!(counted + reasons.len() as u64, self.lines.len() as u64);
     }
 
-    /// The views of the frames that do not have all of them.
-    fn without_all(&self) -> Vec<&Value> {
+    /// The views present in those frames that lack a view.
+    fn incomplete(&self) -> Vec<&Value> {
         let views = self.lines.iter().map(|it| &it["views_present"]);
         views.filter(|it| **it != json!(["a", "b", "c"])).collect()
     }
@@ -90,59 +89,59 @@ fn expected_errors() -> String {
     table
 }
 
-/// What a plain `kill` of a process leaves: no more than a crash.
-fn told_to_end(name: &str, victim: &str) -> Struck {
-    let struck = Struck::new(PACED, name, victim);
+/// Sends a process a signal that asks it to end; it must not lose more than after a crash.
+fn terminate(name: &str, victim: &str) -> Signalled {
+    let run = Signalled::new(PACED, name, victim);
     let number = HashMap::from([("TERM", 15), ("INT", 2), ("HUP", 1)])[name];
-    let said = format!("ended by signal {number}");
-    assert!(struck.said.contains(&said), "{}", struck.said);
-    struck.assert_every_frame();
-    // It goes on for two seconds, then comes back as after a crash.
-    struck.assert_reasons(&["process lost", "recorder lost"], 40);
-    struck
+    let message = format!("ended by signal {number}");
+    assert!(run.stderr.contains(&message), "{}", run.stderr);
+    run.assert_every_frame();
+    // It continues for two seconds, then is restarted as after a crash.
+    run.assert_reasons(&["process lost", "recorder lost"], 40);
+    run
 }
 
 #[test]
-fn a_camera_that_is_told_to_end_comes_back_and_goes_on_where_it_was() {
-    let struck = told_to_end("TERM", "capture --index 1");
-    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+fn a_terminated_capture_process_is_restarted_and_continues_with_the_next_frame() {
+    let run = terminate("TERM", "capture --index 1");
+    assert_eq!(run.incomplete(), Vec::<&Value>::new());
 }
 
 #[test]
-fn a_pose_process_that_is_told_to_end_comes_back() {
-    let struck = told_to_end("HUP", "pose --index 1");
-    assert!(struck.without_all().len() <= 2, "{}", struck.said);
+fn a_terminated_pose_process_is_restarted() {
+    let run = terminate("HUP", "pose --index 1");
+    assert!(run.incomplete().len() <= 2, "{}", run.stderr);
 }
 
 #[test]
-fn a_quality_process_that_is_told_to_end_comes_back() {
+fn a_terminated_quality_process_is_restarted() {
     let more = PACED.to_owned() + "[quality]\ntable = \"q.csv\"\n";
-    let struck = Struck::new(&more, "INT", "quality --index 1");
-    struck.assert_every_frame();
-    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+    let run = Signalled::new(&more, "INT", "quality --index 1");
+    run.assert_every_frame();
+    assert_eq!(run.incomplete(), Vec::<&Value>::new());
 }
 
 #[test]
-fn a_fusion_worker_that_is_told_to_end_comes_back() {
-    let struck = told_to_end("TERM", "fuse --index 0");
-    assert_eq!(struck.lines.last().unwrap()["pairs"], json!(3));
+fn a_terminated_fusion_worker_is_restarted() {
+    let run = terminate("TERM", "fuse --index 0");
+    assert_eq!(run.lines.last().unwrap()["pairs"], json!(3));
 }
 
 #[test]
-fn a_triangulation_that_is_told_to_end_comes_back() {
-    told_to_end("INT", "triangulate");
+fn a_terminated_triangulation_process_is_restarted() {
+    terminate("INT", "triangulate");
 }
 
 #[test]
-fn a_recorder_that_is_told_to_end_comes_back() {
-    told_to_end("HUP", "results");
+fn a_terminated_results_process_is_restarted() {
+    terminate("HUP", "results");
 }
 
 #[test]
-fn a_killed_camera_goes_on_where_it_was() {
-    let struck = Struck::new(PACED, "KILL", "capture --index 1");
-    struck.assert_every_frame();
-    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+fn a_killed_capture_process_continues_with_the_next_frame() {
+    let run = Signalled::new(PACED, "KILL", "capture --index 1");
+    run.assert_every_frame();
+    assert_eq!(run.incomplete(), Vec::<&Value>::new());
 }
 
 #[test]
@@ -161,7 +160,7 @@ fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
     let restarts =
         json!([{ "process": "fuse-0", "restarts": 1 }, { "process": "capture-1", "restarts": 1 }]);
     assert_eq!(report["restarts"], restarts, "{}", ended.stderr);
-    // The recorder has its files open, wherever they are by now.
+    // The results process has its files open, so it writes on after the move.
     let text = fs::read_to_string(case.path("gone/pose3d.jsonl.part")).unwrap();
     assert_eq!(text.lines().count() as u64, N_FRAMES, "{}", ended.stderr);
     assert!(
@@ -172,7 +171,7 @@ fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
 }
 
 #[test]
-fn a_model_that_is_gone_when_a_process_comes_back_costs_that_process_alone() {
+fn a_process_whose_model_is_gone_at_its_restart_is_given_up_and_the_run_goes_on() {
     let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
     let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
@@ -191,12 +190,12 @@ fn a_model_that_is_gone_when_a_process_comes_back_costs_that_process_alone() {
 }
 
 #[test]
-fn a_killed_fusion_worker_costs_its_pairs_of_a_few_frames() {
-    let struck = Struck::new(PACED, "KILL", "fuse --index 0");
-    struck.assert_every_frame();
-    assert_eq!(struck.without_all(), Vec::<&Value>::new());
+fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
+    let run = Signalled::new(PACED, "KILL", "fuse --index 0");
+    run.assert_every_frame();
+    assert_eq!(run.incomplete(), Vec::<&Value>::new());
     // The other worker has one pair of the three.
-    let pairs: Vec<_> = struck.lines.iter().map(|it| &it["pairs"]).collect();
+    let pairs: Vec<_> = run.lines.iter().map(|it| &it["pairs"]).collect();
     assert!(pairs.iter().all(|it| **it != json!(0)), "{pairs:?}");
     let n_without = pairs.iter().filter(|it| ***it != json!(3)).count();
     assert!(n_without < 20, "{pairs:?}");
@@ -204,36 +203,40 @@ fn a_killed_fusion_worker_costs_its_pairs_of_a_few_frames() {
 }
 
 #[test]
-fn a_killed_triangulation_costs_the_frames_it_held_and_they_are_counted() {
-    let struck = Struck::new(PACED, "KILL", "triangulate");
-    // A line of every frame, in order and none twice: a result, or why there is none.
-    struck.assert_every_frame();
-    struck.assert_reasons(&["process lost"], 20);
+fn a_killed_triangulation_process_loses_few_frames_and_they_are_counted() {
+    let run = Signalled::new(PACED, "KILL", "triangulate");
+    // Exactly one line for every frame, in order: a result, or the reason why there is none.
+    run.assert_every_frame();
+    run.assert_reasons(&["process lost"], 20);
 }
 
 #[test]
-fn every_frame_of_a_live_run_has_one_line_though_triangulation_was_killed() {
+fn every_frame_of_a_live_run_has_one_line_after_triangulation_is_killed() {
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
-    let struck = Struck::new(&live, "KILL", "triangulate");
-    let frames = struck.frames();
+    let run = Signalled::new(&live, "KILL", "triangulate");
+    let frames = run.frames();
     let expected: Vec<u64> = (0..frames.len() as u64).collect();
-    assert_eq!(frames, expected, "{}", struck.said);
-    for it in struck.lines.iter().filter(|it| it["status"] == "no result") {
+    assert_eq!(frames, expected, "{}", run.stderr);
+    for it in run.lines.iter().filter(|it| it["status"] == "no result") {
         assert!(!it["reason"].as_str().unwrap().is_empty(), "{it}");
         assert_eq!(it["views_missing"].as_object().unwrap().len(), 3, "{it}");
     }
-    let n_lines = struck.summary["frames"].as_u64().unwrap()
-        + struck.summary["frames_missed"].as_u64().unwrap();
+    let n_lines =
+        run.summary["frames"].as_u64().unwrap() + run.summary["frames_missed"].as_u64().unwrap();
     assert_eq!(n_lines, frames.len() as u64);
 }
 
 #[test]
-fn a_stopped_view_is_found_out_and_no_frame_is_lost() {
-    let struck = Struck::new(PACED, "STOP", "pose --index 1");
-    assert!(struck.said.contains("sent no heartbeat"), "{}", struck.said);
-    struck.assert_every_frame();
-    // All that it may cost is the frame that it held, and the one that waited for it.
-    let without = struck.without_all();
+fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
+    let run = Signalled::new(PACED, "STOP", "pose --index 1");
+    assert!(
+        run.stderr.contains("gave no sign of life"),
+        "{}",
+        run.stderr
+    );
+    run.assert_every_frame();
+    // At most the frame that it held and the next one may lack the view.
+    let without = run.incomplete();
     assert!(without.len() <= 2, "{without:?}");
     assert!(
         without.iter().all(|it| **it == json!(["a", "c"])),
@@ -242,14 +245,14 @@ fn a_stopped_view_is_found_out_and_no_frame_is_lost() {
 }
 
 #[test]
-fn a_live_run_goes_on_without_a_stopped_view_until_it_is_back() {
+fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
-    // Long enough for results without it while it merely stands still.
+    // Long enough for results without the view before the suspended process is restarted.
     let more = live + "[supervise]\nmissed_beats = 12\nmax_restarts = 9\n";
     let case = Case::new("pose-1", &[240; 3], &more);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
-    // Its next life cannot begin before frames are lost with the first: how long that takes is the machine's matter.
+    // Without its model the process cannot restart before frames are lost; how long that takes depends on the machine.
     fs::rename(case.path("model.plx"), case.path("away.plx")).unwrap();
     signal("STOP", started.pid_of("pose --index 1").into());
     started.until("lost frames", |_| {
@@ -270,7 +273,7 @@ fn a_live_run_goes_on_without_a_stopped_view_until_it_is_back() {
     assert_back_after_a_gap(&case.lines("pose3d.jsonl"));
 }
 
-/// View `b` was late, then lost with its process, and is back.
+/// Checks that view `b` was late, then lost with its process, and is back.
 fn assert_back_after_a_gap(lines: &[Value]) {
     let n_without_b = lines
         .iter()

@@ -1,4 +1,4 @@
-//! Runs on a disk, and in a shared memory, that are too small.
+//! Runs with too little disk space or shared memory.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
@@ -9,13 +9,13 @@ use common::{Case, PLAIN, Started};
 use serde_json::{Value, json};
 
 #[test]
-fn a_full_disk_stops_nobody_and_what_was_not_written_is_counted() {
+fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
     let case = Case::new("disk", &[40; 2], PLAIN);
     fs::create_dir(case.path("out")).unwrap();
     let script = "mount -t tmpfs -o size=400k tmpfs out\n\
                   code=0; \"$PARALLAX\" run deployment.toml --json || code=$?\n\
                   cp -r out copy; exit $code";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
@@ -24,14 +24,14 @@ fn a_full_disk_stops_nobody_and_what_was_not_written_is_counted() {
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let summary = &report["recorded"]["summary"];
-    // Every frame was made, not every one was written, and nobody had to be restarted.
+    // Every frame was computed, not every one was written, and no process was restarted.
     assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
     assert_eq!(summary["frames"], json!(40));
     assert!(summary["writes_failed"].as_u64() > Some(10), "{summary:#}");
     let why = summary["first_failure"].as_str().unwrap();
     assert!(why.contains("No space left"), "{why}");
     assert!(ended.stderr.contains("No space left"), "{}", ended.stderr);
-    // What was written is whole.
+    // Every line that was written is complete.
     for name in ["pose3d.jsonl", "pose2d.jsonl"] {
         let text = fs::read_to_string(case.path("copy").join(name)).unwrap();
         assert!(text.ends_with('\n'), "{name} ends in the middle of a line");
@@ -52,7 +52,7 @@ fn too_little_shared_memory_is_refused_with_the_numbers() {
     let case = Case::new("room", &[2; 2], PLAIN);
     let script = "mount -t tmpfs -o size=4m tmpfs /dev/shm\n\
                   exec \"$PARALLAX\" run deployment.toml --json";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
@@ -69,12 +69,12 @@ fn too_little_shared_memory_is_refused_with_the_numbers() {
 }
 
 #[test]
-fn a_recording_for_which_there_is_no_room_is_not_begun() {
+fn a_recording_is_refused_if_the_disk_has_too_little_room() {
     let case = Case::new("no-room", &[2; 2], PLAIN);
     fs::create_dir(case.path("disk")).unwrap();
     let script = "mount -t tmpfs -o size=64k tmpfs disk\n\
                   exec \"$PARALLAX\" record deployment.toml --out disk/run.mcap";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };

@@ -1,4 +1,4 @@
-//! A deployment that runs, as `status` and `top` show it, and runs that have to be fast enough.
+//! A running deployment in `status` and `top`, and runs with a latency budget.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -17,7 +17,7 @@ const PROCESSES: [&str; 7] = [
     "results",
 ];
 
-/// What `status` says of the processes of a case that runs.
+/// The processes of a running case in `status`.
 fn processes(case: &Case) -> Vec<Value> {
     let ended = case.start(&["status", &case.name, "--json"]);
     let ended = ended.wait_among_others();
@@ -33,7 +33,7 @@ fn times<'a>(process: &'a Value, stage: &str, view: Option<u64>) -> Option<&'a V
     times.iter().find(is_meant)
 }
 
-/// A process that has been at work for a while.
+/// Checks a process that has been running for a while.
 fn assert_plausible(it: &Value) {
     assert_eq!(it["state"], "runs", "{it:#}");
     assert!(it["pid"].as_u64() > Some(1), "{it:#}");
@@ -44,8 +44,7 @@ fn assert_plausible(it: &Value) {
         "{it:#}"
     );
     let number = |key: &str| measured[key].as_f64().unwrap();
-    // Pictures come 20 times a second; a loaded machine is behind, and then catches up. Lately, that
-    // may have been none.
+    // 20 pictures per second; a loaded machine is behind, then catches up. There may have been none in the last period.
     assert!(number("sent") / number("seconds") > 0.01, "{it:#}");
     assert!(number("sent_per_second") < 200.0, "{it:#}");
     for it in measured["times"].as_array().unwrap() {
@@ -129,7 +128,7 @@ fn a_process_that_was_killed_is_shown_with_its_restart() {
 }
 
 #[test]
-fn what_does_not_run_cannot_be_watched() {
+fn watching_a_deployment_that_does_not_run_is_refused() {
     let case = Case::new("absent", &[1], "");
     for arguments in [["status", &case.name], ["top", "deployment.toml"]] {
         let ended = case.start(&arguments).wait();
@@ -147,7 +146,7 @@ fn budgeted(case: &Case, budget: &str) -> Ended {
 }
 
 #[test]
-fn a_run_that_misses_its_latency_budget_fails_and_says_where_the_time_went() {
+fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stages() {
     let case = Case::new("budget", &[6; 2], PLAIN);
     let ended = budgeted(&case, "0.001");
     assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
@@ -170,7 +169,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_says_where_the_time_went() {
             "{name}: {it:#}"
         );
     }
-    // Sent at the very end: all frames are in it.
+    // The last heartbeat is sent at the end, so it counts all frames.
     assert_eq!(report["processes"]["results"]["sent"], 6);
 
     let ended = budgeted(&case, "600000");
@@ -181,7 +180,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_says_where_the_time_went() {
 }
 
 #[test]
-fn a_latency_budget_that_cannot_be_is_refused() {
+fn an_invalid_latency_budget_is_refused() {
     let case = Case::new("no-budget", &[1; 2], PLAIN);
     for wrong in ["0", "nan", "-5", "fast"] {
         let ended = budgeted(&case, wrong);

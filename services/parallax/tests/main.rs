@@ -1,4 +1,4 @@
-//! The one executable, run as a user would: one binary, because linking takes longer than most tests.
+//! The program, run as a user would. One test binary, because linking takes longer than most tests.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! What a pose process holds at most, with images and a model of the size that people use.
+//! The peak memory of a pose process, with images and a model of realistic size.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -12,10 +12,10 @@ use serde_json::{Value, json};
 
 const SIZE: [u32; 2] = [640, 480];
 const N_FRAMES: usize = 6;
-/// Types of every part, each with a filter of its own.
+/// Types of every part; each has its own filter.
 const N_TYPES: usize = 6;
 
-/// The planted cameras with larger pictures.
+/// The small test cameras with larger pictures.
 fn rig() -> Rig {
     let mut cameras = planted::rig(2).cameras().to_vec();
     for camera in &mut cameras {
@@ -32,7 +32,7 @@ fn rig() -> Rig {
     Rig::new(cameras, Some(Vector3::z_axis()), "planted").unwrap()
 }
 
-/// The planted model with as many filters as the `HumanEva` model of the paper has, and as large.
+/// The small test model with as many filters as the paper's `HumanEva` model, of the same size.
 fn model() -> Model {
     let small = planted::model();
     let mut spec: ModelSpec = small.spec().clone();
@@ -63,7 +63,7 @@ fn model() -> Model {
     Model::new(spec).unwrap()
 }
 
-/// A picture of nothing but noise, in which poses lie on every level.
+/// A picture of noise, in which there are poses on every level.
 fn noise(seed: u64) -> Canvas {
     let [width, height] = SIZE.map(|it| it as usize);
     let mut random = fastrand::Rng::with_seed(seed);
@@ -78,7 +78,7 @@ fn a_pose_process_stays_under_300_megabytes_at_640x480_with_a_window_of_3_levels
     let more =
         "[capture]\nupright = false\n[pose]\nevidence_window = 3\n[results]\noverlay_every = 0\n";
     let rig = rig();
-    let case = Case::seen_by(&rig, "memory", &[N_FRAMES; 2], more);
+    let case = Case::with_rig(&rig, "memory", &[N_FRAMES; 2], more);
     fmp::files::write(&case.path("model.plx"), &model()).unwrap();
     for (view, camera) in rig.cameras().iter().enumerate() {
         for frame in 0..N_FRAMES {
@@ -98,7 +98,7 @@ fn a_pose_process_stays_under_300_megabytes_at_640x480_with_a_window_of_3_levels
         assert!(evidence > 100_000_000, "{evidence} bytes of evidence");
         let peak = &report["peak_memory_bytes"][format!("pose-{view}")];
         let peak = peak.as_u64().unwrap();
-        // Shared memory counts: evidence is written where it will be read.
+        // Shared memory counts: evidence is written there directly.
         assert!((evidence..300_000_000).contains(&peak), "{peak} bytes");
     }
 }

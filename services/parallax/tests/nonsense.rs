@@ -1,4 +1,4 @@
-//! Footage, calibrations and settings that cannot belong together: refused before the start, or named, with numbers.
+//! Footage, calibrations and settings that do not fit together: refused before the start or reported, with numbers.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -11,7 +11,7 @@ const CHECK: &[&str] = &["config", "check", "deployment.toml"];
 const RUN: &[&str] = &["run", "deployment.toml"];
 const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 
-/// What a user did, how the program ends, and what it says of it.
+/// A user's mistake, the exit code, and the expected text.
 type Row = (
     &'static str,
     fn(&Case),
@@ -20,7 +20,7 @@ type Row = (
     &'static [&'static str],
 );
 
-/// Tries a deployment of three views, of two frames.
+/// Runs a deployment of three views with two frames each.
 fn try_all(rows: &[Row]) {
     let mut wrong = Vec::new();
     for (what, broken, arguments, code, words) in rows {
@@ -42,7 +42,7 @@ fn try_all(rows: &[Row]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Replaces every translation of the rig by what `to` makes of it.
+/// Maps every translation of the rig with `to`.
 fn move_cameras(case: &Case, to: impl Fn(f64) -> f64) {
     let text = fs::read_to_string(case.path("rig.toml")).unwrap();
     let line = |line: &str| {
@@ -63,7 +63,7 @@ fn add(case: &Case, line: &str) {
     case.edit("deployment.toml", "rig = ", &format!("{line}\nrig = "));
 }
 
-/// What may be wrong with a calibration.
+/// Errors in calibrations.
 const CALIBRATIONS: &[Row] = &[
     ("as it is", |_| (), CHECK, 0, &[]),
     (
@@ -120,7 +120,7 @@ const CALIBRATIONS: &[Row] = &[
     ),
 ];
 
-/// What may be wrong with a number of a deployment.
+/// Wrong numbers in deployment files.
 const SETTINGS: &[Row] = &[
     (
         "a part that the model has not",
@@ -177,13 +177,13 @@ const SETTINGS: &[Row] = &[
 ];
 
 #[test]
-fn what_cannot_be_is_refused_before_the_start() {
+fn impossible_deployments_are_refused_before_the_start() {
     try_all(CALIBRATIONS);
     try_all(SETTINGS);
 }
 
 #[test]
-fn one_camera_alone_is_refused_with_what_to_use() {
+fn a_single_camera_is_refused_with_an_alternative() {
     let case = Case::new("alone", &[2], PLAIN);
     for arguments in [CHECK, RUN, DRY] {
         let ended = case.start(arguments).wait();
@@ -198,7 +198,7 @@ fn one_camera_alone_is_refused_with_what_to_use() {
 }
 
 #[test]
-fn footage_that_is_not_that_of_its_camera_is_refused_or_named() {
+fn footage_of_another_camera_is_refused_or_reported() {
     try_all(&[
         (
             "one source for two cameras",
@@ -244,7 +244,7 @@ fn video(case: &Case, name: &str, rate: &str, pattern: &str) {
 }
 
 #[test]
-fn rates_that_differ_are_refused_with_both_numbers() {
+fn different_frame_rates_are_refused_with_both_numbers() {
     let case = Case::new("rates", &[2; 2], PLAIN);
     for (name, rate, pattern) in [
         ("a.mp4", "30", "testsrc"),
@@ -270,12 +270,12 @@ fn rates_that_differ_are_refused_with_both_numbers() {
         };
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // Who knows better says so.
+    // The setting overrides the check.
     let given = [CHECK, &["--set", "capture.frame_rate_hz=30"]].concat();
     let ended = case.start(&given).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     assert!(ended.stderr.contains("frames apart"), "{}", ended.stderr);
-    // A thousandth, over two seconds, is nothing.
+    // A difference of 0.1 %, over two seconds, is accepted.
     case.edit(
         "deployment.toml",
         "source = \"b.mp4\"",
@@ -289,14 +289,14 @@ fn rates_that_differ_are_refused_with_both_numbers() {
 #[test]
 fn a_dry_run_fails_where_the_run_would_not_begin() {
     let case = Case::new("huge", &[2; 16], PLAIN);
-    // So large that no machine has the memory: every frame has 0.8 GB, and is there seven times.
+    // Larger than the memory of usual machines: a frame has 0.8 GB, and exists seven times.
     case.edit(
         "deployment.toml",
         "upright",
         "size = [16384, 16384]\nupright",
     );
     let ended = case.start(DRY).wait();
-    // Where a machine has it all the same, too few files are enough.
+    // On a machine with enough memory, a limit on open files has the same effect.
     let script = "ulimit -n 64; exec \"$PARALLAX\" run deployment.toml --dry-run";
     let few = case.start_in_shell(script).wait();
     for (ended, words) in [(&ended, "/dev/shm"), (&few, "ulimit -n")] {
@@ -308,7 +308,7 @@ fn a_dry_run_fails_where_the_run_would_not_begin() {
 }
 
 #[test]
-fn a_vertical_that_nobody_says_is_found_and_said() {
+fn an_unspecified_vertical_is_estimated_and_reported() {
     let case = Case::new("upright", &[2; 3], PLAIN);
     let text = fs::read_to_string(case.path("rig.toml")).unwrap();
     let without: Vec<&str> = text.lines().filter(|it| !it.starts_with("up = ")).collect();
@@ -319,7 +319,7 @@ fn a_vertical_that_nobody_says_is_found_and_said() {
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let said = "does not say which way is up; taken is up = [0.000, 0.000, 1.000]: cameras are held within 0 degrees";
     assert!(ended.stderr.contains(said), "{}", ended.stderr);
-    // Who says it is not asked.
+    // With the setting nothing is estimated.
     add(&case, "up = [0, 0, 1]");
     let ended = case.start(CHECK).wait();
     assert!(

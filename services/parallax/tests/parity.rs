@@ -1,4 +1,4 @@
-//! A deployment of real processes gives the same bits as one process that does the same.
+//! A deployment of real processes gives the same bits as the same computation in one process.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -11,7 +11,7 @@ use common::{Case, PLAIN, planted};
 use pipeline::{EstimatorSettings, Views};
 
 #[test]
-fn frames_as_they_are() {
+fn unchanged_frames() {
     let case = Case::new("parity", &[20; 3], PLAIN);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -19,10 +19,10 @@ fn frames_as_they_are() {
 }
 
 #[test]
-fn frames_that_are_turned_resized_and_distorted() {
+fn turned_resized_and_distorted_frames() {
     let rig = planted::tilted_rig(3);
     let more = "[capture]\nsize = [120, 140]\n[results]\noverlay_every = 0\n";
-    let case = Case::seen_by(&rig, "warped", &[20; 3], more);
+    let case = Case::with_rig(&rig, "warped", &[20; 3], more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let one = OneProcess {
@@ -53,23 +53,23 @@ fn the_released_energy() {
     one.assert_same(&case, 3, 20);
 }
 
-/// Expected errors in quarters of pixels, other ones for every part, view and frame.
+/// Expected errors, multiples of a quarter pixel, different for every part, view and frame.
 fn sigma_px(frame: usize, view: usize) -> Vec<f32> {
     let quarters = |part: usize| (part * 7 + frame * 3 + view * 5) % 40;
     (0..26).map(|part| quarters(part) as f32 / 4.0).collect()
 }
 
 #[test]
-fn parts_that_are_switched_off_by_what_a_table_expects_of_them() {
+fn parts_switched_off_by_expected_errors() {
     switched_off("expected", "", Views::Pairs);
 }
 
 #[test]
-fn parts_that_are_switched_off_in_views_that_are_solved_at_once() {
+fn parts_switched_off_with_all_views_at_once() {
     switched_off("expected-at-once", AT_ONCE, Views::All);
 }
 
-/// * `fuse`: what else the section says.
+/// * `fuse`: further lines of the section `[fuse]`.
 fn switched_off(name: &str, fuse: &str, views: Views) {
     let more = PLAIN.to_owned()
         + fuse
@@ -119,7 +119,7 @@ fn at_once() -> OneProcess {
 const AT_ONCE: &str = "views = \"all\"\n";
 
 #[test]
-fn four_views_that_are_solved_at_once() {
+fn four_views_at_once() {
     let case = Case::new("at-once", &[12; 4], &format!("{PLAIN}{AT_ONCE}"));
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -127,7 +127,7 @@ fn four_views_that_are_solved_at_once() {
 }
 
 #[test]
-fn views_that_are_solved_at_once_without_the_first_when_its_footage_is_over() {
+fn all_views_at_once_after_the_end_of_the_first_views_footage() {
     let more = format!("{PLAIN}{AT_ONCE}");
     let case = Case::new("at-once-less", &[5, 9, 9], &more);
     let ended = case.run();
@@ -140,7 +140,7 @@ fn views_that_are_solved_at_once_without_the_first_when_its_footage_is_over() {
 }
 
 #[test]
-fn poses_that_are_followed_from_frame_to_frame() {
+fn tracked_poses() {
     let tracked = "[pose]\nsearch = \"tracked\"\ntracked_full_every = 6\n\
                    tracked_margin = 0.1\ntracked_levels = 1\n";
     for (name, window) in [("all", "\"all\""), ("window", "1")] {
@@ -171,7 +171,7 @@ fn poses_that_are_followed_from_frame_to_frame() {
 }
 
 #[test]
-fn deployments_side_by_side_do_not_meet() {
+fn concurrent_deployments_do_not_interfere() {
     let cases = [
         Case::new("left", &[12; 2], PLAIN),
         Case::new("right", &[9; 3], PLAIN),

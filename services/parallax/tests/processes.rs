@@ -1,4 +1,4 @@
-//! Whole deployments of real processes, and what faults leave of them.
+//! Complete deployments of real processes, interrupted and with faults.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -19,7 +19,7 @@ fn frames(lines: &[Value]) -> Vec<u64> {
 
 #[test]
 fn an_interrupted_run_ends_cleanly() {
-    // To the parent alone as `kill` does, and to all processes at once as a terminal does.
+    // To the parent only, as `kill` does, and to all processes at once, as a terminal does.
     for (name, sign) in [("int-one", 1), ("int-all", -1)] {
         let case = Case::new(name, &[400; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);
@@ -39,8 +39,8 @@ fn an_interrupted_run_ends_cleanly() {
 
 #[test]
 fn signals_to_all_processes_at_once_end_the_run_in_order() {
-    // As systemd ends a unit (all of them, whatever their group), `timeout` a command (twice), and a terminal that
-    // closes what runs in it (twice).
+    // As systemd ends a unit (all processes, in any group), `timeout` a command (twice), and a closing terminal its
+    // processes (twice).
     for (name, signals, to_all) in [
         ("unit", &["TERM"][..], true),
         ("timeout", &["TERM", "TERM"], false),
@@ -54,8 +54,8 @@ fn signals_to_all_processes_at_once_end_the_run_in_order() {
         let run = started.id();
         let children: Vec<i64> = children.filter(|_| to_all).collect();
         for sent in signals {
-            // The children first: they must not take it for an order of their own.
-            // Who has ended at the first one does not hear the second.
+            // The children first: they must leave the decision to the supervisor.
+            // A process that has ended after the first signal does not get the second.
             let all = children.iter().chain([&run]).map(i64::to_string);
             let script = format!("kill -s {sent} {} 2>&-", all.collect::<Vec<_>>().join(" "));
             Command::new("sh").args(["-c", &script]).status().unwrap();
@@ -70,7 +70,7 @@ fn signals_to_all_processes_at_once_end_the_run_in_order() {
 }
 
 #[test]
-fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
+fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
     let case = Case::new("kill-pose", &[100; 3], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
@@ -96,7 +96,7 @@ fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
         "{without:?}"
     );
     assert_eq!(lines[99]["views_present"], all, "the view is not back");
-    // A process that was lost is told even if no frame missed its view.
+    // A lost process is reported even if no frame lacks its view.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(
@@ -110,7 +110,7 @@ fn a_killed_pose_process_comes_back_and_its_gap_is_told() {
 }
 
 #[test]
-fn a_view_that_ends_early_is_missing_from_there_on() {
+fn a_view_that_ends_early_is_missing_from_then_on() {
     let case = Case::new("short", &[12, 12, 7], PLAIN);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -138,7 +138,7 @@ fn a_view_that_ends_early_is_missing_from_there_on() {
 }
 
 #[test]
-fn a_killed_recorder_stops_nobody_and_counts_what_it_missed() {
+fn a_killed_results_process_stops_no_other_and_counts_missed_frames() {
     let case = Case::new("kill-results", &[100; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
@@ -179,7 +179,7 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
         assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
     }
     second.assert_nothing_left();
-    // A dead one blocks nobody, and what it had written is whole.
+    // A dead run does not block a new one, and its lines are complete.
     signal("KILL", started.id());
     assert_eq!(started.wait_among_others().status.code(), None);
     let more = ["--set", "capture.pace=\"fast\""];
@@ -196,7 +196,7 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
 }
 
 #[test]
-fn the_name_of_a_camera_leads_nowhere() {
+fn a_camera_name_cannot_lead_outside_the_output_folder() {
     let case = Case::new("escape", &[2; 2], PLAIN);
     let name = "../../../../x_escape";
     case.edit(

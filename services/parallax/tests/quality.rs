@@ -11,10 +11,10 @@ use fmp::{Layout, Scope};
 use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
-use onnx::{Network, Side};
-use pipeline::{SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
+use pipeline::{Answer, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep};
 use serde_json::{Value, json};
-use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
+use testkit::onnx::{Network, Side};
+use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
 
@@ -35,11 +35,11 @@ fn network(tau: f32) -> Network {
     let sigma = vec![Side::Named("n"), Side::Fixed(N_PARTS)];
     net.outputs.push(("sigma".to_owned(), sigma));
     let red = |it: usize| if it < N_PARTS { 0.05 } else { 0.0 };
-    net.floats("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
+    net.weigh("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
     let bias = (0..N_PARTS).map(|it| it as f32 / 800.0);
-    net.floats("b", &[N_PARTS], bias.collect());
+    net.weigh("b", &[N_PARTS], bias.collect());
     let first = |it: usize| if it < N_PARTS { 0.01 } else { 0.0 };
-    net.floats("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
+    net.weigh("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
     net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
     net.node("Flatten", &["mean"], "flat", vec![]);
     net.node("Gemm", &["flat", "w", "b"], "seen", vec![]);
@@ -56,7 +56,7 @@ fn network(tau: f32) -> Network {
     net
 }
 
-/// The search of a view, and where it looks.
+/// The search of a view, and its framing.
 fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
     let layout = Arc::new(plan.layout().clone());
     let step = ViewStep::new(
@@ -68,7 +68,7 @@ fn step_of(plan: &ViewPlan) -> (ViewStep, Arc<Layout>) {
 }
 
 #[test]
-fn the_service_says_what_the_library_says() {
+fn the_service_and_the_library_predict_the_same() {
     let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
     let case = Case::new("network", &[8; 2], &more);
     let file = network(0.02).file();
@@ -88,7 +88,7 @@ fn the_service_says_what_the_library_says() {
             let picture = planted::picture(camera, frame);
             let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
             let found = step.run(image, Scope::whole(&layout), &mut responses);
-            let seen = ForecastInput {
+            let seen = Seen {
                 image,
                 on: (&model, &layout),
                 candidates: &found.candidates,
@@ -108,8 +108,8 @@ fn the_service_says_what_the_library_says() {
     }
 }
 
-/// What every view of a planted rig says of a frame of its own.
-fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>> {
+/// The candidates of every view, each for its own frame.
+fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
     let [width, height] = planted::SIZE.map(|it| it as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
         let (step, layout) = step_of(plan);
@@ -117,7 +117,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
         let picture = planted::picture(plan.camera(), *frame);
         let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
         let found = step.run(image, Scope::whole(&layout), &mut responses);
-        Some(ViewResult {
+        Some(Answer {
             candidates: found.candidates,
             sigma_px: None,
             tau_px: None,
@@ -127,11 +127,11 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
 }
 
 #[test]
-fn a_joint_is_where_the_views_see_it_that_are_expected_to_be_right() {
+fn a_joint_follows_the_views_with_small_expected_errors() {
     let (rig, model) = (planted::rig(4), planted::model());
     let plans = rig.cameras().iter().map(|it| pipeline::plan(&model, it));
     let plans: Vec<_> = plans.collect::<Result<_, _>>().unwrap();
-    let joints = |answers: &[Option<ViewResult>], error_weight: f64| -> Vec<Point3<f64>> {
+    let joints = |answers: &[Option<Answer>], error_weight: f64| -> Vec<Point3<f64>> {
         let settings = SkeletonSettings {
             error_weight,
             facing: false,
@@ -141,7 +141,7 @@ fn a_joint_is_where_the_views_see_it_that_are_expected_to_be_right() {
         let found = step.run(answers, &[]).joints.into_iter();
         found.map(|it| it.unwrap().in_world).collect()
     };
-    // The first view sees another frame than the others.
+    // The first view has another frame than the others.
     let mut answers = answers(&plans, &[7, 0, 0, 0]);
     let unaware = joints(&answers, 1.0);
     let first = answers[0].take();
@@ -169,7 +169,7 @@ fn of_view(case: &Case, name: &str) -> Vec<Value> {
 }
 
 #[test]
-fn no_frame_waits_for_a_network_that_stands_still() {
+fn no_frame_waits_for_a_suspended_network() {
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
                 frame_rate_hz = 5\n[results]\noverlay_every = 0\n\
                 [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
@@ -221,11 +221,11 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     );
     let file = network(0.02).file();
     let stderr = said(&file[..file.len() / 2]);
-    assert!(stderr.contains("truncated or not an ONNX file"), "{stderr}");
+    assert!(stderr.contains("cut off or no ONNX file"), "{stderr}");
 }
 
 #[test]
-fn who_asks_for_onnx_runtime_is_told_what_is_missing_before_anything_starts() {
+fn missing_parts_of_onnx_runtime_are_reported_before_anything_starts() {
     let said = |name: &str, more: &str, status: i32| {
         let section = format!("[quality]\nnetwork = \"q.onnx\"\n{more}\n");
         let case = Case::new(name, &[2; 2], &(PLAIN.to_owned() + &section));
@@ -249,8 +249,8 @@ fn who_asks_for_onnx_runtime_is_told_what_is_missing_before_anything_starts() {
 }
 
 #[test]
-fn a_prediction_that_never_ends_is_found_out_by_the_work_of_those_before() {
-    // The clock alone would leave it alone for ten minutes.
+fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
+    // The time limit alone would detect it after ten minutes.
     let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
                 frame_rate_hz = 20\n[results]\noverlay_every = 0\n\
                 [quality]\nnetwork = \"q.onnx\"\n[supervise]\nhang_limit_s = 600\n";
@@ -264,6 +264,6 @@ fn a_prediction_that_never_ends_is_found_out_by_the_work_of_those_before() {
     let spun = &report["scenarios"][0];
     let process = &spun["measured"]["process"];
     let expected = json!([{ "process": process, "restarts": 1 }]);
-    // On a busy machine the footage may be over before it is back.
+    // On a loaded machine the footage may end before the process is back.
     assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
 }

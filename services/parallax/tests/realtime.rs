@@ -1,4 +1,4 @@
-//! Runs in which the latest frame wins: what is too slow loses frames, and every one is counted.
+//! Runs with realtime delivery: slow stages drop frames, and every dropped frame is counted.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -11,13 +11,13 @@ const LIVE: &str = "[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n\
                     [capture]\nupright = false\nmode = \"realtime\"\n";
 const PACED: &str = "pace = \"realtime\"\nframe_rate_hz = 20\n";
 
-/// What became of a run.
-struct Told {
+/// The report and the results of a run.
+struct Finished {
     report: Value,
     lines: Vec<Value>,
 }
 
-impl Told {
+impl Finished {
     /// Checks that every frame of every view is accounted for, and that the results agree.
     fn new(case: &Case, ended: &Ended) -> Self {
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
@@ -54,50 +54,50 @@ impl Told {
 }
 
 #[test]
-fn who_keeps_up_loses_nothing() {
+fn fast_stages_lose_no_frames() {
     let unhurried = PACED.replace("= 20", "= 8");
     let case = Case::new("live", &[16; 2], &format!("{LIVE}{unhurried}"));
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let told = Told::new(&case, &ended);
-    // A loaded machine may be late for some.
-    assert!(told.view(0, "used") > 8, "{:#}", told.report["views"]);
+    let run = Finished::new(&case, &ended);
+    // On a loaded machine some frames may be late.
+    assert!(run.view(0, "used") > 8, "{:#}", run.report["views"]);
 }
 
 #[test]
-fn who_is_too_slow_answers_fewer_frames_and_every_one_is_counted() {
-    // More frames a second than any machine answers. That slow views take the same ones is a law of
-    // `join::Cadence`, tested there; how soon they get to it is a matter of the machine's load.
+fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
+    // More frames per second than any machine can process. That slow views choose the same frames is tested with
+    // `join::Cadence`; how soon they do depends on the load of the machine.
     let hurried = PACED.replace("= 20", "= 200");
     let more = format!("{LIVE}{hurried}size = [240, 320]\n");
     let case = Case::new("slow", &[300; 3], &more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let told = Told::new(&case, &ended);
+    let run = Finished::new(&case, &ended);
     for view in 0..3 {
-        assert!(told.view(view, "dropped") > 5, "{:#}", told.report["views"]);
+        assert!(run.view(view, "dropped") > 5, "{:#}", run.report["views"]);
     }
-    assert!(!told.lines.is_empty(), "{:#}", told.report["views"]);
+    assert!(!run.lines.is_empty(), "{:#}", run.report["views"]);
 }
 
 #[test]
-fn footage_that_nobody_paces_is_over_at_once_and_what_was_left_out_is_counted() {
+fn footage_without_a_frame_rate_ends_at_once_and_dropped_frames_are_counted() {
     let case = Case::new("unpaced", &[60; 2], LIVE);
     let ended = case.run();
-    let told = Told::new(&case, &ended);
-    // Where the same frame of both views was never in time nothing is placed in space, and that is said.
-    let is_empty = told.report["recorded"]["summary"]["frames_with_pose"] == 0;
+    let run = Finished::new(&case, &ended);
+    // If no frame of both views was in time there is no pose in space, and the report states that.
+    let is_empty = run.report["recorded"]["summary"]["frames_with_pose"] == 0;
     let expected = if is_empty { 7 } else { 0 };
-    assert_eq!(ended.status.code(), Some(expected), "{:#}", told.report);
-    assert_eq!(told.report["no_results"].is_string(), is_empty);
+    assert_eq!(ended.status.code(), Some(expected), "{:#}", run.report);
+    assert_eq!(run.report["no_results"].is_string(), is_empty);
     for view in 0..2 {
-        assert!(told.view(view, "dropped") > 0, "{:#}", told.report["views"]);
-        assert_eq!(told.view(view, "unanswered"), 0);
+        assert!(run.view(view, "dropped") > 0, "{:#}", run.report["views"]);
+        assert_eq!(run.view(view, "unanswered"), 0);
     }
 }
 
 #[test]
-fn a_slow_consumer_does_not_slow_its_producer() {
+fn a_slow_receiver_does_not_slow_its_sender() {
     let patient = "[supervise]\nmissed_beats = 1000\nhang_limit_s = 120\n";
     let case = Case::new("pause", &[80; 2], &format!("{LIVE}{PACED}{patient}"));
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
@@ -105,33 +105,33 @@ fn a_slow_consumer_does_not_slow_its_producer() {
     let pid = started.pid_of("pose --index 1");
     signal("STOP", pid.into());
     let n = case.lines("pose3d.jsonl").len();
-    // The other view goes on in the meantime.
+    // The other view continues meanwhile.
     started.until("ten more", |_| case.lines("pose3d.jsonl").len() >= n + 10);
     signal("CONT", pid.into());
     let ended = started.wait();
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let told = Told::new(&case, &ended);
-    // But for those that a loaded machine was late for, its camera sent all.
-    let unsent = &told.report["recorded"]["summary"]["frames_dropped_by_capture"];
+    let run = Finished::new(&case, &ended);
+    // Its camera sent all frames, except those dropped on a loaded machine.
+    let unsent = &run.report["recorded"]["summary"]["frames_dropped_by_capture"];
     let unsent = unsent.as_u64().unwrap();
-    assert!(2 * unsent < told.view(1, "dropped"), "{:#}", told.report);
-    assert!(told.view(1, "dropped") >= 5, "{:#}", told.report["views"]);
-    let missing = &told.report["recorded"]["summary"]["views_missing"]["b"];
+    assert!(2 * unsent < run.view(1, "dropped"), "{:#}", run.report);
+    assert!(run.view(1, "dropped") >= 5, "{:#}", run.report["views"]);
+    let missing = &run.report["recorded"]["summary"]["views_missing"]["b"];
     assert!(missing["late"].as_u64() > Some(0), "{missing}");
 }
 
 #[test]
-fn a_process_that_computes_for_ever_is_found_out_by_the_work_of_its_frames() {
-    // The clock alone would leave it alone for ten minutes.
+fn a_process_in_an_endless_computation_is_detected_by_its_missing_progress() {
+    // The time limit alone would detect it after ten minutes.
     let patient = "[supervise]\nhang_limit_s = 600\n";
     let case = Case::new("spins", &[160; 2], &format!("{LIVE}{PACED}{patient}"));
     let spins = "name = \"b\"\nfault = \"spin@60+1\"";
     case.edit("deployment.toml", "name = \"b\"", spins);
     let ended = case.run();
-    let told = Told::new(&case, &ended);
+    let run = Finished::new(&case, &ended);
     let restarts = json!([{ "process": "capture-1", "restarts": 1 }]);
-    assert_eq!(told.report["restarts"], restarts, "{}", ended.stderr);
-    let last = told.lines.last().unwrap();
+    assert_eq!(run.report["restarts"], restarts, "{}", ended.stderr);
+    let last = run.lines.last().unwrap();
     assert_eq!(last["views_present"], json!(["a", "b"]), "it is not back");
 }

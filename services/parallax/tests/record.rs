@@ -1,4 +1,4 @@
-//! Runs that are recorded and replayed: the later stages say the same once more, bit for bit.
+//! Runs that are recorded and replayed: the later stages give the same results, bit for bit.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -10,7 +10,7 @@ use common::started::signal;
 use common::{Case, Ended, PLAIN};
 use serde_json::{Value, json};
 
-/// What does not say when it was.
+/// Results without their times.
 const RESULTS: [&str; 4] = ["pose3d.jsonl", "pose3d.csv", "pose2d.jsonl", "pose3d.trc"];
 
 fn recorded(case: &Case, more: &[&str]) -> Value {
@@ -32,7 +32,7 @@ fn text(folder: &Path, name: &str) -> String {
 }
 
 #[test]
-fn where_nothing_may_be_lost_a_replay_from_any_stage_gives_the_same_bits() {
+fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     const N_FRAMES: usize = 6;
     let case = Case::new("again", &[N_FRAMES; 3], PLAIN);
     let report = recorded(&case, &[]);
@@ -56,7 +56,7 @@ fn where_nothing_may_be_lost_a_replay_from_any_stage_gives_the_same_bits() {
             assert!(before == after, "{name} differs when replayed from {from}");
         }
     }
-    // Another value, another result; and it is not one that the recording gives.
+    // Another setting gives another result, so results are computed and not copied from the recording.
     let other = ["--from", "fuse", "--out", "other", "--set"];
     let ended = replayed(&case, &[&other[..], &["triangulate.loss_px=0.01"]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -72,7 +72,7 @@ fn where_nothing_may_be_lost_a_replay_from_any_stage_gives_the_same_bits() {
 }
 
 #[test]
-fn a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes() {
+fn a_truncated_recording_is_replayed_up_to_its_end() {
     let case = Case::new("cut", &[8; 2], PLAIN);
     recorded(&case, &[]);
     let whole = fs::read(case.path("run.mcap")).unwrap();
@@ -96,7 +96,7 @@ fn a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes() {
 }
 
 #[test]
-fn what_was_left_out_or_is_in_the_way_is_told() {
+fn omitted_messages_and_existing_files_are_reported() {
     let case = Case::new("less", &[3; 2], PLAIN);
     let report = recorded(&case, &["--without", "pixels", "--without", "evidence"]);
     let topics = &report["recording"]["topics"];
@@ -131,7 +131,7 @@ fn what_was_left_out_or_is_in_the_way_is_told() {
 }
 
 #[test]
-fn a_changed_byte_of_a_recording_is_named_and_its_message_left_out() {
+fn a_damaged_message_of_a_recording_is_reported_and_left_out() {
     const N_FRAMES: usize = 6;
     let case = Case::new("changed", &[N_FRAMES; 2], PLAIN);
     recorded(&case, &["--without", "evidence", "--without", "pixels"]);
@@ -139,7 +139,7 @@ fn a_changed_byte_of_a_recording_is_named_and_its_message_left_out() {
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
     let poses = &recording.tracks["view-pose/v3/1"].entries;
     let entry = poses.iter().find(|it| it.frame == Some(3)).unwrap();
-    // Behind stamp and times: of what was found. Six bytes of a pose move a joint.
+    // Behind stamp and times, in the content. Six bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
     file[at..at + 6].iter_mut().for_each(|it| *it ^= 0x15);
     case.write("run.mcap", &file);
@@ -165,7 +165,7 @@ fn a_changed_byte_of_a_recording_is_named_and_its_message_left_out() {
 }
 
 #[test]
-fn a_sender_that_comes_after_the_last_result_is_heard_all_the_same() {
+fn a_sender_that_starts_after_the_last_result_is_not_blocked() {
     const N_FRAMES: usize = 12;
     let case = Case::new("after", &[N_FRAMES; 2], PLAIN);
     recorded(&case, &[]);
@@ -180,7 +180,7 @@ fn a_sender_that_comes_after_the_last_result_is_heard_all_the_same() {
     ];
     let patient = ["--set", patient[0], "--set", patient[1]];
     let mut started = case.start(&[&arguments[..], &patient].concat());
-    // Its frames have no part in the results, which are all there before it begins.
+    // Its frames are not used: all results are there before it starts.
     let pid = started.pid_of("replay --stage capture --index 1");
     signal("STOP", pid.into());
     started.until("all results", |folder| {
@@ -198,7 +198,7 @@ fn a_sender_that_comes_after_the_last_result_is_heard_all_the_same() {
 }
 
 #[test]
-fn all_views_at_once_are_recorded_and_replayed_however_many_workers_are_asked_for() {
+fn all_views_at_once_are_recorded_and_replayed_with_any_number_of_workers() {
     let at_once = PLAIN.replace("workers = 2", "workers = 2\nviews = \"all\"");
     let case = Case::new("at-once", &[4; 3], &at_once);
     recorded(&case, &["--without", "pixels"]);

@@ -1,4 +1,4 @@
-//! What runs is shown, and what a killed run leaves behind is removed.
+//! Running deployments are listed, and leftovers of a killed run are removed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -10,7 +10,7 @@ use common::started::signal;
 use common::{Case, PACED, Started};
 use serde_json::Value;
 
-/// What `status` says of the deployment of a case.
+/// The deployment of a case in `status`.
 fn status(case: &Case) -> Option<Value> {
     let ended = case.start(&["status", "--json"]).wait_among_others();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -20,7 +20,7 @@ fn status(case: &Case) -> Option<Value> {
 }
 
 #[test]
-fn a_run_is_shown_and_when_it_was_killed_removed() {
+fn a_run_is_listed_and_removed_after_it_was_killed() {
     let case = Case::new("remains", &[400; 2], PACED);
     assert_eq!(status(&case), None);
     let mut started = case.start(&["run", "deployment.toml"]);
@@ -63,7 +63,7 @@ fn a_run_is_shown_and_when_it_was_killed_removed() {
 }
 
 #[test]
-fn a_name_of_nothing_is_refused() {
+fn an_unknown_deployment_name_is_refused() {
     let case = Case::new("nothing", &[1], "");
     let ended = case.start(&["clean", &case.name]).wait();
     assert_eq!(ended.status.code(), Some(2));
@@ -71,9 +71,9 @@ fn a_name_of_nothing_is_refused() {
 }
 
 #[test]
-fn what_is_no_deployment_is_named_and_stays_and_no_link_is_followed() {
+fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
     let case = Case::new("stays", &[2; 2], "");
-    // First among the deployments; then behind a link in the place of their directory.
+    // First beside the deployments, then behind a link in place of their directory.
     let script = "mount -t tmpfs tmpfs /dev/shm\n\
         base=/dev/shm/px-$(id -u); name=$(sed -n 's/^name = \"\\(.*\\)\"/\\1/p' deployment.toml | head -n 1)\n\
         mkdir -m 700 $base; mkdir $base/photos $base/$name\n\
@@ -87,7 +87,7 @@ fn what_is_no_deployment_is_named_and_stays_and_no_link_is_followed() {
         attack folder; diff -r before $base; rm -r $base\n\
         cp -r before home; chown -h 65534 home; ln -s $PWD/home $base; chown -h 65534 $base\n\
         attack link; diff -r before home";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };

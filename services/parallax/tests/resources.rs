@@ -1,5 +1,4 @@
-//! What a run does without: room in shared memory, descriptors, a name of its own, network ports; and what
-//! belongs to somebody else.
+//! Runs without enough shared memory, file descriptors or a free name; leftovers of other users; no network sockets.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;
@@ -15,10 +14,10 @@ use common::{Case, Ended, PACED, PLAIN, Started};
 use runtime::Namespace;
 use serde_json::{Value, json};
 
-/// Not the user who runs tests.
+/// A user other than the one who runs the tests.
 const OTHER: u32 = 65_534;
 
-/// Nothing of a run was ended by a fault of memory.
+/// Checks that no process of a run was ended by a memory fault.
 fn assert_no_bus_error(ended: &Ended) {
     for words in ["signal 7", "SIGBUS", "signal 11", "panic"] {
         assert!(!ended.stderr.contains(words), "{words}: {}", ended.stderr);
@@ -26,10 +25,10 @@ fn assert_no_bus_error(ended: &Ended) {
 }
 
 #[test]
-fn shared_memory_that_is_filled_during_a_run_costs_who_begins_and_nobody_else() {
+fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
     let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
     let case = Case::new("filled", &[300; 3], &more);
-    // The processes are children of the run; one of them is killed once there is no room for another.
+    // The processes are children of the run; one of them is killed when there is no room to start another.
     let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
         \"$PARALLAX\" run deployment.toml --json & run=$!\n\
         while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
@@ -43,7 +42,7 @@ fn shared_memory_that_is_filled_during_a_run_costs_who_begins_and_nobody_else() 
             *\" service pose \"*) kill -9 ${dir#/proc/};; esac;; esac\n\
         done\n\
         code=0; wait $run || code=$?; exit $code";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
@@ -64,10 +63,10 @@ fn shared_memory_that_is_filled_during_a_run_costs_who_begins_and_nobody_else() 
 }
 
 #[test]
-fn shared_memory_that_is_filled_while_a_run_begins_is_an_error_and_no_signal() {
+fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal() {
     let case = Case::new("filling", &[20; 3], PLAIN);
-    // Something takes all that is left as soon as the supervisor has its lock, and goes on doing so; when it is no
-    // longer needed the next run has room again. Five times, and on until it was soon enough once.
+    // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the
+    // next run. Five times, and further until it was early enough once.
     let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
         n=0\n\
         for wait in 0 1 3 5 8 0 2 0 4 0 6 0 1 0 3 0 5 0 8 0; do\n\
@@ -81,7 +80,7 @@ fn shared_memory_that_is_filled_while_a_run_begins_is_an_error_and_no_signal() {
           if [ $n -ge 5 ] && grep -qx 1 code-*; then break; fi\n\
         done\n\
         exec \"$PARALLAX\" run deployment.toml --json";
-    let Some(started) = Started::among_own_file_systems(case.folder(), script) else {
+    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
@@ -104,12 +103,12 @@ fn shared_memory_that_is_filled_while_a_run_begins_is_an_error_and_no_signal() {
 }
 
 #[test]
-fn a_file_that_may_not_grow_is_counted_and_ends_nobody() {
+fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
     let case = Case::new("limit", &[60; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
     let record = started.pid_of("results").to_string();
-    // What it has written is larger already.
+    // The file is larger than that already.
     let limit = "--fsize=1000:1000";
     let set = std::process::Command::new("prlimit")
         .args(["--pid", &record, limit])
@@ -127,7 +126,7 @@ fn a_file_that_may_not_grow_is_counted_and_ends_nobody() {
 }
 
 #[test]
-fn a_limit_on_the_size_of_files_is_an_error_with_its_number() {
+fn a_file_size_limit_is_an_error_with_the_limit() {
     let case = Case::new("small", &[2; 2], PLAIN);
     let script = "ulimit -f 16; exec \"$PARALLAX\" run deployment.toml --json";
     let ended = case.start_in_shell(script).wait();
@@ -139,7 +138,7 @@ fn a_limit_on_the_size_of_files_is_an_error_with_its_number() {
 }
 
 #[test]
-fn what_a_run_makes_is_its_users_alone_whatever_the_umask_is() {
+fn files_of_a_run_are_accessible_to_their_owner_only_with_any_umask() {
     let case = Case::new(
         "umask",
         &[3; 2],
@@ -149,7 +148,7 @@ fn what_a_run_makes_is_its_users_alone_whatever_the_umask_is() {
         if mount -t tmpfs tmpfs /dev/shm 2>/dev/null; then mkdir -m 777 /dev/shm/px-$(id -u); fi\n\
         \"$PARALLAX\" record deployment.toml --out run.mcap --json\n\
         stat -c %a /dev/shm/px-$(id -u) >base";
-    let started = Started::among_own_file_systems(case.folder(), script);
+    let started = Started::in_mount_namespace(case.folder(), script);
     let in_own = started.is_some();
     let ended = started
         .unwrap_or_else(|| case.start_in_shell(script))
@@ -182,7 +181,7 @@ fn what_a_run_makes_is_its_users_alone_whatever_the_umask_is() {
 }
 
 #[test]
-fn shared_memory_that_is_cut_off_is_told_and_ends_nobody_by_a_signal() {
+fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
     let case = Case::new("cut", &[400; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml"]);
     started.until("three frames", |_| case.lines("pose3d.jsonl").len() >= 3);
@@ -191,13 +190,13 @@ fn shared_memory_that_is_cut_off_is_told_and_ends_nobody_by_a_signal() {
         let entry = entry.unwrap();
         let name = entry.file_name().into_string().unwrap();
         if name.starts_with(namespace.prefix()) {
-            // One may go while this looks.
+            // A file may disappear during the listing.
             let file = fs::OpenOptions::new().write(true).open(entry.path());
             file.and_then(|it| it.set_len(0)).ok();
         }
     }
-    // Most often the supervisor ends at once. It may also wait for ever for what a cut off file should say: then only
-    // a kill ends it, which is a limit that is stated.
+    // Usually the supervisor ends at once. It may also wait for ever on a truncated file, until it is killed: this is a
+    // documented limit.
     let (id, begin) = (started.id(), Instant::now());
     while !started.is_over() && begin.elapsed() < Duration::from_secs(15) {
         std::thread::sleep(Duration::from_millis(50));
@@ -206,7 +205,7 @@ fn shared_memory_that_is_cut_off_is_told_and_ends_nobody_by_a_signal() {
     if is_stuck {
         signal("KILL", id);
     }
-    // Its processes end with it, which takes them a moment.
+    // Its processes end with it, after a moment.
     let ended = started.wait_among_others();
     let expected = if is_stuck { None } else { Some(1) };
     assert_eq!(ended.status.code(), expected, "{}", ended.stderr);
@@ -252,7 +251,7 @@ fn a_second_run_of_the_same_name_is_refused_and_the_first_goes_on() {
 }
 
 #[test]
-fn the_leftovers_of_another_user_are_named_with_what_to_do() {
+fn leftovers_of_another_user_are_named_with_a_remedy() {
     let case = Case::new("foreign", &[2; 2], PLAIN);
     let namespace = Namespace::new(&case.name).unwrap();
     fs::create_dir_all(namespace.root()).unwrap();
@@ -308,7 +307,7 @@ fn no_process_of_a_run_has_a_network_socket() {
             assert!(open.is_empty(), "process {pid} has a {protocol} socket");
         }
     }
-    // Those of the wake-ups, which have names in the file system: the look did see sockets.
+    // The sockets for wake-ups have names in the file system: so the listing does find sockets.
     assert!(n_sockets > 10, "{n_sockets}");
     assert_eq!(started.wait().status.code(), Some(0));
 }

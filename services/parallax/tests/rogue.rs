@@ -1,5 +1,5 @@
-//! Somebody publishes into a running deployment what nobody of it would say: it is refused and counted,
-//! by cause, and the run goes on.
+//! A foreign process publishes invalid messages into a running deployment: they are refused and counted by cause, and the
+//! run goes on.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -18,10 +18,10 @@ use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter
 use serde_json::Value;
 
 const N_FRAMES: usize = 200;
-/// What takes longer has got stuck.
+/// Anything that takes longer is stuck.
 const WATCHDOG: Duration = Duration::from_mins(2);
 
-/// A process that is no part of the deployment but may read and write its memory: the same user's.
+/// A process of the same user that is not part of the deployment, but has access to its shared memory.
 struct Rogue {
     bus: Bus,
     _waiter: Waiter,
@@ -29,14 +29,14 @@ struct Rogue {
 }
 
 impl Rogue {
-    /// Joins a deployment, and learns its session from the signs of life.
+    /// Connects to a deployment, and reads its session from the heartbeats.
     fn join(case: &Case) -> Self {
         let namespace = Namespace::new(&case.name).unwrap();
         let bus = Bus::open(&namespace, "rogue", &Stop::new().unwrap()).unwrap();
         let mut waiter = bus.waiter();
-        let signs = bus.subscriber::<Health>(&topic::health("results"), &mut waiter);
-        let signs = signs.unwrap();
-        let session = until(|| signs.latest().unwrap()).session;
+        let heartbeats = bus.subscriber::<Health>(&topic::health("results"), &mut waiter);
+        let heartbeats = heartbeats.unwrap();
+        let session = until(|| heartbeats.latest().unwrap()).session;
         Self {
             bus,
             _waiter: waiter,
@@ -44,9 +44,9 @@ impl Rogue {
         }
     }
 
-    /// Kills a process and takes its place before it is back.
+    /// Kills a process, and takes its place as the sender before it is restarted.
     ///
-    /// * `victim`: as on its command line.
+    /// * `victim`: the process, as on its command line.
     fn replace<T>(
         &self,
         started: &mut Started,
@@ -57,18 +57,18 @@ impl Rogue {
         assert!(matches!(refused, PortError::Publisher { .. }), "{refused}");
         loop {
             signal("KILL", started.pid_of(victim).into());
-            // On a busy machine its successor may be there first.
+            // On a loaded machine the restarted process may be faster.
             let begin = Instant::now();
             while begin.elapsed() < Duration::from_secs(3) {
-                if let Ok(it) = publisher(&self.bus) {
-                    return it;
+                if let Ok(port) = publisher(&self.bus) {
+                    return port;
                 }
                 std::thread::sleep(Duration::from_millis(1));
             }
         }
     }
 
-    /// As the right sender would have it.
+    /// A valid stamp and timing.
     fn stamp(&self, view: u32, frame: u64) -> (Stamp, Timing) {
         let now = now_nanos();
         let stamp = Stamp {
@@ -85,7 +85,7 @@ impl Rogue {
         (stamp, timing)
     }
 
-    /// Every way in which a stamp can be wrong.
+    /// Stamps and timings with one wrong value each.
     fn wrong_stamps(&self, view: u32) -> [(Stamp, Timing); 6] {
         let (stamp, timing) = self.stamp(view, 5);
         let ahead = now_nanos() + 3_600_000_000_000;
@@ -154,31 +154,31 @@ fn send_wrong_evidence(
     loan.send().unwrap();
 }
 
-/// One of the ways in which the content of a pose can be wrong, by its frame.
+/// Makes one value of a pose wrong; which one depends on the frame.
 fn with_wrong_content(mut pose: ViewPose) -> ViewPose {
-    let way = pose.stamp.frame % 4;
+    let kind = pose.stamp.frame % 4;
     let candidate = &mut pose.candidates[0];
-    candidate.n_parts = if way == 0 { u16::MAX } else { 26 };
-    pose.n_candidates = if way == 1 { u32::MAX } else { 1 };
-    candidate.x[3] = if way == 2 { u16::MAX } else { 0 };
-    candidate.score = if way == 3 { f32::NAN } else { 0.0 };
+    candidate.n_parts = if kind == 0 { u16::MAX } else { 26 };
+    pose.n_candidates = if kind == 1 { u32::MAX } else { 1 };
+    candidate.x[3] = if kind == 2 { u16::MAX } else { 0 };
+    candidate.score = if kind == 3 { f32::NAN } else { 0.0 };
     pose
 }
 
-/// Waits until there is something.
-fn until<T>(mut look: impl FnMut() -> Option<T>) -> T {
+/// Waits until `poll` returns something.
+fn until<T>(mut poll: impl FnMut() -> Option<T>) -> T {
     let begin = Instant::now();
     loop {
-        if let Some(it) = look() {
-            return it;
+        if let Some(value) = poll() {
+            return value;
         }
         assert!(begin.elapsed() < WATCHDOG, "waited in vain");
         std::thread::sleep(Duration::from_millis(1));
     }
 }
 
-/// A run of two views that has begun.
-fn begun(name: &str, more: &str) -> (Case, Started, Rogue) {
+/// A run of two views that has written ten results.
+fn start(name: &str, more: &str) -> (Case, Started, Rogue) {
     let more = more.to_owned() + "[supervise]\nmax_restarts = 50\n";
     let case = Case::new(name, &[N_FRAMES; 2], &more);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
@@ -187,7 +187,7 @@ fn begun(name: &str, more: &str) -> (Case, Started, Rogue) {
     (case, started, rogue)
 }
 
-/// What a run that went on to its end refused, as `process cause`.
+/// Checks that a run went on to its end; returns what it refused, as `process cause`.
 fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -196,7 +196,7 @@ fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
     let restarts = report["restarts"].as_array().unwrap();
     let restarted: BTreeSet<&str> = restarts
         .iter()
-        .map(|it| it["process"].as_str().unwrap())
+        .map(|restart| restart["process"].as_str().unwrap())
         .collect();
     assert_eq!(restarted.len(), 1, "only the replaced one: {restarted:?}");
     let last = case.lines("pose3d.jsonl").pop().unwrap();
@@ -213,15 +213,18 @@ fn refused(case: &Case, ended: &Ended) -> BTreeSet<String> {
 fn assert_all(refused: &BTreeSet<String>, processes: &[&str], causes: &[&str]) {
     for process in processes {
         for cause in causes {
-            let it = format!("{process} {cause}");
-            assert!(refused.contains(&it), "{it} is not in {refused:?}");
+            let expected = format!("{process} {cause}");
+            assert!(
+                refused.contains(&expected),
+                "{expected} is not in {refused:?}"
+            );
         }
     }
 }
 
 #[test]
-fn who_is_no_part_of_a_deployment_can_neither_speak_another_type_nor_beside_the_right_sender() {
-    let (case, started, rogue) = begun("types", PACED);
+fn a_foreign_process_cannot_publish_another_type_or_beside_the_right_sender() {
+    let (case, started, rogue) = start("types", PACED);
     let wrong_type = rogue.bus.publisher::<PairPose>(&topic::view_pose(0));
     assert!(matches!(wrong_type, Err(PortError::WrongType { .. })));
     let wrong_header = rogue
@@ -239,10 +242,10 @@ fn who_is_no_part_of_a_deployment_can_neither_speak_another_type_nor_beside_the_
 }
 
 #[test]
-fn poses_and_evidence_of_nobody_are_refused() {
-    // Where nothing may be lost the views would wait for the frames that the rogue took away.
+fn invalid_poses_and_evidence_are_refused() {
+    // With lossless delivery the run would wait for the frames that the killed process had received.
     let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
-    let (case, mut started, rogue) = begun("poses", &live);
+    let (case, mut started, rogue) = start("poses", &live);
     let poses: Publisher<ViewPose> = rogue.replace(&mut started, "pose --index 1", |bus| {
         bus.publisher(&topic::view_pose(1))
     });
@@ -263,7 +266,7 @@ fn poses_and_evidence_of_nobody_are_refused() {
     };
     assert_eq!(poses.wait_for_subscribers(3, WATCHDOG), 3);
     assert_eq!(evidence.wait_for_subscribers(1, WATCHDOG), 1);
-    // Who keeps up with the clock may pass over what comes too fast.
+    // A realtime receiver may skip messages that are sent too fast.
     let pause = || std::thread::sleep(Duration::from_millis(100));
     for (stamp, timing) in rogue.wrong_stamps(1) {
         let wrong = ViewPose {
@@ -275,13 +278,13 @@ fn poses_and_evidence_of_nobody_are_refused() {
         send_wrong_evidence(&evidence, (stamp, timing));
         pause();
     }
-    // The right stamp of a frame that may be due, and nothing else right.
+    // A valid stamp of a frame that may be due, with wrong content.
     let next = case.lines("pose3d.jsonl").len() as u64;
     for frame in next..next + 24 {
         poses.send(&with_wrong_content(good(frame))).unwrap();
         pause();
     }
-    // Evidence is held until its frame is due, so there is one of a frame to come.
+    // Evidence is held until its frame is due, so this one is about a later frame.
     let to_come = rogue.stamp(1, case.lines("pose3d.jsonl").len() as u64 + 8);
     send_wrong_evidence(&evidence, to_come);
     drop((poses, evidence, rogue));
@@ -292,8 +295,8 @@ fn poses_and_evidence_of_nobody_are_refused() {
 }
 
 #[test]
-fn frames_whose_sizes_do_not_match_are_refused() {
-    let (case, mut started, rogue) = begun("frames", PACED);
+fn frames_with_wrong_sizes_are_refused() {
+    let (case, mut started, rogue) = start("frames", PACED);
     let frames: SlicePublisher<u8, FrameHeader> =
         rogue.replace(&mut started, "capture --index 0", |bus| {
             bus.slice_publisher(&topic::frame(0))
@@ -333,8 +336,8 @@ fn frames_whose_sizes_do_not_match_are_refused() {
 }
 
 #[test]
-fn pairs_and_results_of_nobody_are_refused() {
-    let (case, mut started, rogue) = begun("pairs", PACED);
+fn invalid_pairs_are_refused() {
+    let (case, mut started, rogue) = start("pairs", PACED);
     let pairs: Publisher<PairPose> = rogue.replace(&mut started, "fuse --index 0", |bus| {
         bus.publisher(&topic::pair_pose(0))
     });
@@ -371,12 +374,13 @@ fn pairs_and_results_of_nobody_are_refused() {
 }
 
 #[test]
-fn results_and_signs_of_life_of_nobody_are_refused() {
-    let (case, mut started, rogue) = begun("results", PACED);
+fn invalid_results_and_heartbeats_are_refused() {
+    let (case, mut started, rogue) = start("results", PACED);
     let results: Publisher<Pose3d> = rogue.replace(&mut started, "triangulate", |bus| {
         bus.publisher(&topic::pose3d())
     });
-    let signs: Option<Publisher<Health>> = rogue.bus.publisher(&topic::health("triangulate")).ok();
+    let heartbeats: Option<Publisher<Health>> =
+        rogue.bus.publisher(&topic::health("triangulate")).ok();
     let (stamp, timing) = rogue.stamp(0, 20);
     let good = Pose3d {
         stamp,
@@ -413,7 +417,7 @@ fn results_and_signs_of_life_of_nobody_are_refused() {
     let mut nowhere = good;
     nowhere.joints[3].in_world[1] = f64::NAN;
     results.send(&nowhere).unwrap();
-    if let Some(signs) = signs {
+    if let Some(heartbeats) = heartbeats {
         for session in [rogue.session, 1] {
             let wrong = Health {
                 session,
@@ -423,7 +427,7 @@ fn results_and_signs_of_life_of_nobody_are_refused() {
                 refused: [u64::MAX; 6],
                 ..Health::default()
             };
-            signs.send(&wrong).unwrap();
+            heartbeats.send(&wrong).unwrap();
         }
     }
     drop((results, rogue));

@@ -1,4 +1,4 @@
-//! Cores, priorities and locked memory: set where they may be, and said where not.
+//! Cores, priorities and locked memory: applied where permitted, reported where not.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
@@ -17,7 +17,7 @@ fn status_of(pid: u32, key: &str) -> String {
 }
 
 #[test]
-fn processes_run_on_the_cores_that_the_deployment_gives_them() {
+fn processes_run_on_their_configured_cores() {
     let cores = runtime::own_cores().unwrap();
     let (first, last) = (cores[0], cores[cores.len() - 1]);
     let text = format!(
@@ -27,7 +27,7 @@ fn processes_run_on_the_cores_that_the_deployment_gives_them() {
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     for (process, core) in [("pose-0", first), ("pose-1", last), ("results", last)] {
         let pid = started.pid_of(process);
-        // It says so before it does anything else.
+        // It logs this before anything else.
         let expected = core.to_string();
         started.until(process, |_| {
             status_of(pid, "Cpus_allowed_list:") == expected
@@ -44,7 +44,7 @@ fn processes_run_on_the_cores_that_the_deployment_gives_them() {
 }
 
 #[test]
-fn a_dry_run_shows_what_every_process_is_given() {
+fn a_dry_run_shows_cores_and_priority_of_every_process() {
     let more = "[runtime]\nspin = true\ncores = { fuse = [0, 9999] }\n";
     let case = Case::new("shown", &[2; 3], more);
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
@@ -77,7 +77,7 @@ fn a_dry_run_shows_what_every_process_is_given() {
 }
 
 #[test]
-fn a_process_that_is_none_of_the_deployment_is_refused_by_name() {
+fn an_unknown_process_is_refused_by_name() {
     let case = Case::new(
         "unknown",
         &[2; 2],
@@ -92,11 +92,11 @@ fn a_process_that_is_none_of_the_deployment_is_refused_by_name() {
     );
 }
 
-/// Runs the deployment without the right to a real-time priority or to lock memory; none if that cannot be had.
+/// Runs the deployment without the privileges for real-time priority and locked memory; `None` if that is impossible.
 fn without_rights(case: &Case) -> Option<Output> {
     let limits = ["--rtprio=0", "--memlock=65536:65536"];
     let parallax = [env!("CARGO_BIN_EXE_parallax"), "run", "deployment.toml"];
-    // The owner of the machine needs no limits, unless this is taken away too.
+    // Limits do not apply to root, unless these capabilities are dropped too.
     let drop = ["setpriv", "--bounding-set=-sys_nice,-ipc_lock"];
     let drop = [&drop[..], &["--inh-caps=-sys_nice,-ipc_lock"]].concat();
     let is_owner = status_of(std::process::id(), "Uid:").starts_with('0');
@@ -116,7 +116,7 @@ fn without_rights(case: &Case) -> Option<Output> {
 }
 
 #[test]
-fn what_may_not_be_is_said_once_with_what_to_try_and_the_run_goes_on() {
+fn missing_privileges_are_reported_once_with_a_remedy_and_the_run_continues() {
     let more = "[results]\noverlay_every = 0\n[capture]\nupright = false\n\
                 [runtime]\nlock_memory = true\npriority = { pose = 50, triangulate = 50 }\n";
     let case = Case::new("rights", &[4; 2], more);

@@ -1,4 +1,4 @@
-//! Sequences of people who do not exist, from the command to the last process of a deployment.
+//! Synthetic sequences, from the command to the last process of a deployment.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -52,7 +52,7 @@ fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
 }
 
 #[test]
-fn what_is_written_runs_and_a_live_scene_gives_the_same_bits() {
+fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     let case = case("synth-run");
     let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -77,7 +77,7 @@ fn what_is_written_runs_and_a_live_scene_gives_the_same_bits() {
 }
 
 #[test]
-fn without_a_model_the_one_that_ships_finds_the_person() {
+fn the_default_model_finds_the_person() {
     let case = case("synth-shipped");
     let three = ["--rig", "ring:3:5.5", "--frames", "1", "--no-masks"];
     let ended = synth(&case, &[&["walk"], &three[..]].concat());
@@ -104,17 +104,17 @@ fn without_a_model_the_one_that_ships_finds_the_person() {
     assert!(n_found >= 2, "{n_found} of 3 necks: {}", ended.stdout);
 }
 
-/// However busy the machine is: no picture is taken before its time, so what there is no time for is passed over.
+/// On any machine: no picture is taken before its time, and pictures without enough time are skipped.
 #[test]
 fn a_live_scene_keeps_up_with_the_clock() {
     let case = case("synth-clock");
     let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // As long as it takes until there are results; it is stopped then.
+    // Runs until there are results; then it is stopped.
     case.edit("live/deployment.toml", "frames=3", "frames=100000");
     let file = "live/deployment.toml";
     case.edit(file, "synth-s1-walking-1", &case.name);
-    // A stage waits for a late view as long as a busy machine needs.
+    // Long enough for a late view on a loaded machine.
     let sets = [
         "capture.size=[160,120]",
         "results.overlay_every=0",
@@ -152,7 +152,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(130), "{}", ended.stderr);
     for (frame, captured_ms) in shots() {
-        // Ten a second; the clock of a run begins before its cameras.
+        // Ten per second; the clock of a run starts before its cameras.
         assert!(
             captured_ms >= 100.0 * frame,
             "frame {frame}: {captured_ms} ms"
@@ -161,7 +161,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
 }
 
 #[test]
-fn the_truth_is_the_projection_of_the_exact_rig() {
+fn the_ground_truth_is_the_projection_by_the_exact_rig() {
     let case = case("synth-truth");
     let flaws = [
         "flawed",
@@ -194,7 +194,7 @@ fn the_truth_is_the_projection_of_the_exact_rig() {
                 let projected = camera.project(&joint.into()).unwrap();
                 let [x, y] = pixel.unwrap();
                 let error = (x - projected.x).hypot(y - projected.y);
-                // A camera whose clock is right sees the joints where they are at the nominal time.
+                // A camera with the right clock sees the joints at their positions at the nominal time.
                 assert_eq!(error < 1e-6, late == 0.0, "{}: {error} px", view.camera);
             }
         }
@@ -203,7 +203,7 @@ fn the_truth_is_the_projection_of_the_exact_rig() {
 }
 
 #[test]
-fn the_number_of_threads_changes_nothing() {
+fn the_output_does_not_depend_on_the_number_of_threads() {
     let case = case("synth-threads");
     for threads in ["1", "3"] {
         let arguments = [
@@ -293,7 +293,7 @@ fn truth(case: &Case, folder: &str) -> (Header, Vec<Frame>) {
 }
 
 #[test]
-fn what_was_recorded_is_done_by_somebody_else() {
+fn recorded_motion_is_performed_by_another_person() {
     let case = case("synth-motion");
     let first = ["first", "--live", "--rig", "ring:2", "--actions", "boxing"];
     let ended = synth(
@@ -340,7 +340,7 @@ fn what_was_recorded_is_done_by_somebody_else() {
 }
 
 #[test]
-fn a_recording_that_cannot_be_done_is_refused_with_the_right_code() {
+fn an_unusable_motion_recording_is_refused_with_the_right_exit_code() {
     let case = case("synth-motion-refused");
     let first = ["first", "--live", "--rig", "ring:2", "--frames", "5"];
     let ended = synth(&case, &[&first[..], &["--rate", "10"]].concat());
@@ -367,7 +367,7 @@ fn a_recording_that_cannot_be_done_is_refused_with_the_right_code() {
 }
 
 #[test]
-fn what_cannot_be_made_is_refused_with_the_right_code() {
+fn impossible_sequences_are_refused_with_the_right_exit_code() {
     let case = case("synth-refused");
     let code = |arguments: &[&str]| {
         let ended = synth(&case, arguments);

@@ -63,7 +63,7 @@ passes = 1
 cache-mib = 64
 ";
 
-/// Figures, images without any, and settings, in a folder.
+/// A folder with images of figures, images without figures, and settings.
 struct Drawn {
     folder: TempDir,
 }
@@ -173,7 +173,7 @@ fn is_gone(path: &Path) -> bool {
 }
 
 #[test]
-fn what_was_trained_finds_other_figures_whatever_the_threads_and_kills() {
+fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
     let drawn = Drawn::new(14);
     for name in ["one", "two", "killed"] {
         fs::create_dir(drawn.path(name)).unwrap();
@@ -222,7 +222,7 @@ fn what_was_trained_finds_other_figures_whatever_the_threads_and_kills() {
 }
 
 #[test]
-fn what_was_stopped_says_how_to_go_on_and_refuses_what_is_foreign() {
+fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
     let drawn = Drawn::new(14);
     let stopped = drawn.begun("m.fmp");
     signal("INT", stopped.id());
@@ -244,7 +244,7 @@ fn what_was_stopped_says_how_to_go_on_and_refuses_what_is_foreign() {
     }
 }
 
-/// Adds a line before, and one of every kind of bad label after the sound ones.
+/// Adds a bad line at the beginning, and one line for every kind of bad label at the end.
 fn add_bad_labels(drawn: &Drawn) {
     let sound = fs::read_to_string(drawn.path("people.jsonl")).unwrap();
     let outside = FIGURE.map(|it| [it[0] + 60.0, it[1]]);
@@ -271,7 +271,7 @@ fn add_bad_labels(drawn: &Drawn) {
 }
 
 #[test]
-fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
+fn bad_labels_are_reported_and_counted_or_fatal() {
     let drawn = Drawn::new(14);
     add_bad_labels(&drawn);
     drawn.write("negatives/9.png", "no image");
@@ -318,7 +318,7 @@ fn bad_labels_are_reported_left_out_and_counted_or_fatal() {
 }
 
 #[test]
-fn a_wrong_command_line_is_told_before_anything_is_trained() {
+fn a_wrong_command_line_is_refused_before_the_training() {
     let drawn = Drawn::new(2);
     drawn.write("wrong.toml", "n-tpyes = 3\n");
     drawn.write("none.toml", "interval = 0\n");

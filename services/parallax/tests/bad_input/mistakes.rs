@@ -1,11 +1,11 @@
-//! What newcomers do wrong, and what they are told: what it is, where, and what to try.
+//! Mistakes of new users, and the error messages: what is wrong, where, and what to try.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
 use crate::common::{Case, Ended, PLAIN};
 
-/// Words of the program and of its libraries that no user should have to read.
+/// Internal words that no user should have to read.
 const NEVER: &[&str] = &[
     "u64",
     "usize",
@@ -19,11 +19,11 @@ const NEVER: &[&str] = &[
     "stream did not contain",
 ];
 
-/// One mistake, made in a good deployment of two views of two frames, `a` and `b`.
+/// One mistake in a valid deployment of two views, `a` and `b`, with two frames each.
 pub(crate) struct Mistake {
     pub(crate) what: &'static str,
     pub(crate) made: fn(&Case),
-    /// What the shell runs after the program's name.
+    /// The arguments of the program, as shell text.
     pub(crate) command: &'static str,
     pub(crate) code: i32,
     /// What is wrong, and where.
@@ -64,7 +64,7 @@ fn forbid(case: &Case, name: &str) {
     fs::set_permissions(case.path(name), fs::Permissions::from_mode(0o0)).unwrap();
 }
 
-/// So that the folder can be removed.
+/// Restores permissions, so that the folder can be removed.
 fn permit(case: &Case) {
     for name in ["b", "films"] {
         if case.path(name).exists() {
@@ -73,7 +73,7 @@ fn permit(case: &Case) {
     }
 }
 
-/// A script; what does not name the program is what comes after its name.
+/// A script; text without the program's name is its arguments.
 fn in_shell(command: &str) -> String {
     if command.contains("$PARALLAX") {
         return command.to_owned();
@@ -81,7 +81,7 @@ fn in_shell(command: &str) -> String {
     format!("exec \"$PARALLAX\" {command}")
 }
 
-/// Makes every mistake of a table, and sees what is said.
+/// Makes every mistake of a table, and checks the error message.
 pub(crate) fn check(table: &[Mistake]) {
     let mut wrong = Vec::new();
     for it in table {
@@ -175,7 +175,7 @@ const NO_FILES: &[Mistake] = &[
 ];
 
 #[test]
-fn sources_that_are_no_files() {
+fn sources_other_than_files() {
     check(NO_FILES);
 }
 
@@ -266,7 +266,7 @@ const FOOTAGE: &[Mistake] = &[
 ];
 
 #[test]
-fn footage_that_is_not_as_it_is_named() {
+fn footage_with_a_misleading_name() {
     check(FOOTAGE);
 }
 
@@ -329,11 +329,11 @@ const MAY_NOT: &[Mistake] = &[
 ];
 
 #[test]
-fn what_may_not_be_read() {
+fn unreadable_files() {
     let probe = Case::new("oops-may", &[2; 2], PLAIN);
     let probe = probe.start_in_shell("test $(id -u) != 0 || exec unshare -U true");
     if probe.wait().status.code() != Some(0) {
-        return; // Nothing is forbidden to this user.
+        return; // This user can read everything.
     }
     check(MAY_NOT);
 }

@@ -415,6 +415,6 @@ const INPUTS: &[Mistake] = &[
 ];
 
 #[test]
-fn models_rigs_and_what_goes_with_them() {
+fn models_rigs_and_related_files() {
     check(INPUTS);
 }

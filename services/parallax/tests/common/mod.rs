@@ -1,4 +1,4 @@
-//! A planted deployment in a folder of its own, run by the one executable as a user would.
+//! A small deployment with a synthetic figure in a folder of its own, run with the program as a user would.
 #![allow(dead_code, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -18,11 +18,11 @@ use tempfile::TempDir;
 
 pub(crate) use started::{Ended, Started};
 
-/// No overlays and no turning, so that frames are the pictures as they were planted.
+/// No overlays and no rotation, so that frames equal the generated pictures.
 pub(crate) const PLAIN: &str =
     "[capture]\nupright = false\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
-/// The same at a pace that leaves time to interfere.
+/// The same at 20 frames per second, which leaves time to interfere.
 pub(crate) const PACED: &str = "[capture]\nupright = false\npace = \"realtime\"\n\
      frame_rate_hz = 20\n[results]\noverlay_every = 0\n[fuse]\nworkers = 2\n";
 
@@ -33,17 +33,17 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// A planted scene.
+    /// A deployment with generated footage.
     ///
-    /// * `name`: of the test; the deployment's is made of it, and is another every time.
-    /// * `n_frames`: of every view.
-    /// * `more`: what else the deployment file says.
+    /// * `name`: beginning of the deployment's name, which is unique.
+    /// * `n_frames`: number of frames by view.
+    /// * `more`: appended to the deployment file.
     pub(crate) fn new(name: &str, n_frames: &[usize], more: &str) -> Self {
-        Self::seen_by(&planted::rig(n_frames.len()), name, n_frames, more)
+        Self::with_rig(&planted::rig(n_frames.len()), name, n_frames, more)
     }
 
-    /// The same, seen by other cameras, one for every number of frames.
-    pub(crate) fn seen_by(rig: &Rig, name: &str, n_frames: &[usize], more: &str) -> Self {
+    /// The same with another rig.
+    pub(crate) fn with_rig(rig: &Rig, name: &str, n_frames: &[usize], more: &str) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let nth = COUNT.fetch_add(1, Ordering::Relaxed);
         let case = Self {
@@ -73,7 +73,7 @@ impl Case {
         case
     }
 
-    /// A file of the folder.
+    /// Path of a file in the folder.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -83,12 +83,12 @@ impl Case {
         self.folder.path()
     }
 
-    /// Writes a file of the folder.
+    /// Writes a file in the folder.
     pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         fs::write(self.path(name), content).unwrap();
     }
 
-    /// Replaces text in a file of the folder; it must be there.
+    /// Replaces text in a file in the folder; the text must occur.
     pub(crate) fn edit(&self, name: &str, from: &str, to: &str) {
         let text = fs::read_to_string(self.path(name)).unwrap();
         assert!(
@@ -103,7 +103,7 @@ impl Case {
         Started::new(self.folder(), arguments)
     }
 
-    /// The same from a shell script; `$PARALLAX` is the program.
+    /// Starts a shell script in the folder; `$PARALLAX` is the program.
     pub(crate) fn start_in_shell(&self, script: &str) -> Started {
         Started::in_shell(self.folder(), script)
     }
@@ -115,7 +115,7 @@ impl Case {
         ended
     }
 
-    /// Nothing of the deployment lies in shared memory any more.
+    /// Checks that the deployment has left nothing in shared memory.
     pub(crate) fn assert_nothing_left(&self) {
         let namespace = Namespace::new(&self.name).unwrap();
         let left: Vec<String> = fs::read_dir("/dev/shm")
@@ -131,13 +131,13 @@ impl Case {
         );
     }
 
-    /// The lines of a file of results, as far as they are whole; those of a run that goes on, too.
+    /// The complete lines of a results file, also while the run is writing it.
     pub(crate) fn lines(&self, name: &str) -> Vec<serde_json::Value> {
         let whole = self.path("out").join(name);
         let part = self.path("out").join(format!("{name}.part"));
         let text = fs::read_to_string(part).or_else(|_| fs::read_to_string(whole));
         let text = text.unwrap_or_default();
-        let end = text.rfind('\n').map_or(0, |it| it + 1);
+        let end = text.rfind('\n').map_or(0, |at| at + 1);
         text[..end]
             .lines()
             .map(|line| serde_json::from_str(line).unwrap())

@@ -1,4 +1,4 @@
-//! A figure that moves, the cameras that see it, and a model that finds it in milliseconds.
+//! A moving figure, cameras, and a model that finds the figure in milliseconds.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(crate) fn rig(n_views: usize) -> Rig {
         let angle = 0.6 * view as f64 - 0.5;
         let eye = Point3::new(3.0 * angle.sin(), -3.0 * angle.cos(), 0.2);
         let looking = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-        // From y up and z backward to y down and z forward.
+        // From y up, z backward to y down, z forward.
         let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
         Camera {
             name: name(view),
@@ -36,7 +36,7 @@ pub(crate) fn rig(n_views: usize) -> Rig {
     Rig::new(cameras.collect(), Some(Vector3::z_axis()), "planted").unwrap()
 }
 
-/// The same cameras with lenses that distort, each rolled by an angle of its own.
+/// The same cameras with lens distortion, each with another roll angle.
 pub(crate) fn tilted_rig(n_views: usize) -> Rig {
     let tilted = rig(n_views).cameras().to_vec().into_iter().enumerate();
     let cameras = tilted.map(|(view, it)| {
@@ -64,7 +64,7 @@ pub(crate) fn name(view: usize) -> String {
     char::from(b'a' + view as u8).to_string()
 }
 
-/// What a camera sees in a frame.
+/// The picture of a camera in a frame.
 pub(crate) fn picture(camera: &Camera, frame: usize) -> Canvas {
     let [width, height] = SIZE.map(|it| it as usize);
     let mut canvas = Canvas::new(Size::new(width, height), [90, 96, 102]);
@@ -97,7 +97,7 @@ pub(crate) fn joints(frame: usize) -> Vec<[f64; 3]> {
     skeleton::PARSE14.from_parts(&parts)
 }
 
-/// A part of a figure that stands: further down the further from the head, and to its own side.
+/// Position of a part of the standing figure: lower with its depth in the tree, and displaced to its side.
 fn standing(part: usize) -> Point3<f64> {
     let depth = core::iter::successors(PARENT[part], |it| PARENT[*it]).count() as f64;
     let side = (MIRROR[part] as f64 - part as f64).signum();
@@ -110,7 +110,7 @@ fn standing(part: usize) -> Point3<f64> {
     )
 }
 
-/// A model of 26 parts of two types with four filters of 3x3 cells that like edges.
+/// A model of 26 parts of two types with four filters of 3x3 cells that respond to edges.
 pub(crate) fn model() -> Arc<Model> {
     Arc::new(Model::new(spec()).unwrap())
 }

@@ -1,4 +1,4 @@
-//! The results of a run against those of one process that does the same, bit for bit.
+//! Compares the results of a run with those of the same computation in one process, bit for bit.
 
 use fmp::Layout;
 use footage::{Canvas, Fill, Size, Warp};
@@ -11,21 +11,21 @@ use skeleton::PARSE14;
 
 use super::{Case, planted};
 
-/// What the one process does.
+/// The computation in one process.
 #[derive(Debug, Default)]
 pub(crate) struct OneProcess {
     /// The settings of its steps.
     pub(crate) settings: EstimatorSettings,
-    /// Size of its frames, which are turned upright; the pictures as they are without it.
+    /// Size of the upright frames; without it, frames equal the pictures.
     pub(crate) upright_size: Option<[u32; 2]>,
     /// Expected errors of the parts in a frame of a view, if there are any.
     pub(crate) sigma_px: Option<fn(frame: usize, view: usize) -> Vec<f32>>,
-    /// Whether a view is missing in a frame; none is without it.
+    /// Whether a view is missing in a frame; without it, none is.
     pub(crate) is_missing: Option<fn(frame: usize, view: usize) -> bool>,
 }
 
 impl OneProcess {
-    /// Compares the results of a run with what this one gives.
+    /// Compares the results of a run with those of this computation.
     pub(crate) fn assert_same(&self, case: &Case, n_views: usize, n_frames: usize) {
         let rig = geometry::files::read(&case.path("rig.toml"), &ReadOptions::default()).unwrap();
         let mut views: Vec<View> = rig

@@ -1,4 +1,4 @@
-//! One running `parallax`: what it says, its processes, and how it ends.
+//! A running `parallax`: its output, its processes, and its exit.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -8,7 +8,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// What takes longer has got stuck.
+/// Anything that takes longer is stuck.
 const WATCHDOG: Duration = Duration::from_mins(4);
 
 /// A running `parallax`.
@@ -18,7 +18,7 @@ pub(crate) struct Started {
     log: PathBuf,
 }
 
-/// How it ended.
+/// Exit status and output of a finished `parallax`.
 #[derive(Debug)]
 pub(crate) struct Ended {
     pub(crate) status: ExitStatus,
@@ -34,14 +34,13 @@ impl Started {
         Self::from_command(folder, command)
     }
 
-    /// The same among file systems of its own, which a shell script prepares; `$PARALLAX` is the
-    /// program. None where that is not allowed.
-    pub(crate) fn among_own_file_systems(folder: &Path, script: &str) -> Option<Self> {
+    /// Starts a shell script in its own mount namespace; `$PARALLAX` is the program. `None` without the permission for that.
+    pub(crate) fn in_mount_namespace(folder: &Path, script: &str) -> Option<Self> {
         let allowed = Command::new("unshare")
             .args(["-m", "sh", "-c", "mount -t tmpfs tmpfs /mnt"])
             .stderr(Stdio::null())
             .status();
-        if !allowed.is_ok_and(|it| it.success()) {
+        if !allowed.is_ok_and(|status| status.success()) {
             return None;
         }
         let mut command = Command::new("unshare");
@@ -51,7 +50,7 @@ impl Started {
         Some(Self::from_command(folder, command))
     }
 
-    /// The same from a shell script; `$PARALLAX` is the program.
+    /// Starts a shell script; `$PARALLAX` is the program.
     pub(crate) fn in_shell(folder: &Path, script: &str) -> Self {
         let mut command = Command::new("sh");
         command
@@ -78,7 +77,7 @@ impl Started {
         }
     }
 
-    /// Waits for its end; no process of it may be left then.
+    /// Waits for its end, and checks that no process of it is left.
     pub(crate) fn wait(self) -> Ended {
         let folder = self.folder.clone();
         let ended = self.wait_among_others();
@@ -98,14 +97,14 @@ impl Started {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            // What is not over yet is killed when this is dropped.
-            assert!(begin.elapsed() < WATCHDOG, "stuck:\n{}", self.said("err"));
+            // A process that still runs is killed when this is dropped.
+            assert!(begin.elapsed() < WATCHDOG, "stuck:\n{}", self.output("err"));
             std::thread::sleep(Duration::from_millis(10));
         };
         let ended = Ended {
             status,
-            stdout: self.said("out"),
-            stderr: self.said("err"),
+            stdout: self.output("out"),
+            stderr: self.output("err"),
         };
         assert!(!ended.stderr.contains("panicked"), "{}", ended.stderr);
         ended
@@ -132,7 +131,11 @@ impl Started {
         let folder = self.folder.clone();
         wait_until(what, || {
             let over = self.child.try_wait().unwrap();
-            assert!(over.is_none(), "over before {what}:\n{}", self.said("err"));
+            assert!(
+                over.is_none(),
+                "over before {what}:\n{}",
+                self.output("err")
+            );
             holds(&folder)
         });
     }
@@ -147,13 +150,13 @@ impl Started {
         i64::from(self.child.id())
     }
 
-    fn said(&self, what: &str) -> String {
+    fn output(&self, what: &str) -> String {
         fs::read_to_string(self.log.with_extension(what)).unwrap()
     }
 }
 
 impl Drop for Started {
-    /// Ends what a failed test left running; a process that has been waited for is left alone.
+    /// Kills the process if a failed test left it running.
     fn drop(&mut self) {
         drop(self.child.kill());
         drop(self.child.wait());
@@ -177,7 +180,7 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// Processes whose command line names a folder, with its words.
+/// Processes whose command line contains a folder, with their arguments.
 pub(crate) fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
     let folder = folder.to_str().unwrap();
     let entries = fs::read_dir("/proc").unwrap();
@@ -185,10 +188,10 @@ pub(crate) fn processes(folder: &Path) -> Vec<(u32, Vec<String>)> {
         .filter_map(|entry| {
             let entry = entry.ok()?;
             let pid = entry.file_name().to_str()?.parse().ok()?;
-            // A process that ended in between has no command line any more.
+            // A process that has ended meanwhile has no command line.
             let line = fs::read_to_string(entry.path().join("cmdline")).ok()?;
-            let words = line.split('\0').map(str::to_owned).collect();
-            line.contains(folder).then_some((pid, words))
+            let arguments = line.split('\0').map(str::to_owned).collect();
+            line.contains(folder).then_some((pid, arguments))
         })
         .collect()
 }

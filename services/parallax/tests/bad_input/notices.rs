@@ -1,4 +1,4 @@
-//! What is told before a run begins, and where its data come from.
+//! Notices before a run begins, and the origin of data.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use super::mistakes::{section, source};
 use crate::common::{Case, PLAIN};
 
 #[test]
-fn a_file_says_where_its_data_come_from() {
+fn a_file_reports_the_origin_of_its_data() {
     let case = Case::new("oops-data", &[2; 2], PLAIN);
     case.edit(
         "deployment.toml",
@@ -27,8 +27,8 @@ fn a_file_says_where_its_data_come_from() {
 }
 
 #[test]
-fn the_files_that_ship_say_where_their_data_come_from() {
-    // In a folder of their own, as in a clone that has nothing beside it.
+fn shipped_files_report_the_origin_of_their_data() {
+    // In a folder of their own, as in a fresh clone.
     let case = Case::new("oops-clone", &[2; 2], PLAIN);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
     fs::create_dir(case.path("configs")).unwrap();
@@ -59,7 +59,7 @@ fn the_files_that_ship_say_where_their_data_come_from() {
 }
 
 #[test]
-fn what_ships_works_wherever_the_program_is() {
+fn shipped_files_are_found_from_any_program_location() {
     let case = Case::new("oops-ships", &[2; 2], PLAIN);
     case.edit("deployment.toml", "model = \"model.plx\"\n", "");
     case.edit(
@@ -70,7 +70,7 @@ fn what_ships_works_wherever_the_program_is() {
     section(&case, "[quality]\nnetwork = \"shipped\"");
     let ended = case.start(&["config", "check", "deployment.toml"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // A path remains a path.
+    // A path is used as a path.
     for (from, to) in [
         ("network = \"shipped\"", "network = \"./shipped\""),
         ("\"./shipped\"", "\"a/shipped\""),
@@ -87,7 +87,7 @@ fn what_ships_works_wherever_the_program_is() {
 }
 
 #[test]
-fn padding_is_told_with_the_size_that_has_none() {
+fn padding_is_reported_with_a_size_that_needs_none() {
     let case = Case::new("oops-pad", &[2; 2], PLAIN);
     let said = |size: &str| {
         let set = format!("capture.size={size}");
@@ -110,7 +110,7 @@ fn padding_is_told_with_the_size_that_has_none() {
 }
 
 #[test]
-fn a_recording_says_what_it_will_take_and_keeps_to_it() {
+fn the_announced_size_of_a_recording_is_right() {
     let case = Case::new("oops-room", &[4; 2], PLAIN);
     let ended = case
         .start(&["record", "deployment.toml", "--out", "run.mcap"])
@@ -128,7 +128,7 @@ fn a_recording_says_what_it_will_take_and_keeps_to_it() {
         ended.stderr
     );
     assert!(line.contains(" for all 4 frames; "), "{line}");
-    // What it said is not less than what it took, and not many times as much.
+    // The announced size is not smaller than the actual one, and not many times larger.
     let number = |before: &str| -> f64 {
         let at = line.find(before).unwrap() + before.len();
         let mut words = line[at..].split(' ');
@@ -138,7 +138,7 @@ fn a_recording_says_what_it_will_take_and_keeps_to_it() {
     };
     let said = number("up to ") * 4.0;
     let took = fs::metadata(case.path("run.mcap")).unwrap().len() as f64;
-    // Signs of life, schemas and settings come on top: some hundred kilobytes.
+    // Heartbeats, schemas and settings add some hundred kilobytes.
     assert!(
         took < said + 1e6 && said < 4.0 * took,
         "said {said}, took {took}: {line}"
