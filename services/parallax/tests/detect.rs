@@ -64,7 +64,7 @@ fn a_damaged_file_is_named_and_the_others_are_searched() {
     for words in ["0001.jpg", "0002.bmp", "absent.png", "3 of 6 files"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // Without any other file, it is an input error.
+    // If no file can be read it is an input error.
     for files in [&["a/0001.jpg"][..], &["a/0001.jpg", "absent.png"]] {
         let (ended, lines) = detect(&case, files);
         assert_eq!(

@@ -11,7 +11,7 @@ const CHECK: &[&str] = &["config", "check", "deployment.toml"];
 const RUN: &[&str] = &["run", "deployment.toml"];
 const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
 
-/// A user's mistake, the exit code, and the expected text.
+/// A mistake, how it is made, the arguments, the exit code, and the expected texts.
 type Row = (
     &'static str,
     fn(&Case),
@@ -270,7 +270,7 @@ fn different_frame_rates_are_refused_with_both_numbers() {
         };
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
-    // The setting overrides the check.
+    // With the rate in the settings the same footage is accepted with a warning.
     let given = [CHECK, &["--set", "capture.frame_rate_hz=30"]].concat();
     let ended = case.start(&given).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -296,7 +296,7 @@ fn a_dry_run_fails_where_the_run_would_not_begin() {
         "size = [16384, 16384]\nupright",
     );
     let ended = case.start(DRY).wait();
-    // On a machine with enough memory, a limit on open files has the same effect.
+    // A limit on open files refuses the run on any machine.
     let script = "ulimit -n 64; exec \"$PARALLAX\" run deployment.toml --dry-run";
     let few = case.start_in_shell(script).wait();
     for (ended, words) in [(&ended, "/dev/shm"), (&few, "ulimit -n")] {

@@ -54,7 +54,7 @@ fn signals_to_all_processes_at_once_end_the_run_in_order() {
         let run = started.id();
         let children: Vec<i64> = children.filter(|_| to_all).collect();
         for sent in signals {
-            // The children first: they must leave the decision to the supervisor.
+            // The children first: they must not act on the signal themselves.
             // A process that has ended after the first signal does not get the second.
             let all = children.iter().chain([&run]).map(i64::to_string);
             let script = format!("kill -s {sent} {} 2>&-", all.collect::<Vec<_>>().join(" "));
