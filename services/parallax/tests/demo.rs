@@ -46,7 +46,11 @@ fn a_killed_camera_is_restarted_and_the_report_counts_the_lost_frames() {
         "the same on standard output and in the file"
     );
 
-    assert_eq!(report["machine"], Value::Null, "a given rate needs no measurement");
+    assert_eq!(
+        report["machine"],
+        Value::Null,
+        "a given rate needs no measurement"
+    );
     assert_eq!(report["frame_rate_hz"], 1.5);
     let number = |it: &Value| it.as_f64().unwrap_or(f64::NAN);
     let killed = &report["killed"];
@@ -141,7 +145,11 @@ fn a_missed_limit_of_the_demo_is_named_and_has_its_own_exit_code() {
         (&report["held"], &report["killed"]),
         (&json!(false), &Value::Null)
     );
-    assert_eq!(report["run"]["restarts"], json!([]), "no process was killed");
+    assert_eq!(
+        report["run"]["restarts"],
+        json!([]),
+        "no process was killed"
+    );
     // The machine is measured before and after; the slower result is reported, with the resulting frame rate.
     let machine = &report["machine"];
     let [frame_ms, rate_hz, slowness] =
