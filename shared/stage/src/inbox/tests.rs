@@ -1,4 +1,4 @@
-//! Joining, with made-up messages, a clock of its own and counts that can be read.
+//! Joins with inputs made of lists, and a clock that the tests set.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
@@ -16,7 +16,7 @@ use crate::{Account, Port, Receive, Sender, Stamped};
 const SESSION: u64 = 7;
 const PATIENCE: Duration = Duration::from_nanos(100);
 
-/// A topic made of a list; what is sent later is pushed.
+/// A topic made of a list; a sent message is appended.
 #[derive(Debug)]
 struct Topic<M> {
     waiting: Rc<RefCell<VecDeque<M>>>,
@@ -132,7 +132,7 @@ fn two_views(rules: Rules) -> ([Topic<ViewPose>; 2], Inbox<'static, u64>) {
     (topics, inbox)
 }
 
-/// Polls, and gives the complete frames with which slots came.
+/// Polls; returns the complete frames, and for every slot whether it has a message.
 fn frames(inbox: &mut Inbox<'_, u64>, counts: &Counts, now: u64) -> Vec<(u64, Vec<bool>)> {
     let clock = move || now;
     let context = Context::new(SESSION, &clock, counts);
@@ -159,7 +159,7 @@ fn a_frame_is_complete_when_every_input_has_sent() {
 }
 
 #[test]
-fn a_frame_goes_on_at_its_deadline_and_a_later_message_is_counted_as_late() {
+fn a_frame_is_complete_at_its_deadline_and_a_later_message_is_counted_as_late() {
     let ([first, second], mut inbox) = two_views(rules(Delivery::Realtime));
     let counts = Counts::default();
     first.send(message(0, 0));
@@ -171,7 +171,7 @@ fn a_frame_goes_on_at_its_deadline_and_a_later_message_is_counted_as_late() {
 }
 
 #[test]
-fn a_connected_sender_is_given_more_time_where_nothing_may_be_lost() {
+fn a_connected_sender_has_more_time_with_lossless_delivery() {
     let connected = Topic {
         n_senders: 1,
         ..Topic::<ViewPose>::new()
@@ -190,7 +190,7 @@ fn a_connected_sender_is_given_more_time_where_nothing_may_be_lost() {
 }
 
 #[test]
-fn messages_of_others_and_messages_that_cannot_be_decoded_are_refused() {
+fn messages_of_other_senders_and_undecodable_messages_are_refused() {
     let ([first, _second], mut inbox) = two_views(rules(Delivery::Realtime));
     let counts = Counts::default();
     let mut of_another_session: ViewPose = message(0, 0);
@@ -204,7 +204,7 @@ fn messages_of_others_and_messages_that_cannot_be_decoded_are_refused() {
 }
 
 #[test]
-fn it_is_over_when_every_input_has_ended_and_every_frame_was_given_out() {
+fn it_is_over_when_every_input_has_ended_and_every_frame_was_returned() {
     let ([first, second], mut inbox) = two_views(rules(Delivery::Lossless));
     let counts = Counts::default();
     first.send(message(0, 0));
@@ -249,7 +249,7 @@ fn the_messages_and_the_end_of_a_worker_count_for_its_pairs() {
     assert!(inbox.is_over(2));
 }
 
-/// A view's poses, and its expected errors, which are welcome for 30 ns and serve later frames for 25 ns.
+/// A view's poses, and its expected errors: optional, with a deadline of 30 ns and a largest age of 25 ns.
 fn with_errors(delivery: Delivery) -> (Topic<ViewPose>, Topic<ViewQuality>, Inbox<'static, u64>) {
     let (poses, errors) = (Topic::new(), Topic::new());
     let inputs = vec![
@@ -267,7 +267,7 @@ fn with_errors(delivery: Delivery) -> (Topic<ViewPose>, Topic<ViewQuality>, Inbo
 }
 
 #[test]
-fn no_frame_waits_for_an_optional_message_past_its_deadline_and_the_last_one_serves_while_fresh() {
+fn no_frame_waits_for_an_optional_message_past_its_deadline_and_the_last_one_is_used_while_fresh() {
     let (poses, errors, mut inbox) = with_errors(Delivery::Realtime);
     let counts = Counts::default();
     errors.send(message(0, 0));
@@ -285,7 +285,7 @@ fn no_frame_waits_for_an_optional_message_past_its_deadline_and_the_last_one_ser
 }
 
 #[test]
-fn where_nothing_may_be_lost_optional_messages_are_waited_for() {
+fn with_lossless_delivery_frames_wait_for_optional_messages() {
     let (poses, _errors, mut inbox) = with_errors(Delivery::Lossless);
     let counts = Counts::default();
     poses.send(message(0, 0));
@@ -316,7 +316,7 @@ fn a_slow_stage_skips_to_the_latest_frame_only_where_frames_may_be_lost() {
 }
 
 #[test]
-fn what_comes_after_the_end_is_discarded() {
+fn messages_after_the_end_of_stream_are_discarded() {
     let ([first, _second], inbox) = two_views(rules(Delivery::Lossless));
     first.send(message(0, 0));
     inbox.drain().unwrap();
