@@ -71,7 +71,7 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
-        if !Address::is_one(&spec.path) {
+        if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
         }
         let address = address(spec)?;
@@ -95,7 +95,7 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
-        if !Address::is_one(&spec.path) {
+        if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)));
         }
         let address = address(spec)?;
@@ -273,14 +273,7 @@ mod tests {
 
     #[test]
     fn a_source_that_cannot_be_opened_is_an_error_with_the_cause() {
-        let refused = |spec: &SourceSpec| {
-            let error: &dyn std::error::Error = &Feed::look(spec).unwrap_err();
-            let causes = core::iter::successors(Some(error), |it| it.source());
-            causes
-                .map(ToString::to_string)
-                .collect::<Vec<_>>()
-                .join(": ")
-        };
+        let refused = |spec: &SourceSpec| causes::in_one_line(&Feed::look(spec).unwrap_err());
         let path = |path: &str| SourceSpec::new(path);
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));

@@ -229,11 +229,7 @@ fn every_frame_of_a_live_run_has_one_line_after_triangulation_is_killed() {
 #[test]
 fn a_suspended_pose_process_is_detected_and_no_frame_is_lost() {
     let run = Signalled::new(PACED, "STOP", "pose --index 1");
-    assert!(
-        run.stderr.contains("gave no sign of life"),
-        "{}",
-        run.stderr
-    );
+    assert!(run.stderr.contains("sent no heartbeat"), "{}", run.stderr);
     run.assert_every_frame();
     // At most the frame that it held and the next one may lack the view.
     let without = run.incomplete();

@@ -11,10 +11,10 @@ use fmp::{Layout, Scope};
 use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
-use pipeline::{Answer, SkeletonSettings, SkeletonStep, ViewSettings, ViewStep};
+use onnx::{Network, Side};
+use pipeline::{SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
 use serde_json::{Value, json};
-use testkit::onnx::{Network, Side};
-use viewquality::{Card, Forecaster, Seen, Unit, n_evidence};
+use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
 
@@ -35,11 +35,11 @@ fn network(tau: f32) -> Network {
     let sigma = vec![Side::Named("n"), Side::Fixed(N_PARTS)];
     net.outputs.push(("sigma".to_owned(), sigma));
     let red = |it: usize| if it < N_PARTS { 0.05 } else { 0.0 };
-    net.weigh("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
+    net.floats("w", &[3, N_PARTS], (0..3 * N_PARTS).map(red).collect());
     let bias = (0..N_PARTS).map(|it| it as f32 / 800.0);
-    net.weigh("b", &[N_PARTS], bias.collect());
+    net.floats("b", &[N_PARTS], bias.collect());
     let first = |it: usize| if it < N_PARTS { 0.01 } else { 0.0 };
-    net.weigh("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
+    net.floats("v", &[k, N_PARTS], (0..k * N_PARTS).map(first).collect());
     net.node("GlobalAveragePool", &["tile"], "mean", vec![]);
     net.node("Flatten", &["mean"], "flat", vec![]);
     net.node("Gemm", &["flat", "w", "b"], "seen", vec![]);
@@ -88,7 +88,7 @@ fn the_service_and_the_library_predict_the_same() {
             let picture = planted::picture(camera, frame);
             let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
             let found = step.run(image, Scope::whole(&layout), &mut responses);
-            let seen = Seen {
+            let seen = ForecastInput {
                 image,
                 on: (&model, &layout),
                 candidates: &found.candidates,
@@ -109,7 +109,7 @@ fn the_service_and_the_library_predict_the_same() {
 }
 
 /// The candidates of every view, each for its own frame.
-fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
+fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>> {
     let [width, height] = planted::SIZE.map(|it| it as usize);
     let say = |(plan, frame): (&Arc<ViewPlan>, &usize)| {
         let (step, layout) = step_of(plan);
@@ -117,7 +117,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<Answer>> {
         let picture = planted::picture(plan.camera(), *frame);
         let image = Rgb8View::new(width, height, picture.rgb()).unwrap();
         let found = step.run(image, Scope::whole(&layout), &mut responses);
-        Some(Answer {
+        Some(ViewResult {
             candidates: found.candidates,
             sigma_px: None,
             tau_px: None,
@@ -131,7 +131,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
     let (rig, model) = (planted::rig(4), planted::model());
     let plans = rig.cameras().iter().map(|it| pipeline::plan(&model, it));
     let plans: Vec<_> = plans.collect::<Result<_, _>>().unwrap();
-    let joints = |answers: &[Option<Answer>], error_weight: f64| -> Vec<Point3<f64>> {
+    let joints = |answers: &[Option<ViewResult>], error_weight: f64| -> Vec<Point3<f64>> {
         let settings = SkeletonSettings {
             error_weight,
             facing: false,
@@ -221,7 +221,7 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     );
     let file = network(0.02).file();
     let stderr = said(&file[..file.len() / 2]);
-    assert!(stderr.contains("cut off or no ONNX file"), "{stderr}");
+    assert!(stderr.contains("truncated or not an ONNX file"), "{stderr}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use fmp::{Moment, Scope, Tracker};
+use fmp::{FrameTime, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
 use metrics::Passage;
@@ -135,19 +135,23 @@ impl View<'_> {
             }
         };
         let rate = self.job.frame_rate_hz;
-        let at = Moment {
+        let at = FrameTime {
             frame: nth,
             seconds: rate.map(|rate| header.stamp.frame as f64 / rate),
         };
         let scope = memory.tracker.scope(layout, at);
         let mut found = self.find(image, scope, &mut memory.responses)?;
-        if self.job.step.gives_up(&memory.tracker, &found.estimate) {
+        if self
+            .job
+            .step
+            .needs_full_search(&memory.tracker, &found.estimate)
+        {
             // Its memory for evidence is released first.
             drop(found);
             found = self.find(image, Scope::whole(layout), &mut memory.responses)?;
         }
         let step = &self.job.step;
-        step.follow(&mut memory.tracker, at, &found.estimate);
+        step.update(&mut memory.tracker, at, &found.estimate);
         Ok(Ok(found))
     }
 

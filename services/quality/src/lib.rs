@@ -4,6 +4,7 @@
 mod config;
 mod service;
 
-pub use config::{Config, Device};
+pub use config::Config;
 pub use service::{Job, NetworkSource, Source, run};
 pub use stage::HELD_REALTIME;
+pub use viewquality::Device;

@@ -8,7 +8,7 @@ use kernels::Rgb8View;
 use messages::{FrameHeader, ViewPose, ViewQuality, topic};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Stage};
-use viewquality::{Forecaster, Predictor, Seen};
+use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;
 
 /// What one view's process has to do.
@@ -138,7 +138,7 @@ fn predict(
             return no_prediction();
         }
     };
-    let seen = Seen {
+    let seen = ForecastInput {
         image,
         on: (model, layout),
         candidates: &candidates,
