@@ -18,11 +18,12 @@ const LAYERS: &[&[&str]] = &[
         "files",
         "onnx",
         "statistics",
+        "wording",
     ],
     &[
         "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles", "trc",
     ],
-    &["metrics", "recording", "fmp", "scene"],
+    &["metrics", "recording", "fmp", "scene", "deployment"],
     &["runtime"],
     &["multiview", "viewquality"],
     &["pipeline", "evaluation", "datasets", "consistency"],

@@ -11,7 +11,7 @@ use stage::Stage;
 
 use crate::job::Job;
 use crate::supply::{Step, Supply};
-use crate::{Mode, Pace};
+use deployment::capture::{Mode, Pace};
 
 /// Real-time footage begins this long after the run, so that every process has started.
 const LEAD_NANOS: u64 = 2_000_000_000;

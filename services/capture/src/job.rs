@@ -5,7 +5,7 @@ use core::time::Duration;
 use footage::SourceSpec;
 use geometry::Framing;
 
-use crate::{Faults, Mode, Pace};
+use deployment::capture::{Faults, Mode, Pace};
 
 /// What one camera's process has to do.
 #[derive(Debug)]

@@ -2,10 +2,10 @@
 
 use runtime::{ExitKind, Failure, OrFail as _, Service, now_nanos};
 
-use crate::Pace;
 use crate::camera::Camera;
 use crate::job::Job;
 use crate::supply::{Step, Supply};
+use deployment::capture::Pace;
 
 /// Sends the footage of one view, then the end of the stream.
 ///

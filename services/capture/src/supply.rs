@@ -6,9 +6,9 @@ mod tests;
 use footage::{FootageError, Size, SourceSpec};
 use messages::Status;
 
-use crate::fault::{Fault, FaultKind, Faults};
 use crate::feed::{Feed, FeedError, FeedInfo};
 use crate::guard::Guard;
+use deployment::capture::{Fault, FaultKind, Faults};
 
 /// Time between attempts to reopen a camera, nanoseconds.
 const PAUSE_NANOS: u64 = 500_000_000;
@@ -53,7 +53,7 @@ impl Supply {
     /// Opens the footage or makes the scene.
     ///
     /// * `is_live`: frames follow a clock, and a camera that is gone may come back.
-    /// * `frozen_after`: see [`crate::Config::frozen_after`].
+    /// * `frozen_after`: see [`deployment::capture::Config::frozen_after`].
     ///
     /// # Errors
     ///

@@ -29,7 +29,8 @@ Examples:
     parallax replay run.mcap --from fuse --set fuse.alpha=2     its later stages again, with another value
     parallax chaos                                      processes killed on purpose, and what held
     parallax bench transport                            how long a message takes from process to process
-    parallax config show my.toml                        every value, and who said it
+    parallax config show my.toml                        every value, and where it comes from
+    parallax config schema > parallax.schema.json       completion and checks in an editor
     parallax detect photo.jpg --model parse.mat --json  people in single images
     parallax model import parse.mat --out parse.plx     another format's model as our own
     parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own

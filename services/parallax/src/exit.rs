@@ -1,9 +1,5 @@
 //! How a command ends: the exit codes that users and scripts may rely on.
 
-use runtime::{ExitKind, Fault};
-
-use crate::deployment::ConfigError;
-
 /// The table of exit codes, as `--help` shows it.
 pub(crate) const EXIT_CODES: &str = "\
 Exit codes:
@@ -19,17 +15,10 @@ Exit codes:
 
 Data goes to standard output, messages and progress to standard error.";
 
-impl Fault for ConfigError {
-    fn kind(&self) -> ExitKind {
-        match self {
-            Self::Read { .. } => ExitKind::Input,
-            _ => ExitKind::Config,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use runtime::ExitKind;
+
     use super::*;
 
     #[test]

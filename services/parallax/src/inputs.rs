@@ -21,8 +21,8 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
-use crate::deployment::Deployment;
-use crate::shipped::{self, Shipped};
+use crate::shipped::Shipped;
+use deployment::Deployment;
 
 /// The named model, or the one that ships with Parallax.
 pub(crate) fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
@@ -44,7 +44,7 @@ fn shipped_model() -> Result<Arc<Model>, Failure> {
 
 /// Reads the model, of whichever format.
 pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
-    if shipped::is_one(path) {
+    if deployment::is_shipped(path) {
         return shipped_model();
     }
     fmp::files::read(path)
@@ -98,7 +98,10 @@ pub(crate) struct Footage {
 }
 
 /// What of a camera's footage is to be used.
-pub(crate) fn source(camera: &capture::Camera, config: &capture::Config) -> SourceSpec {
+pub(crate) fn source(
+    camera: &deployment::capture::Camera,
+    config: &deployment::capture::Config,
+) -> SourceSpec {
     SourceSpec {
         start: config.start_frame,
         step: config.frame_step,
@@ -186,7 +189,7 @@ pub(crate) fn shape(model: &Model) -> Shape {
 
 /// The part-type tables of some cameras: those that are named, and of the other pairs what was learned.
 pub(crate) fn pair_tables(
-    config: &fuse::Config,
+    config: &deployment::fuse::Config,
     learned: Option<&Learned>,
     model: &Model,
     cameras: &[&str],
@@ -212,8 +215,8 @@ pub(crate) fn pair_tables(
         return Ok(PairTables { of_pairs, by_angle });
     };
     let appearance = match config.energy {
-        fuse::Energy::Paper => learned.weights.appearance,
-        fuse::Energy::Released => Appearance::Joint,
+        deployment::fuse::Energy::Paper => learned.weights.appearance,
+        deployment::fuse::Energy::Released => Appearance::Joint,
     };
     if let Some(rig) = &config.consistency_rig {
         let Some(own) = learned.of_rig(rig, cameras, appearance) else {
@@ -241,7 +244,7 @@ pub(crate) fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
 
 /// Reads the network of a deployment, if it has one.
 pub(crate) fn own_network(
-    config: &quality::Config,
+    config: &deployment::quality::Config,
     n_parts: usize,
 ) -> Result<Option<Network>, Failure> {
     let Some(file) = &config.network else {
@@ -257,10 +260,14 @@ pub(crate) fn own_network(
 #[cfg(feature = "ort")]
 fn by_onnx_runtime(
     library: &Path,
-    device: quality::Device,
+    device: deployment::quality::Device,
     file: &Path,
     n_parts: usize,
 ) -> Result<Network, Failure> {
+    let device = match device {
+        deployment::quality::Device::Cpu => viewquality::Device::Cpu,
+        deployment::quality::Device::Cuda => viewquality::Device::Cuda,
+    };
     let runtime = viewquality::OnnxRuntime::load(library, device);
     let runtime = runtime.map_err(|error| refused(library, &error))?;
     let bytes = Shipped::Network.read(file)?;
@@ -270,7 +277,7 @@ fn by_onnx_runtime(
 #[cfg(not(feature = "ort"))]
 fn by_onnx_runtime(
     library: &Path,
-    _device: quality::Device,
+    _device: deployment::quality::Device,
     _file: &Path,
     _n_parts: usize,
 ) -> Result<Network, Failure> {
@@ -361,24 +368,4 @@ pub(crate) fn is_image(path: &Path) -> bool {
     ["png", "jpg", "jpeg", "bmp"]
         .iter()
         .any(|it| extension.eq_ignore_ascii_case(it))
-}
-
-/// Reads everything that the deployment names, and says what it is.
-pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
-    let resolved = crate::plan::Resolved::new(deployment)?;
-    let prepared = crate::prepare::Prepared::new(&resolved)?;
-    prepared.check_predictions(&resolved)?;
-    if let Some(padding) = &prepared.padding {
-        tracing::warn!("{padding}");
-    }
-    let n_frames = resolved.n_frames();
-    let solved_in = match prepared.settings.views {
-        pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
-        pipeline::Views::All => "solved at once".to_owned(),
-    };
-    Ok(format!(
-        "{} views, {solved_in}, {n_frames} frames, a model of {} parts",
-        prepared.views.len(),
-        prepared.model.n_parts()
-    ))
 }

@@ -10,7 +10,7 @@ use std::time::Instant;
 use metrics::{Reading, ReadingError};
 use runtime::{Failure, Keys, Namespace, ObservedProcess, Observer, OrFail as _, Stop, now_nanos};
 
-use crate::plan::SERVICES;
+use crate::resolved::SERVICES;
 
 pub(crate) use describe::{describe, measured};
 pub(crate) use table::table;

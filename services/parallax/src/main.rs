@@ -20,31 +20,32 @@
 //! energy, [`messages`](../messages/index.html) for what travels between processes.
 #![forbid(unsafe_code)]
 
-mod audience;
 mod budget;
 mod claim;
 mod cli;
 mod commands;
-mod deployment;
 mod describe;
 mod exit;
 mod globals;
 mod inputs;
 mod judged;
 mod live;
+mod load;
 mod nothing;
 mod output;
 mod padding;
 mod plan;
 mod prepare;
+mod recorded;
+mod resolved;
 mod sanity;
 mod scheduling;
 mod search;
 mod sheet;
 mod shipped;
 mod spread;
+mod stage;
 mod summary;
-mod taped;
 mod trial;
 mod vertical;
 mod views;

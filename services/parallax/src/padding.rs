@@ -1,7 +1,7 @@
 //! How much of the frames is padding, because their size has another aspect than the camera's image.
 
-use crate::deployment::Deployment;
 use crate::prepare::View;
+use deployment::Deployment;
 
 /// Shares of padding below this are not worth a word.
 const WORTH_A_WORD: f64 = 0.1;

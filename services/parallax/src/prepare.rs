@@ -7,16 +7,15 @@ use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
-use pipeline::{EstimatorSettings, SkeletonSettings, all_pairs};
+use pipeline::{EstimatorSettings, SkeletonSettings};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
 use viewquality::Predictor;
 
-use crate::deployment::Deployment;
 use crate::inputs;
 use crate::padding;
-use crate::plan::Resolved;
-use crate::shipped;
+use crate::resolved::Resolved;
+use deployment::Deployment;
 
 /// One view, ready.
 #[derive(Debug, Clone)]
@@ -71,7 +70,7 @@ impl Prepared {
         }
         let settings = settings(deployment, &model, &views)?;
         Ok(Self {
-            pairs: pairs(deployment),
+            pairs: resolved.topology().pairs().to_vec(),
             up_in_world: rig.up_in_world(),
             padding: padding::warning(deployment, &views, &sizes),
             model,
@@ -92,7 +91,7 @@ impl Prepared {
         };
         let table = inputs::quality_table(file, self.model.n_parts())?;
         let name = config.name_in_table(&resolved.deployment.cameras[view].name);
-        let predictor = Predictor::from_table(&table, config.selection(), name);
+        let predictor = Predictor::from_table(&table, quality::selection(config), name);
         let predictor = predictor.map_err(|error| inputs::in_file(file, &error))?;
         Ok(Some(predictor))
     }
@@ -106,7 +105,7 @@ impl Prepared {
 
     fn predict(&self, resolved: &Resolved) -> Result<(), Failure> {
         let deployment = &resolved.deployment;
-        let ships = |file: &Option<PathBuf>| file.as_deref().is_some_and(shipped::is_one);
+        let ships = |file: &Option<PathBuf>| file.as_deref().is_some_and(deployment::is_shipped);
         let has_other_model = deployment.model.is_some() && !ships(&deployment.model);
         if has_other_model && ships(&deployment.quality.network) {
             tracing::warn!(
@@ -174,34 +173,6 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
     })
 }
 
-/// The pairs of views that are fused.
-fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
-    if deployment.fuse.views == fuse::Views::All {
-        return (1..deployment.cameras.len())
-            .map(|it| [it - 1, it])
-            .collect();
-    }
-    if deployment.fuse.pairs.is_empty() {
-        return all_pairs(deployment.cameras.len());
-    }
-    let mut pairs: Vec<[usize; 2]> = deployment
-        .fuse
-        .pairs
-        .iter()
-        .filter_map(|names| indices(deployment, names))
-        .collect();
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
-}
-
-/// The two cameras, ascending.
-fn indices(deployment: &Deployment, names: &[String; 2]) -> Option<[usize; 2]> {
-    let index = |name: &String| deployment.cameras.iter().position(|it| it.name == *name);
-    let [first, second] = [index(&names[0])?, index(&names[1])?];
-    Some([first.min(second), first.max(second)])
-}
-
 fn settings(
     deployment: &Deployment,
     model: &Model,
@@ -212,11 +183,11 @@ fn settings(
     let learned = inputs::learned(deployment.fuse.consistency.as_deref(), model)?;
     let names: Vec<&str> = views.iter().map(|it| it.name.as_str()).collect();
     let tables = inputs::pair_tables(&deployment.fuse, learned.as_ref(), model, &names)?;
-    let mut fuse = deployment.fuse.clone();
-    if let fuse::Tau::File(tau) = &fuse.tau {
-        fuse.tau = fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    let mut config = deployment.fuse.clone();
+    if let deployment::fuse::Tau::File(tau) = &config.tau {
+        config.tau = deployment::fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
     }
-    let n_thresholds = fuse.tau.px().len();
+    let n_thresholds = fuse::tau_px(&config.tau).len();
     if ![0, model.n_parts()].contains(&n_thresholds) {
         let message = format!(
             "`fuse.tau` has {n_thresholds} thresholds, the model has {} parts",
@@ -235,14 +206,15 @@ fn settings(
     let defaults = SkeletonSettings::default();
     let joints = JointSet::by_name(&deployment.triangulate.joints).unwrap_or(defaults.joints);
     Ok(EstimatorSettings {
-        view: deployment.pose.settings(),
-        fuse: fuse.settings(
+        view: pose::settings(&deployment.pose),
+        fuse: fuse::settings(
+            &config,
             deployment.pose.candidates,
             frame_scale as f32,
             learned.as_ref(),
         ),
         tables,
-        views: deployment.fuse.views.into(),
+        views: fuse::views(deployment.fuse.views),
         skeleton: SkeletonSettings {
             joints,
             joint_map: learned.and_then(|it| it.joint_map(joints)),
@@ -251,7 +223,7 @@ fn settings(
                 ..defaults.triangulation
             },
             error_weight: deployment.triangulate.error_weight,
-            combine: deployment.triangulate.combine.into(),
+            combine: triangulate::combine(deployment.triangulate.combine),
             facing: deployment.fuse.facing,
             ..defaults
         },

@@ -9,9 +9,9 @@ use geometry::files::{Finding, Severity, check as check_rig};
 use runtime::{ExitKind, Failure};
 use scene::Address;
 
-use crate::deployment::Deployment;
 use crate::inputs;
-use crate::plan::Resolved;
+use crate::resolved::Resolved;
+use deployment::Deployment;
 
 /// Rates further apart than this factor cannot be paired frame by frame.
 const RATES: f64 = 1.02;
@@ -29,7 +29,7 @@ const CELLS: usize = 32;
 /// rates that differ.
 pub(crate) fn check(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
-    let mut doubts = deployment.doubts();
+    let mut doubts = deployment.doubts(n_cores());
     several(deployment)?;
     sources(deployment)?;
     doubts.extend(cameras(deployment)?);
@@ -225,7 +225,10 @@ struct Pictures {
 
 impl Pictures {
     /// Unless all pixels are alike, as of a camera without light. Scenes are not made for it.
-    fn of(camera: &capture::Camera, capture: &capture::Config) -> Option<Self> {
+    fn of(
+        camera: &deployment::capture::Camera,
+        capture: &deployment::capture::Config,
+    ) -> Option<Self> {
         if Address::is_address(&camera.source) {
             return None;
         }
@@ -276,4 +279,9 @@ pub(crate) fn warn(resolved: &Resolved) -> Result<(), Failure> {
         tracing::warn!("{doubt}");
     }
     Ok(())
+}
+/// Cores of this machine, where it tells.
+fn n_cores() -> Option<usize> {
+    let known = std::thread::available_parallelism();
+    known.ok().map(usize::from)
 }

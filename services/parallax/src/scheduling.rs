@@ -1,7 +1,29 @@
-//! What the system does not grant the processes of a deployment: said once, and then gone without.
+//! What the processes of a deployment ask of the scheduler, and what the system does not grant: reported once, and then
+//! gone without.
 
-use runtime::{Denied, Scheduling};
+use deployment::{Policy, Runtime};
+use runtime::{Denied, RealTime, Scheduling};
 use supervise::ProcessSpec;
+
+/// Those that somebody waits for: a camera waits for its clock, and nobody for the recorder.
+const SPINNING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
+
+/// What a process asks of the system's scheduler.
+pub(crate) fn asked(settings: &Runtime, service: &str, process: &str) -> Scheduling {
+    let policy = match settings.policy {
+        Policy::Fifo => runtime::Policy::Fifo,
+        Policy::RoundRobin => runtime::Policy::RoundRobin,
+    };
+    let cores = settings.cores.get(process).or(settings.cores.get(service));
+    let priority = settings.priority.get(process);
+    let priority = priority.or(settings.priority.get(service));
+    Scheduling {
+        cores: cores.cloned().unwrap_or_default(),
+        real_time: priority.map(|&priority| RealTime { policy, priority }),
+        lock_memory: settings.lock_memory,
+        spin: settings.spin && SPINNING.contains(&service),
+    }
+}
 
 /// Takes from processes what the system would not grant them.
 ///
@@ -45,7 +67,6 @@ pub(crate) fn permit(
 mod tests {
     use std::io::ErrorKind;
 
-    use runtime::RealTime;
     use supervise::Role;
 
     use super::*;
@@ -108,5 +129,37 @@ mod tests {
         let mut processes = [spec("pose-0", "cores=0,1 spin"), spec("fuse-0", "")];
         assert_eq!(permit(&mut processes, rehearse), Vec::<String>::new());
         assert_eq!(processes[0].scheduling.to_string(), "cores=0,1 spin");
+    }
+
+    fn of(text: &str, process: &str) -> String {
+        let it: Runtime = toml::from_str(text).unwrap();
+        let service = process.split('-').next().unwrap();
+        asked(&it, service, process).to_string()
+    }
+
+    #[test]
+    fn nothing_is_asked_for_by_default() {
+        for process in ["capture-0", "pose-1", "triangulate"] {
+            assert_eq!(of("", process), "");
+        }
+    }
+
+    #[test]
+    fn what_is_said_of_a_process_wins_over_what_is_said_of_its_service() {
+        let text = "cores = { pose = [0, 1], pose-2 = [3] }\npriority = { pose-2 = 9, fuse = 4 }";
+        assert_eq!(of(text, "pose-0"), "cores=0,1");
+        assert_eq!(of(text, "pose-2"), "cores=3 fifo=9");
+        assert_eq!(of(text, "fuse-0"), "fifo=4");
+        assert_eq!(of(text, "results"), "");
+    }
+
+    #[test]
+    fn who_waits_for_a_clock_and_who_nobody_waits_for_do_not_spin() {
+        let text = "spin = true\npolicy = \"round-robin\"\npriority = { capture = 2 }";
+        for process in ["pose-0", "quality-0", "fuse-1", "triangulate"] {
+            assert_eq!(of(text, process), "spin");
+        }
+        assert_eq!(of(text, "capture-0"), "round-robin=2");
+        assert_eq!(of(text, "results"), "");
     }
 }

@@ -5,12 +5,10 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use deployment::{SHIPPED, is_shipped};
 use runtime::{ExitKind, Failure};
 
 use crate::inputs;
-
-/// The word that stands for a file that ships, where a file can be named; `./shipped` is a file of that name.
-const WORD: &str = "shipped";
 
 /// A file that ships; their cards lie beside them in `configs/models`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +38,7 @@ impl Shipped {
             Self::Network => "network",
             Self::Consistency => "consistency",
         };
-        format!("{WORD}:{kind}").into()
+        format!("{SHIPPED}:{kind}").into()
     }
 
     /// The file of that name.
@@ -51,7 +49,7 @@ impl Shipped {
 
     /// What a file of this kind holds: the one that is named, or the one that ships.
     pub(crate) fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
-        if is_one(file) {
+        if is_shipped(file) {
             return Ok(Cow::Borrowed(self.bytes()));
         }
         let bytes = fs::read(file).map_err(|error| {
@@ -78,41 +76,14 @@ impl Shipped {
             Self::Consistency => ["fuse.consistency", "train consistency"],
         };
         format!(
-            "`{key}` is a file that `parallax {made_by}` made, or \"{WORD}\": the one that is built in"
+            "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
         )
     }
-}
-
-/// Whether a name is that of a file that ships.
-pub(crate) fn is_one(file: &Path) -> bool {
-    file == Path::new(WORD)
-}
-
-/// A name with relative paths taken as relative to `base`.
-pub(crate) fn relative_to(file: &Path, base: &Path) -> PathBuf {
-    if is_one(file) {
-        return file.to_owned();
-    }
-    base.join(file)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_word_alone_is_built_in_and_a_path_is_a_path() {
-        let base = Path::new("/room");
-        assert_eq!(relative_to(Path::new(WORD), base), Path::new(WORD));
-        for (named, file) in [
-            ("./shipped", "/room/./shipped"),
-            ("a/shipped", "/room/a/shipped"),
-            ("a.onnx", "/room/a.onnx"),
-        ] {
-            assert!(!is_one(Path::new(named)), "{named}");
-            assert_eq!(relative_to(Path::new(named), base), Path::new(file));
-        }
-    }
 
     #[test]
     fn each_of_them_is_what_it_is_called() {

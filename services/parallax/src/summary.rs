@@ -20,7 +20,7 @@ use crate::budget::{self, Budget};
 use crate::live;
 use crate::nothing;
 use crate::output;
-use crate::plan::Resolved;
+use crate::resolved::Resolved;
 use crate::views::ViewReport;
 
 pub(crate) use recorded::Recorded;
@@ -181,7 +181,7 @@ impl Report {
                 .filter(|it| it.counts.refused.iter().any(|n| *n > 0))
                 .map(|it| (it.name.clone(), it.counts.refused))
                 .collect(),
-            is_lossless: resolved.deployment.capture.mode == capture::Mode::Lossless,
+            is_lossless: resolved.deployment.capture.mode == deployment::capture::Mode::Lossless,
             views: ViewReport::all(resolved, outcome, recorded.summary()),
             budget: resolved
                 .deployment

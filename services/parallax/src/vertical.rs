@@ -8,9 +8,9 @@ use kernels::Rgb8View;
 use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
 use runtime::Failure;
 
-use crate::deployment::Deployment;
 use crate::inputs;
 use crate::search::Search;
+use deployment::Deployment;
 
 /// Pictures of a camera that are searched, and the frames between them.
 const N_PICTURES: u64 = 2;
@@ -238,7 +238,11 @@ impl<'a> Pictures<'a> {
 
 impl<'a> View<'a> {
     /// What cannot be read is said by who reads it later.
-    fn new(entry: &capture::Camera, camera: &'a Camera, capture: &capture::Config) -> Option<Self> {
+    fn new(
+        entry: &deployment::capture::Camera,
+        camera: &'a Camera,
+        capture: &deployment::capture::Config,
+    ) -> Option<Self> {
         let spec = SourceSpec {
             start: capture.start_frame,
             step: STEP,

@@ -8,7 +8,7 @@ use runfiles::{Missing, Summary};
 use serde::Serialize;
 use supervise::{Counts, Outcome};
 
-use crate::plan::Resolved;
+use crate::resolved::Resolved;
 
 /// What became of the frames of one view: all counts but the first add up to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -38,14 +38,14 @@ fn the_released_energy() {
     let case = Case::new("released", &[20; 3], &more);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let config = fuse::Config {
-        energy: fuse::Energy::Released,
-        ..fuse::Config::default()
+    let config = deployment::fuse::Config {
+        energy: deployment::fuse::Energy::Released,
+        ..deployment::fuse::Config::default()
     };
-    let n_candidates = pose::Config::default().candidates;
+    let n_candidates = deployment::pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
-            fuse: config.settings(n_candidates, 1.0, None),
+            fuse: fuse::settings(&config, n_candidates, 1.0, None),
             ..EstimatorSettings::default()
         },
         ..OneProcess::default()
@@ -88,15 +88,15 @@ fn switched_off(name: &str, fuse: &str, views: Views) {
     case.write("q.csv", table);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let config = fuse::Config {
-        tau: fuse::Tau::Given(vec![5.0; 26]),
-        ..fuse::Config::default()
+    let config = deployment::fuse::Config {
+        tau: deployment::fuse::Tau::Given(vec![5.0; 26]),
+        ..deployment::fuse::Config::default()
     };
-    let n_candidates = pose::Config::default().candidates;
+    let n_candidates = deployment::pose::Config::default().candidates;
     let one = OneProcess {
         settings: EstimatorSettings {
             views,
-            fuse: config.settings(n_candidates, 1.0, None),
+            fuse: fuse::settings(&config, n_candidates, 1.0, None),
             ..EstimatorSettings::default()
         },
         sigma_px: Some(sigma_px),
@@ -148,14 +148,14 @@ fn tracked_poses() {
         let case = Case::new(&format!("tracked-{name}"), &[20; 3], &more);
         let ended = case.run();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-        let pose: pose::Config = toml::from_str(&format!(
+        let pose: deployment::pose::Config = toml::from_str(&format!(
             "{}evidence_window = {window}\n",
             tracked.trim_start_matches("[pose]\n")
         ))
         .unwrap();
         let one = OneProcess {
             settings: EstimatorSettings {
-                view: pose.settings(),
+                view: pose::settings(&pose),
                 ..EstimatorSettings::default()
             },
             ..OneProcess::default()

@@ -1,11 +1,11 @@
 //! Receives frames, sends single-view candidates and their evidence.
 #![forbid(unsafe_code)]
 
-mod config;
 mod job;
 mod service;
+mod settings;
 mod view;
 
-pub use config::{All, Config, Search, Window};
 pub use job::Job;
 pub use service::run;
+pub use settings::{precision, settings};

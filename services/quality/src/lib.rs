@@ -1,10 +1,10 @@
 //! Receives frames and candidates, sends the expected error of every part.
 #![forbid(unsafe_code)]
 
-mod config;
 mod service;
+mod settings;
 
-pub use config::Config;
 pub use service::{Job, NetworkSource, Source, run};
+pub use settings::selection;
 pub use stage::HELD_REALTIME;
 pub use viewquality::Device;

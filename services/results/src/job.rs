@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::{Config, Scene};
+use deployment::results::Config;
+
+use crate::Scene;
 
 /// What the process has to do.
 #[derive(Debug)]

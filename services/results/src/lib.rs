@@ -4,8 +4,6 @@
 //! one frame), the writers of one format each, and [`Output`], which puts them together.
 #![forbid(unsafe_code)]
 
-mod config;
-
 mod scene;
 
 mod frame;
@@ -32,7 +30,6 @@ mod job;
 mod service;
 mod writer;
 
-pub use config::Config;
 pub use folder::{Folder, FolderError, remove_pictures};
 pub use frame::{Absent, FrameRecord, Picture, ViewRecord};
 pub use job::Job;

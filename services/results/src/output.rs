@@ -10,9 +10,10 @@ use runfiles::{
 
 use crate::lines::Lines;
 use crate::summary::Tally;
+use deployment::results::Config;
+
 use crate::{
-    Absent, Config, Folder, FolderError, FrameRecord, Latency, Scene, overlay, pose2d, pose3d,
-    times, trc,
+    Absent, Folder, FolderError, FrameRecord, Latency, Scene, overlay, pose2d, pose3d, times, trc,
 };
 
 const TRC: &str = "pose3d.trc";

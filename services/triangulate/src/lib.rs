@@ -1,8 +1,8 @@
 //! Receives the poses of pairs, sends joints in the world.
 #![forbid(unsafe_code)]
 
-mod config;
 mod service;
+mod settings;
 
-pub use config::{Combine, Config};
 pub use service::{Job, run};
+pub use settings::combine;

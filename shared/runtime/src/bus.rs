@@ -82,7 +82,7 @@ pub enum BusError {
     /// The wake-up of a topic cannot be created.
     #[error(
         "cannot create wake-up of topic {topic:?}: {}",
-        crate::words::spaced(source)
+        wording::spaced(source)
     )]
     CreateWakeUp {
         /// Name of the topic.

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use rustix::process::{Resource, getrlimit};
 
 use crate::reserve::Refused;
-use crate::words::in_words;
+use wording::in_words;
 
 /// Exit statuses, the same for the command and for all its services.
 ///

@@ -35,7 +35,6 @@ mod remains;
 mod scheduling;
 mod stop;
 mod terminal;
-mod words;
 
 pub use bus::{Bus, BusError, Topic};
 pub use child::{Child, freeze, kill, thaw, wait_for_any};
@@ -71,4 +70,3 @@ pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
 pub use terminal::Keys;
 pub use topic::{Delivery, Limits, TopicPlan};
 pub use waiter::{WaitError, Waiter, Woken};
-pub use words::in_words;

@@ -26,7 +26,7 @@ pub enum ObserverError {
     /// Its processes cannot be listed.
     #[error(
         "cannot list the topics of deployment {name:?}: {}",
-        crate::words::spaced(source)
+        wording::spaced(source)
     )]
     List {
         /// Its name.

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
+use deployment::Entry;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
-use crate::deployment::{Entry, Loaded};
-
-use crate::{inputs, output};
+use crate::{load, output, plan};
 
 /// What to do with a deployment file.
 #[derive(Debug, Subcommand)]
@@ -18,6 +17,29 @@ pub(crate) enum Command {
     Show(Arguments),
     /// Check the file, and that what it names can be read.
     Check(Arguments),
+    /// Print the JSON schema of deployment files, for editors.
+    #[command(after_help = SCHEMA_HELP)]
+    Schema,
+    /// Print every key, what it takes, and what it means.
+    Keys(Keys),
+}
+
+const SCHEMA_HELP: &str = "\
+The schema (JSON Schema, draft 2020-12) tells an editor the keys of a deployment file, so that it completes and explains
+them and marks what is unknown. What the schema cannot express, such as values that contradict each other, `config check`
+finds.
+
+For VS Code with \"Even Better TOML\", and other editors that use taplo:
+    parallax config schema > parallax.schema.json
+and as the first line of the deployment file:
+    #:schema ./parallax.schema.json";
+
+/// How to print the keys.
+#[derive(Debug, Args)]
+pub(crate) struct Keys {
+    /// Print the settings reference: Markdown, a table for each section.
+    #[arg(long)]
+    markdown: bool,
 }
 
 /// Which deployment file.
@@ -38,13 +60,33 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Show(it) => show(it),
         Command::Check(it) => check(it),
+        Command::Schema => schema(),
+        Command::Keys(it) => keys(it),
     }
+}
+
+fn schema() -> Result<ExitCode, Failure> {
+    output::json(&deployment::schema())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn keys(arguments: &Keys) -> Result<ExitCode, Failure> {
+    if arguments.markdown {
+        let reference = deployment::reference().or_fail(ExitKind::Run)?;
+        output::line(reference.trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for key in deployment::keys() {
+        output::line(format_args!("{}: {}", key.name, key.takes))?;
+        output::line(format_args!("    {}", key.meaning))?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let loaded = match &arguments.file {
-        Some(file) => Loaded::read(file, &arguments.set)?,
-        None => Loaded::defaults(&arguments.set)?,
+        Some(file) => load::read(file, &arguments.set)?,
+        None => load::defaults(&arguments.set)?,
     };
     let entries = loaded.entries().or_fail(ExitKind::Run)?;
     if arguments.json {
@@ -62,7 +104,7 @@ fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";
     for entry in entries {
-        let (of, name) = entry.key.split_once('.').unwrap_or(("", entry.key));
+        let (of, name) = entry.key.split_once('.').unwrap_or(("", &entry.key));
         if of != section {
             lines.extend([String::new(), format!("[{of}]")]);
             section = of;
@@ -82,8 +124,8 @@ fn check(arguments: &Arguments) -> Result<ExitCode, Failure> {
         .as_ref()
         .ok_or("config check needs a deployment file")
         .or_fail(ExitKind::Usage)?;
-    let loaded = Loaded::read(file, &arguments.set)?;
-    let report = inputs::check(&loaded.deployment)?;
+    let loaded = load::read(file, &arguments.set)?;
+    let report = plan::check(&loaded.deployment)?;
     if arguments.json {
         output::json(&json!({ "schema_version": 1, "file": file, "ok": true }))?;
     } else {

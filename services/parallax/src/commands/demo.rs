@@ -14,8 +14,8 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 
 use super::run::Planned;
-use crate::deployment::Loaded;
 use crate::globals::Globals;
+use crate::load;
 use crate::trial::Point;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let cast = arguments.cast(before.as_ref());
     let stage = Stage::new(&cast, folder)?;
     remove_reports(&stage)?;
-    let loaded = Loaded::read(&stage.write(&cast)?, &[])?;
+    let loaded = load::read(&stage.write(&cast)?, &[])?;
     let planned = Planned::new(&loaded.deployment, globals.level())?;
     let processes: Vec<String> = planned.processes().map(str::to_owned).collect();
     announce(&cast, before.as_ref(), globals, &stage, processes.len());
@@ -208,7 +208,7 @@ fn gauge(arguments: &Arguments, folder: &Path, globals: Globals) -> Result<Optio
     }
     let cast = arguments.cast(None);
     let stage = Stage::new(&cast, folder.to_path_buf())?;
-    let loaded = Loaded::read(&stage.write(&cast)?, &[])?;
+    let loaded = load::read(&stage.write(&cast)?, &[])?;
     let planned = Planned::new(&loaded.deployment, globals.level())?;
     Gauge::new(&stage, planned.resolved()).map(Some)
 }

@@ -11,19 +11,19 @@ use std::sync::Mutex;
 
 use clap::Args;
 use datasets::Selection;
+use deployment::fuse::Config;
 use experiment::{FilmSettings, Version};
-use fuse::Config;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence, SequenceError};
 use viewquality::Forecaster;
 
 use super::judge::selection;
 use crate::claim::Claim;
-use crate::deployment::fuse_numbers;
 use crate::globals::Globals;
 use crate::inputs;
 use crate::nothing;
-use crate::shipped::{self, Shipped};
+use crate::shipped::Shipped;
+use deployment::fuse_numbers;
 use job::Job;
 
 pub(super) use job::no_film;
@@ -201,8 +201,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         quiet: globals.quiet,
         learned,
         tau_px: match &config.tau {
-            fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
-            it => it.px(),
+            deployment::fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
+            it => fuse::tau_px(it),
         },
         model,
         config,
@@ -293,7 +293,7 @@ fn config(arguments: &Arguments) -> Result<Config, Failure> {
     if let Some(file) = &arguments.consistency {
         config.consistency = Some(file.clone());
     }
-    let needs_file = config.tau == fuse::Tau::Named(fuse::TauName::Learned);
+    let needs_file = config.tau == deployment::fuse::Tau::Named(deployment::fuse::TauName::Learned);
     if needs_file && config.consistency.is_none() {
         let message = "`tau = \"learned\"` needs `consistency`, or --consistency";
         return Err(Failure::new(ExitKind::Config, message));
@@ -316,7 +316,7 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
         .or_fail(ExitKind::Config)?;
     let folder = file.parent().map_or_else(PathBuf::new, PathBuf::from);
     if let Some(file) = &mut config.consistency {
-        *file = shipped::relative_to(file, &folder);
+        *file = deployment::relative_to(file, &folder);
     }
     for table in &mut config.compatibility {
         table.files = table.files.each_ref().map(|it| folder.join(it));

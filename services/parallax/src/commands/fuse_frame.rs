@@ -5,9 +5,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
+use deployment::fuse::{Tau, TauName};
 use fmp::Model;
 use footage::{Fill, Size, Source, SourceSpec, Warp};
-use fuse::{Tau, TauName};
 use geometry::files::ReadOptions;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
@@ -229,14 +229,14 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
 }
 
 /// What the command line says about fusion.
-fn config(arguments: &Arguments) -> fuse::Config {
-    let defaults = fuse::Config::default();
+fn config(arguments: &Arguments) -> deployment::fuse::Config {
+    let defaults = deployment::fuse::Config::default();
     let is_released = arguments.energy == Energy::Released;
-    fuse::Config {
+    deployment::fuse::Config {
         energy: if is_released {
-            fuse::Energy::Released
+            deployment::fuse::Energy::Released
         } else {
-            fuse::Energy::Paper
+            deployment::fuse::Energy::Paper
         },
         alpha: arguments.alpha,
         beta: arguments.beta,
@@ -290,7 +290,7 @@ fn settings(
     }
     let scale = views.iter().map(|it| frame_scale(&it.framing)).sum::<f64>() / views.len() as f64;
     Ok(EstimatorSettings {
-        fuse: config.settings(n_candidates, scale as f32, learned.as_ref()),
+        fuse: fuse::settings(&config, n_candidates, scale as f32, learned.as_ref()),
         view: ViewSettings {
             n_candidates,
             ..view

@@ -9,12 +9,13 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::audience::Tape;
 use crate::commands::run::Planned;
-use crate::deployment::Loaded;
 use crate::globals::Globals;
-use crate::plan::Resolved;
-use crate::{output, taped};
+use crate::load;
+use crate::plan;
+use crate::resolved::Resolved;
+use crate::{output, recorded};
+use deployment::RecordingPlan;
 use room::{Forecast, Growth, PerFrame};
 
 /// Lives of the recording process that are looked for.
@@ -74,20 +75,20 @@ enum Bulk {
 
 /// Runs the deployment and records it.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let mut loaded = Loaded::read(&arguments.config, &arguments.set)?;
+    let mut loaded = load::read(&arguments.config, &arguments.set)?;
     if let Some(results) = &arguments.results {
         loaded.deployment.output = std::path::absolute(results).or_fail(ExitKind::Usage)?;
     }
     let file = std::path::absolute(&arguments.out).or_fail(ExitKind::Usage)?;
-    let tape = Tape {
+    let plan = RecordingPlan {
         file: file.clone(),
         without_pixels: arguments.without.contains(&Bulk::Pixels),
         without_evidence: arguments.without.contains(&Bulk::Evidence),
         queue_mb: arguments.queue_mb,
     };
     let resolved = Resolved {
-        tape: Some(tape),
-        ..Resolved::new(&loaded.deployment)?
+        recording: Some(plan),
+        ..plan::resolve(&loaded.deployment)?
     };
     let planned = Planned::of(resolved, globals.level())?;
     let forecast = forecast(&planned, &file, arguments)?;
@@ -99,23 +100,23 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let mut growth = Growth::new(&file, &forecast);
     let report = planned.carry_out(globals, &stop, &mut |_| growth.note())?;
-    let recording = taped::open(&file)?;
+    let recording = recorded::open(&file)?;
     let later = (1..MOST_LIVES).map(|it| record::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
     if arguments.json {
         let mut value = report.json();
-        value["recording"] = taped::json(&file, &recording);
+        value["recording"] = recorded::json(&file, &recording);
         value["recording"]["goes_on_in"] =
             later.iter().map(|it| it.display().to_string()).collect();
         output::json(&value)?;
     } else if !globals.quiet {
         output::line(report.text())?;
-        output::line(taped::text(&file, &recording))?;
+        output::line(recorded::text(&file, &recording))?;
         for file in &later {
             output::line(format_args!("  goes on in {}", file.display()))?;
         }
     }
-    let flawed = !taped::is_whole(&recording) || !later.is_empty();
+    let flawed = !recorded::is_whole(&recording) || !later.is_empty();
     let kind = report.kind().or(flawed.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }

@@ -7,14 +7,16 @@ use clap::Args;
 use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::audience::{Replay, Stage};
 use crate::commands::run::Planned;
-use crate::deployment::Loaded;
 use crate::globals::Globals;
-use crate::plan::Resolved;
+use crate::load;
+use crate::plan;
+use crate::recorded::{self, Settings};
+use crate::resolved::Resolved;
 use crate::shipped::Shipped;
-use crate::taped::{self, Settings};
+use crate::stage;
 use crate::{inputs, output};
+use deployment::{Replay, Stage};
 
 /// What to replay.
 #[derive(Debug, Args)]
@@ -35,7 +37,7 @@ pub(crate) struct Arguments {
     /// The recording.
     file: PathBuf,
     /// The first stage that runs.
-    #[arg(long, value_name = "STAGE", value_enum, default_value_t = Stage::Pose)]
+    #[arg(long, value_name = "STAGE", value_parser = stage::parser(), default_value = "pose")]
     from: Stage,
     /// So many times as fast as recorded, or `max`; without it `max` where nothing may be lost, else 1.
     #[arg(long, value_name = "X", value_parser = speed)]
@@ -71,14 +73,14 @@ fn speed(text: &str) -> Result<Speed, String> {
 /// Replays the recording.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let file = std::path::absolute(&arguments.file).or_fail(ExitKind::Usage)?;
-    let recording = taped::open(&file)?;
+    let recording = recorded::open(&file)?;
     if !globals.quiet {
-        output::message(taped::text(&file, &recording));
+        output::message(recorded::text(&file, &recording));
     }
     let settings = settings(&file, &recording)?;
     let from = arguments.from;
     let refused = |key: &str| refused(key, from);
-    let mut loaded = Loaded::again(&settings.resolved.deployment, &arguments.set, refused)?;
+    let mut loaded = load::again(&settings.resolved.deployment, &arguments.set, refused)?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let out = arguments.out.clone();
     let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
@@ -86,26 +88,26 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     warn_of_other_files(&settings);
     let mode = loaded.deployment.capture.mode;
     let resolved = if from == Stage::Capture {
-        Resolved::new(&loaded.deployment)?
+        plan::resolve(&loaded.deployment)?
     } else {
         Resolved {
             footage: settings.resolved.footage,
             deployment: loaded.deployment,
-            tape: None,
+            recording: None,
             replay: Some(Replay {
                 file: file.clone(),
                 from,
                 speed: match (arguments.speed, mode) {
                     (Some(Speed::Times(it)), _) => Some(it),
-                    (None, capture::Mode::Realtime) => Some(1.0),
-                    (Some(Speed::Max), _) | (None, capture::Mode::Lossless) => None,
+                    (None, deployment::capture::Mode::Realtime) => Some(1.0),
+                    (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
                 },
             }),
         }
     };
     check(&file, &recording, &resolved, from)?;
-    let damaged = taped::damaged(&file, &recording, &resolved, from)?;
-    if let Some(text) = taped::damaged_text(&damaged).filter(|_| !globals.quiet) {
+    let damaged = recorded::damaged(&file, &recording, &resolved, from)?;
+    if let Some(text) = recorded::damaged_text(&damaged).filter(|_| !globals.quiet) {
         output::message(text);
     }
     let planned = Planned::of(resolved, globals.level())?;
@@ -113,8 +115,8 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let report = planned.carry_out(globals, &stop, &mut |_| None)?;
     if arguments.json {
         let mut value = report.json();
-        value["recording"] = taped::json(&file, &recording);
-        value["recording"]["damaged"] = taped::damaged_json(&damaged);
+        value["recording"] = recorded::json(&file, &recording);
+        value["recording"]["damaged"] = recorded::damaged_json(&damaged);
         output::json(&value)?;
     } else if !globals.quiet {
         output::line(report.text())?;
@@ -125,7 +127,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             ))?;
         }
     }
-    let is_sound = damaged.is_empty() && taped::is_undamaged(&recording);
+    let is_sound = damaged.is_empty() && recorded::is_undamaged(&recording);
     let is_less = from != Stage::Capture && !is_sound;
     let kind = report.kind().or(is_less.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
@@ -147,7 +149,7 @@ fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
 /// Why a value may not be replaced, if it may not: its stage is given by the recording.
 fn refused(key: &str, from: Stage) -> Option<String> {
     let section = key.split('.').next().unwrap_or_default();
-    let is_given = match Stage::of_service(section) {
+    let is_given = match Stage::of_name(section) {
         Some(stage) => stage < from && key != "capture.mode",
         None => from > Stage::Capture && section == "camera",
     };
@@ -181,7 +183,8 @@ fn check(
     let without = recording.about.as_ref().map(|it| it.without);
     let without = without.unwrap_or_default();
     let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
-    let looks = from == Stage::Pose || (from == Stage::Quality && resolved.has_network());
+    let looks =
+        from == Stage::Pose || (from == Stage::Quality && resolved.deployment.has_network());
     let fuses = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
     let lacks = if looks && without.pixels {
         Some("the pixels of its frames")
@@ -211,7 +214,7 @@ fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'sta
         (Stage::Quality, Kind::ViewQuality, "expected errors"),
         (Stage::Fuse, Kind::PairPose, "answers of pairs"),
     ];
-    let has_quality = resolved.has_quality();
+    let has_quality = resolved.deployment.has_quality();
     let n_cameras = resolved.deployment.cameras.len();
     let is_sent = move |stage: Stage| match stage {
         Stage::Quality => has_quality,
@@ -254,7 +257,7 @@ mod tests {
             ("results", None),
             ("record", None),
         ] {
-            assert_eq!(Stage::of_service(service), stage);
+            assert_eq!(Stage::of_name(service), stage);
         }
     }
 }

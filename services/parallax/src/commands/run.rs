@@ -12,13 +12,15 @@ use supervise::{Event, Plan};
 use tracing::Level;
 
 use crate::claim::Claim;
-use crate::deployment::{Deployment, Loaded};
 use crate::globals::Globals;
 use crate::inputs;
-use crate::plan::{self, Resolved};
+use crate::load;
+use crate::plan;
 use crate::prepare::Prepared;
+use crate::resolved::Resolved;
 use crate::summary::{Report, Watcher};
 use crate::{output, scheduling};
+use deployment::Deployment;
 
 /// What to run.
 #[derive(Debug, Args)]
@@ -66,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let budget = arguments.latency_budget_ms;
     let budget = budget.map(|it| format!("supervise.latency_budget_ms={it:?}"));
     let set: Vec<String> = arguments.set.iter().cloned().chain(budget).collect();
-    let mut loaded = Loaded::read(&arguments.config, &set)?;
+    let mut loaded = load::read(&arguments.config, &set)?;
     if let Some(out) = &arguments.out {
         loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     }
@@ -108,7 +110,7 @@ pub(crate) struct Planned {
 impl Planned {
     /// Reads what the deployment names, and deals the work to processes.
     pub(crate) fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
-        Self::of(Resolved::new(deployment)?, log)
+        Self::of(plan::resolve(deployment)?, log)
     }
 
     /// Deals the work of a deployment whose footage is known to processes.

@@ -1,23 +1,24 @@
 //! `parallax service`: become one process of a deployment.
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
+use deployment::Stage;
 use messages::topic;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
 use viewquality::Forecaster;
 
-use crate::audience::{Audience, Stage};
 use crate::inputs;
-use crate::plan::{self, Dealing, Resolved};
 use crate::prepare::{self, Prepared};
-use crate::taped;
+use crate::recorded;
+use crate::resolved::Resolved;
+use crate::stage;
 
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -61,7 +62,7 @@ struct Own {
     #[arg(long, default_value_t = 0)]
     index: usize,
     /// What a recording stands in for.
-    #[arg(long)]
+    #[arg(long, value_parser = stage::parser())]
     stage: Option<Stage>,
     /// Compute for ever in the first life, once something of a later frame has been sent.
     #[arg(long)]
@@ -125,7 +126,6 @@ fn pool(n_threads: usize) -> ThreadPoolBuilder {
 fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let deployment = &resolved.deployment;
     let rig = inputs::rig_of(deployment)?;
-    let dealing = Dealing::new(&[], 0);
     let job = capture::Job {
         view,
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
@@ -134,7 +134,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         framing: prepare::framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,
-        n_consumers: Audience::new(resolved, &dealing).of_frames(),
+        n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
         patience: resolved.patience(),
     };
     capture::run(service, &job)
@@ -142,15 +142,14 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
-    let audience = Audience::new(resolved, &dealing);
+    let topology = resolved.topology();
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
     let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
     let job = pose::Job {
         view,
         step: step.or_fail(ExitKind::Config)?,
-        n_pose_consumers: audience.of_poses(),
-        n_evidence_consumers: audience.of_evidence(view),
+        n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
+        n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
@@ -175,14 +174,12 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
                 .or_fail(ExitKind::Config)?,
         ),
     };
-    let workers = resolved.deployment.fuse.most_workers();
-    let dealing = Dealing::new(&prepared.pairs, workers);
     let mut job = quality::Job {
         view,
         source,
         frame_step: resolved.deployment.capture.frame_step,
         frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
-        n_consumers: Audience::new(resolved, &dealing).of_qualities(),
+        n_consumers: resolved.topology().receivers_of(&topic::view_quality(view)),
         patience: resolved.patience(),
     };
     quality::run(service, &mut job)
@@ -190,12 +187,12 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 
 fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
+    let topology = resolved.topology();
     let plans = prepared.plans();
     let job = fuse::Job {
         worker,
         views: prepared.settings.views,
-        pairs: dealing.of(worker),
+        pairs: topology.pairs_of(worker),
         step: Arc::new(FuseStep::new(
             prepared.model,
             prepared.settings.fuse,
@@ -203,11 +200,11 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
             prepared.settings.tables,
         )),
         plans,
-        has_quality: resolved.has_quality(),
+        has_quality: resolved.deployment.has_quality(),
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
         quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
         frame_step: resolved.deployment.capture.frame_step.max(1),
-        n_consumers: Audience::new(resolved, &dealing).of_pairs(),
+        n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
         patience: resolved.patience(),
     };
     fuse::run(service, &job)
@@ -215,7 +212,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
 
 fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
+    let topology = resolved.topology();
     let plans = prepared.plans();
     let step = SkeletonStep::new(
         plans.clone(),
@@ -225,9 +222,9 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let job = triangulate::Job {
         plans,
         views: prepared.settings.views,
-        n_workers: dealing.n_workers,
-        n_consumers: Audience::new(resolved, &dealing).of_results(),
-        pairs: dealing.pairs,
+        n_workers: topology.n_workers(),
+        n_consumers: topology.receivers_of(&topic::pose3d()),
+        pairs: prepared.pairs,
         // A pair that waits for a view takes this long itself.
         patience: 2 * resolved.patience(),
     };
@@ -236,8 +233,8 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
 
 fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
+    let topology = resolved.topology();
     let deployment = &resolved.deployment;
-    let dealing = Dealing::new(&prepared.pairs, deployment.fuse.most_workers());
     let views = prepared.views.iter().map(|it| results::View {
         name: it.name.clone(),
         framing: it.framing.clone(),
@@ -256,59 +253,58 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         config: deployment.results.clone(),
         output: deployment.output.clone(),
         start_frame: deployment.capture.start_frame,
-        n_workers: dealing.n_workers,
-        has_quality: resolved.has_quality(),
+        n_workers: topology.n_workers(),
+        has_quality: resolved.deployment.has_quality(),
     };
     results::run(service, job)
 }
 
 fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let tape = resolved.tape.as_ref();
-    let tape = tape
+    let topology = resolved.topology();
+    let plan = resolved.recording.as_ref();
+    let plan = plan
         .ok_or("there is no recording")
         .or_fail(ExitKind::Config)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
-    let processes = plan::processes(resolved, &prepared, Path::new(""));
     let job = record::Job {
-        file: tape.file.clone(),
-        about: taped::about(resolved, tape)?,
+        file: plan.file.clone(),
+        about: recorded::about(resolved, plan)?,
         topics: record::Topics {
             n_views: prepared.views.len(),
-            n_workers: dealing.n_workers,
-            has_quality: resolved.has_quality(),
-            processes: processes.into_iter().map(|it| it.name).collect(),
+            n_workers: topology.n_workers(),
+            has_quality: resolved.deployment.has_quality(),
+            processes: topology
+                .processes()
+                .iter()
+                .map(|it| it.name.clone())
+                .collect(),
         },
-        queue_bytes: tape.queue_mb.saturating_mul(1_000_000),
+        queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
     };
     record::run(service, job)
 }
 
 fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
     let recording = resolved.replay.as_ref().zip(own.stage);
     let (it, stage) = recording
         .ok_or("there is no recording, or no --stage")
         .or_fail(ExitKind::Config)?;
-    let dealing = Dealing::new(&prepared.pairs, resolved.deployment.fuse.most_workers());
-    let audience = Audience::new(resolved, &dealing);
-    let output = |topic: String, n_receivers: usize| replay::Output { topic, n_receivers };
-    let outputs = match stage {
-        Stage::Capture => vec![output(topic::frame(own.index), audience.of_frames())],
-        Stage::Pose => vec![
-            output(topic::view_pose(own.index), audience.of_poses()),
-            output(topic::evidence(own.index), audience.of_evidence(own.index)),
-        ],
-        Stage::Quality => vec![output(
-            topic::view_quality(own.index),
-            audience.of_qualities(),
-        )],
-        Stage::Fuse => vec![output(topic::pair_pose(own.index), audience.of_pairs())],
-        Stage::Triangulate => vec![output(topic::pose3d(), audience.of_results())],
+    let topology = resolved.topology();
+    let mut processes = topology.processes().iter();
+    let replayed = processes.find(|process| {
+        let index = process.index.unwrap_or(0);
+        process.service == stage.name() && index == own.index
+    });
+    let replayed = replayed
+        .ok_or("there is no such process in this deployment")
+        .or_fail(ExitKind::Usage)?;
+    let output = |topic: &String| replay::Output {
+        topic: topic.clone(),
+        n_receivers: topology.receivers_of(topic),
     };
     let job = replay::Job {
         file: it.file.clone(),
-        outputs,
+        outputs: replayed.outputs.iter().map(output).collect(),
         pace: it.speed.map_or(replay::Pace::Max, replay::Pace::Times),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         patience: resolved.patience(),

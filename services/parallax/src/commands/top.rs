@@ -8,8 +8,8 @@ use std::process::ExitCode;
 use clap::Args;
 use runtime::{ExitKind, Failure, Keys, Namespace, OrFail as _, Stop, deployments};
 
-use crate::deployment::Loaded;
 use crate::live::{self, Live};
+use crate::load;
 use crate::output;
 
 /// The screen beside the one that scrolls, without a cursor; and back.
@@ -67,7 +67,7 @@ pub(crate) fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if let Some(named) = named {
         let is_file = Path::new(named).extension().is_some_and(|it| it == "toml");
         let name = if is_file {
-            Loaded::read(Path::new(named), &[])?.deployment.name
+            load::read(Path::new(named), &[])?.deployment.name
         } else {
             named.to_owned()
         };

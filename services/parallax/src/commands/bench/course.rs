@@ -12,14 +12,15 @@ use serde_json::{Value, json};
 use super::load::Arguments;
 use super::pictures;
 use crate::commands::run::Planned;
-use crate::deployment::{Deployment, Loaded};
 use crate::globals::Globals;
 use crate::inputs;
+use crate::load;
 use crate::spread::Spread;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 use crate::trial::strike::{Blow, Strike};
+use deployment::Deployment;
 
 /// How long a stage waits for a view of cameras that do not exist, milliseconds.
 const DEADLINE_MS: u64 = 500;
@@ -200,7 +201,7 @@ impl Course {
 
     /// Takes no more of the footage than some seconds, and no more cameras than there are.
     fn shorten(&mut self, arguments: &Arguments) -> Result<(), Failure> {
-        let deployment = Loaded::read(&self.file, &self.set)?.deployment;
+        let deployment = load::read(&self.file, &self.set)?.deployment;
         let n_cameras = deployment.cameras.len();
         self.n_views = arguments.views.unwrap_or(n_cameras);
         if self.n_views > n_cameras {
@@ -223,7 +224,7 @@ impl Course {
     fn deployment(&self, case: Case) -> Result<Deployment, Failure> {
         let more = case.set().into_iter().map(str::to_owned);
         let set: Vec<String> = self.set.iter().cloned().chain(more).collect();
-        let mut it = Loaded::read(&self.file, &set)?.deployment;
+        let mut it = load::read(&self.file, &set)?.deployment;
         it.output = self.folder.join(case.folder());
         keep_views(&mut it, case.n_views);
         if let Some(folder) = &self.pictures {

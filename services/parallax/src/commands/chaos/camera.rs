@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn every_fault_is_one_that_a_camera_can_have() {
         for it in CameraFault::ALL {
-            let faults: capture::Faults = it.setting([40, 60]).parse().unwrap();
+            let faults: deployment::capture::Faults = it.setting([40, 60]).parse().unwrap();
             assert!(faults.at(39).is_none() && faults.at(40).is_some(), "{it:?}");
             assert!(faults.at(57).is_some() && faults.at(60).is_none(), "{it:?}");
         }

@@ -11,12 +11,13 @@ use super::Arguments;
 use super::census;
 use super::judge::Aftermath;
 use crate::commands::run::Planned;
-use crate::deployment::{Deployment, Loaded};
 use crate::globals::Globals;
 use crate::inputs;
+use crate::load;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
+use deployment::Deployment;
 
 /// Of the cameras that do not exist: frames a second, and how long a stage waits for a view that is late.
 const RATE_HZ: f64 = 5.0;
@@ -133,7 +134,7 @@ impl Ground {
         more: &[&str],
         change: &dyn Fn(&mut Deployment),
     ) -> Result<Planned, Failure> {
-        let mut loaded = Loaded::read(&self.file, &self.set(more))?;
+        let mut loaded = load::read(&self.file, &self.set(more))?;
         loaded.deployment.output = self.output(scenario);
         change(&mut loaded.deployment);
         Planned::new(&loaded.deployment, self.globals.level())

@@ -2,7 +2,7 @@
 
 use super::camera::CameraFault;
 use super::{moved, stall};
-use crate::plan::SERVICES;
+use crate::resolved::SERVICES;
 use crate::trial::strike::Blow;
 
 /// A fault.

@@ -13,8 +13,8 @@ use scene::{Scene, View};
 use serde_json::{Value, json};
 use statistics::Sorted;
 
-use crate::plan::Resolved;
 use crate::prepare::Prepared;
+use crate::resolved::Resolved;
 use crate::trial::stage::Stage;
 
 /// Frames a second on a machine that is fast enough.

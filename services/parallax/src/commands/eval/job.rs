@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use consistency::Learned;
+use deployment::fuse::Config;
 use experiment::{
     Bench, Expectation, Film, FilmError, FilmSettings, Header, Predicted, Record, Setup,
     SingleView, Trial, Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use fmp::Model;
-use fuse::Config;
 use indicatif::{ProgressBar, ProgressStyle};
 use pipeline::{SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -240,11 +240,12 @@ impl Job {
         let maps = film.footage_from_frame();
         let mean = maps.iter().map(scale).sum::<f32>() / maps.len().max(1) as f32;
         let mut config = self.config.clone();
-        if let fuse::Tau::File(tau) = &config.tau {
-            config.tau = fuse::Tau::Given(inputs::tau(&tau.file, self.model.n_parts())?);
+        if let deployment::fuse::Tau::File(tau) = &config.tau {
+            config.tau =
+                deployment::fuse::Tau::Given(inputs::tau(&tau.file, self.model.n_parts())?);
         }
         let learned = self.learned.as_ref();
-        let mut fuse = config.settings(self.n_candidates, mean, learned);
+        let mut fuse = fuse::settings(&config, self.n_candidates, mean, learned);
         if self.oracle {
             // The true errors are in tenths of the person's size.
             let tau = learned.filter(|_| !fuse.tau_tenths.is_empty());

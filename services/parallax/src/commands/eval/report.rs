@@ -84,9 +84,7 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
         |[width, height]| format!("{width}x{height}"),
     );
     let frames = format!("{n_frames} instants; sequences: {}", done.sequences.len());
-    let settings = job
-        .config
-        .settings(job.n_candidates, 1.0, job.learned.as_ref());
+    let settings = fuse::settings(&job.config, job.n_candidates, 1.0, job.learned.as_ref());
     let model = arguments.model.as_ref();
     let model = model.map_or("the one that ships".to_owned(), |it| {
         it.display().to_string()
@@ -101,8 +99,8 @@ fn about(arguments: &Arguments, job: &Job, done: &Done) -> Vec<(String, String)>
             format!(
                 "{}, alpha {}, beta {}, distances {}",
                 match job.config.energy {
-                    fuse::Energy::Paper => "the paper's",
-                    fuse::Energy::Released => "that of the released program",
+                    deployment::fuse::Energy::Paper => "the paper's",
+                    deployment::fuse::Energy::Released => "that of the released program",
                 },
                 settings.alpha,
                 settings.beta,

@@ -1,11 +1,12 @@
-//! Rewrites the error texts of TOML and JSON parsers for users.
+//! Rewrites the error texts of TOML and JSON parsers, and of the transport, for users.
+#![forbid(unsafe_code)]
 
 /// Replaces serde's terms in an error text by terms that users know.
 ///
 /// ```
 /// let text = "line 3: invalid type: string \"x\", expected u64";
 /// assert_eq!(
-///     runtime::in_words(text),
+///     wording::in_words(text),
 ///     "line 3: expected a whole number of at least 0, found the text \"x\""
 /// );
 /// ```
@@ -68,7 +69,8 @@ fn of_transport(text: &str) -> Option<String> {
 }
 
 /// The name of a transport error that has no text, as words.
-pub(crate) fn spaced(error: &impl std::fmt::Debug) -> String {
+#[must_use]
+pub fn spaced(error: &impl std::fmt::Debug) -> String {
     split_words(&format!("{error:?}"))
 }
 

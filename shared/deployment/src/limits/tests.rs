@@ -1,18 +1,19 @@
 //! Every numeric key of a deployment with values that cannot be: the message that each gets.
 
-use std::fs;
+use std::path::Path;
 
-use super::super::keys::KEYS;
-use super::super::{ConfigError, Loaded};
+use crate::{AnyMachine, ConfigError, Loaded, keys};
 
 const SHORT: &str = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
     [[camera]]\nname = 'a'\nsource = 'a.mp4'\n[[camera]]\nname = 'b'\nsource = 'b.mp4'\n";
 
 fn read(set: &str) -> Result<Loaded, ConfigError> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("deployment.toml");
-    fs::write(&file, SHORT).unwrap();
-    Loaded::read(&file, &[set.to_owned()])
+    Loaded::parse(
+        SHORT,
+        Path::new("deployment.toml"),
+        &[set.to_owned()],
+        &AnyMachine,
+    )
 }
 
 /// Key, values that are refused with what the message says; values that are taken.
@@ -400,15 +401,16 @@ fn every_key_with_a_number_says_what_it_may_be() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    for (key, _) in KEYS {
-        let is_asked = ROWS.iter().any(|it| it.0 == *key) || OTHERS.contains(key);
+    let keys = keys();
+    for key in keys.iter().map(|it| it.name.as_str()) {
+        let is_asked = ROWS.iter().any(|it| it.0 == key) || OTHERS.contains(&key);
         assert!(is_asked, "{key} stands in no table: what may it be?");
     }
 }
 
 #[test]
 fn what_is_hardly_meant_is_named_with_its_number() {
-    let doubts = |set: &str| read(set).unwrap().deployment.doubts();
+    let doubts = |set: &str| read(set).unwrap().deployment.doubts(Some(4));
     assert_eq!(doubts("capture.mode=lossless"), Vec::<String>::new());
     for (set, words) in [
         ("supervise.deadline_ms=5", "`supervise.deadline_ms` is 5"),

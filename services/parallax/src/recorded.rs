@@ -6,16 +6,16 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use deployment::{Deployment, RecordingPlan, Stage};
+use messages::topic;
 use recording::{About, Checked, Damaged, Kind, Recording, Without};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::audience::{Audience, Stage, Tape};
-use crate::deployment::Deployment;
 use crate::inputs;
-use crate::plan::{Dealing, Resolved};
-use crate::shipped::{self, Shipped};
+use crate::resolved::Resolved;
+use crate::shipped::Shipped;
 
 /// So many damaged messages are named, and so many places.
 const MOST_NAMED: usize = 10;
@@ -30,11 +30,11 @@ pub(crate) struct Settings {
 }
 
 /// What the recording of a run says about itself; the process that writes it adds the session.
-pub(crate) fn about(resolved: &Resolved, tape: &Tape) -> Result<About, Failure> {
+pub(crate) fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure> {
     let settings = Settings {
         files: fingerprints(&resolved.deployment)?,
         resolved: Resolved {
-            tape: None,
+            recording: None,
             ..resolved.clone()
         },
     };
@@ -45,8 +45,8 @@ pub(crate) fn about(resolved: &Resolved, tape: &Tape) -> Result<About, Failure> 
         began_unix_nanos: since.map_or(0, |it| it.as_nanos() as u64),
         settings: serde_json::to_string(&settings).or_fail(ExitKind::Run)?,
         without: Without {
-            pixels: tape.without_pixels,
-            evidence: tape.without_evidence,
+            pixels: plan.without_pixels,
+            evidence: plan.without_evidence,
         },
     })
 }
@@ -68,7 +68,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     ] {
         let Some(file) = file else { continue };
         // Files that ship may be several, and have one name.
-        let name = if shipped::is_one(file) {
+        let name = if deployment::is_shipped(file) {
             kind.name()
         } else {
             file.clone()
@@ -105,7 +105,7 @@ pub(crate) fn damaged(
     resolved: &Resolved,
     from: Stage,
 ) -> Result<Vec<Damaged>, Failure> {
-    let has_frames = Audience::new(resolved, &Dealing::new(&[], 0)).of_frames() > 0;
+    let has_frames = resolved.topology().receivers_of(&topic::frame(0)) > 0;
     let is_replayed = |topic: &str| match Kind::of_topic(topic) {
         Some(Kind::Frame) => from > Stage::Capture && has_frames,
         Some(Kind::ViewPose) => from > Stage::Pose,

@@ -1,46 +1,71 @@
-//! A deployment file: what a user starts, typed, with every default filled in.
+//! The deployment: the file that a user writes, and the processes and topics that follow from it.
+//!
+//! Reading order: [`Deployment`] and its sections (the keys, their meanings and defaults), [`Loaded`] (from text and
+//! `--set` options to a deployment that was checked), [`Topology`] (which processes run, and who sends to whom).
+//!
+//! Pure: texts in, values out. What only the machine can tell is asked of a [`Machine`].
+#![forbid(unsafe_code)]
+
+pub mod capture;
+pub mod fuse;
+pub mod pose;
+pub mod quality;
+pub mod results;
+pub mod triangulate;
+
+mod fault;
+mod processes;
 
 mod error;
+mod fields;
 mod keys;
 mod limits;
 mod lists;
 mod load;
+mod machine;
 mod places;
-mod processes;
+mod reference;
 mod rules;
+mod schema;
+mod shipped;
+mod topology;
 
 use std::path::{Path, PathBuf};
 
-use scene::Address;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use error::ConfigError;
-pub(crate) use keys::Entry;
-pub(crate) use load::Loaded;
-pub(crate) use processes::Runtime;
-pub(crate) use rules::fuse_numbers;
+pub use error::ConfigError;
+pub use keys::{Entry, Key, Origin, keys};
+pub use load::Loaded;
+pub use machine::{AnyMachine, Machine};
+pub use processes::{Policy, Runtime};
+pub use reference::reference;
+pub use rules::{Complaint, MAX_CORES, fuse_numbers};
+pub use schema::schema;
+pub use shipped::{SHIPPED, is_shipped, relative_to};
+pub use topology::{Process, RecordingPlan, Replay, Role, Stage, Topology};
 
-use crate::shipped;
-
-/// Everything a user may say about a run. Defaults are those of the services' `Config`s.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Everything that a deployment file can set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Deployment {
+pub struct Deployment {
     /// Name of the deployment: its processes share memory under it.
     pub name: String,
     /// Calibration of the cameras.
     pub rig: PathBuf,
-    /// Unit of the lengths in it, where it is not what its format says.
+    /// Unit of the lengths in the calibration, where it is not what its format tells.
     pub unit: Option<Unit>,
-    /// Direction against gravity in its world; replaces what it says.
+    /// Direction against gravity in the world of the calibration, `[x, y, z]`; replaces what the file has; found from
+    /// cameras and people where neither gives it.
     pub up: Option<[f64; 3]>,
-    /// Trained model; the one that ships with Parallax if not given.
+    /// Trained model; the one that ships with Parallax without it, or with the word `"shipped"`.
     pub model: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
-    /// Where the footage comes from, and how to get it: said where a file is missing.
+    /// Where the footage comes from, and how to get it: shown where a file that is named here is missing.
     pub data: Option<String>,
-    /// The cameras, in the order in which views are numbered.
+    /// The cameras, each a `[[camera]]` of its own, in the order in which views are numbered.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,
     /// How pixels get in.
@@ -59,7 +84,7 @@ pub(crate) struct Deployment {
     #[serde(default)]
     pub triangulate: triangulate::Config,
     /// What is left behind.
-    #[serde(default)]
+    #[serde(default, alias = "record")]
     pub results: results::Config,
     /// Deadlines and restarts.
     #[serde(default)]
@@ -70,9 +95,9 @@ pub(crate) struct Deployment {
 }
 
 /// A unit of lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Unit {
+pub enum Unit {
     /// Metres.
     M,
     /// Centimetres.
@@ -92,24 +117,21 @@ impl From<Unit> for geometry::files::Unit {
 }
 
 /// Section `[supervise]`: how long to wait, and how often to try again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub(crate) struct Supervision {
-    /// How long a stage waits for a view that is late, milliseconds; by mode if not given.
+pub struct Supervision {
+    /// How long a stage waits for a late view; 10000 lossless, 200 realtime.
     pub deadline_ms: Option<u64>,
-    /// How long the main loop of a process may stand still before it is killed, seconds; by mode if
-    /// not given.
+    /// How long a process may stand still before it is killed, seconds; 120 lossless, 10 realtime.
     pub hang_limit_s: Option<u64>,
-    /// How many signs of life, one every 150 ms, a process may miss that stands still because a signal
-    /// stopped it; where the latest frame wins also for how many a turn of any process but `results` and `record` may
-    /// compute, however short those before it were.
+    /// Signs of life, one every 150 ms, that a stopped process (SIGSTOP) may miss before it is killed; realtime: and
+    /// for how many of them a turn of any but `results` and `record` may compute, however short those before it were.
     pub missed_beats: u32,
-    /// Most restarts of one process within the window before it is given up.
+    /// Restarts of one process within the window before it is given up.
     pub max_restarts: u32,
     /// The window in which restarts are counted, seconds.
     pub restart_window_s: u64,
-    /// Longest 99th percentile from capture to result with which a run succeeds, milliseconds; any if
-    /// not given.
+    /// A run fails if 1 frame in 100 takes longer from capture to result; none without it.
     pub latency_budget_ms: Option<f64>,
 }
 
@@ -127,8 +149,18 @@ impl Default for Supervision {
 }
 
 impl Deployment {
+    /// Whether expected errors are predicted from the frames.
+    pub fn has_network(&self) -> bool {
+        self.quality.network.is_some()
+    }
+
+    /// Whether there are processes that send expected errors.
+    pub fn has_quality(&self) -> bool {
+        self.quality.table.is_some() || self.has_network()
+    }
+
     /// How long a stage waits for a view that is late, milliseconds.
-    pub(crate) fn deadline_ms(&self) -> u64 {
+    pub fn deadline_ms(&self) -> u64 {
         self.supervise
             .deadline_ms
             .unwrap_or(match self.capture.mode {
@@ -138,7 +170,7 @@ impl Deployment {
     }
 
     /// How long the main loop of a process may stand still before it is killed, seconds.
-    pub(crate) fn hang_limit_s(&self) -> u64 {
+    pub fn hang_limit_s(&self) -> u64 {
         self.supervise
             .hang_limit_s
             .unwrap_or(match self.capture.mode {
@@ -148,15 +180,15 @@ impl Deployment {
     }
 
     /// Takes every relative path as relative to `base`.
-    fn resolve(&mut self, base: &Path) {
+    fn resolve(&mut self, base: &Path, machine: &dyn Machine) {
         for path in [&mut self.rig, &mut self.output] {
             *path = base.join(&path);
         }
         if let Some(model) = &mut self.model {
-            *model = shipped::relative_to(model, base);
+            *model = relative_to(model, base);
         }
         for camera in &mut self.cameras {
-            camera.source = source(&camera.source, base);
+            camera.source = machine.footage(&camera.source, base);
         }
         let quality = &mut self.quality;
         let files = [&mut quality.table, &mut quality.onnx_runtime];
@@ -165,7 +197,7 @@ impl Deployment {
         }
         let may_ship = [&mut quality.network, &mut self.fuse.consistency];
         for file in may_ship.into_iter().flatten() {
-            *file = shipped::relative_to(file, base);
+            *file = relative_to(file, base);
         }
         if let fuse::Tau::File(tau) = &mut self.fuse.tau {
             tau.file = base.join(&tau.file);
@@ -176,16 +208,4 @@ impl Deployment {
             }
         }
     }
-}
-
-/// Footage as it is named in a file of the folder `base`; what is no file stays as it is, and is refused later.
-fn source(named: &str, base: &Path) -> String {
-    if Address::is_address(named) {
-        return Address::relative_to(named, base);
-    }
-    let on_disk = base.join(named);
-    if named.is_empty() || (footage::is_live(named) && !on_disk.exists()) {
-        return named.to_owned();
-    }
-    on_disk.to_string_lossy().into_owned()
 }

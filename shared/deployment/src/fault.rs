@@ -73,10 +73,10 @@ pub struct FaultError {
 /// Faults of one camera, written `freeze@30+20, unplug@80+10`: the kind, the first frame and the number of frames.
 ///
 /// ```
-/// let faults: capture::Faults = "freeze@30+20".parse()?;
-/// assert_eq!(faults.at(49).map(|it| it.kind), Some(capture::FaultKind::Freeze));
+/// let faults: deployment::capture::Faults = "freeze@30+20".parse()?;
+/// assert_eq!(faults.at(49).map(|it| it.kind), Some(deployment::capture::FaultKind::Freeze));
 /// assert_eq!(faults.at(50), None);
-/// # Ok::<(), capture::FaultError>(())
+/// # Ok::<(), deployment::capture::FaultError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]

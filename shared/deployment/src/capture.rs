@@ -1,11 +1,12 @@
 //! Section `[capture]` of a deployment file, and its `[[camera]]` entries.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Faults;
+pub use crate::fault::{Fault, FaultError, FaultKind, Faults};
 
 /// Where the pictures of one camera come from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// The camera of the rig, by its name there.
@@ -16,13 +17,14 @@ pub struct Camera {
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,
-    /// What is to go wrong with the camera, for a test: `freeze@30+20` (see [`Faults`]).
+    /// What is to go wrong with the camera, for a test: `freeze@30+20`.
     #[serde(default, skip_serializing_if = "Faults::is_empty")]
+    #[schemars(with = "String")]
     pub fault: Faults,
 }
 
 /// What happens when a stage is slower than its input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// Nothing is dropped: senders wait for their receivers.
@@ -33,7 +35,7 @@ pub enum Mode {
 }
 
 /// How fast recorded frames are handed out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Pace {
     /// As fast as they can be read and taken.
@@ -44,29 +46,28 @@ pub enum Pace {
 }
 
 /// How pixels get into the pipeline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Whether anything may be dropped.
+    /// `lossless`: nothing is dropped; `realtime`: the latest frame wins.
     pub mode: Mode,
-    /// How fast recorded frames are handed out.
+    /// `fast`: as fast as frames are taken; `realtime`: at the frame rate.
     pub pace: Pace,
-    /// Size `[width, height]` of the frames that the pipeline sees, pixels.
+    /// `[width, height]` of the frames that the pipeline sees, pixels.
     pub size: Option<[usize; 2]>,
-    /// Size of the frames as a share of the camera's; instead of `size`.
+    /// Size of the frames as a share of the camera's image; without either: the camera's size.
     pub scale: Option<f64>,
-    /// Turn every frame about the optical axis until the world's up points up, where the rig knows it.
+    /// Turn frames until the world's up points up.
     pub upright: bool,
-    /// Frames per second of image folders, and of a video that does not say.
+    /// Frames per second of images, and of a video that does not tell.
     pub frame_rate_hz: Option<f64>,
-    /// First frame of the footage to use, from 0.
+    /// First frame to use, from 0.
     pub start_frame: u64,
     /// Use every n-th frame.
     pub frame_step: u64,
     /// Most frames to use; all without it.
     pub n_frames: Option<u64>,
-    /// A camera whose picture stays the same, bit for bit, is called frozen from this repetition on; 0:
-    /// never. A single image as source may repeat for ever.
+    /// Repetitions of a picture, bit for bit, from which on its camera is called frozen; 0: never.
     pub frozen_after: u32,
 }
 

@@ -1,24 +1,24 @@
 //! Section `[triangulate]` of a deployment file.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How joints in the world are made of poses in the views.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Which joints: `parse14`, `umpm15` or `humaneva20`.
+    /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,
-    /// How a view's pose is made of those of its pairs: `mean`, as in the paper, or `consensus`.
+    /// One pose per view out of its pairs': `mean`, as in the paper, or `consensus`.
     pub combine: Combine,
     /// Reprojection error at which an observation begins to count less, pixels.
     pub loss_px: f64,
-    /// How much of a part's expected error makes its view uncertain about a joint, where a network predicts
-    /// it: 1 takes the prediction as it is, 0 leaves it to fusion alone.
+    /// How much of its expected error makes a view uncertain about a joint, where a network predicts it; 0: not at all.
     pub error_weight: f64,
 }
 
 /// How a view's pose is made of those of its pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Combine {
     /// Their mean, as in the paper.
@@ -28,22 +28,13 @@ pub enum Combine {
     Consensus,
 }
 
-impl From<Combine> for pipeline::Combine {
-    fn from(from: Combine) -> Self {
-        match from {
-            Combine::Mean => Self::Mean,
-            Combine::Consensus => Self::Consensus,
-        }
-    }
-}
-
 impl Default for Config {
     fn default() -> Self {
         Self {
             joints: "parse14".to_owned(),
             combine: Combine::default(),
             loss_px: geometry::Settings::default().loss_px,
-            error_weight: pipeline::SkeletonSettings::default().error_weight,
+            error_weight: 1.0,
         }
     }
 }

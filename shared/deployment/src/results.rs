@@ -1,16 +1,17 @@
-//! Section `[record]` of a deployment file.
+//! Section `[results]` of a deployment file.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a run leaves behind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Write `pose3d.trc` for `OpenSim`.
     pub trc: bool,
     /// Draw every n-th frame of every view; 0 draws none.
     pub overlay_every: u64,
-    /// The part whose epipolar lines are drawn, from 1 as in the model's tables.
+    /// Part whose epipolar lines are drawn, from 1.
     pub epipolar_part: usize,
 }
 

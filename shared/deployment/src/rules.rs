@@ -1,16 +1,18 @@
 //! What must hold of a deployment before anything is started.
 
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
-use runtime::MAX_CORES;
 
-use super::{ConfigError, Deployment, limits};
+use crate::{ConfigError, Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
 const MOST_AT_ONCE: usize = 8;
 
+/// Most cores of a machine that Linux numbers.
+pub const MAX_CORES: usize = 1024;
+
 /// A value that cannot be.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Complaint {
+pub struct Complaint {
     /// The key, with its section.
     pub key: String,
     /// Its value.
@@ -21,7 +23,7 @@ pub(crate) struct Complaint {
 
 impl Complaint {
     /// The same with its place: file and line, or the option of the command line.
-    pub(crate) fn at(self, place: String) -> ConfigError {
+    pub fn at(self, place: String) -> ConfigError {
         ConfigError::Value {
             place,
             key: self.key,
@@ -65,8 +67,8 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
 }
 
 /// Checks what depends on the machine that the deployment shall run on.
-pub(super) fn fits_machine(it: &Deployment) -> Result<(), Complaint> {
-    it.pose.precision.check().map_err(|why| Complaint {
+pub(super) fn fits_machine(it: &Deployment, machine: &dyn Machine) -> Result<(), Complaint> {
+    machine.has(it.pose.precision).map_err(|why| Complaint {
         key: "pose.precision".to_owned(),
         got: "\"bf16\"".to_owned(),
         expected: format!("\"f32\", or nothing: {why}"),
@@ -175,7 +177,7 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
 }
 
 /// Checks the numbers of a section `[fuse]`, which stands in files of its own, too.
-pub(crate) fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
+pub fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
     within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
     within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
     not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
@@ -184,7 +186,7 @@ pub(crate) fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
     if let Some(cells) = it.max_distance_cells {
         positive("fuse.max_distance_cells", cells)?;
     }
-    for tau in it.tau.px() {
+    for &tau in it.tau.given() {
         not_negative("fuse.tau", f64::from(tau))?;
     }
     limits::fuse(it)

@@ -1,19 +1,10 @@
 //! Why a deployment file was refused: always with the place, and with what would do.
 
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use crate::keys::OLDER;
 
 /// Why a deployment file was refused.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum ConfigError {
-    /// The file could not be read.
-    #[error("cannot read the deployment file {}{}", file.display(), why_not(file, source))]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+pub enum ConfigError {
     /// A key that nothing reads, most often a slip.
     #[error("{place}: unknown key `{key}`, {hint}")]
     UnknownKey {
@@ -50,7 +41,7 @@ impl ConfigError {
     /// Explains what the TOML reader said.
     ///
     /// Serde says `unknown field`, the name, then what it knows, each in backticks; of its other words see
-    /// [`runtime::in_words`].
+    /// [`wording::in_words`].
     ///
     /// * `key`: of the value that is wrong, with its section, where it is known.
     pub(super) fn explain(place: String, message: &str, key: Option<&str>) -> Self {
@@ -65,7 +56,7 @@ impl ConfigError {
                 hint,
             };
         }
-        let said = runtime::in_words(message.trim_end()).replace('\n', ", ");
+        let said = wording::in_words(message.trim_end()).replace('\n', ", ");
         let message = match (key, names.first()) {
             (Some(key), _) if message.starts_with("duplicate key") => {
                 format!("`{key}` is given twice{}", of_cameras(key))
@@ -79,17 +70,6 @@ impl ConfigError {
             _ => said,
         };
         Self::Malformed { place, message }
-    }
-}
-
-/// What the file is instead, where the words of the system do not tell.
-fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
-    if error.kind() == ErrorKind::InvalidData {
-        ": it is no text (not UTF-8)"
-    } else if file.is_dir() {
-        ": it is a folder; name the .toml file in it"
-    } else {
-        ""
     }
 }
 
@@ -117,6 +97,11 @@ fn of_what_is_missing(key: &str) -> &'static str {
 
 /// The nearest known name, or all of them if none is near.
 fn hint(key: &str, known: &[&str]) -> String {
+    let is_older = |name: &str| {
+        let newer = OLDER.iter().find(|it| it.0 == name);
+        newer.is_some_and(|it| known.contains(&it.1))
+    };
+    let known: Vec<&str> = known.iter().copied().filter(|it| !is_older(it)).collect();
     let nearest = known
         .iter()
         .map(|it| (strsim::damerau_levenshtein(key, it), it))
@@ -130,6 +115,8 @@ fn hint(key: &str, known: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
     #[test]

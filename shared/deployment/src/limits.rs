@@ -1,7 +1,7 @@
 //! Between which numbers every key of a deployment file lies, and which of them are doubtful.
 
-use super::rules::{Complaint, between, demand};
-use super::{Deployment, Runtime};
+use crate::rules::{Complaint, between, demand};
+use crate::{Deployment, Runtime, capture, fuse, pose};
 
 /// One hour, and one day, milliseconds.
 const HOUR_MS: u64 = 3_600_000;
@@ -56,7 +56,7 @@ pub(super) fn fuse(it: &fuse::Config) -> Result<(), Complaint> {
     if let Some(cells) = it.max_distance_cells {
         between("fuse.max_distance_cells", cells, 1e-3, 1e6)?;
     }
-    for tau in it.tau.px() {
+    for &tau in it.tau.given() {
         between("fuse.tau", f64::from(tau), 0.0, 1e6)?;
     }
     Ok(())
@@ -116,7 +116,9 @@ fn whole(key: &str, got: u64, least: u64, most: u64) -> Result<(), Complaint> {
 
 impl Deployment {
     /// What can be, but is hardly meant: with its number and what to try.
-    pub(crate) fn doubts(&self) -> Vec<String> {
+    ///
+    /// * `n_cores`: of the machine, where that is known.
+    pub fn doubts(&self, n_cores: Option<usize>) -> Vec<String> {
         let mut doubts = Vec::new();
         let is_lossless = self.capture.mode == capture::Mode::Lossless;
         let deadline_ms = self.deadline_ms();
@@ -149,8 +151,8 @@ impl Deployment {
             ));
         }
         let threads = self.pose.threads;
-        let cores = std::thread::available_parallelism().map_or(usize::MAX, usize::from);
-        if threads > 4 * cores {
+        let cores = n_cores.unwrap_or(usize::MAX);
+        if threads > cores.saturating_mul(4) {
             doubts.push(format!(
                 "`pose.threads` is {threads} in every pose process, of a machine of {cores} cores"
             ));

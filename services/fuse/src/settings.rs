@@ -1,0 +1,142 @@
+//! From the section `[fuse]` of a deployment to the settings of the optimiser.
+
+use consistency::Learned;
+use deployment::fuse::{Config, Energy, Switch, Tau, TauName, Views};
+use multiview::{EnergyKind, Settings, SwitchBy};
+use viewquality::TrainingErrors;
+
+/// The settings of the optimiser.
+///
+/// * `n_candidates`: most candidates that a view offers.
+/// * `frame_scale`: pixels of the frame per pixel of the footage, in which `tau` is given.
+/// * `learned`: the content of the file `consistency`; its weights are those of the paper's energy where this
+///   says nothing else.
+pub fn settings(
+    config: &Config,
+    n_candidates: usize,
+    frame_scale: f32,
+    learned: Option<&Learned>,
+) -> Settings {
+    let scaled = |px: Vec<f32>| px.into_iter().map(|it| it * frame_scale).collect();
+    let (energy, defaults) = match config.energy {
+        Energy::Paper => (EnergyKind::Paper, Settings::default()),
+        Energy::Released => (EnergyKind::Released, Settings::released()),
+    };
+    let weights = learned.filter(|_| config.energy == Energy::Paper);
+    let weights = weights.map(|it| it.weights);
+    let defaults = match weights {
+        None => defaults,
+        Some(it) => Settings {
+            alpha: it.alpha,
+            beta: it.beta,
+            max_distance_cells: it.max_distance_cells.unwrap_or(f64::INFINITY),
+            ..defaults
+        },
+    };
+    let is_learned = config.tau == Tau::Named(TauName::Learned);
+    let tau_tenths = learned.filter(|_| is_learned);
+    Settings {
+        energy,
+        alpha: config.alpha.unwrap_or(defaults.alpha),
+        beta: config.beta.unwrap_or(defaults.beta),
+        max_distance_cells: config
+            .max_distance_cells
+            .unwrap_or(defaults.max_distance_cells),
+        max_iterations: config.max_iterations,
+        epsilon_px: config.epsilon_px,
+        tau_px: scaled(tau_px(&config.tau)),
+        tau_tenths: tau_tenths.map_or_else(Vec::new, |it| it.tau_tenths.clone()),
+        rescue_px: scaled(rescue_px(&config.tau)),
+        switch: match config.switch {
+            Switch::Either => SwitchBy::Either,
+            Switch::Support => SwitchBy::Support,
+            Switch::Worse => SwitchBy::Worse,
+        },
+        facing: config.facing,
+        n_candidates,
+    }
+}
+
+/// What the views of a frame are solved in.
+pub fn views(from: Views) -> pipeline::Views {
+    match from {
+        Views::Pairs => pipeline::Views::Pairs,
+        Views::All => pipeline::Views::All,
+    }
+}
+
+fn training(tau: &Tau) -> Option<TrainingErrors> {
+    let Tau::Named(name) = tau else {
+        return None;
+    };
+    match name {
+        TauName::None | TauName::Learned => None,
+        TauName::HumanEva | TauName::HumanEvaMedian => Some(TrainingErrors::HUMANEVA),
+        TauName::Umpm | TauName::UmpmMedian => Some(TrainingErrors::UMPM),
+    }
+}
+
+/// The thresholds, pixels of the footage; empty if there are none, or if a file has them that is
+/// still to be read.
+pub fn tau_px(tau: &Tau) -> Vec<f32> {
+    let Some(errors) = training(tau) else {
+        return match tau {
+            Tau::Given(px) => px.clone(),
+            Tau::Named(_) | Tau::File(_) => Vec::new(),
+        };
+    };
+    let is_median = matches!(
+        tau,
+        Tau::Named(TauName::HumanEvaMedian | TauName::UmpmMedian)
+    );
+    let thresholds = if is_median {
+        viewquality::Tau::median_only(&errors)
+    } else {
+        viewquality::Tau::median_and_inaccuracy(&errors)
+    };
+    thresholds.px().to_vec()
+}
+
+/// The median training errors, by which the released energy takes one of two switched-off views
+/// back; empty if they are not known.
+fn rescue_px(tau: &Tau) -> Vec<f32> {
+    training(tau).map_or_else(Vec::new, |it| it.median_px.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_the_optimiser() {
+        let expected = Settings::default();
+        assert_eq!(
+            settings(&Config::default(), expected.n_candidates, 1.0, None),
+            expected
+        );
+    }
+
+    #[test]
+    fn the_papers_rule_is_the_median_alone() {
+        let px = |name| tau_px(&Tau::Named(name));
+        assert_eq!(
+            px(TauName::HumanEvaMedian),
+            TrainingErrors::HUMANEVA.median_px
+        );
+        assert_eq!(px(TauName::UmpmMedian), TrainingErrors::UMPM.median_px);
+        assert!(px(TauName::Umpm)[0] > px(TauName::UmpmMedian)[0]);
+        assert!(px(TauName::None).is_empty());
+    }
+
+    #[test]
+    fn the_released_energy_has_its_own_weight() {
+        let config = Config {
+            energy: Energy::Released,
+            ..Config::default()
+        };
+        assert_eq!(
+            settings(&config, 1, 1.0, None).alpha,
+            Settings::released().alpha
+        );
+    }
+}

@@ -1,0 +1,60 @@
+//! From the section `[pose]` of a deployment to the settings of the single-view step.
+
+use deployment::pose::{All, Config, Precision, Search, Window};
+use fmp::TrackSettings;
+use pipeline::{EvidenceWindow, ViewSettings};
+
+/// The settings of the single-view step.
+pub fn settings(config: &Config) -> ViewSettings {
+    ViewSettings {
+        window: match config.evidence_window {
+            Window::All(All::All) => EvidenceWindow::All,
+            Window::Levels(reach) => EvidenceWindow::Around(reach),
+        },
+        n_candidates: config.candidates,
+        min_separation: config.min_separation,
+        precision: precision(config.precision),
+        track: (config.search == Search::Tracked).then_some(TrackSettings {
+            levels: config.tracked_levels,
+            margin: config.tracked_margin,
+            full_every: config.tracked_full_every,
+            max_gap: config.tracked_max_gap,
+            max_drop: config.tracked_max_drop,
+            speed: config.tracked_speed,
+            max_gap_s: config.tracked_max_gap_ms / 1000.0,
+            full_every_s: config.tracked_full_every_ms / 1000.0,
+        }),
+    }
+}
+
+/// How exactly the filters are evaluated.
+pub fn precision(from: Precision) -> fmp::Precision {
+    match from {
+        Precision::F32 => fmp::Precision::F32,
+        Precision::Bf16 => fmp::Precision::Bf16,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_those_of_the_step() {
+        assert_eq!(settings(&Config::default()), ViewSettings::default());
+    }
+
+    #[test]
+    fn less_precision_is_had_by_its_name_only() {
+        let of = |text: &str| toml::from_str::<Config>(text).map(|it| settings(&it).precision);
+        assert_eq!(of("search = \"tracked\""), Ok(fmp::Precision::F32));
+        assert_eq!(of("precision = \"bf16\""), Ok(fmp::Precision::Bf16));
+        of("precision = \"f16\"").unwrap_err();
+    }
+
+    #[test]
+    fn who_asks_for_tracking_by_name_gets_its_defaults() {
+        let config: Config = toml::from_str("search = \"tracked\"").unwrap();
+        assert_eq!(settings(&config).track, Some(TrackSettings::default()));
+    }
+}

@@ -1,0 +1,241 @@
+//! From a file and the options of the command line to a deployment.
+
+use std::ops::Range;
+use std::path::Path;
+
+use toml::de::DeTable;
+use toml::{Table, Value};
+
+use crate::keys::OLDER;
+use crate::lists::fits;
+use crate::places::{malformed, of_set};
+use crate::rules::{self, Complaint};
+use crate::{ConfigError, Deployment, Machine};
+
+/// A deployment, and what of it was said by whom.
+#[derive(Debug)]
+pub struct Loaded {
+    /// What it says, paths resolved, defaults filled in.
+    pub deployment: Deployment,
+    /// What the file says, as it stands there.
+    pub in_file: Table,
+    /// What the command line says.
+    pub on_command_line: Table,
+}
+
+impl Loaded {
+    /// Reads the text of a deployment file; `set` are `key=value` pairs that replace what it says.
+    ///
+    /// * `file`: where the text comes from. Relative paths are relative to it, whoever gives them.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`], the first that is found.
+    pub fn parse(
+        text: &str,
+        file: &Path,
+        set: &[String],
+        machine: &dyn Machine,
+    ) -> Result<Self, ConfigError> {
+        let malformed = |error: &toml::de::Error| malformed(file, text, error);
+        let mut in_file: Table = toml::from_str(text).map_err(|it| malformed(&it))?;
+        rename_older(&mut in_file, |older| {
+            place(file, text, span_of(text, older))
+        })?;
+        let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
+        let on_command_line = overrides(set)?;
+        let mut given = in_file.clone();
+        if !on_command_line.is_empty() {
+            merge(&mut given, on_command_line.clone());
+            let read = given.clone().try_into();
+            deployment = read.map_err(|error| of_set(&error))?;
+        }
+        let placed = |it: Complaint| {
+            let at = place(file, text, span_of_any(text, &it.key));
+            it.at(at)
+        };
+        fits(&deployment, &given).map_err(placed)?;
+        deployment.resolve(&machine.folder_of(file), machine);
+        let checked =
+            rules::check(&deployment).and_then(|()| rules::fits_machine(&deployment, machine));
+        checked.map_err(placed)?;
+        Ok(Self {
+            deployment,
+            in_file,
+            on_command_line,
+        })
+    }
+}
+
+impl Loaded {
+    /// A deployment that was read before, with other values.
+    ///
+    /// * `refused`: says what may not be replaced, by its dotted key, and why.
+    ///
+    /// Relative paths in `set` are relative to the working folder.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`], the first that is found.
+    pub fn again(
+        deployment: &Deployment,
+        set: &[String],
+        refused: impl Fn(&str) -> Option<String>,
+        machine: &dyn Machine,
+    ) -> Result<Self, ConfigError> {
+        let on_command_line = overrides(set)?;
+        for argument in set {
+            let key = argument.split('=').next().unwrap_or_default().trim();
+            if let Some(message) = refused(&of_today(key)) {
+                let place = format!("--set {argument}");
+                return Err(ConfigError::Malformed { place, message });
+            }
+        }
+        let in_file = Table::try_from(deployment)
+            .map_err(|error| ConfigError::explain("--set".to_owned(), &error.to_string(), None))?;
+        let mut table = in_file.clone();
+        merge(&mut table, on_command_line.clone());
+        let read: Result<Deployment, toml::de::Error> = table.try_into();
+        let mut deployment = read.map_err(|error| of_set(&error))?;
+        fits(&deployment, &on_command_line).map_err(|it| it.at("--set".to_owned()))?;
+        deployment.resolve(&machine.folder_of(Path::new("")), machine);
+        rules::check(&deployment).map_err(|it| it.at("--set".to_owned()))?;
+        Ok(Self {
+            deployment,
+            in_file,
+            on_command_line,
+        })
+    }
+}
+
+/// What stands in the place of a file that only the defaults are asked of.
+const NO_FILE: &str = "name = \"\"\nrig = \"\"\noutput = \"\"\ncamera = []\n";
+
+impl Loaded {
+    /// The defaults alone; the keys that have none are empty.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] where `set` gives what cannot be.
+    pub fn defaults(set: &[String]) -> Result<Self, ConfigError> {
+        let mut table = Table::new();
+        let on_command_line = overrides(set)?;
+        let explain = |error: toml::de::Error| of_set(&error);
+        merge(&mut table, NO_FILE.parse().map_err(explain)?);
+        merge(&mut table, on_command_line.clone());
+        Ok(Self {
+            deployment: table.try_into().map_err(explain)?,
+            in_file: Table::new(),
+            on_command_line,
+        })
+    }
+}
+
+/// `file:line` of a span; the file alone where there is none.
+pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
+    let Some(before) = span.and_then(|it| text.get(..it.start)) else {
+        return file.display().to_string();
+    };
+    let line = 1 + before.matches('\n').count();
+    format!("{}:{line}", file.display())
+}
+
+/// Where a dotted key stands in `text`; where its section does if the key itself is not there.
+fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
+    let document = DeTable::parse(text).ok()?;
+    let mut table = document.into_inner();
+    let mut found = None;
+    for name in key.split('.') {
+        let (name, value) = table.into_iter().find(|(it, _)| it.get_ref() == name)?;
+        found = Some(name.span());
+        match value.into_inner() {
+            toml::de::DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found
+}
+
+/// The same, where the file has the older name of its section too.
+fn span_of_any(text: &str, key: &str) -> Option<Range<usize>> {
+    span_of(text, key).or_else(|| {
+        let (section, rest) = key.split_once('.')?;
+        let (older, _) = OLDER.iter().find(|it| it.1 == section)?;
+        span_of(text, &format!("{older}.{rest}")).or_else(|| span_of(text, older))
+    })
+}
+
+/// A key by the name that its section has today.
+fn of_today(key: &str) -> String {
+    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
+    match OLDER.iter().find(|it| it.0 == section) {
+        Some((_, name)) => format!("{name}.{rest}"),
+        None => key.to_owned(),
+    }
+}
+
+/// Gives sections the names that they have today.
+///
+/// * `place`: of a section that is given by both names.
+fn rename_older(table: &mut Table, place: impl Fn(&str) -> String) -> Result<(), ConfigError> {
+    for (older, name) in OLDER {
+        let Some(section) = table.remove(older) else {
+            continue;
+        };
+        if table.contains_key(name) {
+            let message = format!(
+                "`{older}` is the older name of `{name}`, and both are given: move the keys of `{older}` to `{name}`"
+            );
+            return Err(ConfigError::Malformed {
+                place: place(older),
+                message,
+            });
+        }
+        table.insert(name.to_owned(), section);
+    }
+    Ok(())
+}
+
+/// What `--set section.key=value` says, as a table.
+///
+/// A value that is not TOML is taken as text, so that `--set fuse.energy=released` needs no quotes.
+fn overrides(set: &[String]) -> Result<Table, ConfigError> {
+    let mut table = Table::new();
+    for argument in set {
+        let malformed = |message: &str| ConfigError::Malformed {
+            place: format!("--set {argument}"),
+            message: message.to_owned(),
+        };
+        let (key, value) = argument
+            .split_once('=')
+            .ok_or_else(|| malformed("expected key=value, for example fuse.workers=2"))?;
+        let value = format!("it = {value}")
+            .parse::<Table>()
+            .ok()
+            .and_then(|mut it| it.remove("it"))
+            .unwrap_or_else(|| Value::String(value.to_owned()));
+        let nested = key.trim().rsplit('.').fold(value, |inner, name| {
+            Value::Table(Table::from_iter([(name.to_owned(), inner)]))
+        });
+        if let Value::Table(nested) = nested {
+            merge(&mut table, nested);
+        }
+    }
+    rename_older(&mut table, |_| "--set".to_owned())?;
+    Ok(table)
+}
+
+/// Puts what `over` says in the place of what `table` says, key by key.
+fn merge(table: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(over)) => merge(inner, over),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,255 @@
+//! Deployment files that are read, and those that are refused.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{AnyMachine, fuse, keys, pose};
+
+const SHORT: &str = r#"
+name = "two"
+rig = "rig.toml"
+model = "/models/m.mat"
+output = "out"
+
+[[camera]]
+name = "a"
+source = "videos/a.mp4"
+
+[[camera]]
+name = "b"
+source = "/videos/b.mp4"
+
+[fuse]
+workers = 2
+"#;
+
+fn read(text: &str, set: &[&str]) -> Result<Loaded, ConfigError> {
+    let set: Vec<String> = set.iter().map(|it| (*it).to_owned()).collect();
+    Loaded::parse(text, Path::new("/room/deployment.toml"), &set, &AnyMachine)
+}
+
+fn refused(text: &str, set: &[&str]) -> String {
+    let error = read(text, set).unwrap_err().to_string();
+    error.split_once("deployment.toml").map_or_else(
+        || error.clone(),
+        |(_, rest)| format!("deployment.toml{rest}"),
+    )
+}
+
+#[test]
+fn a_short_file_is_enough() {
+    let got = read(SHORT, &[]).unwrap().deployment;
+    assert_eq!(got.fuse.workers, 2);
+    assert_eq!(got.pose, pose::Config::default());
+    assert_eq!(got.cameras.len(), 2);
+}
+
+#[test]
+fn relative_paths_are_relative_to_the_file() {
+    let loaded = read(SHORT, &[]).unwrap();
+    let folder = loaded.deployment.rig.parent().unwrap();
+    assert!(folder.is_absolute() && loaded.deployment.rig.ends_with("rig.toml"));
+    assert_eq!(
+        loaded.deployment.model.as_deref(),
+        Some(Path::new("/models/m.mat"))
+    );
+    assert!(Path::new(&loaded.deployment.cameras[0].source).starts_with(folder));
+    assert_eq!(loaded.deployment.cameras[1].source, "/videos/b.mp4");
+}
+
+#[test]
+fn the_command_line_wins_over_the_file() {
+    let set = [
+        "fuse.workers=3",
+        "fuse.energy=released",
+        "capture.n_frames=7",
+    ];
+    let got = read(SHORT, &set).unwrap().deployment;
+    assert_eq!(got.fuse.workers, 3);
+    assert_eq!(got.fuse.energy, fuse::Energy::Released);
+    assert_eq!(got.capture.n_frames, Some(7));
+}
+
+#[test]
+fn a_list_that_is_too_long_is_refused_and_a_shorter_one_may_replace_a_longer() {
+    let text = SHORT.replace("workers = 2", "pairs = [['a', 'b'], ['b', 'a']]");
+    let one = read(&text, &["fuse.pairs=[['a', 'b']]"]).unwrap();
+    assert_eq!(one.deployment.fuse.pairs.len(), 1);
+    let pairs = text.replace("['b', 'a']", "['b', 'a', 'c']");
+    let got = refused(&pairs, &[]);
+    assert!(
+        got.ends_with("`fuse.pairs` is a list of 3 values, expected 2"),
+        "{got}"
+    );
+    let size = format!("{SHORT}\n[capture]\nsize = [64, 48, 3]\n");
+    let got = refused(&size, &[]);
+    assert!(
+        got.ends_with("`capture.size` is a list of 3 values, expected 2"),
+        "{got}"
+    );
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_line_and_a_suggestion() {
+    let text = SHORT.replace("workers", "wrokers");
+    assert_eq!(
+        refused(&text, &[]),
+        "deployment.toml:16: unknown key `wrokers`, did you mean `workers`?"
+    );
+}
+
+#[test]
+fn an_unknown_key_of_the_command_line_is_named_too() {
+    assert_eq!(
+        refused(SHORT, &["fuse.wrokers=3"]),
+        "--set: unknown key `wrokers`, did you mean `workers`?"
+    );
+}
+
+#[test]
+fn a_missing_key_is_named() {
+    let text = SHORT.replace("rig = ", "# rig = ");
+    assert!(refused(&text, &[]).contains("missing key `rig`"));
+}
+
+#[test]
+fn a_value_of_another_kind_is_refused_with_its_line() {
+    let text = SHORT.replace("workers = 2", "workers = \"two\"");
+    let got = refused(&text, &[]);
+    assert!(got.starts_with("deployment.toml:16: "), "{got}");
+}
+
+#[test]
+fn a_value_that_cannot_be_is_refused_with_its_line() {
+    let text = SHORT.replace("workers = 2", "workers = 0");
+    assert_eq!(
+        refused(&text, &[]),
+        "deployment.toml:16: `fuse.workers` is 0, expected 1 to 16"
+    );
+}
+
+#[test]
+fn what_has_no_meaning_for_all_views_at_once_is_refused() {
+    let text = SHORT.replace("workers = 2", "views = \"all\"");
+    read(&text, &[]).unwrap();
+    for (set, expected) in [
+        ("fuse.energy=released", "`fuse.energy` is \"released\""),
+        ("fuse.pairs=[['a', 'b']]", "`fuse.pairs` is given"),
+        (
+            "triangulate.combine=consensus",
+            "`triangulate.combine` is \"consensus\"",
+        ),
+    ] {
+        let got = refused(&text, &[set]);
+        assert!(got.contains(expected), "{got}");
+        read(&text, &["fuse.views=pairs", set]).unwrap();
+    }
+}
+
+#[test]
+fn text_that_is_not_toml_is_refused_with_its_line() {
+    let got = refused(&SHORT.replace("[fuse]", "[fuse"), &[]);
+    assert!(got.starts_with("deployment.toml:15: "), "{got}");
+}
+
+/// Whether a text and an option are taken; what is refused is said with its place.
+fn is_taken(text: &str, set: &str) -> bool {
+    let file = Path::new("deployment.toml");
+    match Loaded::parse(text, file, &[set.to_owned()], &AnyMachine) {
+        Ok(loaded) => {
+            loaded.entries().unwrap();
+            true
+        }
+        Err(error) => {
+            let said = error.to_string();
+            let begin = ["deployment.toml", "--set"];
+            assert!(begin.iter().any(|it| said.starts_with(it)), "{said}");
+            assert!(!said.contains('\n'), "{said}");
+            false
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_a_deployment_or_an_error_with_its_place(text: String, set: String) {
+        is_taken(&text, &set);
+    }
+
+    #[test]
+    fn a_changed_deployment_is_one_or_an_error_with_its_place(
+        at in 0..SHORT.len(),
+        n in 0_usize..6,
+        to in "[a-z0-9=\\[\\]{}.,\"'\n -]{0,8}",
+    ) {
+        let mut text = SHORT.to_owned();
+        text.replace_range(at..(at + n).min(SHORT.len()), &to);
+        is_taken(&text, "fuse.workers=3");
+    }
+
+    #[test]
+    fn any_value_of_a_known_key_is_taken_or_refused(
+        key in prop::sample::select(keys().into_iter().map(|it| it.name).collect::<Vec<_>>()),
+        value in prop::sample::select(vec![
+            "-1", "0", "1", "99999999999", "1e308", "nan", "-inf", "''", "'x'", "[]", "[1]",
+            "[nan]", "{}", "[[1]]", "{ file = 3 }", "{ a = 'b' }", "true", "1979-05-27", "=",
+        ]),
+    ) {
+        is_taken(SHORT, &format!("{key}={value}"));
+    }
+}
+
+#[test]
+fn an_override_without_a_value_is_refused() {
+    assert!(refused(SHORT, &["fuse.workers"]).contains("expected key=value"));
+}
+
+#[test]
+fn the_section_of_the_results_may_have_its_older_name() {
+    let text = format!("{SHORT}\n[record]\noverlay_every = 3\n");
+    let loaded = read(&text, &["record.trc=false"]).unwrap();
+    assert_eq!(loaded.deployment.results.overlay_every, 3);
+    assert!(!loaded.deployment.results.trc);
+    // Whoever gives it, and by whichever name: it is one section, and shown by its name of today.
+    let mixed = read(&text, &["results.overlay_every=4"]).unwrap();
+    assert_eq!(mixed.deployment.results.overlay_every, 4);
+    let entries = loaded.entries().unwrap();
+    let origin = |key: &str| entries.iter().find(|it| it.key == key).unwrap().origin;
+    assert_eq!(origin("results.overlay_every"), crate::Origin::File);
+    assert_eq!(origin("results.trc"), crate::Origin::CommandLine);
+}
+
+#[test]
+fn a_wrong_value_under_the_older_name_is_refused_with_its_line() {
+    let text = format!("{SHORT}\n[record]\nepipolar_part = 0\n");
+    assert_eq!(
+        refused(&text, &[]),
+        "deployment.toml:19: `results.epipolar_part` is 0, expected 1 to 1000"
+    );
+    let text = format!("{SHORT}\n[record]\ntcr = true\n");
+    assert_eq!(
+        refused(&text, &[]),
+        "deployment.toml:19: unknown key `tcr`, did you mean `trc`?"
+    );
+}
+
+#[test]
+fn both_names_of_the_results_at_once_are_refused() {
+    let text = format!("{SHORT}\n[record]\ntrc = true\n[results]\noverlay_every = 1\n");
+    assert_eq!(
+        refused(&text, &[]),
+        "deployment.toml:18: `record` is the older name of `results`, and both are given: move the keys of `record` to \
+         `results`"
+    );
+    let got = refused(SHORT, &["record.trc=true", "results.trc=false"]);
+    assert!(
+        got.starts_with("--set: `record` is the older name"),
+        "{got}"
+    );
+}
+
+#[test]
+fn the_older_name_is_not_suggested() {
+    let got = refused(&format!("{SHORT}\n[recrd]\n"), &[]);
+    assert!(!got.contains("`record`"), "{got}");
+}

@@ -1,0 +1,99 @@
+//! Section `[pose]` of a deployment file.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The single-view solver, and what it hands on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Levels either side of every candidate's that fusion may use, or `"all"`.
+    pub evidence_window: Window,
+    /// Most distinct candidates that a view offers to fusion.
+    pub candidates: usize,
+    /// Least mean distance of two candidates' parts, in box sides.
+    pub min_separation: f64,
+    /// Threads of one pose process.
+    pub threads: usize,
+    /// `f32`: the same bits everywhere; `bf16`: faster and less exact, needs a processor with AMX.
+    pub precision: Precision,
+    /// `full`: every frame everywhere; `tracked`: near the last pose, faster and approximate.
+    pub search: Search,
+    /// `tracked`: levels either side of the last pose's that are searched.
+    pub tracked_levels: u16,
+    /// `tracked`: how far around the last pose's box is searched, as a share of its longer side.
+    pub tracked_margin: f64,
+    /// `tracked`: every n-th frame is searched in full.
+    pub tracked_full_every: u64,
+    /// `tracked`: largest step from frame to frame that is followed; 1: no frame may be left out.
+    pub tracked_max_gap: u64,
+    /// `tracked`: fall of the score since the last full search that asks for another, of the same frame.
+    pub tracked_max_drop: f32,
+    /// `tracked`: how far a pose may move in a second, as a share of its box's longer side.
+    pub tracked_speed: f64,
+    /// `tracked`: longest time from frame to frame that is followed; longer ones are searched in full.
+    pub tracked_max_gap_ms: f64,
+    /// `tracked`: a frame so long after the last full search is searched in full.
+    pub tracked_full_every_ms: f64,
+}
+
+/// How exactly the responses of the filters are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// In single precision: the same bits on every machine.
+    #[default]
+    F32,
+    /// Features and weights rounded to bfloat16, sums in single precision: faster and less exact.
+    Bf16,
+}
+
+/// How a pose process looks for poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Search {
+    /// Every frame on all levels and everywhere: the paper's method.
+    #[default]
+    Full,
+    /// Near the best pose of the last frame, and in full now and then: faster, and approximate.
+    Tracked,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            evidence_window: Window::All(All::All),
+            candidates: 8,
+            min_separation: 1.0,
+            threads: 1,
+            precision: Precision::F32,
+            search: Search::Full,
+            tracked_levels: 4,
+            tracked_margin: 0.25,
+            tracked_full_every: 10,
+            tracked_max_gap: 2,
+            tracked_max_drop: 0.3,
+            tracked_speed: 2.0,
+            tracked_max_gap_ms: 250.0,
+            tracked_full_every_ms: 500.0,
+        }
+    }
+}
+
+/// Levels of the pyramid around those of the candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a number of levels, or \"all\"")]
+pub enum Window {
+    /// So many levels either side of every candidate's own.
+    Levels(u16),
+    /// All of them.
+    All(All),
+}
+
+/// The word `all`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum All {
+    /// Everything.
+    All,
+}

@@ -1,0 +1,233 @@
+//! What must hold of the processes of any deployment.
+
+use core::fmt::Write as _;
+use std::path::Path;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{AnyMachine, Loaded};
+
+/// A deployment of so many cameras.
+fn deployment(n_views: usize, settings: &str) -> Deployment {
+    let mut text = "name = 'a'\nrig = 'r'\noutput = 'o'\n".to_owned();
+    for view in 0..n_views {
+        write!(text, "[[camera]]\nname = 'c{view}'\nsource = 's'\n").unwrap();
+    }
+    text.push_str(settings);
+    let loaded = Loaded::parse(&text, Path::new("d.toml"), &[], &AnyMachine);
+    loaded.unwrap().deployment
+}
+
+fn recording(without_evidence: bool) -> RecordingPlan {
+    RecordingPlan {
+        file: PathBuf::new(),
+        without_pixels: false,
+        without_evidence,
+        queue_mb: 1,
+    }
+}
+
+fn replay(from: Stage) -> Replay {
+    Replay {
+        file: PathBuf::new(),
+        from,
+        speed: None,
+    }
+}
+
+fn of_service<'a>(topology: &'a Topology, service: &str) -> Vec<&'a Process> {
+    let processes = topology.processes().iter();
+    processes.filter(|it| it.service == service).collect()
+}
+
+#[test]
+fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed() {
+    for n_views in 3..=6 {
+        let deployment = deployment(n_views, "[fuse]\nviews = 'all'\nworkers = 3\n");
+        let recording = recording(false);
+        let recorded = Topology::new(&deployment, Some(&recording), None);
+        let replay = replay(Stage::Triangulate);
+        let replayed = Topology::new(&deployment, None, Some(&replay));
+        for topology in [&recorded, &replayed] {
+            assert_eq!(topology.n_workers(), 1);
+            assert_eq!(of_service(topology, "fuse").len(), 1);
+            let answers = |it: &Process| {
+                let inputs = it.inputs.iter();
+                inputs
+                    .filter(|input| input.starts_with("pair-pose/"))
+                    .count()
+            };
+            for it in topology.processes() {
+                let reads = ["triangulate", "results", "record"].contains(&it.service);
+                assert_eq!(answers(it), usize::from(reads), "{}", it.name);
+            }
+            assert_eq!(topology.pairs_of(0).len(), n_views - 1);
+        }
+        let fused = replayed.process("fuse-0").unwrap();
+        assert!(fused.is_replayed && fused.inputs.is_empty());
+        assert_eq!(fused.outputs, [topic::pair_pose(0)]);
+        assert_eq!(recorded.receivers_of(&topic::pair_pose(0)), 3);
+        assert_eq!(replayed.receivers_of(&topic::pair_pose(0)), 2);
+        // What stands in for a pose process sends to nobody but those that run.
+        assert_eq!(recorded.receivers_of(&topic::view_pose(0)), 4);
+        assert_eq!(replayed.receivers_of(&topic::view_pose(0)), 2);
+    }
+}
+
+#[test]
+fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
+    let deployment = deployment(3, "[quality]\nnetwork = 'n'\n[fuse]\nworkers = 2\n");
+    let recording = recording(false);
+    let topology = Topology::new(&deployment, Some(&recording), None);
+    let n = |topic: String| topology.receivers_of(&topic);
+    assert_eq!(n(topic::frame(1)), 4, "pose, quality, results, record");
+    assert_eq!(
+        n(topic::view_pose(1)),
+        6,
+        "quality, fuse twice, triangulate, results, record"
+    );
+    // Pairs 0-1 and 1-2 are the first worker's, 0-2 the second's.
+    assert_eq!([0, 1, 2].map(|view| n(topic::evidence(view))), [3, 2, 3]);
+    assert_eq!(n(topic::view_quality(1)), 4, "fuse twice, results, record");
+    assert_eq!(n(topic::pair_pose(1)), 3, "triangulate, results, record");
+    assert_eq!(n(topic::pose3d()), 2, "results, record");
+    let names: Vec<&str> = topology
+        .processes()
+        .iter()
+        .map(|it| it.name.as_str())
+        .collect();
+    let expected = "record results triangulate fuse-0 fuse-1 quality-0 quality-1 quality-2 pose-0 pose-1 pose-2 \
+                    capture-0 capture-1 capture-2";
+    assert_eq!(names.join(" "), expected);
+}
+
+#[test]
+fn every_pair_has_one_worker() {
+    for most in 1..12 {
+        let deployment = deployment(5, &format!("[fuse]\nworkers = {most}\n"));
+        let topology = Topology::new(&deployment, None, None);
+        let mut dealt: Vec<usize> = (0..topology.n_workers())
+            .flat_map(|worker| topology.pairs_of(worker))
+            .map(|it| it.0)
+            .collect();
+        dealt.sort_unstable();
+        assert_eq!(dealt, (0..10).collect::<Vec<_>>(), "{most} workers");
+    }
+}
+
+#[test]
+fn a_view_is_read_by_the_workers_of_its_pairs() {
+    let on = |n_views, settings: &str| {
+        let topology = Topology::new(&deployment(n_views, settings), None, None);
+        [0, 1, 2].map(|view| topology.workers_on(view))
+    };
+    assert_eq!(on(3, "[fuse]\nworkers = 3\n"), [2, 2, 2]);
+    let one = "[fuse]\nworkers = 4\npairs = [['c1', 'c0'], ['c0', 'c1']]\n";
+    assert_eq!(on(3, one), [1, 1, 0]);
+}
+
+#[test]
+fn one_camera_has_no_worker() {
+    let topology = Topology::new(&deployment(1, "[fuse]\nworkers = 4\n"), None, None);
+    assert_eq!(topology.n_workers(), 0);
+    assert_eq!(topology.workers_on(0), 0);
+    assert_eq!(of_service(&topology, "fuse").len(), 0);
+}
+
+prop_compose! {
+    fn any_settings()(
+        n_views in 1_usize..=6,
+        views in prop::sample::select(vec!["pairs", "all"]),
+        workers in 1_usize..=8,
+        quality in prop::sample::select(vec!["", "table = 't'", "network = 'n'"]),
+        some in prop::option::of(prop::collection::vec((0_usize..6, 1_usize..6), 1..4)),
+    ) -> (usize, String) {
+        let mut pairs = String::new();
+        if let Some(some) = some.filter(|_| views == "pairs" && n_views > 1) {
+            let pair = |(first, step): (usize, usize)| {
+                let first = first % n_views;
+                let second = (first + 1 + step % (n_views - 1)) % n_views;
+                format!("['c{first}', 'c{second}']")
+            };
+            let all: Vec<String> = some.into_iter().map(pair).collect();
+            pairs = format!("pairs = [{}]\n", all.join(", "));
+        }
+        (n_views, format!("[quality]\n{quality}\n[fuse]\nviews = '{views}'\nworkers = {workers}\n{pairs}"))
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_input_has_one_sender_and_all_count_the_same(
+        (n_views, settings) in any_settings(),
+        without_evidence in prop::option::of(any::<bool>()),
+        from in prop::option::of(prop::sample::select(Stage::ALL.to_vec())),
+    ) {
+        let deployment = deployment(n_views, &settings);
+        let recording = without_evidence.map(recording);
+        let replay = from.map(replay);
+        let topology = Topology::new(&deployment, recording.as_ref(), replay.as_ref());
+        let all = topology.processes();
+
+        // A topic has one sender, and a receiver nothing twice.
+        let mut outputs: Vec<&String> = all.iter().flat_map(|it| &it.outputs).collect();
+        let n_outputs = outputs.len();
+        outputs.sort();
+        outputs.dedup();
+        prop_assert_eq!(outputs.len(), n_outputs);
+        for it in all {
+            let mut inputs = it.inputs.clone();
+            inputs.sort();
+            inputs.dedup();
+            prop_assert_eq!(inputs.len(), it.inputs.len(), "{}", it.name);
+            for input in &it.inputs {
+                prop_assert!(outputs.contains(&input), "{} waits for {input}, which has no sender", it.name);
+            }
+        }
+        for topic in &outputs {
+            let lists = all.iter().filter(|it| it.inputs.contains(topic)).count();
+            prop_assert_eq!(topology.receivers_of(topic), lists);
+        }
+
+        // Senders start after their receivers.
+        for (nth, sender) in all.iter().enumerate() {
+            let before = |topic: &String| all[nth..].iter().all(|it| !it.inputs.contains(topic));
+            prop_assert!(sender.outputs.iter().all(before), "{}", sender.name);
+        }
+
+        // Everybody knows the same workers.
+        let n_workers = of_service(&topology, "fuse").len();
+        prop_assert_eq!(n_workers, topology.n_workers());
+        for service in ["triangulate", "results", "record"] {
+            for it in of_service(&topology, service).into_iter().filter(|it| !it.is_replayed) {
+                for worker in 0..8 {
+                    let takes = it.inputs.contains(&topic::pair_pose(worker));
+                    prop_assert_eq!(takes, worker < n_workers, "{} of {}", it.name, worker);
+                }
+            }
+        }
+
+        // A worker reads the evidence of the views of its pairs, and of no others.
+        for worker in of_service(&topology, "fuse").into_iter().filter(|it| !it.is_replayed) {
+            let pairs = topology.pairs_of(worker.index.unwrap());
+            prop_assert!(!pairs.is_empty());
+            for view in 0..n_views {
+                let is_its = pairs.iter().any(|it| it.1.contains(&view));
+                prop_assert_eq!(worker.inputs.contains(&topic::evidence(view)), is_its);
+            }
+        }
+
+        // What stands in for a process sends the same, and takes nothing.
+        let whole = Topology::new(&deployment, recording.as_ref(), None);
+        for (it, real) in all.iter().zip(whole.processes()) {
+            let stage = Stage::of_name(it.service);
+            let stands_in = from.zip(stage).is_some_and(|(from, stage)| stage < from);
+            prop_assert_eq!(it.is_replayed, stands_in);
+            prop_assert_eq!((&it.name, &it.outputs, it.role), (&real.name, &real.outputs, real.role));
+            let inputs = if stands_in { &[][..] } else { &real.inputs[..] };
+            prop_assert_eq!(&it.inputs[..], inputs);
+        }
+        prop_assert_eq!(topology.n_recorders(), 1 + usize::from(recording.is_some()));
+    }
+}
