@@ -3,6 +3,7 @@
 use c3d::C3d;
 use consistency::{Appearance, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
+use deployment::{AnyMachine, Loaded, Stage, Topology};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
@@ -17,6 +18,51 @@ use viewquality::{Card, Network, Table, Tau};
 fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
     checksum::Envelope { magic, version: 1 }.seal(payload)
 }
+/// Deployment files; the first line may be an option of the command line.
+///
+/// What is taken shows all its keys, is taken again as it was written out, and has processes that fit together.
+pub fn deployment_text(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let file = std::path::Path::new("deployment.toml");
+    let option = input
+        .lines()
+        .next()
+        .and_then(|it| it.strip_prefix("#--set "));
+    let set: Vec<String> = option.map(str::to_owned).into_iter().collect();
+    let loaded = match Loaded::parse(input, file, &set, &AnyMachine) {
+        Ok(it) => it,
+        Err(error) => {
+            let told = error.to_string();
+            let place = ["deployment.toml", "--set"];
+            assert!(place.iter().any(|it| told.starts_with(it)), "{told}");
+            return;
+        }
+    };
+    assert_eq!(
+        loaded.entries().expect("keys").len(),
+        deployment::keys().len()
+    );
+    let again = Loaded::again(&loaded.deployment, &[], |_| None, &AnyMachine).expect("as it was");
+    assert_eq!(again.deployment, loaded.deployment);
+    let topology = Topology::new(&loaded.deployment, None, None);
+    let all = topology.processes();
+    let sends = |topic: &String| all.iter().filter(|it| it.outputs.contains(topic)).count();
+    for topic in all.iter().flat_map(|it| &it.inputs) {
+        assert_eq!(sends(topic), 1, "{topic}");
+    }
+    for stage in Stage::ALL {
+        let n = all.iter().filter(|it| it.service == stage.name()).count();
+        let most = if stage == Stage::Fuse {
+            topology.n_workers()
+        } else {
+            topology.n_views()
+        };
+        assert!(n <= most, "{stage:?}");
+    }
+}
+
 /// The authors' text models.
 pub fn model_text(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {

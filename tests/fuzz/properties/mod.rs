@@ -5,8 +5,9 @@ mod files;
 mod messages;
 
 pub use files::{
-    calibration, consistency, model_mat, model_own, model_text, motion_c3d, people_lines,
-    people_mat, quality_network, quality_table, run_files, scene_text, training_checkpoint,
+    calibration, consistency, deployment_text, model_mat, model_own, model_text, motion_c3d,
+    people_lines, people_mat, quality_network, quality_table, run_files, scene_text,
+    training_checkpoint,
     type_table,
 };
 pub use messages::{wire_fusion, wire_messages};
@@ -18,6 +19,7 @@ pub type Target = (&'static str, fn(&[u8]));
 pub const TARGETS: [Target; 16] = [
     ("calibration", calibration),
     ("consistency", consistency),
+    ("deployment_text", deployment_text),
     ("model_mat", model_mat),
     ("model_own", model_own),
     ("model_text", model_text),
