@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use capture::Feed;
 use consistency::{Appearance, Learned, Shape};
+use deployment::Deployment;
 use fmp::Model;
 use footage::{SourceSpec, Turn};
 use geometry::Rig;
@@ -22,7 +23,6 @@ use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
 use crate::shipped::Shipped;
-use deployment::Deployment;
 
 /// The named model, or the one that ships with Parallax.
 pub(crate) fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {

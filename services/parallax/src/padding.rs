@@ -1,7 +1,8 @@
 //! How much of the frames is padding, because their size has another aspect than the camera's image.
 
-use crate::prepare::View;
 use deployment::Deployment;
+
+use crate::prepare::View;
 
 /// Shares of padding below this are not worth a word.
 const WORTH_A_WORD: f64 = 0.1;

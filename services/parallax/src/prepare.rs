@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use deployment::Deployment;
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
@@ -15,7 +16,6 @@ use viewquality::Predictor;
 use crate::inputs;
 use crate::padding;
 use crate::resolved::Resolved;
-use deployment::Deployment;
 
 /// One view, ready.
 #[derive(Debug, Clone)]

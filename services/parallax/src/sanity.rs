@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use capture::Feed;
+use deployment::Deployment;
 use footage::SourceSpec;
 use geometry::Rig;
 use geometry::files::{Finding, Severity, check as check_rig};
@@ -11,7 +12,6 @@ use scene::Address;
 
 use crate::inputs;
 use crate::resolved::Resolved;
-use deployment::Deployment;
 
 /// Rates further apart than this factor cannot be paired frame by frame.
 const RATES: f64 = 1.02;

@@ -1,6 +1,7 @@
 //! Which way is up, where neither calibration nor deployment says it: from how cameras are held, and from people.
 
 use capture::Feed;
+use deployment::Deployment;
 use fmp::Layout;
 use footage::{Fill, Size, SourceSpec, Warp};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
@@ -10,7 +11,6 @@ use runtime::Failure;
 
 use crate::inputs;
 use crate::search::Search;
-use deployment::Deployment;
 
 /// Pictures of a camera that are searched, and the frames between them.
 const N_PICTURES: u64 = 2;

@@ -48,6 +48,7 @@ pub enum Pace {
 /// How pixels get into the pipeline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Capture")]
 pub struct Config {
     /// `lossless`: nothing is dropped; `realtime`: the latest frame wins.
     pub mode: Mode,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The energy that ties the views together, and its optimiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Fuse")]
 pub struct Config {
     /// `paper`: the paper's; `released`: what the authors' program computes.
     pub energy: Energy,

@@ -100,6 +100,10 @@ pub(crate) fn camera_keys() -> Vec<Key> {
 
 impl Loaded {
     /// Every key with its value, in order.
+    ///
+    /// # Errors
+    ///
+    /// A value that TOML cannot hold, such as a whole number beyond 64 bits with sign.
     pub fn entries(&self) -> Result<Vec<Entry>, toml::ser::Error> {
         let table = Table::try_from(&self.deployment)?;
         let entry = |it: Key| Entry {

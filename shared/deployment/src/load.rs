@@ -38,11 +38,13 @@ impl Loaded {
         machine: &dyn Machine,
     ) -> Result<Self, ConfigError> {
         let malformed = |error: &toml::de::Error| malformed(file, text, error);
-        let mut in_file: Table = toml::from_str(text).map_err(|it| malformed(&it))?;
-        rename_older(&mut in_file, |older| {
-            place(file, text, span_of(text, older))
-        })?;
+        let mut in_file: Result<Table, _> = toml::from_str(text);
+        if let Ok(table) = &mut in_file {
+            rename_older(table, |older| place(file, text, span_of(text, older)))?;
+        }
+        // The complaints of the structs tell more than those of a table: they go first.
         let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
+        let in_file = in_file.map_err(|it| malformed(&it))?;
         let on_command_line = overrides(set)?;
         let mut given = in_file.clone();
         if !on_command_line.is_empty() {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// The single-view solver, and what it hands on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Pose")]
 pub struct Config {
     /// Levels either side of every candidate's that fusion may use, or `"all"`.
     pub evidence_window: Window,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Where the expected errors of the parts come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Quality")]
 pub struct Config {
     /// Network that predicts the errors of every view, an ONNX file, or `"shipped"`, the one that ships; in place of a
     /// table.

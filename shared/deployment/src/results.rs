@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// What a run leaves behind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Results")]
 pub struct Config {
     /// Write `pose3d.trc` for `OpenSim`.
     pub trc: bool,

@@ -177,6 +177,10 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
 }
 
 /// Checks the numbers of a section `[fuse]`, which stands in files of its own, too.
+///
+/// # Errors
+///
+/// The first number that cannot be.
 pub fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
     within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
     within("fuse.max_iterations", it.max_iterations, 1, 1000)?;

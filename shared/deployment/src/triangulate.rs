@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// How joints in the world are made of poses in the views.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(rename = "Triangulate")]
 pub struct Config {
     /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,

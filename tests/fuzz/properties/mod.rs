@@ -7,8 +7,7 @@ mod messages;
 pub use files::{
     calibration, consistency, deployment_text, model_mat, model_own, model_text, motion_c3d,
     people_lines, people_mat, quality_network, quality_table, run_files, scene_text,
-    training_checkpoint,
-    type_table,
+    training_checkpoint, type_table,
 };
 pub use messages::{wire_fusion, wire_messages};
 
@@ -16,7 +15,7 @@ pub use messages::{wire_fusion, wire_messages};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 16] = [
+pub const TARGETS: [Target; 17] = [
     ("calibration", calibration),
     ("consistency", consistency),
     ("deployment_text", deployment_text),

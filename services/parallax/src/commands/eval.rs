@@ -12,6 +12,7 @@ use std::sync::Mutex;
 use clap::Args;
 use datasets::Selection;
 use deployment::fuse::Config;
+use deployment::fuse_numbers;
 use experiment::{FilmSettings, Version};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence, SequenceError};
@@ -23,7 +24,6 @@ use crate::globals::Globals;
 use crate::inputs;
 use crate::nothing;
 use crate::shipped::Shipped;
-use deployment::fuse_numbers;
 use job::Job;
 
 pub(super) use job::no_film;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use deployment::RecordingPlan;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use crate::commands::run::Planned;
@@ -15,7 +16,6 @@ use crate::load;
 use crate::plan;
 use crate::resolved::Resolved;
 use crate::{output, recorded};
-use deployment::RecordingPlan;
 use room::{Forecast, Growth, PerFrame};
 
 /// Lives of the recording process that are looked for.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use deployment::{Replay, Stage};
 use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
@@ -16,7 +17,6 @@ use crate::resolved::Resolved;
 use crate::shipped::Shipped;
 use crate::stage;
 use crate::{inputs, output};
-use deployment::{Replay, Stage};
 
 /// What to replay.
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
+use deployment::Deployment;
 use runtime::{
     ExitKind, Failure, OrFail as _, Scheduling, Stop, free_shared_memory, needed_bytes, preflight,
 };
@@ -20,7 +21,6 @@ use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use crate::summary::{Report, Watcher};
 use crate::{output, scheduling};
-use deployment::Deployment;
 
 /// What to run.
 #[derive(Debug, Args)]

@@ -253,3 +253,13 @@ fn the_older_name_is_not_suggested() {
     let got = refused(&format!("{SHORT}\n[recrd]\n"), &[]);
     assert!(!got.contains("`record`"), "{got}");
 }
+
+#[test]
+fn a_number_larger_than_any_is_refused_as_its_key_asks() {
+    let text = SHORT.replace("workers = 2", "workers = 99999999999999999999");
+    let got = refused(&text, &[]);
+    assert!(
+        got.contains("`fuse.workers`: expected a whole number"),
+        "{got}"
+    );
+}

@@ -4,6 +4,7 @@ use core::fmt::{self, Display, Formatter};
 use std::fs;
 use std::path::PathBuf;
 
+use deployment::Deployment;
 use runfiles::Percentiles;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
@@ -20,7 +21,6 @@ use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 use crate::trial::strike::{Blow, Strike};
-use deployment::Deployment;
 
 /// How long a stage waits for a view of cameras that do not exist, milliseconds.
 const DEADLINE_MS: u64 = 500;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use deployment::Deployment;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::Action;
 use serde_json::Value;
@@ -17,7 +18,6 @@ use crate::load;
 use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
-use deployment::Deployment;
 
 /// Of the cameras that do not exist: frames a second, and how long a stage waits for a view that is late.
 const RATE_HZ: f64 = 5.0;
