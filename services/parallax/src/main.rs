@@ -9,12 +9,14 @@
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
+//! | the deployment | [`deployment`](../deployment/index.html): keys, defaults, rules, processes |
+//! | pages | [`report`](../report/index.html) |
 //! | offline | [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
-//! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html), [`modelpage`](../modelpage/index.html), [`runpage`](../runpage/index.html) |
+//! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html) |
 //! | method | [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`fmp`](../fmp/index.html): the paper |
 //! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html) |
-//! | tools | [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
-//! | ground | [`skeleton`](../skeleton/index.html); for tests only: [`testkit`](../testkit/index.html) |
+//! | tools | [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
+//! | ground | [`skeleton`](../skeleton/index.html), [`wording`](../wording/index.html), [`statistics`](../statistics/index.html), [`checksum`](../checksum/index.html), [`causes`](../causes/index.html), [`files`](../files/index.html), [`onnx`](../onnx/index.html); for tests only: [`testkit`](../testkit/index.html) |
 //!
 //! Begin with [`pipeline`](../pipeline/index.html) for the way of a frame, [`multiview`](../multiview/index.html) for the
 //! energy, [`messages`](../messages/index.html) for what travels between processes.

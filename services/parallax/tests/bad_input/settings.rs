@@ -334,7 +334,7 @@ const INPUTS: &[Mistake] = &[
         "model for a network",
         |it| section(it, "[quality]\nnetwork = \"model.plx\""),
         &["model.plx"],
-        &["no ONNX file"],
+        &["not an ONNX file"],
     ),
     input(
         "absent consistency",

@@ -5,9 +5,6 @@ use std::path::{Path, PathBuf};
 
 use super::blocks::prose;
 
-/// Pages that another tool writes, and that need not be there yet.
-const AWAITED: [&str; 1] = ["docs/settings.md"];
-
 /// Links of files that lead nowhere, with their places.
 pub(crate) fn broken(root: &Path, files: &[PathBuf]) -> Vec<String> {
     let mut problems = Vec::new();
@@ -44,12 +41,7 @@ fn follow(root: &Path, file: &Path, target: &str) -> Result<(), String> {
         file.parent().unwrap_or(root).join(path)
     };
     if !page.exists() {
-        let is_awaited = AWAITED.iter().any(|it| normal(&page) == root.join(it));
-        return if is_awaited {
-            Ok(())
-        } else {
-            Err("there is no such file".to_owned())
-        };
+        return Err("there is no such file".to_owned());
     }
     if anchor.is_empty() {
         return Ok(());
@@ -64,19 +56,6 @@ fn follow(root: &Path, file: &Path, target: &str) -> Result<(), String> {
     } else {
         Err("there is no such heading".to_owned())
     }
-}
-
-/// A path without `.` and `..`.
-fn normal(path: &Path) -> PathBuf {
-    let mut normal = PathBuf::new();
-    for part in path.components() {
-        if part.as_os_str() == ".." {
-            normal.pop();
-        } else {
-            normal.push(part);
-        }
-    }
-    normal
 }
 
 /// The anchor that a heading gets: lower case, without punctuation, a hyphen for a space.
