@@ -7,4 +7,3 @@ mod settings;
 pub use service::{Job, NetworkSource, Source, run};
 pub use settings::selection;
 pub use stage::HELD_REALTIME;
-pub use viewquality::Device;

@@ -1,7 +1,8 @@
 //! The loop of every service: wait, receive, check, join, compute, send, account, end.
 //!
 //! A service declares its inputs and outputs on a [`Stage`] and gives the step that turns one frame into messages. The
-//! stage decides when a frame is complete, handles late messages and the end of streams, and ends the process. Every message is checked and decoded once, when it is received.
+//! stage decides when a frame is complete, handles late messages and the end of streams, and ends the process. Every
+//! message is checked and decoded once, when it is received.
 //!
 //! | input | method | a frame waits for it |
 //! |---|---|---|

@@ -46,7 +46,8 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// Checks the session, the sender and the times of a message. The end of a worker's stream carries the worker's number instead of a pair.
+    /// Checks the session, the sender and the times of a message. The end of a worker's stream
+    /// names no pair, so its number is not checked.
     pub(crate) fn check<M: Stamped>(
         self,
         message: &M,
