@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use deployment::{Deployment, Process, Stage};
+use deployment::{Deployment, Process, Stage, Topology};
 use messages::topic;
 use runtime::{
     Delivery, DeploymentPlan, ExitKind, Failure, HEARTBEAT, Namespace, OrFail as _, TopicPlan,
@@ -105,10 +105,12 @@ pub(crate) fn topics(
 fn processes(resolved: &Resolved, file: &Path) -> Vec<ProcessSpec> {
     let topology = resolved.topology();
     let processes = topology.processes().iter();
-    processes.map(|it| process(it, resolved, file)).collect()
+    processes
+        .map(|it| process(it, &topology, resolved, file))
+        .collect()
 }
 
-fn process(it: &Process, resolved: &Resolved, file: &Path) -> ProcessSpec {
+fn process(it: &Process, topology: &Topology, resolved: &Resolved, file: &Path) -> ProcessSpec {
     let mut args: Vec<OsString> = vec!["--plan".into(), file.into()];
     if let Some(index) = it.index {
         args.extend(["--index".into(), index.to_string().into()]);
@@ -128,6 +130,7 @@ fn process(it: &Process, resolved: &Resolved, file: &Path) -> ProcessSpec {
             deployment::Role::Redundant => Role::Redundant,
             deployment::Role::Optional => Role::Optional,
         },
+        senders: topology.senders_to(it).map(|it| it.name.clone()).collect(),
         scheduling: scheduling::asked(&resolved.deployment.runtime, it.service, &it.name),
         // Not known of what is written at the end; and where nothing may be lost nothing is hurried.
         most_work: (is_hurried && is_even).then_some(EVEN),

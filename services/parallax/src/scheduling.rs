@@ -77,6 +77,7 @@ mod tests {
             service: name.to_owned(),
             args: Vec::new(),
             role: Role::Optional,
+            senders: Vec::new(),
             scheduling: scheduling.parse().unwrap(),
             most_work: None,
         }

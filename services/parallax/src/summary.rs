@@ -93,6 +93,11 @@ impl Watcher {
             Event::GivenUp { process, restarts } => {
                 self.say(&format!("{process} is given up after {restarts} restarts"));
             }
+            Event::Dismissed { process } => {
+                self.say(&format!(
+                    "{process} is stopped: nothing is left that sends to it"
+                ));
+            }
             _ => {}
         }
     }

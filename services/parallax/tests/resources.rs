@@ -64,7 +64,8 @@ fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
 
 #[test]
 fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal() {
-    let case = Case::new("filling", &[20; 3], PLAIN);
+    let more = PLAIN.to_owned() + "[supervise]\nmax_restarts = 2\ndeadline_ms = 2000\n";
+    let case = Case::new("filling", &[20; 3], &more);
     // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the
     // next run. Five times, and further until it was early enough once.
     let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\

@@ -121,6 +121,11 @@ pub enum Event<'a> {
         /// How often it was restarted.
         restarts: u32,
     },
+    /// A process is stopped: every process that sends to it is given up.
+    Dismissed {
+        /// Its name.
+        process: &'a str,
+    },
     /// The stop request is sent to all processes.
     Stopping,
 }

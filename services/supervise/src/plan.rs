@@ -41,6 +41,9 @@ pub struct ProcessSpec {
     pub args: Vec<OsString>,
     /// What happens to the run without it.
     pub role: Role,
+    /// Names of the processes that send to it. Once all of them are given up, it is stopped: its receivers would wait
+    /// for a process that is alive and has nothing to send.
+    pub senders: Vec<String>,
     /// Its requests to the system's scheduler.
     pub scheduling: Scheduling,
     /// After some messages: how many times the processor time of the longest iteration of its main loop an

@@ -163,6 +163,7 @@ impl Supervisor<'_> {
                 self.receive(index, now);
                 self.reap(index, now)?;
             }
+            self.dismiss(now);
             if self.is_done(now) {
                 break;
             }
@@ -172,6 +173,31 @@ impl Supervisor<'_> {
             self.sleep(self.until_due(), Some(self.stop))?;
         }
         Ok(())
+    }
+
+    /// Stops the processes that wait for messages that nothing is left to send.
+    fn dismiss(&mut self, now: Instant) {
+        for index in 0..self.watches.len() {
+            let watch = &self.watches[index];
+            let is_lost = |name: &String| {
+                let mut others = self.watches.iter();
+                others.any(|it| it.spec.name == *name && it.is_lost())
+            };
+            let senders = &watch.spec.senders;
+            let is_idle = !watch.is_finished() && watch.is_idle(&self.plan.policy, now);
+            if watch.is_dismissed || !is_idle || senders.is_empty() || !senders.iter().all(is_lost)
+            {
+                continue;
+            }
+            let watch = &mut self.watches[index];
+            watch.is_dismissed = true;
+            if let Some(child) = watch.child() {
+                child.terminate();
+            }
+            (self.on_event)(Event::Dismissed {
+                process: &watch.spec.name,
+            });
+        }
     }
 
     /// Time until the next restart.
@@ -293,7 +319,8 @@ impl Supervisor<'_> {
         self.receive(index, now);
         let watch = &mut self.watches[index];
         // A process that was signalled together with the supervisor may end earlier.
-        let is_in_order = watch.reports_finished() || self.stop.is_requested();
+        let is_in_order =
+            watch.reports_finished() || watch.is_dismissed || self.stop.is_requested();
         if let Some(death) = death_of(status, is_in_order) {
             return self.died(index, death, now);
         }

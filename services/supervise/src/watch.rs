@@ -50,6 +50,8 @@ pub(crate) struct Watch {
     /// The last received message.
     received: Change,
     work: Work,
+    /// Whether it was stopped because nothing is left that sends to it.
+    pub(crate) is_dismissed: bool,
 }
 
 /// The state of a process.
@@ -151,6 +153,7 @@ impl Watch {
             iteration: Change::new(now),
             received: Change::new(now),
             work: Work::default(),
+            is_dismissed: false,
         }
     }
 
@@ -163,6 +166,7 @@ impl Watch {
         self.iteration = Change::new(now);
         self.received = Change::new(now);
         self.work = Work::default();
+        self.is_dismissed = false;
     }
 
     pub(crate) fn child(&self) -> Option<&Child> {
@@ -333,6 +337,15 @@ impl Watch {
 
     pub(crate) fn is_given_up(&self) -> bool {
         matches!(self.phase, Phase::GivenUp)
+    }
+
+    /// Whether it will send nothing more, without having sent the end of its stream.
+    pub(crate) fn is_lost(&self) -> bool {
+        match self.phase {
+            Phase::GivenUp => true,
+            Phase::Ended(_) => self.is_dismissed,
+            Phase::Running(_) | Phase::Due(_) => false,
+        }
     }
 
     /// Its output about its end: from the last `error:` on, or the last lines.

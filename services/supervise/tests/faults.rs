@@ -58,6 +58,27 @@ fn state_of(run: &Run, process: &str) -> State {
 }
 
 #[test]
+fn a_process_is_stopped_once_all_that_send_to_it_are_given_up() {
+    let mut case = Case::new(
+        Delivery::Lossless,
+        &[
+            ("sink", "receive 0", Role::Optional),
+            ("view-0", "fail 1", Role::Optional),
+            ("view-1", "fail 1", Role::Optional),
+        ],
+    );
+    case.plan.policy.max_restarts = 1;
+    case.plan.processes[0].senders = vec!["view-0".to_owned(), "view-1".to_owned()];
+    let run = case.run(|_, _| {});
+    let dismissed = Recorded::Dismissed("sink".to_owned());
+    assert_eq!(run.events.last(), Some(&Recorded::Stopping));
+    assert!(run.events.contains(&dismissed), "{:#?}", run.events);
+    assert_eq!(state_of(&run, "sink"), State::Stopped);
+    assert_eq!(run.deaths("sink"), []);
+    assert!(run.outcome().is_degraded());
+}
+
+#[test]
 fn a_sender_that_waits_for_a_killed_receiver_continues() {
     let mut case = Case::new(
         Delivery::Lossless,

@@ -167,6 +167,12 @@ impl Topology {
         self.processes.iter().find(|it| it.name == name)
     }
 
+    /// The processes that send to another: each publishes a topic that it subscribes to.
+    pub fn senders_to<'a>(&'a self, receiver: &'a Process) -> impl Iterator<Item = &'a Process> {
+        let sends = |it: &&Process| it.outputs.iter().any(|out| receiver.inputs.contains(out));
+        self.processes.iter().filter(sends)
+    }
+
     /// How many processes subscribe to a topic.
     pub fn receivers_of(&self, topic: &str) -> usize {
         self.count(|it| it.inputs.iter().any(|input| input == topic))

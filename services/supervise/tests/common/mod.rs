@@ -24,6 +24,7 @@ pub(crate) enum Recorded {
     Died(String, Death),
     Restarting(String, Duration),
     GivenUp(String, u32),
+    Dismissed(String),
     Stopping,
 }
 
@@ -59,6 +60,7 @@ impl Case {
                 service: "dummy".to_owned(),
                 args: behaviour.split(' ').map(Into::into).collect(),
                 role,
+                senders: Vec::new(),
                 scheduling: Scheduling::default(),
                 most_work: None,
             });
@@ -193,6 +195,7 @@ fn note(event: &Event<'_>) -> Option<Recorded> {
         Event::Died { process, death } => Recorded::Died((*process).to_owned(), *death),
         Event::Restarting { process, pause } => Recorded::Restarting((*process).to_owned(), *pause),
         Event::GivenUp { process, restarts } => Recorded::GivenUp((*process).to_owned(), *restarts),
+        Event::Dismissed { process } => Recorded::Dismissed((*process).to_owned()),
         Event::Stopping => Recorded::Stopping,
         Event::Health { .. } => return None,
     })

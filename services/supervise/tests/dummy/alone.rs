@@ -27,6 +27,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         service: "dummy".to_owned(),
         args: vec!["hang-once".into()],
         role: Role::Essential,
+        senders: Vec::new(),
         scheduling: Scheduling::default(),
         most_work: None,
     });

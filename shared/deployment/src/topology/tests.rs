@@ -92,6 +92,14 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
     assert_eq!(n(topic::view_quality(1)), 4, "fuse twice, results, record");
     assert_eq!(n(topic::pair_pose(1)), 3, "triangulate, results, record");
     assert_eq!(n(topic::pose3d()), 2, "results, record");
+    let senders = |name: &str| {
+        let receiver = topology.process(name).unwrap();
+        let senders = topology.senders_to(receiver);
+        senders.map(|it| it.name.as_str()).collect::<Vec<_>>()
+    };
+    assert_eq!(senders("capture-1"), [""; 0]);
+    assert_eq!(senders("pose-1"), ["capture-1"]);
+    assert_eq!(senders("quality-1"), ["pose-1", "capture-1"]);
     let names: Vec<&str> = topology
         .processes()
         .iter()
