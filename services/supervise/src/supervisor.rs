@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use messages::{Health, Metrics, topic};
 use runtime::{
-    Bus, BusError, Child, Cleaner, ExitKind, Fault, Launch, LockError, PortError, PreflightError,
-    Stop, preflight, wait_for_any,
+    Bus, BusError, Child, Cleaner, ExitKind, Fault, Launch, LockError, Losses, PortError,
+    PreflightError, Stop, preflight, wait_for_any,
 };
 
 use crate::watch::{Phase, Sequel, Watch, death_of};
@@ -342,6 +342,10 @@ impl Supervisor<'_> {
                 (self.on_event)(Event::Restarting { process, pause });
             }
             Sequel::GiveUp => {
+                let process = watch.spec.name.as_str();
+                if let Err(error) = Losses::of(&self.plan.namespace).note(process) {
+                    tracing::warn!(process, %error, "senders will wait for it for long");
+                }
                 (self.on_event)(Event::GivenUp {
                     process: &watch.spec.name,
                     restarts: watch.epoch,

@@ -9,7 +9,9 @@ use rustix::process::{
     Pid, Resource, Rlimit, Signal, getppid, getrlimit, set_parent_process_death_signal, setrlimit,
 };
 
-use crate::{Bus, Delivery, ExitKind, Failure, Health, Launch, Progress, Stop, init_logging};
+use crate::{
+    Bus, Delivery, ExitKind, Failure, Health, Launch, Patience, Progress, Stop, init_logging,
+};
 
 /// What a service works with: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
@@ -64,12 +66,16 @@ impl Service {
     /// same time but take different times; a restarted process finds the others running. With lossless
     /// delivery a late receiver would miss earlier messages, so receivers are waited for as long as for room.
     ///
-    /// * `deadline`: the patience later on.
-    pub fn patience_at_start(&self, deadline: Duration) -> Duration {
-        match (self.launch.epoch, self.launch.delivery) {
+    /// * `deadline`: the patience later on, and for receivers that were given up.
+    pub fn patience_at_start(&self, deadline: Duration) -> Patience {
+        let limit = match (self.launch.epoch, self.launch.delivery) {
             (0, Delivery::Lossless) => deadline.max(self.bus.patience()),
             (0, Delivery::Realtime) => deadline.max(BEGINNING),
             _ => deadline,
+        };
+        Patience {
+            limit,
+            after_losses: deadline,
         }
     }
 }

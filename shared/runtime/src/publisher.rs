@@ -14,6 +14,7 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as
 use iceoryx2::sample_mut::SampleMut;
 
 use crate::bus::Bus;
+use crate::losses::{Losses, Patience};
 use crate::memory;
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
@@ -110,8 +111,8 @@ impl<T: Message> Publisher<T> {
     }
 
     /// See [`SlicePublisher::wait_for_subscribers`].
-    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
-        self.port.wait_for_subscribers(n, limit)
+    pub fn wait_for_subscribers(&self, n: usize, patience: impl Into<Patience>) -> usize {
+        self.port.wait_for_subscribers(n, patience.into())
     }
 }
 
@@ -162,9 +163,9 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
     /// Waits for `n` subscribers, and with [`Delivery::Lossless`] until they have acknowledged this
     /// publisher: before that, messages that do not fit into their buffers are lost.
     ///
-    /// Returns how many there are; fewer than `n` after `limit` or a stop request.
-    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
-        self.port.wait_for_subscribers(n, limit)
+    /// Returns how many there are; fewer than `n` if the patience is over, or after a stop request.
+    pub fn wait_for_subscribers(&self, n: usize, patience: impl Into<Patience>) -> usize {
+        self.port.wait_for_subscribers(n, patience.into())
     }
 }
 
@@ -214,6 +215,7 @@ struct Port<E: Message, H: Header> {
     copies: Copies,
     /// How long to wait for a slow receiver.
     patience: Duration,
+    losses: Losses,
 }
 
 impl Bus {
@@ -295,6 +297,7 @@ impl<E: Message, H: Header> Port<E, H> {
             progress: bus.progress().clone(),
             copies: bus.copies().clone(),
             patience: bus.patience(),
+            losses: Losses::of(bus.namespace()),
         })
     }
 
@@ -371,11 +374,14 @@ impl<E: Message, H: Header> Port<E, H> {
         }
     }
 
-    fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+    fn wait_for_subscribers(&self, n: usize, patience: Patience) -> usize {
         let begin = Instant::now();
         loop {
             let ready = self.n_ready();
-            if ready >= n || begin.elapsed() >= limit || self.stop.is_requested() {
+            let waited = begin.elapsed();
+            let is_over = waited >= patience.limit
+                || (waited >= patience.after_losses && ready + self.losses.count() >= n);
+            if ready >= n || is_over || self.stop.is_requested() {
                 return ready;
             }
             self.progress.tick();

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 
 use common::{Deployment, shared_memory};
 use messages::{EvidenceHeader, FrameHeader, ViewQuality};
-use runtime::{Bus, Delivery, Limits, PortError, SendError, Stop, TopicPlan, Waiter, Woken};
+use runtime::{
+    Bus, Delivery, Limits, Losses, Patience, PortError, SendError, Stop, TopicPlan, Waiter, Woken,
+};
 
 const SOON: Duration = Duration::from_secs(20);
 
@@ -193,6 +195,24 @@ fn an_earlier_subscriber_counts_once_it_is_connected() {
     );
     assert_eq!(subscriber.receive().unwrap(), None);
     assert_eq!(publisher.wait_for_subscribers(1, SOON), 1);
+}
+
+#[test]
+fn a_receiver_that_was_given_up_is_waited_for_no_longer_than_later_on() {
+    let deployment = Deployment::new(&[small(Delivery::Lossless, 2)]);
+    let sender = deployment.bus("sender");
+    let publisher = sender.publisher::<ViewQuality>("small").unwrap();
+    Losses::of(sender.namespace()).note("receiver-0").unwrap();
+    let begin = Instant::now();
+    let mut patience = Patience {
+        limit: Duration::from_millis(300),
+        after_losses: Duration::from_millis(1),
+    };
+    // Two are missing, one was given up: the other is waited for.
+    assert_eq!(publisher.wait_for_subscribers(2, patience), 0);
+    assert!(begin.elapsed() >= patience.limit);
+    patience.limit = Duration::from_hours(1);
+    assert_eq!(publisher.wait_for_subscribers(1, patience), 0);
 }
 
 #[test]

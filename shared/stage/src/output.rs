@@ -1,13 +1,13 @@
 //! The outputs of a stage.
 
 use core::fmt;
-use core::time::Duration;
 use std::rc::Rc;
 
 use messages::{Stamp, Timing};
 use metrics::Passage;
 use runtime::{
-    Element, Failure, Header, Message, Publisher, SendError, Service, SlicePublisher, now_nanos,
+    Element, Failure, Header, Message, Patience, Publisher, SendError, Service, SlicePublisher,
+    now_nanos,
 };
 
 use crate::{Stamped, Turn};
@@ -87,7 +87,7 @@ pub(crate) enum EndStamp {
 /// An output of any message type.
 pub(crate) trait Outgoing {
     /// Waits for the receivers; returns how many are connected, and how many are expected.
-    fn wait(&self, patience: Duration) -> [usize; 2];
+    fn wait(&self, patience: Patience) -> [usize; 2];
     fn n_connected(&self) -> usize;
     /// Sends the end of the stream, if this topic has one.
     fn end(&self, of_input: Option<Stamp>, session: u64) -> Result<(), SendError>;
@@ -100,7 +100,7 @@ pub(crate) struct Messages<M: Message> {
 }
 
 impl<M: Message + Stamped> Outgoing for Messages<M> {
-    fn wait(&self, patience: Duration) -> [usize; 2] {
+    fn wait(&self, patience: Patience) -> [usize; 2] {
         let n = self
             .publisher
             .wait_for_subscribers(self.n_receivers, patience);
@@ -131,7 +131,7 @@ pub(crate) struct Arrays<E: Element, H: Header> {
 }
 
 impl<E: Element, H: Header> Outgoing for Arrays<E, H> {
-    fn wait(&self, patience: Duration) -> [usize; 2] {
+    fn wait(&self, patience: Patience) -> [usize; 2] {
         let n = self
             .publisher
             .wait_for_subscribers(self.n_receivers, patience);

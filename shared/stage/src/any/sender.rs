@@ -1,12 +1,11 @@
 //! Sends bytes on a topic of any message type.
 
-use core::time::Duration;
-
 use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
 use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 use recording::{Envelope, Kind, Message};
 use runtime::{
-    Bus, Element, Header, Message as PlainMessage, PortError, Publisher, SendError, SlicePublisher,
+    Bus, Element, Header, Message as PlainMessage, Patience, PortError, Publisher, SendError,
+    SlicePublisher,
 };
 
 /// The sending end of one topic.
@@ -48,14 +47,14 @@ impl Sender {
     }
 
     /// See [`SlicePublisher::wait_for_subscribers`].
-    pub fn wait_for_subscribers(&self, n: usize, limit: Duration) -> usize {
+    pub fn wait_for_subscribers(&self, n: usize, patience: Patience) -> usize {
         match &self.port {
-            Port::Frame(port) => port.wait_for_subscribers(n, limit),
-            Port::Evidence(port) => port.wait_for_subscribers(n, limit),
-            Port::ViewPose(port) => port.wait_for_subscribers(n, limit),
-            Port::ViewQuality(port) => port.wait_for_subscribers(n, limit),
-            Port::PairPose(port) => port.wait_for_subscribers(n, limit),
-            Port::Pose3d(port) => port.wait_for_subscribers(n, limit),
+            Port::Frame(port) => port.wait_for_subscribers(n, patience),
+            Port::Evidence(port) => port.wait_for_subscribers(n, patience),
+            Port::ViewPose(port) => port.wait_for_subscribers(n, patience),
+            Port::ViewQuality(port) => port.wait_for_subscribers(n, patience),
+            Port::PairPose(port) => port.wait_for_subscribers(n, patience),
+            Port::Pose3d(port) => port.wait_for_subscribers(n, patience),
             Port::Health => 0,
         }
     }
