@@ -45,7 +45,7 @@ impl Calibration {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|it| it * scale);
             fit.without_px = self.watch.without_px(view).map(|it| it * scale);
-            // With the footage of another camera none of them stands where it says.
+            // With the footage of another camera, every camera contradicts the calibration.
             let is_named = self.watch.is_reported(view) && self.exchanged.is_none();
             if is_named && !fit.suspected {
                 tracing::warn!(
@@ -59,7 +59,7 @@ impl Calibration {
         }
     }
 
-    /// Says it once.
+    /// Logs it once.
     fn find_exchanged(&mut self, scene: &Scene) {
         let Some(it) = self.swaps.swap().filter(|_| self.exchanged.is_none()) else {
             return;
@@ -86,7 +86,7 @@ impl Calibration {
         });
     }
 
-    /// Says it once, at once.
+    /// Logs it once, as soon as it is known.
     fn tell_contradiction(&mut self, scene: &Scene) {
         let names = || scene.views.iter().map(|it| it.name.clone());
         let Some(it) = self
@@ -123,7 +123,7 @@ impl Calibration {
         self.exchanged.as_ref()
     }
 
-    /// What is known of every camera, by name.
+    /// The state of every camera, by name.
     ///
     /// * `names`: of the views, in their order.
     pub(crate) fn fits(&self, names: impl Iterator<Item = String>) -> BTreeMap<String, CameraFit> {

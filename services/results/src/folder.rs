@@ -17,14 +17,14 @@ pub struct FolderError {
     pub doing: &'static str,
     /// The file or folder.
     pub path: PathBuf,
-    /// What the system said.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
 /// A folder whose files are replaced whole.
 ///
 /// A file `x` is written as `x.part` and renamed at the end, so that an earlier run's result stays
-/// until a new one is complete, and a part that was left over says so by its name.
+/// until a new one is complete, and the name of an unfinished file shows that it is one.
 #[derive(Debug)]
 pub struct Folder {
     dir: PathBuf,
@@ -112,7 +112,7 @@ impl Folder {
     ///
     /// # Errors
     ///
-    /// What the system said.
+    /// The error of the operating system.
     pub fn fill(&self, name: &str, text: &str) -> io::Result<()> {
         // In place: what is emptied first may be taken by others.
         let mut file = OpenOptions::new().write(true).open(self.part(name))?;

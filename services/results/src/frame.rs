@@ -5,7 +5,7 @@ use messages::{FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
 
 use crate::{Missing, Scene};
 
-/// What one view said about one frame; `None` where nothing came.
+/// The messages of one view about one frame; `None` where none came.
 #[derive(Debug, Clone, Default)]
 pub struct ViewRecord {
     /// The frame itself, without its pixels.
@@ -40,14 +40,14 @@ pub struct Absent {
     pub views: Vec<Missing>,
 }
 
-/// What was said about one frame.
+/// All messages about one frame.
 #[derive(Debug, Clone)]
 pub struct FrameRecord {
     /// The result.
     pub pose3d: Pose3d,
     /// The views.
     pub views: Vec<ViewRecord>,
-    /// The pairs that answered, in order of arrival.
+    /// The pairs that sent a pose, in order of arrival.
     pub pairs: Vec<PairPose>,
 }
 

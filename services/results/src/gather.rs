@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use messages::{FrameHeader, MAX_VIEWS, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 
-use crate::missing::Voice;
+use crate::missing::ViewHistory;
 use crate::{Absent, FrameRecord, Missing, Picture, ViewRecord};
 
 /// Most frames that wait for their results; the oldest are discarded first.
@@ -20,7 +20,7 @@ const MAX_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 #[derive(Debug)]
 pub(crate) struct Gather {
     frames: BTreeMap<u64, Parts>,
-    voices: Vec<Voice>,
+    histories: Vec<ViewHistory>,
     /// The latest epoch of the process that sends results.
     epoch: u32,
     /// The first frame that has no line yet.
@@ -51,7 +51,7 @@ impl Gather {
     pub(crate) fn new(n_views: usize, next: u64, frame_step: u64, is_resumed: bool) -> Self {
         Self {
             frames: BTreeMap::new(),
-            voices: vec![Voice::default(); n_views],
+            histories: vec![ViewHistory::default(); n_views],
             epoch: 0,
             next,
             frame_step: frame_step.max(1),
@@ -60,16 +60,16 @@ impl Gather {
     }
 
     /// Notes the ports of a view's capture and pose processes that are connected.
-    pub(crate) fn answerers(&mut self, view: usize, ports: [Vec<u128>; 2]) {
-        if let Some(voice) = self.voices.get_mut(view) {
-            voice.answerers(ports);
+    pub(crate) fn note_ports(&mut self, view: usize, ports: [Vec<u128>; 2]) {
+        if let Some(history) = self.histories.get_mut(view) {
+            history.note_ports(ports);
         }
     }
 
     /// Notes a frame, with its pixels if they are to be drawn on.
     pub(crate) fn frame(&mut self, view: usize, header: &FrameHeader, picture: Option<Picture>) {
-        if let Some(voice) = self.voices.get_mut(view) {
-            voice.frame(header);
+        if let Some(history) = self.histories.get_mut(view) {
+            history.note_frame(header);
         }
         if header.status == Status::END {
             return;
@@ -81,8 +81,8 @@ impl Gather {
     }
 
     pub(crate) fn pose(&mut self, view: usize, pose: &ViewPose) {
-        if let Some(voice) = self.voices.get_mut(view) {
-            voice.pose(pose);
+        if let Some(history) = self.histories.get_mut(view) {
+            history.note_pose(pose);
         }
         if pose.status == Status::END {
             return;
@@ -121,8 +121,8 @@ impl Gather {
         let Parts { mut views, pairs } = parts.unwrap_or_else(|| self.empty());
         self.next = frame.saturating_add(self.frame_step);
         self.epoch = self.epoch.max(pose3d.stamp.epoch);
-        for (view, (it, voice)) in views.iter_mut().zip(&mut self.voices).enumerate() {
-            let missing = voice.settle(frame, it.pose.as_ref(), is_first);
+        for (view, (it, history)) in views.iter_mut().zip(&mut self.histories).enumerate() {
+            let missing = history.note_result(frame, it.pose.as_ref(), is_first);
             it.missing = (pose3d.views_present >> view & 1 == 0).then_some(missing);
         }
         let record = FrameRecord {
@@ -135,7 +135,7 @@ impl Gather {
 
     /// The frames after the last result when the stream has ended, up to the end of the longest footage.
     pub(crate) fn rest(&mut self) -> Vec<Absent> {
-        let end = self.voices.iter().filter_map(Voice::end).max();
+        let end = self.histories.iter().filter_map(ViewHistory::end).max();
         let most = self.next.saturating_add(MAX_ABSENT * self.frame_step);
         self.absent(end.unwrap_or(0).min(most), false)
     }
@@ -153,9 +153,9 @@ impl Gather {
                     .as_ref()
                     .and_then(|parts| parts.views[view].pose.as_ref())
             };
-            let voices = self.voices.iter_mut().enumerate();
-            let views: Vec<Missing> = voices
-                .map(|(view, voice)| voice.settle(frame, pose(view), is_lost))
+            let histories = self.histories.iter_mut().enumerate();
+            let views: Vec<Missing> = histories
+                .map(|(view, history)| history.note_result(frame, pose(view), is_lost))
                 .collect();
             let reason = if is_resumed {
                 "recorder lost".to_owned()
@@ -187,7 +187,7 @@ impl Gather {
 
     fn empty(&self) -> Parts {
         Parts {
-            views: vec![ViewRecord::default(); self.voices.len()],
+            views: vec![ViewRecord::default(); self.histories.len()],
             pairs: Vec::new(),
         }
     }

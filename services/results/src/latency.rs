@@ -8,7 +8,7 @@ use runfiles::{LatencyReport, Percentiles};
 
 use crate::FrameRecord;
 
-/// Longest duration told apart, microseconds: an hour.
+/// Longest duration that is resolved, microseconds: an hour.
 const LONGEST_MICROS: u64 = 3_600_000_000;
 
 /// Collects durations frame by frame.
@@ -108,7 +108,7 @@ impl Latency {
         self.remember(record);
     }
 
-    /// The way of a frame, backwards.
+    /// The path of a frame, from the result back to its capture.
     fn walk(&mut self, record: &FrameRecord) -> Option<()> {
         let result = record.pose3d.timing;
         let pair = record
@@ -121,7 +121,7 @@ impl Latency {
         let pose = record.views[view].pose?.timing;
         let frame = record.views[view].frame?.timing;
         let worker = pair.stamp.view as usize % self.n_workers;
-        // The same worker may have answered for another pair of this frame just before.
+        // The same worker may have sent another pair of this frame just before.
         let same_worker = record.pairs.iter().filter(|it| {
             it.stamp.view as usize % self.n_workers == worker
                 && it.timing.sent_at_nanos <= pair.timing.received_at_nanos
@@ -187,7 +187,7 @@ impl Latency {
         }
     }
 
-    /// What became of the time so far.
+    /// How the time so far divides.
     pub fn report(&self) -> LatencyReport {
         let of = |kind| {
             let those = self.histograms.iter().filter(move |it| it.0.0 == kind);

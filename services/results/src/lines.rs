@@ -30,7 +30,7 @@ impl Lines {
     ///
     /// # Errors
     ///
-    /// What the system said first.
+    /// The first error of the operating system.
     pub(crate) fn append(&mut self, text: &str) -> io::Result<()> {
         let written = self.file.write_all(text.as_bytes());
         match &written {

@@ -5,20 +5,20 @@ use messages::{FrameHeader, Status, ViewPose};
 /// Why a view has no part in a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// It answered, but with nothing: nobody was found, or there was no frame.
+    /// It sent a message without a pose: no person was found, or there was no frame.
     Empty(Status),
-    /// It answered too late, or had not answered yet.
+    /// Its message came too late, or had not come yet.
     Late,
-    /// It passed the frame over and went on.
+    /// It skipped the frame.
     Dropped,
-    /// Its process, or the one that puts the views together, had died.
+    /// Its process, or the one that fuses the views, had died.
     Lost,
     /// Its footage has fewer frames.
     Ended,
 }
 
 impl Missing {
-    /// In words.
+    /// The reason as written to the files of a run.
     pub fn reason(self) -> &'static str {
         match self {
             Self::Empty(status) => status.reason(),
@@ -30,39 +30,39 @@ impl Missing {
     }
 }
 
-/// What is known of one view's processes.
+/// What has been received from one view's processes.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Voice {
-    /// Those of its processes, as they were last seen.
+pub(crate) struct ViewHistory {
+    /// The connected ports of its capture and pose processes.
     ports: [Vec<u128>; 2],
-    /// The latest life of its pose process that was heard.
+    /// The latest epoch of its pose process that a message came from.
     epoch: u32,
-    /// The latest whose answer has a result.
-    settled: u32,
-    /// Somebody who was there to answer is gone, and there has been no answer since.
-    is_absent: bool,
+    /// The latest epoch of its pose process that a result used.
+    used_epoch: u32,
+    /// A port has disappeared, and no pose has come since.
+    lost_process: bool,
     last_frame: Option<u64>,
-    /// The life of its camera's process that was heard last, and the last frame of it.
-    shot: Option<(u32, u64)>,
-    /// That process is gone, and nothing has been heard of the next.
-    is_blind: bool,
-    /// The last frame before that process was replaced, and the first after it.
+    /// The latest epoch of its capture process, and the last frame of that epoch.
+    captured: Option<(u32, u64)>,
+    /// The port of its capture process has disappeared, and no frame of the next epoch has come.
+    lost_capture: bool,
+    /// The last frame before that process was restarted, and the first after it.
     gap: Option<[u64; 2]>,
     /// Its first frame that does not exist.
     end: Option<u64>,
 }
 
-impl Voice {
-    /// Hears of a frame, or that there are no more.
-    pub(crate) fn frame(&mut self, header: &FrameHeader) {
-        let (life, frame) = (header.stamp.epoch, header.stamp.frame);
-        if let Some((before, last)) = self.shot
-            && life > before
+impl ViewHistory {
+    /// Takes a frame, or the end of the stream.
+    pub(crate) fn note_frame(&mut self, header: &FrameHeader) {
+        let (epoch, frame) = (header.stamp.epoch, header.stamp.frame);
+        if let Some((before, last)) = self.captured
+            && epoch > before
         {
             self.gap = Some([last, frame]);
-            self.is_blind = false;
+            self.lost_capture = false;
         }
-        self.shot = self.shot.max(Some((life, frame)));
+        self.captured = self.captured.max(Some((epoch, frame)));
         if header.status == Status::END {
             self.end = Some(frame);
         }
@@ -73,9 +73,9 @@ impl Voice {
         self.end
     }
 
-    /// Hears an answer, or that there are no more.
-    pub(crate) fn pose(&mut self, pose: &ViewPose) {
-        self.is_absent = false;
+    /// Takes a pose, or the end of the stream.
+    pub(crate) fn note_pose(&mut self, pose: &ViewPose) {
+        self.lost_process = false;
         if pose.status == Status::END {
             self.end = Some(pose.stamp.frame);
             return;
@@ -84,32 +84,32 @@ impl Voice {
         self.last_frame = self.last_frame.max(Some(pose.stamp.frame));
     }
 
-    /// Notes who is there to answer. Who is replaced at once was gone all the same.
-    pub(crate) fn answerers(&mut self, ports: [Vec<u128>; 2]) {
+    /// Takes the ports that are connected. A process that was restarted at once was lost all the same.
+    pub(crate) fn note_ports(&mut self, ports: [Vec<u128>; 2]) {
         let is_gone = |it: &u128| !ports.iter().flatten().any(|other| other == it);
-        let is_absent = self.ports.iter().flatten().any(is_gone);
-        self.is_absent |= is_absent && self.last_frame.is_some();
-        // An answer to what the camera sent before its death says nothing of the camera.
-        self.is_blind |= self.ports[0].iter().any(is_gone) && self.shot.is_some();
+        let is_lost = self.ports.iter().flatten().any(is_gone);
+        self.lost_process |= is_lost && self.last_frame.is_some();
+        // A pose of a frame that capture sent before its death does not mean that capture is back.
+        self.lost_capture |= self.ports[0].iter().any(is_gone) && self.captured.is_some();
         self.ports = ports;
     }
 
-    /// Takes note of a result, and says why the view would have no part in it.
+    /// Takes a result, and returns why the view would have no part in it.
     ///
-    /// * `pose`: what it said about that frame.
+    /// * `pose`: its message about that frame.
     /// * `is_first`: whether this is the first result of a restarted process.
-    pub(crate) fn settle(
+    pub(crate) fn note_result(
         &mut self,
         frame: u64,
         pose: Option<&ViewPose>,
         is_first: bool,
     ) -> Missing {
-        let is_new = self.epoch != self.settled;
+        let is_new = self.epoch != self.used_epoch;
         if let Some(pose) = pose {
-            self.settled = self.settled.max(pose.stamp.epoch);
+            self.used_epoch = self.used_epoch.max(pose.stamp.epoch);
         }
         let was_lost = is_first
-            || (pose.is_none() && (self.is_absent || is_new || self.has_no_shot_of(frame)));
+            || (pose.is_none() && (self.lost_process || is_new || self.was_not_captured(frame)));
         match pose {
             Some(pose) if pose.status != Status::OK => Missing::Empty(pose.status),
             None if self.end.is_some_and(|end| end <= frame) => Missing::Ended,
@@ -119,13 +119,13 @@ impl Voice {
         }
     }
 
-    /// Whether the process of its camera was not there to send a frame.
-    fn has_no_shot_of(&self, frame: u64) -> bool {
-        let is_later = self.shot.is_some_and(|(_, last)| last < frame);
+    /// Whether its capture process was not running when the frame was due.
+    fn was_not_captured(&self, frame: u64) -> bool {
+        let is_later = self.captured.is_some_and(|(_, last)| last < frame);
         let is_between = self
             .gap
             .is_some_and(|[last, first]| last < frame && frame < first);
-        self.is_blind && is_later || is_between
+        self.lost_capture && is_later || is_between
     }
 }
 
@@ -147,62 +147,62 @@ mod tests {
         }
     }
 
-    /// Of a capture, and of the pose process that is started as the `n`-th.
+    /// Of a capture process, and of the `n`-th start of a pose process.
     fn ports(n: u128) -> [Vec<u128>; 2] {
         [vec![7], vec![n]]
     }
 
-    /// A view that has answered frames 0 and 1, of which there are results.
-    fn voice() -> Voice {
-        let mut voice = Voice::default();
-        voice.answerers(ports(1));
+    /// A view that has sent poses of frames 0 and 1, both with results.
+    fn history() -> ViewHistory {
+        let mut history = ViewHistory::default();
+        history.note_ports(ports(1));
         for frame in 0..2 {
-            let said = pose(frame, 0, Status::OK);
-            voice.pose(&said);
-            voice.settle(frame, Some(&said), false);
+            let sent = pose(frame, 0, Status::OK);
+            history.note_pose(&sent);
+            history.note_result(frame, Some(&sent), false);
         }
-        voice
+        history
     }
 
     #[test]
-    fn an_answer_without_a_pose_says_why() {
+    fn a_message_without_a_pose_gives_the_reason() {
         for status in [Status::NO_DETECTION, Status::NO_FRAME, Status::BAD_INPUT] {
-            let got = voice().settle(2, Some(&pose(2, 0, status)), false);
+            let got = history().note_result(2, Some(&pose(2, 0, status)), false);
             assert_eq!(got.reason(), status.reason());
         }
     }
 
     #[test]
-    fn an_answer_that_has_no_part_was_late() {
-        let mut voice = voice();
-        let said = pose(2, 0, Status::OK);
-        assert_eq!(voice.settle(2, Some(&said), false), Missing::Late);
-        assert_eq!(voice.settle(3, None, false), Missing::Late);
+    fn a_pose_that_the_result_did_not_use_was_late() {
+        let mut history = history();
+        let sent = pose(2, 0, Status::OK);
+        assert_eq!(history.note_result(2, Some(&sent), false), Missing::Late);
+        assert_eq!(history.note_result(3, None, false), Missing::Late);
     }
 
     #[test]
-    fn who_went_on_has_dropped_the_frame() {
-        let mut voice = voice();
-        voice.pose(&pose(4, 0, Status::OK));
-        assert_eq!(voice.settle(3, None, false), Missing::Dropped);
+    fn a_frame_before_a_later_pose_was_dropped() {
+        let mut history = history();
+        history.note_pose(&pose(4, 0, Status::OK));
+        assert_eq!(history.note_result(3, None, false), Missing::Dropped);
     }
 
     #[test]
-    fn frames_between_two_lives_are_lost() {
-        let mut voice = voice();
-        voice.answerers([vec![7], Vec::new()]);
-        assert_eq!(voice.settle(2, None, false), Missing::Lost);
-        voice.answerers(ports(2));
-        assert_eq!(voice.settle(3, None, false), Missing::Lost);
+    fn frames_between_two_epochs_are_lost() {
+        let mut history = history();
+        history.note_ports([vec![7], Vec::new()]);
+        assert_eq!(history.note_result(2, None, false), Missing::Lost);
+        history.note_ports(ports(2));
+        assert_eq!(history.note_result(3, None, false), Missing::Lost);
         let back = pose(5, 1, Status::OK);
-        voice.pose(&back);
-        assert_eq!(voice.settle(4, None, false), Missing::Lost);
-        voice.settle(5, Some(&back), false);
-        assert_eq!(voice.settle(6, None, false), Missing::Late);
+        history.note_pose(&back);
+        assert_eq!(history.note_result(4, None, false), Missing::Lost);
+        history.note_result(5, Some(&back), false);
+        assert_eq!(history.note_result(6, None, false), Missing::Late);
     }
 
-    /// A frame of a life of the camera's process.
-    fn shot(frame: u64, epoch: u32) -> FrameHeader {
+    /// A frame of an epoch of the capture process.
+    fn captured(frame: u64, epoch: u32) -> FrameHeader {
         FrameHeader {
             stamp: Stamp {
                 frame,
@@ -214,64 +214,64 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_a_killed_camera_are_lost_though_its_last_one_is_answered_after_its_death() {
-        let mut voice = voice();
-        voice.frame(&shot(2, 0));
-        voice.answerers([Vec::new(), vec![1]]);
-        let said = pose(2, 0, Status::OK);
-        voice.pose(&said);
-        assert_eq!(voice.settle(2, Some(&said), false), Missing::Late);
-        assert_eq!(voice.settle(3, None, false), Missing::Lost);
-        voice.answerers([vec![8], vec![1]]);
-        assert_eq!(voice.settle(4, None, false), Missing::Lost);
-        voice.frame(&shot(7, 1));
-        assert_eq!(voice.settle(5, None, false), Missing::Lost);
-        voice.pose(&pose(7, 0, Status::OK));
-        assert_eq!(voice.settle(6, None, false), Missing::Lost);
-        voice.frame(&shot(8, 1));
-        assert_eq!(voice.settle(8, None, false), Missing::Late);
+    fn frames_of_a_killed_capture_are_lost_though_the_pose_of_its_last_one_comes_later() {
+        let mut history = history();
+        history.note_frame(&captured(2, 0));
+        history.note_ports([Vec::new(), vec![1]]);
+        let sent = pose(2, 0, Status::OK);
+        history.note_pose(&sent);
+        assert_eq!(history.note_result(2, Some(&sent), false), Missing::Late);
+        assert_eq!(history.note_result(3, None, false), Missing::Lost);
+        history.note_ports([vec![8], vec![1]]);
+        assert_eq!(history.note_result(4, None, false), Missing::Lost);
+        history.note_frame(&captured(7, 1));
+        assert_eq!(history.note_result(5, None, false), Missing::Lost);
+        history.note_pose(&pose(7, 0, Status::OK));
+        assert_eq!(history.note_result(6, None, false), Missing::Lost);
+        history.note_frame(&captured(8, 1));
+        assert_eq!(history.note_result(8, None, false), Missing::Late);
     }
 
     #[test]
-    fn a_frame_that_the_camera_sent_before_its_death_was_late() {
-        let mut voice = voice();
-        voice.frame(&shot(2, 0));
-        voice.frame(&shot(3, 0));
-        voice.answerers([Vec::new(), vec![1]]);
-        voice.pose(&pose(2, 0, Status::OK));
-        assert_eq!(voice.settle(3, None, false), Missing::Late);
-        assert_eq!(voice.settle(4, None, false), Missing::Lost);
+    fn a_frame_that_capture_sent_before_its_death_was_late() {
+        let mut history = history();
+        history.note_frame(&captured(2, 0));
+        history.note_frame(&captured(3, 0));
+        history.note_ports([Vec::new(), vec![1]]);
+        history.note_pose(&pose(2, 0, Status::OK));
+        assert_eq!(history.note_result(3, None, false), Missing::Late);
+        assert_eq!(history.note_result(4, None, false), Missing::Lost);
     }
 
     #[test]
-    fn who_is_replaced_before_anybody_looks_is_lost() {
-        let mut voice = voice();
-        voice.answerers(ports(1));
-        assert_eq!(voice.settle(2, None, false), Missing::Late);
-        voice.answerers(ports(2));
-        voice.answerers(ports(2));
-        assert_eq!(voice.settle(3, None, false), Missing::Lost);
+    fn a_process_restarted_between_two_checks_is_lost() {
+        let mut history = history();
+        history.note_ports(ports(1));
+        assert_eq!(history.note_result(2, None, false), Missing::Late);
+        history.note_ports(ports(2));
+        history.note_ports(ports(2));
+        assert_eq!(history.note_result(3, None, false), Missing::Lost);
     }
 
     #[test]
-    fn who_has_never_been_there_is_late() {
-        let mut voice = Voice::default();
-        voice.answerers([Vec::new(), Vec::new()]);
-        assert_eq!(voice.settle(0, None, false), Missing::Late);
+    fn a_process_that_never_connected_is_late() {
+        let mut history = ViewHistory::default();
+        history.note_ports([Vec::new(), Vec::new()]);
+        assert_eq!(history.note_result(0, None, false), Missing::Late);
     }
 
     #[test]
-    fn what_a_killed_triangulation_held_is_lost() {
-        let mut voice = voice();
-        let said = pose(2, 0, Status::OK);
-        assert_eq!(voice.settle(2, Some(&said), true), Missing::Lost);
+    fn the_frames_of_a_killed_triangulation_are_lost() {
+        let mut history = history();
+        let sent = pose(2, 0, Status::OK);
+        assert_eq!(history.note_result(2, Some(&sent), true), Missing::Lost);
     }
 
     #[test]
-    fn beyond_the_end_there_is_nothing_to_miss() {
-        let mut voice = voice();
-        voice.pose(&pose(3, 0, Status::END));
-        assert_eq!(voice.settle(2, None, false), Missing::Late);
-        assert_eq!(voice.settle(3, None, false), Missing::Ended);
+    fn frames_after_the_end_of_the_footage_are_not_lost() {
+        let mut history = history();
+        history.note_pose(&pose(3, 0, Status::END));
+        assert_eq!(history.note_result(2, None, false), Missing::Late);
+        assert_eq!(history.note_result(3, None, false), Missing::Ended);
     }
 }

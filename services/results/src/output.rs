@@ -17,7 +17,7 @@ use crate::{
 };
 
 const TRC: &str = "pose3d.trc";
-/// Room that is taken for what is said about the run: several times what sixteen views need.
+/// Bytes reserved for the files written at the end: several times what sixteen views need.
 const RESERVED_BYTES: usize = 32 << 10;
 
 /// The files of a run.
@@ -51,7 +51,7 @@ pub enum OutputError {
 }
 
 impl Output {
-    /// Begins the files of a run. Room for what is said about the run at its end is taken now.
+    /// Begins the files of a run. Room for those written at its end is reserved now.
     ///
     /// * `n_workers`: fusion processes, for the latency of each.
     /// * `folder`: where; what a killed recorder left there is gone on with if it is resumed.
@@ -103,7 +103,7 @@ impl Output {
         self.tally.last_frame().map(|it| it.saturating_add(step))
     }
 
-    /// Writes that frames have no result, and why. Frames before them of which nothing was said are written, too.
+    /// Writes frames without a result, with the reason. Frames before them that no message was about are written, too.
     pub fn absent(&mut self, absent: &[Absent]) {
         for it in absent {
             self.fill_up_to(it.frame);
@@ -216,7 +216,7 @@ impl Output {
         self.tally.summary()
     }
 
-    /// `pose3d.trc` says first how many rows follow, so its head is written last.
+    /// The head of `pose3d.trc` holds the number of rows, so it is written last.
     fn head_trc(&self) -> io::Result<()> {
         let (path, headed) = (self.folder.part(TRC), self.folder.part("pose3d.trc.head"));
         let rows = fs::read_to_string(&path)?;

@@ -1,4 +1,4 @@
-//! Pictures of a view: the view's own answer, the fused one, and one part's epipolar lines.
+//! Pictures of a view: its single-view pose, the fused pose, and one part's epipolar lines.
 
 use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs, line_width};
 use geometry::epipolar::epipolar_curve;

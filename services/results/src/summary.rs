@@ -153,7 +153,7 @@ impl Tally {
         self.summary.frames_not_recorded += n;
     }
 
-    /// Counts a write that failed; answers whether it is the first.
+    /// Counts a write that failed; returns whether it is the first.
     pub(crate) fn failed(&mut self, what: &dyn core::fmt::Display) -> bool {
         self.summary.writes_failed += 1;
         let is_first = self.summary.first_failure.is_none();

@@ -1,4 +1,4 @@
-//! `times.jsonl`: when every frame was taken, answered and turned into a result, and by which life of a process.
+//! `times.jsonl`: when every frame was captured, solved in each view and turned into a result, and by which epoch of a process.
 
 use messages::Status;
 use runfiles::{CameraTimes, PoseTimes, TimesLine, ViewTimes};

@@ -69,7 +69,7 @@ impl fmt::Display for Death {
     }
 }
 
-/// /// An event of a run; `process` is the name of a process.
+/// An event of a run; `process` is the name of a process.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event<'a> {
     /// A process has been started.
@@ -111,7 +111,7 @@ pub enum Event<'a> {
     Restarting {
         /// Its name.
         process: &'a str,
-        /// /// The pause before.
+        /// The pause before.
         pause: Duration,
     },
     /// A process will not be started again.

@@ -2,7 +2,7 @@
 
 use messages::{Health, Metrics, Refusal};
 
-/// /// The outcome of a run.
+/// The outcome of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// All processes, in the order of the plan.
@@ -44,7 +44,7 @@ pub struct ProcessOutcome {
 /// The state of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// /// It runs.
+    /// It runs.
     Running,
     /// It has received the end of stream and sent it on.
     Finished,
@@ -57,9 +57,9 @@ pub enum State {
 /// The counts of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// /// Messages received.
+    /// Messages received.
     pub n_received: u64,
-    /// /// Messages sent.
+    /// Messages sent.
     pub n_sent: u64,
     /// Messages or frames that were lost before they reached it, or came too late.
     pub n_dropped: u64,

@@ -40,7 +40,7 @@ struct Normal {
 }
 
 impl JointFit {
-    /// /// Adds a sample.
+    /// Adds a sample.
     ///
     /// # Panics
     ///

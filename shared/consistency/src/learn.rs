@@ -9,7 +9,7 @@ use crate::counts::{Counts, Shape};
 use crate::joints::{JointFit, JointSample};
 use crate::{Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights};
 
-/// /// Settings of the learning.
+/// Settings of the learning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Bins of half the circle.

@@ -32,7 +32,7 @@ impl Share {
 /// How frames are resampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
-    /// /// Number of resamples.
+    /// Number of resamples.
     pub n_resamples: usize,
     /// The same seed gives the same interval.
     pub seed: u64,

@@ -13,7 +13,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// /// An empty histogram.
+    /// An empty histogram.
     ///
     /// * `reach`: the histogram goes from `-reach` to `reach`, in the unit of the errors.
     /// * `n_bins`: number of bins, at least 2.

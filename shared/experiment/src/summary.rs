@@ -50,7 +50,7 @@ pub struct Summary {
     pub predictions: Vec<Judgement>,
 }
 
-/// /// A group of sequences; every frame has the same weight.
+/// A group of sequences; every frame has the same weight.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
     /// Name of the data set.
@@ -119,7 +119,7 @@ pub struct ChangesOf {
     pub bins: Vec<[f64; 2]>,
 }
 
-/// /// Aggregates scores.
+/// Aggregates scores.
 ///
 /// * `versions`: their names; the first is what the others are compared with.
 pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootstrap) -> Summary {

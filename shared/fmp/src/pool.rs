@@ -6,7 +6,7 @@ use crossbeam::queue::ArrayQueue;
 /// only make theirs anew.
 const MOST: usize = 256;
 
-/// Workspaces of one kind: whoever begins takes one, and puts it back at the end.
+/// Workspaces of one kind: a solution takes one when it begins, and returns it at the end.
 ///
 /// A queue without locks, so that threads that begin and end at one time do not wait for each other. First in,
 /// first out: for workspaces of which there is one per caller, not for those that are taken many times a frame and
@@ -25,7 +25,7 @@ impl<T> Default for Pool<T> {
 }
 
 impl<T: Default> Pool<T> {
-    /// A workspace that nobody uses, or a new one.
+    /// A free workspace, or a new one.
     pub(crate) fn take(&self) -> T {
         self.free.pop().unwrap_or_default()
     }

@@ -62,7 +62,7 @@ impl Meter {
         self.name = cut(name);
     }
 
-    /// /// Records a duration.
+    /// Records a duration.
     ///
     /// * `view`: of which view, if of one.
     pub fn spent(&mut self, span: Span, view: Option<usize>, nanos: u64) {

@@ -55,12 +55,12 @@ pub enum ReadingError {
     /// Counts or times that contradict each other.
     #[error("counts that contradict each other: {what}")]
     Contradiction {
-        /// /// The contradiction.
+        /// The contradiction.
         what: &'static str,
     },
 }
 
-/// /// The metrics of another process.
+/// The metrics of another process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reading {
     /// The session.
@@ -73,9 +73,9 @@ pub struct Reading {
     pub began_at_nanos: u64,
     /// When the message was sent, `CLOCK_MONOTONIC`, nanoseconds.
     pub at_nanos: u64,
-    /// /// Messages received.
+    /// Messages received.
     pub n_received: u64,
-    /// /// Messages sent.
+    /// Messages sent.
     pub n_sent: u64,
     /// Messages sent per second recently, in thousandths.
     pub sent_millihertz: u64,

@@ -56,7 +56,7 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// /// Creates a learner for a network.
+    /// Creates a learner for a network.
     ///
     /// * `speeds`: of an earlier learner; none at the start.
     /// * `frozen`: how many of the first parameters are not trained.
@@ -83,7 +83,7 @@ impl Learner {
         }
     }
 
-    /// /// The parameters.
+    /// The parameters.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
     }

@@ -10,7 +10,7 @@ use crate::network::{self, Conv, Ops, Places, Shape};
 pub enum Role {
     /// Trained with weight decay.
     Weight,
-    /// /// Trained without weight decay.
+    /// Trained without weight decay.
     Bias,
     /// A statistic of the data: not trained.
     Fixed,

@@ -38,10 +38,10 @@ pub struct About {
 /// The metadata of a recording is missing or invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AboutError {
-    /// /// A key is missing.
+    /// A key is missing.
     #[error("the recording does not say its {0}")]
     Missing(&'static str),
-    /// /// A value is not a number.
+    /// A value is not a number.
     #[error("the recording's {key} is {got:?}")]
     Value {
         /// Which.

@@ -49,7 +49,7 @@ pub(crate) fn take<R: Read + Seek>(
     Ok(())
 }
 
-/// /// Reads a message.
+/// Reads a message.
 pub(crate) fn message<R: Read + Seek>(
     cursor: &mut Cursor<'_, R>,
     found: &mut Contents,

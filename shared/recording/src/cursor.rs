@@ -13,7 +13,7 @@ pub(crate) enum Stop {
     Io(io::Error),
 }
 
-/// /// A position in a file.
+/// A position in a file.
 pub(crate) struct Cursor<'a, R: Read + Seek> {
     input: BufReader<&'a mut R>,
     at: u64,
@@ -21,7 +21,7 @@ pub(crate) struct Cursor<'a, R: Read + Seek> {
 }
 
 impl<'a, R: Read + Seek> Cursor<'a, R> {
-    /// /// At the start of a file.
+    /// At the start of a file.
     pub(crate) fn new(input: &'a mut R) -> io::Result<Self> {
         let end = input.seek(SeekFrom::End(0))?;
         input.seek(SeekFrom::Start(0))?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// The magic bytes at the start and the end of a file.
 pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
-/// /// Opcodes of records.
+/// Opcodes of records.
 pub(crate) mod op {
     pub(crate) const HEADER: u8 = 0x01;
     pub(crate) const FOOTER: u8 = 0x02;

@@ -45,7 +45,7 @@ pub fn encode(kind: Kind, head: &[u8], elements: &[u8], out: &mut Vec<u8>) {
     }
 }
 
-/// /// A parsed message.
+/// A parsed message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Message<'a> {
     /// The struct.
@@ -55,7 +55,7 @@ pub struct Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// /// Parses a message.
+    /// Parses a message.
     ///
     /// # Errors
     ///
@@ -108,11 +108,11 @@ pub(crate) fn check_length(kind: Kind, len: u64) -> Result<(), Malformed> {
 /// Stamp, timing and status of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Envelope {
-    /// /// Its stamp.
+    /// Its stamp.
     pub stamp: Stamp,
-    /// /// Its times.
+    /// Its times.
     pub timing: Timing,
-    /// /// Whether it contains a result.
+    /// Whether it contains a result.
     pub status: Status,
 }
 

@@ -24,7 +24,7 @@ const MOST_FALSE_STARTS: u32 = 10_000;
 /// A recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// /// It is another kind of file.
+    /// It is another kind of file.
     #[error("this is not an MCAP file")]
     NotMcap,
     /// The file cannot be read.
@@ -99,7 +99,7 @@ pub fn read<'a, R: Read + Seek>(
     Message::parse(kind, buffer).map_err(|source| ReadError::Message { offset, source })
 }
 
-/// /// A damaged message.
+/// A damaged message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Damaged {
     /// Its topic.

@@ -115,7 +115,7 @@ impl Health {
         Ok(health)
     }
 
-    /// /// Counts received messages.
+    /// Counts received messages.
     pub fn received(&self, n: u64) {
         self.counts.n_received.fetch_add(n, Ordering::Relaxed);
     }
@@ -161,7 +161,7 @@ impl Health {
         self.counts.meter(|meter| meter.passed(passage));
     }
 
-    /// /// Records a duration, nanoseconds.
+    /// Records a duration, nanoseconds.
     ///
     /// * `view`: of which view, if of one.
     pub fn spent(&self, span: Span, view: Option<usize>, nanos: u64) {
@@ -208,7 +208,7 @@ impl Drop for Health {
     }
 }
 
-/// /// The ports of the sending thread.
+/// The ports of the sending thread.
 struct Sender<'a> {
     counts: &'a Counts,
     heartbeats: Publisher<HealthMessage>,

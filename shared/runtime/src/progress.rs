@@ -18,7 +18,7 @@ pub struct Progress {
 type Steps = Box<dyn Fn() -> u64 + Send + Sync>;
 
 impl Progress {
-    /// /// Counts one iteration.
+    /// Counts one iteration.
     pub fn tick(&self) {
         self.count.fetch_add(1, Ordering::Relaxed);
     }

@@ -45,7 +45,7 @@ pub enum SendError {
         topic: Arc<str>,
         /// Requested length, elements.
         len: usize,
-        /// /// Largest length, elements.
+        /// Largest length, elements.
         max_len: usize,
     },
     /// Stop was requested while the sender waited for a slow receiver.

@@ -22,7 +22,7 @@ pub struct Remains {
     pub supervisor: Option<u32>,
     /// Names and process ids of its processes.
     pub processes: Vec<String>,
-    /// /// Number of its files, including shared memory.
+    /// Number of its files, including shared memory.
     pub n_files: u64,
     /// The memory they take, bytes.
     pub bytes: u64,

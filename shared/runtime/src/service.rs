@@ -53,7 +53,7 @@ pub(crate) type WakeUp = EventFactory<ipc::Service>;
 /// A port of a topic cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
-    /// /// The topic does not exist.
+    /// The topic does not exist.
     #[error(
         "topic {topic:?} does not exist; topics are created by the supervisor before it starts processes"
     )]

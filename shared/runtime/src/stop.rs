@@ -123,12 +123,12 @@ impl Stop {
         Ok(stop)
     }
 
-    /// /// Requests the stop.
+    /// Requests the stop.
     pub fn request(&self) {
         self.inner.wake();
     }
 
-    /// /// Whether stop was requested.
+    /// Whether stop was requested.
     pub fn is_requested(&self) -> bool {
         self.inner.requested.load(Ordering::Acquire)
     }

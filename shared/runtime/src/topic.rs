@@ -24,11 +24,11 @@ pub struct Limits {
     pub publishers: usize,
     /// Largest number of subscribers.
     pub subscribers: usize,
-    /// /// Queue length of a subscriber, messages.
+    /// Queue length of a subscriber, messages.
     pub buffer: usize,
-    /// /// Messages that one subscriber may borrow at the same time.
+    /// Messages that one subscriber may borrow at the same time.
     pub borrowed: usize,
-    /// /// Messages that one publisher may have on loan at the same time.
+    /// Messages that one publisher may have on loan at the same time.
     pub loaned: usize,
 }
 

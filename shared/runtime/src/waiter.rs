@@ -50,7 +50,7 @@ pub struct Waiter {
     progress: Progress,
     /// Whether it spins instead of sleeping while there are subscribers.
     spins: bool,
-    /// /// Whether there are subscribers.
+    /// Whether there are subscribers.
     has_ports: bool,
     n_turns: Cell<u32>,
 }

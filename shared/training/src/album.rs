@@ -17,7 +17,7 @@ pub trait Album: Sync {
     /// Number of background images, which show no people.
     fn n_backgrounds(&self) -> usize;
 
-    /// /// A background image.
+    /// A background image.
     ///
     /// # Errors
     ///

@@ -46,7 +46,7 @@ struct Planned {
 /// Why nothing can be trained.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// /// No person is large enough.
+    /// No person is large enough.
     #[error(
         "of {n_people} people, none is large enough for filters of {filter_px} pixels: take larger pictures, or smaller filters"
     )]

@@ -95,7 +95,7 @@ impl std::fmt::Debug for Trainer<'_> {
 }
 
 impl<'a> Trainer<'a> {
-    /// /// Prepares a training.
+    /// Prepares a training.
     ///
     /// # Errors
     ///

@@ -86,7 +86,7 @@ fn split_words(name: &str) -> String {
     words
 }
 
-/// /// Describes the value that was found.
+/// Describes the value that was found.
 fn found(got: &str) -> String {
     let plain = |value: &str| value.trim_matches('`').to_owned();
     if let Some(text) = got.strip_prefix("string ") {
@@ -106,7 +106,7 @@ fn found(got: &str) -> String {
     }
 }
 
-/// /// Describes the expected value.
+/// Describes the expected value.
 fn wanted(asked: &str) -> String {
     let number = asked
         .strip_prefix("an array of length ")

@@ -15,7 +15,7 @@ use tracing::Level;
 /// A run that takes longer is stuck.
 const WATCHDOG: Duration = Duration::from_mins(2);
 
-/// /// A recorded event.
+/// A recorded event.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Recorded {
     Started(String, u32, u32),
