@@ -6,8 +6,6 @@ use multiview::{Compatibility, TypeTables};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::Appearance;
-
 /// Co-occurrences of part types of pairs of views.
 ///
 /// Of every part `i` of the first view a row-major matrix, `[type in first view][type in second view]`, where the part
@@ -19,6 +17,16 @@ pub struct Counts {
     pub same: Vec<Vec<u32>>,
     /// Of views on opposite sides of the person: left and right are exchanged.
     pub exchanged: Vec<Vec<u32>>,
+}
+
+/// The value of the appearance term for two types.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Appearance {
+    /// Joint probability: the paper's `p(a, b)`.
+    Joint,
+    /// Lift over chance: `ln(p(a, b) / (p(a) p(b)))`.
+    Lift,
 }
 
 /// The number of types of every part, and the part on the other side of the body.

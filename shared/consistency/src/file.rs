@@ -6,7 +6,7 @@ use multiview::{AngleTables, TypeTables};
 use serde::{Deserialize, Serialize};
 use skeleton::{JointMap, JointSet};
 
-use crate::counts::{Counts, Shape, marginals};
+use crate::counts::{Appearance, Counts, Shape, marginals};
 
 /// The format name of a consistency file.
 const FORMAT: &str = "parallax-consistency";
@@ -105,16 +105,6 @@ impl Default for Weights {
             appearance: Appearance::Joint,
         }
     }
-}
-
-/// The value of the appearance term for two types.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Appearance {
-    /// Joint probability: the paper's `p(a, b)`.
-    Joint,
-    /// Lift over chance: `ln(p(a, b) / (p(a) p(b)))`.
-    Lift,
 }
 
 /// Tables of the pairs of cameras of one rig.

@@ -13,10 +13,9 @@ mod joints;
 mod learn;
 mod surface;
 
-pub use counts::{Counts, Shape, marginals};
+pub use counts::{Appearance, Counts, Shape, marginals};
 pub use file::{
-    Appearance, FileError, JointWeights, Learned, LearnedFrom, ModelOf, NamedPair, NamedRig,
-    Weights,
+    FileError, JointWeights, Learned, LearnedFrom, ModelOf, NamedPair, NamedRig, Weights,
 };
 pub use joints::{JointFit, JointSample};
 pub use learn::{LearnError, Learner, Pair, Settings, ViewObservation};
