@@ -30,6 +30,7 @@ mod person;
 mod check;
 mod lines;
 mod mat_files;
+mod options;
 mod read;
 mod select;
 
@@ -41,9 +42,10 @@ mod table;
 
 pub use lines::{parse_line, to_line};
 pub use mat_files::{Annotation, MatLayoutError, parse_joints, parse_labels};
+pub use options::ReadOptions;
 pub use person::{Fault, FaultKind, People, Person, Problem};
 pub use picture::Picture;
-pub use read::{DatasetError, ReadOptions, read};
+pub use read::{DatasetError, read};
 pub use sample::Sample;
 pub use select::{SelectError, Selection};
 pub use sides::{Sides, UnknownSides};
