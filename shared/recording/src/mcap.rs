@@ -30,6 +30,8 @@ pub(crate) const RECORD_HEAD_BYTES: u64 = 1 + 8;
 pub(crate) const MESSAGE_HEAD_BYTES: u64 = 2 + 4 + 8 + 8;
 /// Bytes of the head of an uncompressed chunk.
 pub(crate) const CHUNK_HEAD_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
+/// Longest record that is not a message or a chunk, bytes.
+pub(crate) const MAX_RECORD_BYTES: u64 = 16 << 20;
 
 /// The fields of a record, one after the other.
 #[derive(Debug, Default)]
@@ -129,6 +131,12 @@ impl<'a> Fields<'a> {
         }
         Some(map)
     }
+}
+
+/// Name and entries of metadata; none if the fields are invalid.
+pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
+    let mut fields = Fields(body);
+    Some((fields.text()?, fields.map()?))
 }
 
 #[cfg(test)]

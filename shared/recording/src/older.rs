@@ -4,8 +4,7 @@ use std::io::{Read, Seek};
 
 use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::mcap::{Fields, MAGIC, op};
-use crate::scan::{MAX_RECORD_BYTES, metadata};
+use crate::mcap::{Fields, MAGIC, MAX_RECORD_BYTES, metadata, op};
 use crate::{Checked, Kind, Recording, chunk};
 
 /// Most topics.

@@ -4,18 +4,15 @@
 //! contents of messages. So it needs no index at the end, and truncated files are read like complete ones.
 //! After damage it searches for the next valid record.
 
-use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::checks::{Checks, TAG};
 use crate::contents::Contents;
 use crate::cursor::{Cursor, Stop};
-use crate::mcap::{Fields, MAGIC, RECORD_HEAD_BYTES, op};
+use crate::mcap::{MAGIC, MAX_RECORD_BYTES, RECORD_HEAD_BYTES, metadata, op};
 use crate::seal::unseal;
 use crate::{Checked, Entry, Kind, Message, Recording, about, chunk, message, older};
 
-/// Longest record that is not a message or a chunk, bytes.
-pub(crate) const MAX_RECORD_BYTES: u64 = 16 << 20;
 /// Block size of the search, bytes.
 const WINDOW_BYTES: u64 = 1 << 16;
 /// Most false starts of records in a search.
@@ -140,12 +137,6 @@ pub fn check<R: Read + Seek>(
         }
     }
     Ok(damaged)
-}
-
-/// Name and entries of metadata; none if the fields are invalid.
-pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
-    let mut fields = Fields(body);
-    Some((fields.text()?, fields.map()?))
 }
 
 struct Scan<'a, R: Read + Seek> {
