@@ -6,13 +6,15 @@
 
 mod check;
 mod error;
+mod presets;
 mod table;
 mod trial;
 
 use std::path::Path;
 
 pub use error::MotionError;
-pub use table::{MarkerTable, PRESETS};
+pub use presets::PRESETS;
+pub use table::MarkerTable;
 
 use skeleton::PARSE14;
 use trial::Trial;

@@ -7,16 +7,7 @@ use serde::Deserialize;
 use skeleton::PARSE14;
 
 use super::MotionError;
-
-/// Names of the built-in tables, from `configs/markers`.
-pub const PRESETS: [&str; 4] = ["cmu", "pose2sim", "parallax", "optitrack36"];
-
-const TEXTS: [&str; 4] = [
-    include_str!("../../../../configs/markers/cmu.toml"),
-    include_str!("../../../../configs/markers/pose2sim.toml"),
-    include_str!("../../../../configs/markers/parallax.toml"),
-    include_str!("../../../../configs/markers/optitrack36.toml"),
-];
+use super::presets::preset;
 
 const TOES: [&str; 2] = ["right toes", "left toes"];
 
@@ -56,10 +47,9 @@ enum Markers {
 }
 
 impl MarkerTable {
-    /// One of [`PRESETS`].
+    /// One of [`PRESETS`](super::PRESETS).
     pub fn preset(name: &str) -> Option<Self> {
-        let place = PRESETS.iter().position(|it| *it == name)?;
-        Self::parse(TEXTS[place]).ok()
+        Self::parse(preset(name)?).ok()
     }
 
     /// Reads the file of a table.
