@@ -107,6 +107,7 @@
 
 mod settings;
 
+mod pair;
 mod term;
 mod view;
 
@@ -136,7 +137,8 @@ pub use facing::{
     rank_facing,
 };
 pub use heat_map::heat_map;
-pub use optimise::{Iteration, PairEstimate, PairInput, PairStart, estimate_pair};
+pub use optimise::{Iteration, PairEstimate, PairStart, estimate_pair};
+pub use pair::PairInput;
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;

@@ -4,18 +4,7 @@ use fmp::{Bounds, ExtraTerms, Pose, Responses, Solver};
 
 use crate::consistency::{Consistency, PairTerms};
 use crate::released::{ReleasedPair, ReleasedTerms};
-use crate::{EnergyKind, Epipolar, Settings, TypeTables, ViewInput, ViewPlan};
-
-/// A pair of views of one frame.
-#[derive(Debug, Clone, Copy)]
-pub struct PairInput<'a> {
-    /// The two views.
-    pub views: [ViewInput<'a>; 2],
-    /// Their geometry, from the first to the second.
-    pub epipolar: Epipolar,
-    /// Part-type tables of the pair, if any were learned.
-    pub tables: Option<&'a TypeTables>,
-}
+use crate::{EnergyKind, PairInput, Settings, ViewPlan};
 
 /// The start of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
