@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::features::Source;
+use crate::source::Source;
 
 /// A rectangle of the image of one level, pixels of the level.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,14 +1,15 @@
 //! From pixels to the responses of every filter on every level.
 
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use kernels::{
     Amx, Bf16Bank, Bf16Level, CorrelateWorkspace, FilterBank, Isa, Level, NoAmx, Rgb8View, Template,
 };
 
-use crate::features::{Features, Source};
-use crate::pool::Pool;
+use crate::features::Features;
+use crate::pool::{Pool, in_pool, lock};
+use crate::source::Source;
 use crate::{Layout, Model, Precision, Scope};
 
 /// Computes filter responses. Holds what can be prepared once per model, and the workspaces that
@@ -277,14 +278,4 @@ struct Part {
     levels: Range<usize>,
     /// All of them, unless there is one level only.
     panels: Range<usize>,
-}
-
-/// Whether the caller runs inside a rayon pool, and so has asked for its threads to be used.
-pub(crate) fn in_pool() -> bool {
-    rayon::current_thread_index().is_some()
-}
-
-/// Locks a pool of workspaces; they hold nothing that a panic could have left half done.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -3,46 +3,14 @@
 use std::sync::{Mutex, OnceLock};
 
 use kernels::{
-    Bf16Map, FeatureMap, HogShape, HogWorkspace, Isa, PartOfResized, Planes, Rgb8View,
-    ShrinkWorkspace, hog, reduce, resize_part,
+    Bf16Map, FeatureMap, HogWorkspace, PartOfResized, Planes, ShrinkWorkspace, hog, reduce,
+    resize_part,
 };
 
 use crate::cuts::{Cut, cuts};
-use crate::extract::lock;
-use crate::{Layout, N_CHANNELS, Scope};
-
-/// The inputs of the features.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Source<'a> {
-    pub(crate) isa: Isa,
-    pub(crate) image: Rgb8View<'a>,
-    pub(crate) layout: &'a Layout,
-    pub(crate) scope: &'a Scope,
-    /// Levels per octave.
-    pub(crate) interval: usize,
-    pub(crate) cell_px: usize,
-    /// Whether features are kept in bfloat16, or else in single precision.
-    pub(crate) rounded: bool,
-}
-
-impl Source<'_> {
-    /// Size `[rows, cols]` of the features that the responses of a level's window are made of.
-    fn map_size(&self, level: usize) -> [usize; 2] {
-        let it = &self.layout.levels[level];
-        let window = self.layout.window(self.scope, level);
-        [
-            window.rows + it.padded[0] - it.rows,
-            window.cols + it.padded[1] - it.cols,
-        ]
-    }
-
-    fn shape(&self) -> HogShape {
-        HogShape {
-            cell_px: self.cell_px,
-            pad: self.layout.pad.map(|it| it + 1),
-        }
-    }
-}
+use crate::pool::lock;
+use crate::source::Source;
+use crate::{N_CHANNELS, Scope};
 
 /// Features of all levels, with their buffers.
 ///

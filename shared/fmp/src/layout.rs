@@ -2,7 +2,18 @@
 
 use std::ops::Range;
 
-use crate::{Model, Placement};
+use crate::Model;
+
+/// A part on a level of the pyramid: the cell and the type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Placement {
+    /// Column of the response map: the filter's leftmost cell.
+    pub x: u16,
+    /// Row of the response map: the filter's topmost cell.
+    pub y: u16,
+    /// Type (mixture component) of the part, from 0.
+    pub mixture: u8,
+}
 
 /// One level of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,6 +11,7 @@
 pub mod files;
 pub mod reference;
 
+mod bounds;
 mod cuts;
 mod extract;
 mod features;
@@ -24,20 +25,20 @@ mod pyramid;
 mod responses;
 mod scope;
 mod solve;
+mod source;
 mod track;
 
+pub use bounds::{Bound, Bounds};
 pub use extract::Extractor;
-pub use layout::{ImageTooSmall, Layout, LevelLayout};
+pub use layout::{ImageTooSmall, Layout, LevelLayout, Placement};
 pub use local::{LocalScore, local_scores};
 pub use model::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
-pub use pose::{Placement, Pose};
+pub use pose::Pose;
 pub use precision::Precision;
 pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
-pub use solve::{
-    Bound, Bounds, CandidateSettings, ExtraTerms, IncrementalSolver, SolveStatistics, Solver,
-};
+pub use solve::{CandidateSettings, ExtraTerms, IncrementalSolver, SolveStatistics, Solver};
 pub use track::{FrameTime, TrackSettings, Tracker};
 
 /// Channels of the features: 18 contrast-sensitive and 9 contrast-insensitive orientations, 4

@@ -1,4 +1,6 @@
-//! Workspaces that are used again from frame to frame.
+//! Workspaces that are used again from frame to frame, and the threads that share them.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crossbeam::queue::ArrayQueue;
 
@@ -35,6 +37,16 @@ impl<T: Default> Pool<T> {
         // Beyond the limit it is dropped.
         drop(self.free.push(workspace));
     }
+}
+
+/// Whether the caller runs inside a rayon pool, and so has asked for its threads to be used.
+pub(crate) fn in_pool() -> bool {
+    rayon::current_thread_index().is_some()
+}
+
+/// Locks a pool of workspaces; they hold nothing that a panic could have left half done.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

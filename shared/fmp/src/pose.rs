@@ -1,17 +1,6 @@
 //! A pose in one image: where every part is, and which of its types.
 
-use crate::{Layout, Model};
-
-/// One part, placed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Placement {
-    /// Column of the response map: the filter's leftmost cell.
-    pub x: u16,
-    /// Row of the response map: the filter's topmost cell.
-    pub y: u16,
-    /// Type (mixture component) of the part, from 0.
-    pub mixture: u8,
-}
+use crate::{Layout, Model, Placement};
 
 /// The parts of one person in one image, all at the same level of the pyramid.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -2,7 +2,8 @@
 
 use kernels::{FeatureMap, Isa, Rgb8View};
 
-use crate::features::{Features, Source};
+use crate::features::Features;
+use crate::source::Source;
 use crate::{Layout, Model, Scope};
 
 /// The features of an image, level by level; a level is computed at first use.

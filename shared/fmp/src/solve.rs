@@ -17,10 +17,8 @@ use rayon::prelude::*;
 
 use self::statistics::Tally;
 use self::sweep::{Problem, Sweep, Workspace};
-use crate::extract::{in_pool, lock};
-use crate::pool::Pool;
+use crate::pool::{Pool, in_pool, lock};
 use crate::{Edge, Model, Pose, Responses, Spring, Springs};
-pub use bounds::{Bound, Bounds};
 pub use incremental::IncrementalSolver;
 pub use statistics::SolveStatistics;
 

@@ -9,14 +9,12 @@ mod payload;
 pub(crate) mod planted;
 mod released;
 mod summary;
-mod tokens;
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 pub use summary::{ModelSummary, PartSummary, SpringRanges, describe};
-pub use tokens::TextPosition;
 
 use crate::{Model, ModelError, ModelSpec};
 

@@ -1,8 +1,7 @@
 //! The best few distinct poses.
 
-use super::bounds::{Bound, Bounds};
 use super::{Root, Solver};
-use crate::{Pose, Responses};
+use crate::{Bound, Bounds, Pose, Responses};
 
 /// Number of roots that are backtracked together at the first request for a level; doubled each
 /// time.
@@ -42,7 +41,10 @@ impl Solver {
         });
         let (peaks, bounds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
         let poses = self.greedy(evidence, peaks.concat(), n, min_separation);
-        (poses, Bounds::of_some(evidence, bounds))
+        (
+            poses,
+            Bounds::of_some(evidence.layout().levels.len(), bounds),
+        )
     }
 
     /// The best `n` of these roots whose poses are far enough from each other.

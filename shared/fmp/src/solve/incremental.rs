@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::bounds::Upper;
 use super::sweep::{Problem, Workspace};
-use super::{Bounds, ExtraTerms, Search, Solver};
-use crate::extract::{in_pool, lock};
-use crate::{Pose, Responses};
+use super::{ExtraTerms, Search, Solver};
+use crate::bounds::Upper;
+use crate::pool::{in_pool, lock};
+use crate::{Bounds, Pose, Responses};
 
 /// Limit of the score planes that are kept between solutions, bytes.
 const MAX_KEPT_BYTES: usize = 64 << 20;

@@ -1,24 +1,8 @@
 //! Iterates over the whitespace-separated tokens of a text, with their positions.
 
-use std::fmt;
 use std::str::FromStr;
 
-use super::text::TextError;
-
-/// The position of a token in a text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TextPosition {
-    /// Line, from 1.
-    pub line: usize,
-    /// Token of the file, from 1.
-    pub token: usize,
-}
-
-impl fmt::Display for TextPosition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {} (token {})", self.line, self.token)
-    }
-}
+use super::error::{TextError, TextPosition};
 
 /// The tokens of a text.
 #[derive(Debug, Clone)]

@@ -1,0 +1,39 @@
+//! What the features of an image are computed from.
+
+use kernels::{HogShape, Isa, Rgb8View};
+
+use crate::{Layout, Scope};
+
+/// The inputs of the features.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Source<'a> {
+    pub(crate) isa: Isa,
+    pub(crate) image: Rgb8View<'a>,
+    pub(crate) layout: &'a Layout,
+    pub(crate) scope: &'a Scope,
+    /// Levels per octave.
+    pub(crate) interval: usize,
+    pub(crate) cell_px: usize,
+    /// Whether features are kept in bfloat16, or else in single precision.
+    pub(crate) rounded: bool,
+}
+
+impl Source<'_> {
+    /// Size `[rows, cols]` of the features that the responses of a level's window are made of.
+    pub(crate) fn map_size(&self, level: usize) -> [usize; 2] {
+        let it = &self.layout.levels[level];
+        let window = self.layout.window(self.scope, level);
+        [
+            window.rows + it.padded[0] - it.rows,
+            window.cols + it.padded[1] - it.cols,
+        ]
+    }
+
+    /// How the features of an image are laid out.
+    pub(crate) fn shape(&self) -> HogShape {
+        HogShape {
+            cell_px: self.cell_px,
+            pad: self.layout.pad.map(|it| it + 1),
+        }
+    }
+}
