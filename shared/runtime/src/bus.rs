@@ -1,109 +1,23 @@
 //! A process's connection to the shared memory of its deployment.
 
-use core::fmt::Debug;
 use core::time::Duration;
-use std::io;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use iceoryx2::config::Config;
-use iceoryx2::node::NodeCreationFailure;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{
     FilePath, Node, NodeBuilder, NodeName, SemanticString as _, SignalHandlingMode, ipc,
 };
-use iceoryx2::service::builder::event::EventCreateError;
-use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
-use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 
-use crate::deployment::OVERHEAD_BYTES;
+use crate::bus_error::BusError;
 use crate::log::adopt_transport_log;
-use crate::payload::{Header, Message};
+use crate::room::OVERHEAD_BYTES;
 use crate::service::{self, PortError};
-use crate::topic::TopicPlan;
-use crate::{
-    Copies, Namespace, NamespaceError, PrivacyError, Progress, Stop, free_shared_memory, private,
-};
+use crate::topic::{Topic, TopicPlan};
+use crate::{Copies, Namespace, Progress, Stop, free_shared_memory, private};
 
 /// How long a sender waits for a receiver without room, unless set otherwise.
 const PATIENCE: Duration = Duration::from_mins(2);
-
-/// The deployment's shared memory cannot be reached, or a topic not be created.
-#[derive(Debug, thiserror::Error)]
-pub enum BusError {
-    /// The working directory cannot be created or written to.
-    #[error("cannot use working directory {path:?}")]
-    Directory {
-        /// The directory or a file below it.
-        path: PathBuf,
-        /// Why.
-        #[source]
-        source: io::Error,
-    },
-    /// The deployment belongs to another user.
-    #[error(transparent)]
-    Privacy(#[from] PrivacyError),
-    /// iceoryx2 does not accept the namespace.
-    #[error(transparent)]
-    Namespace(#[from] NamespaceError),
-    /// There is no room for the queues of a process. The system would kill it when it first wrote to them.
-    #[error(
-        "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
-        .needed_bytes / 1000, .free_bytes / 1000
-    )]
-    Full {
-        /// Name of the process.
-        process: String,
-        /// What is needed.
-        needed_bytes: u64,
-        /// What is free.
-        free_bytes: u64,
-    },
-    /// The process cannot be registered.
-    #[error("cannot register process {process:?} below {root:?}")]
-    Node {
-        /// Name of the process.
-        process: String,
-        /// Where.
-        root: PathBuf,
-        /// Why.
-        #[source]
-        source: NodeCreationFailure,
-    },
-    /// The topic cannot be created.
-    #[error("cannot create topic {topic:?}")]
-    Create {
-        /// Name of the topic.
-        topic: String,
-        /// Why.
-        #[source]
-        source: PublishSubscribeCreateError,
-    },
-    /// The wake-up of a topic cannot be created.
-    #[error(
-        "cannot create wake-up of topic {topic:?}: {}",
-        wording::spaced(source)
-    )]
-    CreateWakeUp {
-        /// Name of the topic.
-        topic: String,
-        /// Why.
-        source: EventCreateError,
-    },
-    /// The name of a topic or a process is not one that iceoryx2 accepts.
-    #[error("name {name:?} is empty, too long, or not plain text")]
-    Name {
-        /// The name.
-        name: String,
-    },
-}
-
-/// Keeps a topic alive while no process uses it.
-#[derive(Debug)]
-pub struct Topic {
-    _messages: Box<dyn Debug>,
-    _wake_ups: Vec<EventFactory<ipc::Service>>,
-}
 
 /// A process's connection to the shared memory of its deployment. It creates ports.
 #[derive(Debug)]
@@ -225,23 +139,7 @@ impl Bus {
     ///
     /// [`BusError::Create`], [`BusError::CreateWakeUp`], [`BusError::Name`].
     pub fn create_topics(&self, plans: &[TopicPlan]) -> Result<Vec<Topic>, BusError> {
-        plans.iter().map(|plan| plan.create(self)).collect()
-    }
-
-    /// Creates the services of one topic; the type parameters were fixed by its plan.
-    pub(crate) fn create_topic<E: Message, H: Header>(
-        &self,
-        plan: &TopicPlan,
-    ) -> Result<Topic, BusError> {
-        let messages = service::create_messages::<E, H>(&self.node, plan)?;
-        let mut wake_ups = Vec::new();
-        for name in service::wake_up_names(plan) {
-            wake_ups.push(service::create_wake_up(&self.node, &name)?);
-        }
-        Ok(Topic {
-            _messages: Box::new(messages),
-            _wake_ups: wake_ups,
-        })
+        plans.iter().map(|plan| plan.create(&self.node)).collect()
     }
 
     pub(crate) fn notifier(&self, name: &str) -> Result<Notifier<ipc::Service>, PortError> {

@@ -8,6 +8,7 @@ use messages::{
 
 use rustix::process::{Resource, getrlimit};
 
+use crate::room::OVERHEAD_BYTES;
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
 
 /// Queue of small messages of one subscriber with realtime delivery.
@@ -24,9 +25,6 @@ const ONLOOKERS: usize = 4;
 const DESCRIPTORS: u64 = 40;
 /// Open files per topic in the process that keeps it alive: 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
-/// Queues and management of one process, bytes: ten times the measured size.
-pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
-
 /// The parameters that determine the topics of a deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeploymentPlan {

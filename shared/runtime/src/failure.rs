@@ -5,9 +5,6 @@ use core::fmt;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use rustix::process::{Resource, getrlimit};
-
-use crate::reserve::Refused;
 use wording::in_words;
 
 /// Exit statuses, the same for the command and for all its services.
@@ -185,62 +182,6 @@ impl<E: Fault> From<E> for Failure {
             kind,
             hint,
             source: Box::new(error),
-        }
-    }
-}
-
-const ROOM: &str =
-    "make room in /dev/shm: end what else uses it, or give it more (in Docker --shm-size)";
-
-/// If there was no room for a segment: the wanted size, the free size, and what to try.
-fn no_room() -> Option<String> {
-    let kilobytes = |bytes: u64| bytes.div_ceil(1000);
-    Some(match crate::reserve::refused()? {
-        Refused::NoRoom { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted, {} KB are free in /dev/shm: {ROOM}",
-            kilobytes(wanted_bytes),
-            crate::free_shared_memory().unwrap_or(0) / 1000
-        ),
-        Refused::TooLarge { wanted_bytes } => format!(
-            "{} KB of shared memory were wanted in one piece, and no file may have more than {} KB: \
-             allow more (`ulimit -f unlimited`)",
-            kilobytes(wanted_bytes),
-            getrlimit(Resource::Fsize).current.unwrap_or(0) / 1000
-        ),
-    })
-}
-
-impl Fault for crate::BusError {
-    fn hint(&self) -> Option<String> {
-        match self {
-            Self::Privacy(error) => error.hint(),
-            Self::Full { .. } => Some(ROOM.to_owned()),
-            _ => no_room(),
-        }
-    }
-}
-impl Fault for crate::PortError {
-    fn hint(&self) -> Option<String> {
-        let is_known = matches!(self, Self::Memory { .. });
-        no_room().or_else(|| is_known.then(|| ROOM.to_owned()))
-    }
-}
-
-impl Fault for crate::ReceiveError {}
-impl Fault for crate::WaitError {}
-
-impl Fault for crate::NamespaceError {
-    fn kind(&self) -> ExitKind {
-        ExitKind::Config
-    }
-}
-
-impl Fault for crate::SendError {
-    fn kind(&self) -> ExitKind {
-        if self.is_stopped() {
-            ExitKind::Interrupted
-        } else {
-            ExitKind::Run
         }
     }
 }

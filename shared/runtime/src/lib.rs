@@ -1,12 +1,14 @@
 //! Ports, wake-ups, stop requests, heartbeats and logging: the only crate that calls iceoryx2 and the
 //! operating system.
 
+mod delivery;
 mod deployment;
 mod namespace;
 mod topic;
 
 mod beneath;
 mod bus;
+mod bus_error;
 mod clean;
 mod copies;
 mod lock;
@@ -17,6 +19,7 @@ mod payload;
 mod private;
 mod publisher;
 mod reserve;
+mod room;
 mod service;
 mod subscriber;
 mod waiter;
@@ -37,11 +40,13 @@ mod scheduling;
 mod stop;
 mod terminal;
 
-pub use bus::{Bus, BusError, Topic};
+pub use bus::Bus;
+pub use bus_error::BusError;
 pub use child::{Child, freeze, kill, thaw, wait_for_any};
 pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use copies::Copies;
+pub use delivery::{Delivery, Limits};
 pub use deployment::{
     DeploymentPlan, PreflightError, ViewPlan, needed_bytes, preflight, process_topics,
 };
@@ -70,5 +75,5 @@ pub use service::PortError;
 pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
 pub use terminal::Keys;
-pub use topic::{Delivery, Limits, TopicPlan};
+pub use topic::{Topic, TopicPlan};
 pub use waiter::{WaitError, Waiter, Woken};

@@ -15,11 +15,9 @@ use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
 use crate::bus::prepare;
-use crate::private::{self, Root};
+use crate::private::{self, LOCK_FILE, Root};
 use crate::{BusError, ExitKind, Fault, Namespace, beneath};
 
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
-pub(crate) const LOCK_FILE: &str = "lock";
 /// Tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
 /// How long observers are given to leave.

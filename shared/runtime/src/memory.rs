@@ -21,7 +21,8 @@ use crate::mapped::Mapping;
 use crate::payload::{Element, Header};
 use crate::reserve::{self, Refused};
 
-const SHARED_MEMORY: &str = "/dev/shm";
+/// The file system of shared memory.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// The memory of a pool cannot be allocated.
 #[derive(Debug, thiserror::Error)]

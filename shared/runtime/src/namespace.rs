@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
+use crate::{ExitKind, Fault};
+
 /// The longest file name that iceoryx2 puts below the root: `/`, 39 digits, `.event`.
 const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
 /// Bytes of `sun_path`, less the closing NUL (unix(7)).
@@ -42,6 +44,12 @@ pub enum NamespaceError {
         /// The directory.
         root: PathBuf,
     },
+}
+
+impl Fault for NamespaceError {
+    fn kind(&self) -> ExitKind {
+        ExitKind::Config
+    }
 }
 
 /// The name of a deployment, with the directory and the prefix that keep it apart from others.

@@ -7,7 +7,8 @@ use iceoryx2::prelude::{CallbackProgression, Service as _, ipc};
 use iceoryx2::service::ServiceListError;
 use messages::{Metrics, topic};
 
-use crate::lock::{ENDING_FILE, LOCK_FILE, living};
+use crate::lock::{ENDING_FILE, living};
+use crate::private::LOCK_FILE;
 use crate::remains::supervisor;
 use crate::{Bus, BusError, ExitKind, Fault, Namespace, PortError, ReceiveError, Stop, Subscriber};
 

@@ -12,7 +12,7 @@ use rustix::fs::{AtFlags, FileType, Mode, Stat, chmodat, fchmod, fstat, mkdirat,
 use rustix::io::Errno;
 use rustix::process::getuid;
 
-use crate::lock::{LOCK_FILE, SHARED_MEMORY};
+use crate::memory::SHARED_MEMORY;
 use crate::{Namespace, beneath};
 
 /// Mode of a directory that only its owner may enter.
@@ -25,6 +25,8 @@ const OTHERS: u32 = 0o077;
 const OTHERS_WRITE: u32 = 0o022;
 /// The sticky bit: only its owner may remove a file of the directory.
 const STICKY: u32 = 0o1000;
+/// The file that the supervisor of a deployment locks.
+pub(crate) const LOCK_FILE: &str = "lock";
 /// The marker file, which names the deployment that a directory belongs to.
 const MARK_FILE: &str = "parallax-deployment";
 

@@ -14,12 +14,12 @@ use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy, PortFactory as
 use iceoryx2::sample_mut::SampleMut;
 
 use crate::bus::Bus;
+use crate::delivery::Delivery;
 use crate::losses::{Losses, Patience};
 use crate::memory;
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
-use crate::topic::Delivery;
-use crate::{Copies, Progress, Stop};
+use crate::{Copies, ExitKind, Fault, Progress, Stop};
 
 /// Longest pause between two checks of a topic's subscribers.
 const CONNECT_PAUSE: Duration = Duration::from_millis(20);
@@ -71,6 +71,16 @@ pub enum SendError {
         #[source]
         source: IoxSendError,
     },
+}
+
+impl Fault for SendError {
+    fn kind(&self) -> ExitKind {
+        if self.is_stopped() {
+            ExitKind::Interrupted
+        } else {
+            ExitKind::Run
+        }
+    }
 }
 
 impl SendError {

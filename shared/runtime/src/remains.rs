@@ -8,7 +8,9 @@ use std::path::Path;
 use rustix::fs::{major, minor};
 use rustix::io::Errno;
 
-use crate::lock::{LOCK_FILE, SHARED_MEMORY, alive, entries};
+use crate::lock::{alive, entries};
+use crate::memory::SHARED_MEMORY;
+use crate::private::LOCK_FILE;
 use crate::{BusError, LockError, Namespace, beneath, private};
 
 /// A deployment that runs, or that has left files behind.

@@ -1,5 +1,4 @@
-//! Creation and opening of the iceoryx2 services of a topic, with retries while another process does the
-//! same.
+//! Opens the iceoryx2 services of a topic, with retries while another process creates or removes them.
 
 use core::time::Duration;
 use std::thread::sleep;
@@ -13,26 +12,20 @@ use iceoryx2::prelude::{
     AttributeSet, AttributeSpecifier, Node, PortFactory as _, SemanticString as _, ServiceName, ipc,
 };
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
-use iceoryx2::service::builder::event::{EventCreateError, EventOpenError};
-use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeCreateError, PublishSubscribeOpenError,
-};
+use iceoryx2::service::builder::event::EventOpenError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use crate::bus::BusError;
+use crate::Fault;
+use crate::delivery::Delivery;
 use crate::memory::MemoryError;
 use crate::payload::{Header, Message};
-use crate::topic::{Delivery, TopicPlan};
+use crate::room::{ROOM, no_room};
 
 /// How long to wait for a service that another process is creating or removing.
 const IN_FLUX_LIMIT: Duration = Duration::from_secs(5);
 const IN_FLUX_PAUSE: Duration = Duration::from_millis(10);
-/// Processes that may open one topic: more than a deployment has, since dead ones count until they are
-/// cleaned up.
-const MAX_NODES: usize = 96;
-/// Ports of one wake-up: as many as a process may have views, with spare slots for dead ones.
-const MAX_WAKE_UP_PORTS: usize = 64;
 
 /// Attribute of a service: longest array, elements.
 const MAX_LEN: &str = "parallax.max-len";
@@ -142,84 +135,16 @@ pub enum PortError {
     },
 }
 
-/// The events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
-/// connections.
-pub(crate) fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
-    let mut names = Vec::new();
-    if plan.wakes() {
-        names.push(plan.topic().to_owned());
+impl Fault for PortError {
+    fn hint(&self) -> Option<String> {
+        let is_known = matches!(self, Self::Memory { .. });
+        no_room().or_else(|| is_known.then(|| ROOM.to_owned()))
     }
-    if plan.delivery() == Delivery::Lossless {
-        names.push(ready_name(plan.topic()));
-    }
-    names
 }
 
 /// The event by which subscribers acknowledge a publisher.
 pub(crate) fn ready_name(topic: &str) -> String {
     format!("{topic}/ready")
-}
-
-pub(crate) fn create_messages<E: Message, H: Header>(
-    node: &Node<ipc::Service>,
-    plan: &TopicPlan,
-) -> Result<Messages<E, H>, BusError> {
-    let bad_name = || BusError::Name {
-        name: plan.topic().to_owned(),
-    };
-    let name = ServiceName::new(plan.topic()).ok().ok_or_else(bad_name)?;
-    let attributes = attributes(plan).ok_or_else(bad_name)?;
-    let limits = plan.limits();
-    let attempt = || {
-        node.service_builder(&name)
-            .publish_subscribe::<[E]>()
-            .user_header::<H>()
-            .enable_safe_overflow(plan.delivery() == Delivery::Realtime)
-            .max_publishers(limits.publishers)
-            .max_subscribers(limits.subscribers)
-            .max_nodes(MAX_NODES)
-            .subscriber_max_buffer_size(limits.buffer)
-            .subscriber_max_borrowed_samples(limits.borrowed)
-            .history_size(0)
-            .create_with_attributes(&attributes)
-    };
-    let in_flux = |error: &PublishSubscribeCreateError| {
-        use PublishSubscribeCreateError as E;
-        matches!(
-            error,
-            E::ServiceInCorruptedState | E::IsBeingCreatedByAnotherInstance | E::HangsInCreation
-        )
-    };
-    patiently(attempt, in_flux).map_err(|source| BusError::Create {
-        topic: plan.topic().to_owned(),
-        source,
-    })
-}
-
-pub(crate) fn create_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<WakeUp, BusError> {
-    let service = ServiceName::new(name).ok().ok_or_else(|| BusError::Name {
-        name: name.to_owned(),
-    })?;
-    let attempt = || {
-        node.service_builder(&service)
-            .event()
-            .max_notifiers(MAX_WAKE_UP_PORTS)
-            .max_listeners(MAX_WAKE_UP_PORTS)
-            .max_nodes(MAX_NODES)
-            .event_id_max_value(0)
-            .create()
-    };
-    let in_flux = |error: &EventCreateError| {
-        use EventCreateError as E;
-        matches!(
-            error,
-            E::ServiceInCorruptedState | E::IsBeingCreatedByAnotherInstance
-        )
-    };
-    patiently(attempt, in_flux).map_err(|source| BusError::CreateWakeUp {
-        topic: name.to_owned(),
-        source,
-    })
 }
 
 pub(crate) fn open_messages<E: Message, H: Header>(
@@ -292,6 +217,25 @@ pub(crate) struct Extras {
     pub(crate) delivery: Delivery,
 }
 
+impl Extras {
+    /// What [`extras`] reads; the delivery is a setting of the service itself.
+    pub(crate) fn attributes(&self) -> Option<AttributeSpecifier> {
+        let mut attributes = AttributeSpecifier::new();
+        for (key, value) in [
+            (MAX_LEN, self.max_len),
+            (LOANED, self.loaned),
+            (CHUNKS, self.chunks),
+            (MAPPED, self.mapped),
+            (WAKES, usize::from(self.wakes)),
+        ] {
+            let key = AttributeKey::new(key.as_bytes()).ok()?;
+            let value = AttributeValue::new(value.to_string().as_bytes()).ok()?;
+            attributes = attributes.define(&key, &value).ok()?;
+        }
+        Some(attributes)
+    }
+}
+
 pub(crate) fn extras<E: Message, H: Header>(messages: &Messages<E, H>) -> Extras {
     let set = messages.attributes();
     Extras {
@@ -308,22 +252,6 @@ pub(crate) fn extras<E: Message, H: Header>(messages: &Messages<E, H>) -> Extras
     }
 }
 
-fn attributes(plan: &TopicPlan) -> Option<AttributeSpecifier> {
-    let mut attributes = AttributeSpecifier::new();
-    for (key, value) in [
-        (MAX_LEN, plan.max_len()),
-        (LOANED, plan.limits().loaned),
-        (CHUNKS, plan.chunks()),
-        (MAPPED, plan.mapped_chunks()),
-        (WAKES, usize::from(plan.wakes())),
-    ] {
-        let key = AttributeKey::new(key.as_bytes()).ok()?;
-        let value = AttributeValue::new(value.to_string().as_bytes()).ok()?;
-        attributes = attributes.define(&key, &value).ok()?;
-    }
-    Some(attributes)
-}
-
 fn attribute(set: &AttributeSet, key: &str) -> Option<usize> {
     let key = AttributeKey::new(key.as_bytes()).ok()?;
     let value = set.key_value(&key, 0)?;
@@ -337,7 +265,7 @@ fn service_name(topic: &str) -> Result<ServiceName, PortError> {
 }
 
 /// Retries what fails only because another process is creating, removing or cleaning up the same service.
-fn patiently<T, E>(
+pub(crate) fn patiently<T, E>(
     mut attempt: impl FnMut() -> Result<T, E>,
     in_flux: impl Fn(&E) -> bool,
 ) -> Result<T, E> {

@@ -12,10 +12,10 @@ use iceoryx2::prelude::{CallbackProgression, PortFactory as _, ipc};
 use iceoryx2::sample::Sample as IoxSample;
 
 use crate::bus::Bus;
+use crate::delivery::Delivery;
 use crate::payload::{Element, Header, Message};
 use crate::service::{self, Messages, PortError};
-use crate::topic::Delivery;
-use crate::{Copies, Waiter};
+use crate::{Copies, Fault, Waiter};
 
 /// A message could not be received.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +36,8 @@ pub enum ReceiveError {
         source: IoxReceiveError,
     },
 }
+
+impl Fault for ReceiveError {}
 
 /// Receives messages as copies.
 #[derive(Debug)]

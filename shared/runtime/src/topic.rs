@@ -1,52 +1,21 @@
-//! The quality of service of one topic, fixed before any process starts.
+//! One topic: its quality of service, fixed before any process starts, and its creation.
 
-use crate::bus::{Bus, BusError, Topic};
+use core::fmt::Debug;
+
+use iceoryx2::prelude::{Node, ServiceName, ipc};
+use iceoryx2::service::builder::event::EventCreateError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeCreateError;
+
+use crate::bus_error::BusError;
+use crate::delivery::{Delivery, Limits};
 use crate::payload::{Element, Header, Message};
+use crate::service::{Extras, Messages, WakeUp, patiently, ready_name};
 
-/// What happens when a receiver is slower than its sender.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Delivery {
-    /// The sender never waits: a full buffer drops its oldest message, so the latest frame wins.
-    #[default]
-    Realtime,
-    /// Nothing is lost: a full buffer makes the sender wait.
-    Lossless,
-}
-
-/// The number of ports of a topic and their buffers.
-///
-/// Memory is reserved for the worst case, so that a sender always has some:
-/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher, unless
-/// [`TopicPlan::with_few_chunks`] is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
-    /// Largest number of publishers.
-    pub publishers: usize,
-    /// Largest number of subscribers.
-    pub subscribers: usize,
-    /// Queue length of a subscriber, messages.
-    pub buffer: usize,
-    /// Messages that one subscriber may borrow at the same time.
-    pub borrowed: usize,
-    /// Messages that one publisher may have on loan at the same time.
-    pub loaned: usize,
-}
-
-impl Limits {
-    /// One publisher that writes one message at a time.
-    ///
-    /// * `buffer`: queue length of a subscriber, messages.
-    /// * `borrowed`: messages that one subscriber may borrow at the same time.
-    pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
-        Self {
-            publishers: 1,
-            subscribers,
-            buffer,
-            borrowed,
-            loaned: 1,
-        }
-    }
-}
+/// Processes that may open one topic: more than a deployment has, since dead ones count until they are
+/// cleaned up.
+const MAX_NODES: usize = 96;
+/// Ports of one wake-up: as many as a process may have views, with spare slots for dead ones.
+const MAX_WAKE_UP_PORTS: usize = 64;
 
 /// One topic of a deployment: its name, message type and quality of service.
 #[derive(Debug, Clone)]
@@ -59,11 +28,12 @@ pub struct TopicPlan {
     /// See [`Self::with_few_chunks`].
     usual_chunks: Option<usize>,
     wakes: bool,
-    create: fn(&Bus, &Self) -> Result<Topic, BusError>,
+    create: fn(&Node<ipc::Service>, &Self) -> Result<Topic, BusError>,
 }
 
 impl TopicPlan {
-    /// A topic of messages that are copied when sent and received: [`Bus::publisher`], [`Bus::subscriber`].
+    /// A topic of messages that are copied when sent and received: [`Bus::publisher`](crate::Bus::publisher),
+    /// [`Bus::subscriber`](crate::Bus::subscriber).
     pub fn messages<T: Message>(topic: String, delivery: Delivery, limits: Limits) -> Self {
         Self {
             topic,
@@ -73,12 +43,12 @@ impl TopicPlan {
             chunk_bytes: chunk_bytes(0, size_of::<T>()),
             usual_chunks: None,
             wakes: true,
-            create: Bus::create_topic::<T, ()>,
+            create: create::<T, ()>,
         }
     }
 
-    /// A topic of arrays with a header, written and read in place: [`Bus::slice_publisher`],
-    /// [`Bus::slice_subscriber`].
+    /// A topic of arrays with a header, written and read in place:
+    /// [`Bus::slice_publisher`](crate::Bus::slice_publisher), [`Bus::slice_subscriber`](crate::Bus::slice_subscriber).
     ///
     /// The array starts on a cache line, because its header's size is a multiple of one.
     ///
@@ -99,7 +69,7 @@ impl TopicPlan {
             chunk_bytes: chunk_bytes(size_of::<H>(), size_of::<E>() * max_len),
             usual_chunks: None,
             wakes: true,
-            create: Bus::create_topic::<E, H>,
+            create: create::<E, H>,
         }
     }
 
@@ -175,9 +145,118 @@ impl TopicPlan {
     }
 
     /// Creates the services of the topic.
-    pub(crate) fn create(&self, bus: &Bus) -> Result<Topic, BusError> {
-        (self.create)(bus, self)
+    pub(crate) fn create(&self, node: &Node<ipc::Service>) -> Result<Topic, BusError> {
+        (self.create)(node, self)
     }
+
+    fn extras(&self) -> Extras {
+        Extras {
+            max_len: self.max_len,
+            loaned: self.limits.loaned,
+            chunks: self.chunks(),
+            mapped: self.mapped_chunks(),
+            wakes: self.wakes,
+            delivery: self.delivery,
+        }
+    }
+}
+
+/// Keeps a topic alive while no process uses it.
+#[derive(Debug)]
+pub struct Topic {
+    _messages: Box<dyn Debug>,
+    _wake_ups: Vec<WakeUp>,
+}
+
+/// Creates the services of one topic; the type parameters were fixed by its plan.
+fn create<E: Message, H: Header>(
+    node: &Node<ipc::Service>,
+    plan: &TopicPlan,
+) -> Result<Topic, BusError> {
+    let messages = create_messages::<E, H>(node, plan)?;
+    let mut wake_ups = Vec::new();
+    for name in wake_up_names(plan) {
+        wake_ups.push(create_wake_up(node, &name)?);
+    }
+    Ok(Topic {
+        _messages: Box::new(messages),
+        _wake_ups: wake_ups,
+    })
+}
+
+/// The events of a topic: its wake-up if it has one, and with lossless delivery the acknowledgement of
+/// connections.
+fn wake_up_names(plan: &TopicPlan) -> Vec<String> {
+    let mut names = Vec::new();
+    if plan.wakes() {
+        names.push(plan.topic().to_owned());
+    }
+    if plan.delivery() == Delivery::Lossless {
+        names.push(ready_name(plan.topic()));
+    }
+    names
+}
+
+fn create_messages<E: Message, H: Header>(
+    node: &Node<ipc::Service>,
+    plan: &TopicPlan,
+) -> Result<Messages<E, H>, BusError> {
+    let bad_name = || BusError::Name {
+        name: plan.topic().to_owned(),
+    };
+    let name = ServiceName::new(plan.topic()).ok().ok_or_else(bad_name)?;
+    let attributes = plan.extras().attributes().ok_or_else(bad_name)?;
+    let limits = plan.limits();
+    let attempt = || {
+        node.service_builder(&name)
+            .publish_subscribe::<[E]>()
+            .user_header::<H>()
+            .enable_safe_overflow(plan.delivery() == Delivery::Realtime)
+            .max_publishers(limits.publishers)
+            .max_subscribers(limits.subscribers)
+            .max_nodes(MAX_NODES)
+            .subscriber_max_buffer_size(limits.buffer)
+            .subscriber_max_borrowed_samples(limits.borrowed)
+            .history_size(0)
+            .create_with_attributes(&attributes)
+    };
+    let in_flux = |error: &PublishSubscribeCreateError| {
+        use PublishSubscribeCreateError as E;
+        matches!(
+            error,
+            E::ServiceInCorruptedState | E::IsBeingCreatedByAnotherInstance | E::HangsInCreation
+        )
+    };
+    patiently(attempt, in_flux).map_err(|source| BusError::Create {
+        topic: plan.topic().to_owned(),
+        source,
+    })
+}
+
+fn create_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<WakeUp, BusError> {
+    let service = ServiceName::new(name).ok().ok_or_else(|| BusError::Name {
+        name: name.to_owned(),
+    })?;
+    let attempt = || {
+        node.service_builder(&service)
+            .event()
+            .max_notifiers(MAX_WAKE_UP_PORTS)
+            .max_listeners(MAX_WAKE_UP_PORTS)
+            .max_nodes(MAX_NODES)
+            .event_id_max_value(0)
+            .create()
+    };
+    let in_flux = |error: &EventCreateError| {
+        use EventCreateError as E;
+        matches!(
+            error,
+            E::ServiceInCorruptedState | E::IsBeingCreatedByAnotherInstance
+        )
+    };
+    patiently(attempt, in_flux).map_err(|source| BusError::CreateWakeUp {
+        topic: name.to_owned(),
+        source,
+    })
 }
 
 /// Bytes of a cache line, and of the widest vector register.

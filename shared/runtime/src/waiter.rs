@@ -16,7 +16,7 @@ use rustix::io::Errno;
 
 use crate::bus::Bus;
 use crate::service::{self, PortError};
-use crate::{Progress, Stop};
+use crate::{Fault, Progress, Stop};
 
 /// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own;
 /// and a process that sleeps for long would seem to hang.
@@ -41,6 +41,8 @@ pub enum Woken {
 #[derive(Debug, thiserror::Error)]
 #[error("cannot wait for messages")]
 pub struct WaitError(#[source] io::Error);
+
+impl Fault for WaitError {}
 
 /// Wakes a process when one of its subscribers has a message.
 #[derive(Debug)]

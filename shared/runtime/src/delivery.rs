@@ -1,0 +1,46 @@
+//! What a topic does about a slow receiver, its number of ports and their buffers.
+
+/// What happens when a receiver is slower than its sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delivery {
+    /// The sender never waits: a full buffer drops its oldest message, so the latest frame wins.
+    #[default]
+    Realtime,
+    /// Nothing is lost: a full buffer makes the sender wait.
+    Lossless,
+}
+
+/// The number of ports of a topic and their buffers.
+///
+/// Memory is reserved for the worst case, so that a sender always has some:
+/// `subscribers * (buffer + borrowed) + loaned` chunks for each publisher, unless
+/// [`TopicPlan::with_few_chunks`](crate::TopicPlan::with_few_chunks) is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest number of publishers.
+    pub publishers: usize,
+    /// Largest number of subscribers.
+    pub subscribers: usize,
+    /// Queue length of a subscriber, messages.
+    pub buffer: usize,
+    /// Messages that one subscriber may borrow at the same time.
+    pub borrowed: usize,
+    /// Messages that one publisher may have on loan at the same time.
+    pub loaned: usize,
+}
+
+impl Limits {
+    /// One publisher that writes one message at a time.
+    ///
+    /// * `buffer`: queue length of a subscriber, messages.
+    /// * `borrowed`: messages that one subscriber may borrow at the same time.
+    pub fn new(subscribers: usize, buffer: usize, borrowed: usize) -> Self {
+        Self {
+            publishers: 1,
+            subscribers,
+            buffer,
+            borrowed,
+            loaned: 1,
+        }
+    }
+}
