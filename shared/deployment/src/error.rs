@@ -1,6 +1,6 @@
 //! Why a deployment file was refused: always with the place, and with what would do.
 
-use crate::keys::OLDER;
+use crate::older::OLDER;
 
 /// Why a deployment file was refused.
 #[derive(Debug, thiserror::Error)]

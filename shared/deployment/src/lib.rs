@@ -16,6 +16,8 @@ pub mod triangulate;
 mod fault;
 mod processes;
 
+mod complaint;
+mod entries;
 mod error;
 mod fields;
 mod keys;
@@ -23,6 +25,7 @@ mod limits;
 mod lists;
 mod load;
 mod machine;
+mod older;
 mod places;
 mod reference;
 mod rules;
@@ -35,14 +38,16 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use complaint::Complaint;
+pub use entries::{Entry, Origin};
 pub use error::ConfigError;
-pub use keys::{Entry, Key, Origin, keys};
+pub use keys::keys;
 pub use load::Loaded;
 pub use machine::{AnyMachine, Machine};
 pub use processes::{Policy, Runtime};
 pub use reference::reference;
-pub use rules::{Complaint, MAX_CORES, fuse_numbers};
-pub use schema::schema;
+pub use rules::{MAX_CORES, fuse_numbers};
+pub use schema::{Key, schema};
 pub use shipped::{SHIPPED, is_shipped, relative_to};
 pub use topology::{Process, RecordingPlan, Replay, Role, Stage, Topology};
 

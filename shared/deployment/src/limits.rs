@@ -1,6 +1,6 @@
 //! Between which numbers every key of a deployment file lies, and which of them are doubtful.
 
-use crate::rules::{Complaint, between, demand};
+use crate::complaint::{Complaint, between, demand, whole};
 use crate::{Deployment, Runtime, capture, fuse, pose};
 
 /// One hour, and one day, milliseconds.
@@ -103,15 +103,6 @@ fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
         between("supervise.latency_budget_ms", budget, 1e-3, DAY_MS as f64)?;
     }
     Ok(())
-}
-
-fn whole(key: &str, got: u64, least: u64, most: u64) -> Result<(), Complaint> {
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &format!("{least} to {most}"),
-    )
 }
 
 impl Deployment {

@@ -2,8 +2,7 @@
 
 use toml::{Table, Value};
 
-use super::Deployment;
-use super::rules::Complaint;
+use crate::{Complaint, Deployment};
 
 /// Sees that no list is longer than what was taken of it: readers of TOML pass over what is too much.
 ///

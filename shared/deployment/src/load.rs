@@ -1,16 +1,13 @@
 //! From a file and the options of the command line to a deployment.
 
-use std::ops::Range;
 use std::path::Path;
 
-use toml::de::DeTable;
 use toml::{Table, Value};
 
-use crate::keys::OLDER;
 use crate::lists::fits;
-use crate::places::{malformed, of_set};
-use crate::rules::{self, Complaint};
-use crate::{ConfigError, Deployment, Machine};
+use crate::older::{of_today, rename_older};
+use crate::places::{malformed, of_set, place, span_of, span_of_any};
+use crate::{Complaint, ConfigError, Deployment, Machine, rules};
 
 /// A deployment, and what of it was said by whom.
 #[derive(Debug)]
@@ -40,7 +37,10 @@ impl Loaded {
         let malformed = |error: &toml::de::Error| malformed(file, text, error);
         let mut in_file: Result<Table, _> = toml::from_str(text);
         if let Ok(table) = &mut in_file {
-            rename_older(table, |older| place(file, text, span_of(text, older)))?;
+            rename_older(table).map_err(|it| ConfigError::Malformed {
+                place: place(file, text, span_of(text, it.older)),
+                message: it.message,
+            })?;
         }
         // The complaints of the structs tell more than those of a table: they go first.
         let mut deployment: Deployment = toml::from_str(text).map_err(|it| malformed(&it))?;
@@ -133,71 +133,6 @@ impl Loaded {
     }
 }
 
-/// `file:line` of a span; the file alone where there is none.
-pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
-    let Some(before) = span.and_then(|it| text.get(..it.start)) else {
-        return file.display().to_string();
-    };
-    let line = 1 + before.matches('\n').count();
-    format!("{}:{line}", file.display())
-}
-
-/// Where a dotted key stands in `text`; where its section does if the key itself is not there.
-fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
-    let document = DeTable::parse(text).ok()?;
-    let mut table = document.into_inner();
-    let mut found = None;
-    for name in key.split('.') {
-        let (name, value) = table.into_iter().find(|(it, _)| it.get_ref() == name)?;
-        found = Some(name.span());
-        match value.into_inner() {
-            toml::de::DeValue::Table(inner) => table = inner,
-            _ => break,
-        }
-    }
-    found
-}
-
-/// The same, where the file has the older name of its section too.
-fn span_of_any(text: &str, key: &str) -> Option<Range<usize>> {
-    span_of(text, key).or_else(|| {
-        let (section, rest) = key.split_once('.')?;
-        let (older, _) = OLDER.iter().find(|it| it.1 == section)?;
-        span_of(text, &format!("{older}.{rest}")).or_else(|| span_of(text, older))
-    })
-}
-
-/// A key by the name that its section has today.
-fn of_today(key: &str) -> String {
-    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
-    match OLDER.iter().find(|it| it.0 == section) {
-        Some((_, name)) => format!("{name}.{rest}"),
-        None => key.to_owned(),
-    }
-}
-
-/// Gives sections the names that they have today.
-///
-/// * `place`: of a section that is given by both names.
-fn rename_older(table: &mut Table, place: impl Fn(&str) -> String) -> Result<(), ConfigError> {
-    for (older, name) in OLDER {
-        let Some(section) = table.remove(older) else {
-            continue;
-        };
-        if table.contains_key(name) {
-            let message = format!(
-                "`{older}` is the older name of `{name}`, and both are given: move the keys of `{older}` to `{name}`"
-            );
-            return Err(ConfigError::Malformed {
-                place: place(older),
-                message,
-            });
-        }
-        table.insert(name.to_owned(), section);
-    }
-    Ok(())
-}
-
 /// What `--set section.key=value` says, as a table.
 ///
 /// A value that is not TOML is taken as text, so that `--set fuse.energy=released` needs no quotes.
@@ -223,7 +158,10 @@ fn overrides(set: &[String]) -> Result<Table, ConfigError> {
             merge(&mut table, nested);
         }
     }
-    rename_older(&mut table, |_| "--set".to_owned())?;
+    rename_older(&mut table).map_err(|it| ConfigError::Malformed {
+        place: "--set".to_owned(),
+        message: it.message,
+    })?;
     Ok(table)
 }
 

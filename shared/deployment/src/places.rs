@@ -1,12 +1,46 @@
-//! Which key of a deployment file a complaint of the TOML reader is about.
+//! Where a key of a deployment file stands, and which key a complaint of the TOML reader is about.
 
 use std::ops::Range;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
-use super::ConfigError;
-use super::load::place;
+use crate::ConfigError;
+use crate::older::OLDER;
+
+/// `file:line` of a span; the file alone where there is none.
+pub(super) fn place(file: &Path, text: &str, span: Option<Range<usize>>) -> String {
+    let Some(before) = span.and_then(|it| text.get(..it.start)) else {
+        return file.display().to_string();
+    };
+    let line = 1 + before.matches('\n').count();
+    format!("{}:{line}", file.display())
+}
+
+/// Where a dotted key stands in `text`; where its section does if the key itself is not there.
+pub(super) fn span_of(text: &str, key: &str) -> Option<Range<usize>> {
+    let document = DeTable::parse(text).ok()?;
+    let mut table = document.into_inner();
+    let mut found = None;
+    for name in key.split('.') {
+        let (name, value) = table.into_iter().find(|(it, _)| it.get_ref() == name)?;
+        found = Some(name.span());
+        match value.into_inner() {
+            DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found
+}
+
+/// The same, where the file has the older name of its section too.
+pub(super) fn span_of_any(text: &str, key: &str) -> Option<Range<usize>> {
+    span_of(text, key).or_else(|| {
+        let (section, rest) = key.split_once('.')?;
+        let (older, _) = OLDER.iter().find(|it| it.1 == section)?;
+        span_of(text, &format!("{older}.{rest}")).or_else(|| span_of(text, older))
+    })
+}
 
 /// What is wrong with the text of a file, with its line and its key.
 pub(super) fn malformed(file: &Path, text: &str, error: &toml::de::Error) -> ConfigError {

@@ -2,36 +2,14 @@
 
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
 
-use crate::{ConfigError, Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
+use crate::complaint::{Complaint, demand, not_negative, positive, within};
+use crate::{Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
 const MOST_AT_ONCE: usize = 8;
 
 /// Most cores of a machine that Linux numbers.
 pub const MAX_CORES: usize = 1024;
-
-/// A value that cannot be.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Complaint {
-    /// The key, with its section.
-    pub key: String,
-    /// Its value.
-    pub got: String,
-    /// What would do.
-    pub expected: String,
-}
-
-impl Complaint {
-    /// The same with its place: file and line, or the option of the command line.
-    pub fn at(self, place: String) -> ConfigError {
-        ConfigError::Value {
-            place,
-            key: self.key,
-            got: self.got,
-            expected: self.expected,
-        }
-    }
-}
 
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -304,54 +282,5 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
         key,
         &format!("{name:?}"),
         "capture, pose, quality, fuse, triangulate, results, or one process of these, such as pose-0",
-    )
-}
-
-pub(super) fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Result<(), Complaint> {
-    if holds {
-        return Ok(());
-    }
-    Err(Complaint {
-        key: key.to_owned(),
-        got: got.to_owned(),
-        expected: expected.to_owned(),
-    })
-}
-
-fn within(key: &str, got: usize, least: usize, most: usize) -> Result<(), Complaint> {
-    let expected = format!("{least} to {most}");
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &expected,
-    )
-}
-
-fn positive(key: &str, got: f64) -> Result<(), Complaint> {
-    demand(
-        got.is_finite() && got > 0.0,
-        key,
-        &got.to_string(),
-        "a number above 0",
-    )
-}
-
-fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
-    demand(
-        got.is_finite() && got >= 0.0,
-        key,
-        &got.to_string(),
-        "a number of at least 0",
-    )
-}
-
-/// A number from `least` to `most`.
-pub(super) fn between(key: &str, got: f64, least: f64, most: f64) -> Result<(), Complaint> {
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &format!("{least} to {most}"),
     )
 }

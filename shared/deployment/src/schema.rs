@@ -3,7 +3,7 @@
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
-use crate::{Deployment, Key};
+use crate::Deployment;
 
 /// The JSON schema (draft 2020-12) of a deployment file, made from the structs that read it.
 pub fn schema() -> Value {
@@ -11,6 +11,17 @@ pub fn schema() -> Value {
     let mut schema = generator.into_root_schema_for::<Deployment>();
     schema.insert("title".to_owned(), "Parallax deployment".into());
     schema.to_value()
+}
+
+/// A key of a deployment file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    /// Its name with its section: `fuse.workers`.
+    pub name: String,
+    /// What it means: the documentation of its field.
+    pub meaning: String,
+    /// What it takes, as TOML: `whole number`, `"paper" or "released"`.
+    pub takes: String,
 }
 
 /// A JSON schema, asked about its keys.

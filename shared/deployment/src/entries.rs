@@ -1,0 +1,76 @@
+//! Every key of a deployment with its value, and who said it.
+
+use toml::{Table, Value};
+
+use crate::{Key, Loaded, keys};
+
+/// Who said a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// Nobody.
+    Default,
+    /// The deployment file.
+    File,
+    /// `--set` or another option.
+    CommandLine,
+}
+
+impl Origin {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::File => "file",
+            Self::CommandLine => "command line",
+        }
+    }
+}
+
+/// One key.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Entry {
+    /// With its section.
+    pub key: String,
+    /// As TOML; `None` if it is not set and has no default.
+    pub value: Option<Value>,
+    /// Who said it.
+    pub origin: Origin,
+    /// What it means.
+    pub meaning: String,
+}
+
+impl Loaded {
+    /// Every key with its value, in order.
+    ///
+    /// # Errors
+    ///
+    /// A value that TOML cannot hold, such as a whole number beyond 64 bits with sign.
+    pub fn entries(&self) -> Result<Vec<Entry>, toml::ser::Error> {
+        let table = Table::try_from(&self.deployment)?;
+        let entry = |it: Key| Entry {
+            value: lookup(&table, &it.name).cloned(),
+            origin: self.origin(&it.name),
+            key: it.name,
+            meaning: it.meaning,
+        };
+        Ok(keys().into_iter().map(entry).collect())
+    }
+
+    fn origin(&self, key: &str) -> Origin {
+        if lookup(&self.on_command_line, key).is_some() {
+            Origin::CommandLine
+        } else if lookup(&self.in_file, key).is_some() {
+            Origin::File
+        } else {
+            Origin::Default
+        }
+    }
+}
+
+fn lookup<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    match key.split_once('.') {
+        Some((section, rest)) => lookup(table.get(section)?.as_table()?, rest),
+        None => table.get(key),
+    }
+}
