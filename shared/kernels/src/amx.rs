@@ -12,10 +12,9 @@ use missing as system;
 
 use std::sync::OnceLock;
 
-pub(crate) use system::Tiles;
+use crate::tiles::SIDE;
 
-/// Rows of a tile, and columns of single precision: cells and filters of a product.
-pub(crate) const SIDE: usize = 16;
+pub(crate) use system::Tiles;
 
 /// Proof that this machine has AMX with bfloat16 and AVX-512, and that this process may use them.
 ///

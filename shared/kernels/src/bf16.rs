@@ -9,41 +9,15 @@ mod tests;
 use std::ops::Range;
 
 use crate::N_CHANNELS;
-use crate::amx::{Amx, SIDE};
+use crate::amx::Amx;
 use crate::correlate::{FeatureMap, Template};
 use crate::dispatch::{Body, dispatch};
 use crate::isa::Isa;
-use crate::simd::{ROW, Row};
+use crate::simd::ROW;
+use crate::tiles::{BLOCK, Cell, SIDE, Weights};
 
-/// Cells of a block: two tiles of them.
-const BLOCK: usize = 2 * SIDE;
 /// Most filters in a panel: two tiles of them.
 const N_LANES: usize = ROW;
-
-/// The sums of a block of cells, a filter in each lane.
-pub(crate) type Block = [Row; BLOCK];
-
-/// The channels of a cell: a row of a tile, at the beginning of a cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub(crate) struct Cell([u16; N_CHANNELS]);
-
-/// Weights of 32 filters for one filter cell: two tiles of 16 filters, `[channel / 2][filter][channel % 2]`.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub(crate) struct Weights([[[[u16; 2]; SIDE]; SIDE]; 2]);
-
-/// A filter's rows over those of a map.
-pub(crate) struct Sums<'a> {
-    /// Begins with the cell under the first filter cell of the first sum.
-    pub(crate) cells: &'a [Cell],
-    /// Cells from one row of the map to the next.
-    pub(crate) stride: usize,
-    /// Size `[rows, cols]` of the filter.
-    pub(crate) filter: [usize; 2],
-    /// One for each filter cell, row by row.
-    pub(crate) weights: &'a [Weights],
-}
 
 /// The nearest bfloat16, the even one of two that are equally near.
 ///

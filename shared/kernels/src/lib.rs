@@ -26,6 +26,7 @@ mod peak;
 mod planes;
 mod simd;
 mod spring;
+mod tiles;
 
 /// A size for a test: the second where an interpreter (Miri) takes a thousand times as long.
 #[cfg(test)]

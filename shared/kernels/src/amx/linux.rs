@@ -5,9 +5,9 @@ use std::arch::asm;
 use std::arch::x86_64::{__cpuid_count, _xgetbv};
 use std::marker::PhantomData;
 
-use super::{Amx, NoAmx, SIDE};
-use crate::bf16::{Block, Sums};
+use super::{Amx, NoAmx};
 use crate::isa::{Isa, Kind};
+use crate::tiles::{Block, SIDE, Sums};
 
 /// Products of tiles in a round of [`Tiles::exercise`].
 pub(super) const PRODUCTS_OF_ROUND: usize = 64;

@@ -1,7 +1,7 @@
 //! Systems without support for AMX.
 
 use super::{Amx, NoAmx};
-use crate::bf16::{Block, Sums};
+use crate::tiles::{Block, Sums};
 
 pub(super) const PRODUCTS_OF_ROUND: usize = 0;
 

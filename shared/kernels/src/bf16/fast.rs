@@ -6,10 +6,11 @@
 
 use std::ops::Range;
 
-use super::{BLOCK, Bf16Level, Bf16Map, Block, Panel, Sums};
+use super::{Bf16Level, Bf16Map, Panel};
 use crate::amx::{Amx, Tiles};
 use crate::isa::Isa;
 use crate::simd::{Kernel, Row, Simd};
+use crate::tiles::{BLOCK, Block, Sums};
 
 /// Placements that all panels answer before the next ones: their cells stay in the cache.
 const STRIP: usize = 16 * BLOCK;

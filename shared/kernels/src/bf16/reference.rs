@@ -2,9 +2,9 @@
 
 use super::{Bf16Level, Bf16Map, Panel};
 use crate::N_CHANNELS;
-use crate::amx::SIDE;
 use crate::dispatch::{Body, dispatch};
 use crate::isa::Isa;
+use crate::tiles::SIDE;
 
 /// All responses; see [`super::Bf16Bank::correlate`].
 #[expect(
