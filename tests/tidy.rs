@@ -5,6 +5,9 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
 
+#[path = "tidy/circles.rs"]
+mod circles;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -49,6 +52,9 @@ const MAY_BE_UNSAFE: &[&str] = &["kernels", "runtime"];
 
 /// The only crates that may know the transport.
 const MAY_KNOW_TRANSPORT: &[&str] = &["messages", "runtime"];
+
+/// Crates whose files may still import one another in a circle.
+const HAVE_CIRCLES: &[&str] = &[];
 
 const MAX_LINES: usize = 500;
 const MAX_MAIN_LINES: usize = 100;
@@ -136,6 +142,21 @@ fn files_stay_readable() {
                 text.starts_with("//! "),
                 "{} says nothing about itself: open with a `//!` sentence",
                 file.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn no_files_import_one_another_in_a_circle() {
+    for (name, dir) in crates() {
+        let src = dir.join("src");
+        for circle in circles::of_crate(&src, &rust_files(&src)) {
+            assert!(
+                HAVE_CIRCLES.contains(&name.as_str()),
+                "{name}: each of the files {} needs another one of them: move what several need to the file where it \
+                 belongs, or to one of its own that needs none of them",
+                circle.join(", ")
             );
         }
     }
