@@ -3,6 +3,8 @@
 use messages::{MAX_CANDIDATES, MAX_VIEWS};
 
 use crate::complaint::{Complaint, demand, not_negative, positive, within};
+use crate::older::OLDER;
+use crate::topology::{process_name, services};
 use crate::{Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
@@ -265,22 +267,20 @@ fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
 
 /// Whether a name is that of a service, or of a process of the deployment.
 fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Complaint> {
-    let n_views = deployment.cameras.len();
-    let services = [
-        ("capture", n_views),
-        ("pose", n_views),
-        ("quality", n_views),
-        ("fuse", deployment.fuse.most_workers()),
-        ("triangulate", 0),
-        ("results", 0),
-    ];
+    let services = services(deployment);
     let is_one = services.iter().any(|&(service, n)| {
-        name == service || (0..n).any(|index| name == format!("{service}-{index}"))
+        name == service || (0..n).any(|index| name == process_name(service, Some(index)))
     });
-    demand(
-        is_one,
-        key,
-        &format!("{name:?}"),
-        "capture, pose, quality, fuse, triangulate, results, or one process of these, such as pose-0",
-    )
+    let newer = OLDER.iter().find(|it| it.0 == name);
+    let expected = match newer {
+        Some((_, newer)) => format!("{newer:?}, which is what this process is called today"),
+        None => {
+            let names: Vec<&str> = services.iter().map(|it| it.0).collect();
+            format!(
+                "{}, or one process of these, such as pose-0",
+                names.join(", ")
+            )
+        }
+    };
+    demand(is_one, key, &format!("{name:?}"), &expected)
 }

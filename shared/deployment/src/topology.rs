@@ -55,6 +55,29 @@ impl Stage {
     }
 }
 
+/// The process that writes the results.
+const RESULTS: &str = "results";
+/// The process that records every message.
+const RECORD: &str = "record";
+
+/// The services whose processes a deployment file may give cores and a priority, each with the most processes that are
+/// told apart by their number. What records is none of them: no file says whether it runs.
+pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
+    let n_views = deployment.cameras.len();
+    let of_stage = |stage: Stage| match stage {
+        Stage::Capture | Stage::Pose | Stage::Quality => n_views,
+        Stage::Fuse => deployment.fuse.most_workers(),
+        Stage::Triangulate => 0,
+    };
+    let stages = Stage::ALL.map(|it| (it.name(), of_stage(it)));
+    stages.into_iter().chain([(RESULTS, 0)]).collect()
+}
+
+/// The name of a process in its deployment: `pose-1`, or `results` where there is one of its service alone.
+pub(crate) fn process_name(service: &str, index: Option<usize>) -> String {
+    index.map_or(service.to_owned(), |it| format!("{service}-{it}"))
+}
+
 /// The file that every message of a run is recorded in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordingPlan {
@@ -180,7 +203,7 @@ impl Topology {
 
     /// Processes that take everything that leaves the pipeline: `results`, and `record` if there is one.
     pub fn n_recorders(&self) -> usize {
-        self.count(|it| ["results", "record"].contains(&it.service))
+        self.count(|it| [RESULTS, RECORD].contains(&it.service))
     }
 
     /// Views, and so processes of every service that has one for each view.
@@ -240,7 +263,7 @@ impl Builder<'_> {
             let bulk = views().filter(|_| self.with_evidence).map(topic::evidence);
             let inputs = self.everything().into_iter().chain(bulk);
             processes.push(process(
-                "record",
+                RECORD,
                 None,
                 Role::Optional,
                 inputs.collect(),
@@ -248,7 +271,7 @@ impl Builder<'_> {
             ));
         }
         processes.push(process(
-            "results",
+            RESULTS,
             None,
             Role::Optional,
             self.everything(),
@@ -258,7 +281,7 @@ impl Builder<'_> {
         let inputs = inputs.chain((0..self.topology.n_workers).map(topic::pair_pose));
         let outputs = vec![topic::pose3d()];
         processes.push(process(
-            "triangulate",
+            Stage::Triangulate.name(),
             None,
             Role::Essential,
             inputs.collect(),
@@ -271,7 +294,7 @@ impl Builder<'_> {
         processes.extend(views().map(|view| {
             let outputs = vec![topic::view_pose(view), topic::evidence(view)];
             process(
-                "pose",
+                Stage::Pose.name(),
                 Some(view),
                 Role::Redundant,
                 vec![topic::frame(view)],
@@ -280,7 +303,7 @@ impl Builder<'_> {
         }));
         processes.extend(views().map(|view| {
             process(
-                "capture",
+                Stage::Capture.name(),
                 Some(view),
                 Role::Redundant,
                 vec![],
@@ -311,14 +334,16 @@ impl Builder<'_> {
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
         }
         let outputs = vec![topic::pair_pose(worker)];
-        process("fuse", Some(worker), Role::Redundant, inputs, outputs)
+        let service = Stage::Fuse.name();
+        process(service, Some(worker), Role::Redundant, inputs, outputs)
     }
 
     fn quality(&self, view: usize) -> Process {
         let mut inputs = vec![topic::view_pose(view)];
         inputs.extend(self.has_network.then(|| topic::frame(view)));
         let outputs = vec![topic::view_quality(view)];
-        process("quality", Some(view), Role::Optional, inputs, outputs)
+        let service = Stage::Quality.name();
+        process(service, Some(view), Role::Optional, inputs, outputs)
     }
 }
 
@@ -330,7 +355,7 @@ fn process(
     outputs: Vec<String>,
 ) -> Process {
     Process {
-        name: index.map_or(service.to_owned(), |it| format!("{service}-{it}")),
+        name: process_name(service, index),
         service,
         index,
         role,

@@ -248,6 +248,44 @@ fn both_names_of_the_results_at_once_are_refused() {
     );
 }
 
+/// The process of that name today is another one: the file is not taken to mean it, nor guessed about.
+#[test]
+fn cores_of_a_process_by_its_older_name_are_refused_with_the_name_of_today() {
+    for key in ["cores = { record = [0] }", "priority = { record = 10 }"] {
+        let text = format!("{SHORT}\n[record]\ntrc = true\n[runtime]\n{key}\n");
+        let name = key.split(' ').next().unwrap();
+        assert_eq!(
+            refused(&text, &[]),
+            format!(
+                "deployment.toml:21: `runtime.{name}` is \"record\", expected \"results\", which is what this process \
+                 is called today"
+            )
+        );
+        let today = text.replace("{ record", "{ results");
+        assert!(read(&today, &[]).is_ok(), "{today}");
+    }
+}
+
+#[test]
+fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
+    let loaded = read(SHORT, &["quality.network=shipped"]).unwrap();
+    let topology = crate::Topology::new(&loaded.deployment, None, None);
+    for process in topology.processes() {
+        for name in [&process.name, process.service] {
+            let set = format!("runtime.cores={{ {name} = [0] }}");
+            assert!(read(SHORT, &[&set]).is_ok(), "{set}");
+        }
+    }
+    let got = refused(SHORT, &["runtime.cores={ pose-2 = [0] }"]);
+    assert!(
+        got.ends_with(
+            "`runtime.cores` is \"pose-2\", expected capture, pose, quality, fuse, triangulate, results, or one \
+             process of these, such as pose-0"
+        ),
+        "{got}"
+    );
+}
+
 #[test]
 fn the_older_name_is_not_suggested() {
     let got = refused(&format!("{SHORT}\n[recrd]\n"), &[]);
