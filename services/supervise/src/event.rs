@@ -1,4 +1,4 @@
-//! //! Events that the supervisor reports during a run.
+//! Events that the supervisor reports during a run.
 
 use core::fmt;
 use core::time::Duration;

@@ -1,4 +1,4 @@
-//! //! The outcome of a run.
+//! The outcome of a run.
 
 use messages::{Health, Metrics, Refusal};
 

@@ -1,4 +1,4 @@
-//! //! Collects durations and counts of one process.
+//! Collects durations and counts of one process.
 
 use hdrhistogram::Histogram;
 use messages::{Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span};

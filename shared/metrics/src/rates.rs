@@ -1,4 +1,4 @@
-//! //! Recent rates.
+//! Recent rates.
 
 use std::collections::VecDeque;
 

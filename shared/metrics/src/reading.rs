@@ -1,4 +1,4 @@
-//! //! The checked content of another process's metrics message.
+//! The checked content of another process's metrics message.
 
 use messages::{
     Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
