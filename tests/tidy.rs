@@ -33,6 +33,7 @@ const LAYERS: &[&[&str]] = &[
     &["wire", "training", "qualitytraining", "sequences"],
     &["experiment", "stage"],
     &["report"],
+    &["offline"],
     &[
         "capture",
         "pose",

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use capture::Feed;
-use consistency::{Appearance, Learned, Shape};
+use consistency::{Appearance, Learned};
 use deployment::Deployment;
 use fmp::Model;
 use footage::{SourceSpec, Turn};
@@ -172,19 +172,9 @@ pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learn
     let bytes = Shipped::Consistency.read(file)?;
     let text = core::str::from_utf8(&bytes).map_err(|_odd| no_text(file))?;
     let learned = Learned::parse(text).map_err(|error| in_file(file, &error))?;
-    let checked = learned.check_model(&shape(model));
+    let checked = learned.check_model(&offline::consistency::shape(model));
     checked.map_err(|error| in_file(file, &error))?;
     Ok(Some(learned))
-}
-
-/// Types of every part of a model, and the parts on the other side.
-pub(crate) fn shape(model: &Model) -> Shape {
-    let parts = 0..model.n_parts();
-    let mirror = model.spec().mirror.clone();
-    Shape {
-        n_types: parts.clone().map(|part| model.n_types(part)).collect(),
-        mirror: mirror.unwrap_or_else(|| parts.collect()),
-    }
 }
 
 /// The part-type tables of some cameras: those that are named, and of the other pairs what was learned.
@@ -333,39 +323,4 @@ fn no_text(file: &Path) -> Failure {
 /// An input that is wrong: the file, then what is wrong with it.
 pub(crate) fn in_file(file: &Path, error: &dyn std::error::Error) -> Failure {
     Failure::new(ExitKind::Input, format!("{}: {error}", file.display()))
-}
-
-/// The images that are named, those of folders in the order of their names.
-pub(crate) fn images(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut images = Vec::new();
-    for path in named {
-        if !path.is_dir() {
-            images.push(path.clone());
-            continue;
-        }
-        let wrong = |error: std::io::Error| in_file(path, &error);
-        let mut inside = Vec::new();
-        for entry in fs::read_dir(path).map_err(wrong)? {
-            inside.push(entry.map_err(wrong)?.path());
-        }
-        inside.retain(|it| is_image(it));
-        inside.sort();
-        if inside.is_empty() {
-            let message = format!("{}: no image (png, jpg, jpeg, bmp) in it", path.display());
-            return Err(Failure::new(ExitKind::Input, message));
-        }
-        images.append(&mut inside);
-    }
-    Ok(images)
-}
-
-/// Whether a file has an image's name.
-pub(crate) fn is_image(path: &Path) -> bool {
-    let extension = path
-        .extension()
-        .and_then(|it| it.to_str())
-        .unwrap_or_default();
-    ["png", "jpg", "jpeg", "bmp"]
-        .iter()
-        .any(|it| extension.eq_ignore_ascii_case(it))
 }

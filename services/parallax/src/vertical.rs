@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
 use runtime::Failure;
 
 use crate::inputs;
-use crate::search::Search;
+use offline::Search;
 
 /// Pictures of a camera that are searched, and the frames between them.
 const N_PICTURES: u64 = 2;

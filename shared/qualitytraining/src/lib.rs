@@ -9,6 +9,7 @@ pub mod vary;
 pub mod network;
 pub mod onnx;
 pub mod parameters;
+pub mod vgg;
 
 pub mod curves;
 pub mod judge;

@@ -15,9 +15,9 @@ use skeleton::JointSet;
 
 use self::pictures::{Picture, Pictures, Searched};
 use crate::describe::{self, Placed};
-use crate::search::Search;
 use crate::sheet::{Sheet, Skeleton, limbs};
 use crate::{inputs, output};
+use offline::Search;
 
 /// Longest side that is searched unless somebody asks for more, pixels.
 const SIZE: usize = 1280;
@@ -136,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
     }
-    let files = inputs::images(&arguments.images)?;
+    let files = offline::images::listed(&arguments.images)?;
     let mut sheet = arguments.sheet.as_ref().map(|it| {
         let n_pictures = files.iter().map(|it| pictures::count(it, arguments));
         Sheet::new(it.clone(), n_pictures.sum())

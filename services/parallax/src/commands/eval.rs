@@ -15,7 +15,7 @@ use deployment::fuse::Config;
 use deployment::fuse_numbers;
 use experiment::{FilmSettings, Version};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
-use sequences::{Alignment, Sequence, SequenceError};
+use sequences::{Alignment, Sequence};
 use viewquality::Forecaster;
 
 use super::judge::selection;
@@ -25,8 +25,6 @@ use crate::inputs;
 use crate::nothing;
 use crate::shipped::Shipped;
 use job::Job;
-
-pub(super) use job::no_film;
 
 const HELP: &str = "\
 SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax synth`, or a description \
@@ -264,7 +262,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     let mut all: Vec<Sequence> = Vec::new();
     for path in &arguments.sequences {
         let read = sequences::read(path, &options);
-        for mut it in read.map_err(unread)? {
+        for mut it in read.map_err(offline::sequence_failure)? {
             it.thin_out(arguments.every, arguments.frames);
             if all
                 .iter()
@@ -277,15 +275,6 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
         }
     }
     Ok(all)
-}
-
-pub(super) fn unread(error: SequenceError) -> Failure {
-    let kind = match &error {
-        SequenceError::Rig(geometry::files::RigFileError::Read { .. }) => ExitKind::Input,
-        SequenceError::Rig(_) | SequenceError::Cameras { .. } => ExitKind::Calibration,
-        _ => ExitKind::Input,
-    };
-    Failure::new(kind, error)
 }
 
 fn config(arguments: &Arguments) -> Result<Config, Failure> {

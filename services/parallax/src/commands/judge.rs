@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use clap::Args;
 use datasets::{ReadOptions, Selection, Sides, SkeletonTable};
 use experiment::Judged;
+use offline::{Search, judged};
 use runtime::Failure;
 use serde_json::json;
 use skeleton::PARSE14;
 
-use crate::search::Search;
-use crate::{inputs, judged, output};
+use crate::{inputs, output};
 
 /// Which model, and on whom.
 #[derive(Debug, Args)]
@@ -57,12 +57,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     judged::check(&model, &arguments.model.display().to_string())?;
     let options = options(arguments.only.as_ref(), arguments.without.as_ref());
     let read = datasets::read(&arguments.dataset, &options);
-    let mut people = read.map_err(super::train::unread)?;
+    let mut people = read.map_err(offline::dataset_failure)?;
     let table = SkeletonTable::published();
     let sided = people.people.into_iter();
     let sided = sided.map(|it| arguments.sides.of(it, table.joint_mirror()));
     people.people = sided.collect();
-    let pictures = judged::judged(&Search::new(model), "", &people, || false)?;
+    let pictures = judged::judged(
+        &Search::new(model),
+        "",
+        &people,
+        || false,
+        |text| output::message(text),
+    )?;
     let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
     if arguments.json {
         output::json(&json!({

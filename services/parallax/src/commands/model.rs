@@ -70,7 +70,7 @@ fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failur
     let model = inputs::model(file)?;
     let examples = match images {
         [] => None,
-        images => Some(examples::gather(&model, &inputs::images(images)?)?),
+        images => Some(examples::gather(&model, &offline::images::listed(images)?)?),
     };
     let page = report::model::html(&model, examples.as_ref());
     std::fs::write(html, page).map_err(|error| inputs::in_file(html, &error))?;

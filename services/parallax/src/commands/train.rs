@@ -1,35 +1,23 @@
 //! `parallax train`: a model from annotated people, and what several views have in common.
 
-mod alarms;
-mod album;
 mod consistency;
-mod data;
-mod leave;
-mod per_dataset;
-mod progress;
+mod people;
 mod quality;
-mod report;
-mod store;
+mod terminal;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::Instant;
 
 use clap::{Args, Subcommand};
-use datasets::SkeletonTable;
+use offline::person::{Job, Progress, Store};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
-use training::{CheckpointError, Plan, Settings, TrainError, Trainer, Tree};
+use training::Settings;
 
 use crate::globals::Globals;
 use crate::{inputs, output};
-use album::Gallery;
-use data::Data;
-use progress::Progress;
-use report::Report;
-use store::Store;
-
-pub(crate) use data::unread;
+use people::People;
+use terminal::Terminal;
 
 const HELP: &str = "\
 DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of \
@@ -88,7 +76,7 @@ pub(crate) enum Command {
 pub(crate) struct Arguments {
     /// The people.
     #[command(flatten)]
-    data: data::Chosen,
+    data: People,
     /// The model file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     out: Option<PathBuf>,
@@ -137,7 +125,10 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let shared = Arc::new(Shared {
         store: Store::new(&out, arguments.resume)?,
-        progress: Progress::new(stop.clone(), globals.quiet, arguments.json),
+        progress: Progress::new(
+            stop.clone(),
+            Box::new(Terminal::with_bar(globals.quiet, arguments.json)),
+        ),
         quiet: globals.quiet,
     });
     let threads = arguments.threads.map_or(0, usize::from);
@@ -147,7 +138,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         .build()
         .or_fail(ExitKind::Run)?;
     let worker = Arc::clone(&shared);
-    let done = leave::unless_stopped(&stop, move || {
+    let done = offline::unless_stopped(&stop, move || {
         pool.install(|| work(&arguments, &settings, &worker))
     })?;
     shared.progress.finish();
@@ -182,100 +173,18 @@ fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
 }
 
 fn work(arguments: &Arguments, settings: &Settings, shared: &Shared) -> Result<ExitCode, Failure> {
-    let begin = Instant::now();
-    let table = arguments.data.table()?;
-    let judged = match &arguments.judge {
-        Some(folder) => Some(data::in_folders(std::slice::from_ref(folder))?),
-        None => None,
+    let job = Job {
+        data: arguments.data.chosen(),
+        skeleton: arguments.data.table()?,
+        settings: settings.clone(),
+        judge: arguments.judge.clone(),
+        resume: arguments.resume,
     };
-    let data = Data::read(&arguments.data, &table, &shared.progress)?;
-    let gallery = Gallery::new(&data, &table)?;
-    let name = shared.store.model_name();
-    let plan = Plan::new(&name, &tree(&table), gallery.parts(), settings);
-    let plan = plan.or_fail(ExitKind::Input)?;
-    let mut report = Report::new(&data, &gallery, &plan);
-    shared.progress.data(&report)?;
-    let mut trainer = start(arguments, (&plan, settings), &gallery, shared)?;
-    report.n_resumed = trainer.n_done();
-    while let Some(step) = trainer.steps().get(trainer.n_done()).copied() {
-        shared
-            .progress
-            .begin(step, trainer.n_done(), trainer.steps());
-        trainer.step().map_err(failure)?;
-        shared.store.save(
-            &trainer.checkpoint(),
-            gallery.stamp(),
-            trainer.steps().len(),
-        )?;
-        shared.progress.done()?;
-    }
-    let model = trainer.model().map_err(failure)?;
-    report.n_steps = trainer.steps().len();
-    report.n_lost = shared.progress.n_lost();
-    drop(trainer);
-    shared.store.finish(&model)?;
-    report.trained(&model, begin.elapsed());
-    let images = judged.as_ref().unwrap_or(&data.negatives);
-    let folder = arguments.judge.clone();
-    report.alarms = Some(alarms::count(&model, images, folder, &shared.progress)?);
-    report.seconds = begin.elapsed().as_secs_f64();
-    shared.progress.finish();
+    let report = offline::person::train(&job, &shared.store, &shared.progress)?;
     if arguments.json {
         output::json(&report.json())?;
     } else if !shared.quiet {
         output::line(report.text())?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Begins, or goes on from the checkpoint.
-fn start<'a>(
-    arguments: &Arguments,
-    (plan, settings): (&'a Plan, &'a Settings),
-    gallery: &'a Gallery,
-    shared: &'a Shared,
-) -> Result<Trainer<'a>, Failure> {
-    let found = if arguments.resume {
-        shared.store.load(gallery.stamp())?
-    } else {
-        None
-    };
-    let Some(checkpoint) = found else {
-        return Trainer::new(plan, settings, gallery, &shared.progress).map_err(failure);
-    };
-    shared.progress.resuming(checkpoint.n_done());
-    let trainer = Trainer::resume((plan, settings), gallery, &shared.progress, checkpoint);
-    let trainer = trainer.map_err(|error| match error {
-        CheckpointError::Train(error) => failure(error),
-        error => shared.store.refused(error),
-    })?;
-    let (n_done, n_steps) = (trainer.n_done(), trainer.steps().len());
-    shared.store.resumed(n_done, n_steps);
-    shared.progress.resumed(n_done, n_steps)?;
-    Ok(trainer)
-}
-
-fn tree(table: &SkeletonTable) -> Tree {
-    Tree {
-        names: table.names().to_vec(),
-        parents: table.parent().to_vec(),
-        mirror: Some(table.mirror().to_vec()),
-    }
-}
-
-fn failure(error: TrainError) -> Failure {
-    let kind = match error {
-        TrainError::Stopped => ExitKind::Interrupted,
-        TrainError::Model(_) => ExitKind::Run,
-        _ => ExitKind::Input,
-    };
-    Failure::new(kind, error)
-}
-
-/// The folder that a file lies in, as the operating system wants it named.
-fn folder_of(file: &Path) -> &Path {
-    match file.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    }
 }

@@ -9,7 +9,7 @@ use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::Arguments;
 use crate::inputs;
-use crate::search::Search;
+use offline::Search;
 
 /// A picture as people see it.
 #[derive(Debug)]
@@ -98,7 +98,7 @@ fn spec(path: &Path, arguments: &Arguments) -> SourceSpec {
 
 /// How many pictures a file promises; one if it does not say.
 pub(super) fn count(path: &Path, arguments: &Arguments) -> usize {
-    if inputs::is_image(path) {
+    if offline::images::has_image_name(path) {
         return 1;
     }
     let source = Source::open(&spec(path, arguments));

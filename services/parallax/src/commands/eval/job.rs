@@ -9,11 +9,12 @@ use std::time::{Duration, Instant};
 use consistency::Learned;
 use deployment::fuse::Config;
 use experiment::{
-    Bench, Expectation, Film, FilmError, FilmSettings, Header, Predicted, Record, Setup,
-    SingleView, Trial, Version, parse14, part_errors, projected, read_records, tenth_of,
+    Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
+    Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use fmp::Model;
 use indicatif::{ProgressBar, ProgressStyle};
+use offline::film_failure;
 use pipeline::{SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
@@ -84,7 +85,7 @@ impl Job {
         if open.is_empty() {
             return Ok((records, 0));
         }
-        let mut film = Film::open(sequence, &self.film).map_err(no_film)?;
+        let mut film = Film::open(sequence, &self.film).map_err(film_failure)?;
         let mut bench = self.bench(sequence, &film)?;
         let scales: Vec<f32> = film.footage_from_frame().iter().map(scale).collect();
         let mut n_missing = 0;
@@ -92,7 +93,7 @@ impl Job {
             if self.stop.is_requested() {
                 break;
             }
-            let images = film.at(frame.index).map_err(no_film)?;
+            let images = film.at(frame.index).map_err(film_failure)?;
             if images.iter().any(Option::is_none) {
                 n_missing += 1;
                 progress.passed_over(1);
@@ -295,14 +296,6 @@ impl Job {
         let is_needed = self.oracle || self.forecaster.is_some();
         is_needed.then(|| bench.cameras().map(in_frame).collect())
     }
-}
-
-pub(in crate::commands) fn no_film(error: FilmError) -> Failure {
-    let kind = match &error {
-        FilmError::Footage { .. } => ExitKind::Input,
-        FilmError::Framing { .. } | FilmError::Warp { .. } => ExitKind::Calibration,
-    };
-    Failure::new(kind, error)
 }
 
 /// Pixels of the frame per pixel of the footage.

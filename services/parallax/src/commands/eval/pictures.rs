@@ -8,14 +8,14 @@ use std::process::ExitCode;
 use datasets::People;
 use evaluation::Bootstrap;
 use experiment::{Intervals, Judged, Pictures, pictures_latex};
+use offline::{Search, judged};
 use report::evaluation::pictures_html;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
 use super::Arguments;
-use crate::commands::{judge, train};
-use crate::search::Search;
-use crate::{inputs, judged, output};
+use crate::commands::judge;
+use crate::{inputs, output};
 
 /// Whether a path is a data set of single pictures, by what lies there.
 pub(super) fn is_one(path: &Path) -> bool {
@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
             let message = format!("{name} is given twice");
             return Err(Failure::new(ExitKind::Usage, message));
         }
-        let people = datasets::read(path, &options).map_err(train::unread)?;
+        let people = datasets::read(path, &options).map_err(offline::dataset_failure)?;
         all.push((name, people));
     }
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
@@ -54,7 +54,15 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
     let search = Search::new(model);
     let mut sets = Vec::new();
     for (name, people) in &all {
-        let found = pool.install(|| judged::judged(&search, name, people, || stop.is_requested()));
+        let found = pool.install(|| {
+            judged::judged(
+                &search,
+                name,
+                people,
+                || stop.is_requested(),
+                |text| output::message(text),
+            )
+        });
         let set = found?;
         let file = poses.join(format!("{name}.jsonl"));
         put(&file, &lines(people, &set))?;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use report::model::Examples;
 use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::search::Search;
+use offline::Search;
 
 /// Most examples of a type.
 const MOST: usize = 4;

@@ -1,20 +1,18 @@
 //! `parallax train consistency`: what several views of a person have in common, from sequences with truth.
 
-mod report;
-mod work;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use ::consistency::Learned;
 use clap::Args;
+use experiment::FilmSettings;
+use offline::consistency::{Done, Job, Learning, Sequences};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
-use sequences::Sequence;
 
-use crate::commands::eval::{size, unread};
+use super::terminal::Terminal;
+use crate::commands::eval::size;
 use crate::globals::Globals;
-use crate::inputs;
-use work::Work;
+use crate::{inputs, output};
 
 const HELP: &str = "\
 SEQUENCE is what `parallax eval` takes: a folder of HumanEva-I, of UMPM, of `parallax synth`, or a description. \
@@ -89,144 +87,53 @@ pub(crate) struct Arguments {
 /// Learns.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let (train, held) = split(sequences(arguments)?, &arguments.hold_out)?;
-    if let Some(rig) = &arguments.rig {
-        one_rig(&train.iter().chain(&held).collect::<Vec<_>>(), rig)?;
-    }
+    let sequences = Sequences::read(
+        &arguments.sequences,
+        &arguments.hold_out,
+        (arguments.every, arguments.frames),
+        arguments.rig.as_deref(),
+    )?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let bytes = inputs::model_bytes(arguments.model.as_deref())?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .or_fail(ExitKind::Run)?;
-    let work = Work::new(arguments, globals, model, stop);
-    let fingerprint = format!("{:016x}", checksum::fnv1a(&bytes));
+    let job = job(arguments, format!("{:016x}", checksum::fnv1a(&bytes)));
+    let terminal = Terminal::without_bar(globals.quiet, false);
+    let learning = Learning::new(&job, &terminal, model, stop);
     let keep = |learned: &Learned| {
         let text = learned.write().or_fail(ExitKind::Run)?;
         let wrong = |error: std::io::Error| inputs::in_file(&arguments.out, &error);
         std::fs::write(&arguments.out, text).map_err(wrong)
     };
-    let done = pool.install(|| work.run(&train, &held, &fingerprint, &keep))?;
-    report::say(arguments, globals, &done)?;
+    let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &keep))?;
+    print(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
-    let mut all: Vec<Sequence> = Vec::new();
-    for path in &arguments.sequences {
-        let read = sequences::read(path, &sequences::Options::default());
-        for mut it in read.map_err(unread)? {
-            it.thin_out(arguments.every, arguments.frames);
-            all.push(it);
-        }
+/// What is learned, and how.
+fn job(arguments: &Arguments, fingerprint: String) -> Job {
+    Job {
+        tries: arguments.tries,
+        rig: arguments.rig.clone(),
+        with_joints: !arguments.no_joints,
+        film: FilmSettings {
+            size: arguments.size,
+            scale: arguments.scale,
+            upright: !arguments.no_upright,
+        },
+        fingerprint,
     }
-    Ok(all)
 }
 
-/// Those that are learned from, and those that the weights are chosen on.
-fn split(
-    all: Vec<Sequence>,
-    hold_out: &[String],
-) -> Result<(Vec<Sequence>, Vec<Sequence>), Failure> {
-    let mut subjects: Vec<&str> = all.iter().map(|it| it.subject.as_str()).collect();
-    subjects.sort_by_key(|it| (it.len(), *it));
-    subjects.dedup();
-    if let Some(unknown) = hold_out.iter().find(|it| !subjects.contains(&it.as_str())) {
-        let known = subjects.join(", ");
-        let message = format!("--hold-out: there is no subject {unknown:?}, only {known}");
-        return Err(Failure::new(ExitKind::Usage, message));
-    }
-    let held: Vec<String> = if hold_out.is_empty() {
-        let n = subjects.len().div_ceil(4);
-        let last = subjects.iter().rev().take(n);
-        last.map(|it| (*it).to_owned()).collect()
+/// Prints the summary.
+fn print(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+    if arguments.json {
+        output::json(&done.json(&arguments.out))
+    } else if globals.quiet {
+        Ok(())
     } else {
-        hold_out.to_vec()
-    };
-    let (held, train): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|it| held.contains(&it.subject));
-    if train.is_empty() {
-        let message = "all subjects are held out: nobody is left to learn from";
-        let failure = Failure::new(ExitKind::Usage, message);
-        return Err(failure.with_hint("sequences of at least two subjects are needed"));
-    }
-    Ok((train, held))
-}
-
-/// Sees that all sequences have the same cameras.
-fn one_rig(all: &[&Sequence], rig: &str) -> Result<(), Failure> {
-    let cameras = |it: &Sequence| -> Vec<String> {
-        let views = it.views.iter();
-        views.map(|it| it.camera.clone()).collect()
-    };
-    for pair in all.windows(2) {
-        if cameras(pair[0]) != cameras(pair[1]) {
-            let other = pair[1];
-            let message = format!(
-                "--rig {rig}: {} {} has other cameras than the sequence before it",
-                other.dataset, other.name
-            );
-            return Err(Failure::new(ExitKind::Usage, message));
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use geometry::Rig;
-    use skeleton::PARSE14;
-
-    use super::*;
-
-    /// One camera; what it sees does not matter here.
-    fn rig() -> Rig {
-        let camera = geometry::Camera {
-            name: "c1".to_owned(),
-            intrinsics: geometry::Intrinsics {
-                fx: 300.0,
-                fy: 300.0,
-                cx: 160.0,
-                cy: 120.0,
-                size: [320, 240],
-                lens: geometry::Lens::default(),
-            },
-            camera_from_world: nalgebra::Isometry3::identity(),
-        };
-        Rig::new(vec![camera], None, "made up").unwrap()
-    }
-
-    fn sequence(subject: &str) -> Sequence {
-        Sequence {
-            name: subject.to_owned(),
-            dataset: String::new(),
-            subject: subject.to_owned(),
-            action: String::new(),
-            rig: rig(),
-            views: Vec::new(),
-            joints: &PARSE14,
-            frames: Vec::new(),
-        }
-    }
-
-    fn held(subjects: &[&str], hold_out: &[&str]) -> Result<Vec<String>, String> {
-        let all = subjects.iter().map(|it| sequence(it)).collect();
-        let hold_out: Vec<String> = hold_out.iter().map(|it| (*it).to_owned()).collect();
-        let (_, held) = split(all, &hold_out).map_err(|it| it.to_string())?;
-        Ok(held.into_iter().map(|it| it.subject).collect())
-    }
-
-    #[test]
-    fn the_last_fourth_of_the_subjects_is_held_out() {
-        let subjects = ["s1", "s2", "s3", "s9", "s10", "s10", "s4", "s5"];
-        assert_eq!(held(&subjects, &[]).unwrap(), ["s9", "s10", "s10"]);
-        assert_eq!(held(&["s1", "s2"], &["s1"]).unwrap(), ["s1"]);
-    }
-
-    #[test]
-    fn somebody_must_be_left_to_learn_from() {
-        assert!(held(&["s1"], &[]).unwrap_err().contains("nobody is left"));
-        let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
-        assert!(said.contains("no subject \"s3\", only s1, s2"), "{said}");
+        output::line(done.text(&arguments.out))
     }
 }

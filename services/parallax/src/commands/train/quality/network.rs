@@ -56,13 +56,13 @@ impl From<Network> for Kind {
 pub(crate) struct Arguments {
     /// Samples to learn from and to validate on.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
-    pub(super) samples: Vec<PathBuf>,
+    samples: Vec<PathBuf>,
     /// Samples to judge the network on, which it never saw; every file by itself.
     #[arg(long, value_name = "FILE")]
-    pub(super) judge: Vec<PathBuf>,
+    judge: Vec<PathBuf>,
     /// The ONNX file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
-    pub(super) out: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// How to train, as TOML; what it does not say has its default, see --print-settings.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -77,16 +77,16 @@ pub(crate) struct Arguments {
     seed: Option<u32>,
     /// Weights of torchvision's VGG-16 to begin with, as .safetensors.
     #[arg(long, value_name = "FILE")]
-    pub(super) weights: Option<PathBuf>,
+    weights: Option<PathBuf>,
     /// What the file says that it is; its name if not given.
     #[arg(long, value_name = "TEXT")]
-    pub(super) identity: Option<String>,
+    identity: Option<String>,
     /// Go on from the checkpoint of an interrupted training; from the beginning if there is none.
     #[arg(long)]
-    pub(super) resume: bool,
+    resume: bool,
     /// Print events and the summary as JSON, one object a line.
     #[arg(long)]
-    pub(super) json: bool,
+    json: bool,
 }
 
 /// Trains, in a Parallax that can.
@@ -101,7 +101,26 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 }
 
 #[cfg(feature = "train-quality")]
-use super::teach::train;
+fn train(
+    arguments: &Arguments,
+    settings: &Settings,
+    globals: Globals,
+) -> Result<ExitCode, Failure> {
+    use crate::commands::train::terminal::Terminal;
+
+    let job = offline::quality::network::Job {
+        samples: arguments.samples.clone(),
+        judge: arguments.judge.clone(),
+        out: arguments.out.clone().unwrap_or_default(),
+        weights: arguments.weights.clone(),
+        identity: arguments.identity.clone(),
+        resume: arguments.resume,
+    };
+    let stop = runtime::Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::without_bar(globals.quiet || arguments.json, arguments.json);
+    offline::quality::network::train(&job, settings, &stop, &terminal)?;
+    Ok(ExitCode::SUCCESS)
+}
 
 #[cfg(not(feature = "train-quality"))]
 fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {

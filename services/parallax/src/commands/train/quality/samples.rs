@@ -2,19 +2,13 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
-use datasets::{Picture, ReadOptions, Selection};
-use qualitytraining::sample::Sample;
-use qualitytraining::store::Samples;
-use rayon::prelude::*;
+use offline::quality::{Scenes, samples};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use viewquality::TileShape;
 
-use super::super::{data::unread, per_dataset::deal};
-use super::observer::Observer;
-use super::scenes;
+use crate::commands::train::terminal::Terminal;
 use crate::globals::Globals;
 use crate::{inputs, output};
 
@@ -63,19 +57,19 @@ pub(crate) struct Arguments {
     without: Vec<String>,
     /// Number of scenes that do not exist; each gives some pictures of every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) scenes: u32,
+    scenes: u32,
     /// Numbers of the people in the scenes.
-    #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = scenes::subjects)]
-    pub(super) subjects: [u64; 2],
+    #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
+    subjects: [u64; 2],
     /// Frames of every camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
-    pub(super) frames: u16,
+    frames: u16,
     /// Photographs without people that stand in the place of every third room.
     #[arg(long, value_name = "DIR")]
-    pub(super) backdrop: Option<PathBuf>,
+    backdrop: Option<PathBuf>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    seed: u64,
     /// The single-view model; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -105,115 +99,52 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .thread_name(|it| format!("samples-{it}"))
         .build()
         .or_fail(ExitKind::Run)?;
-    let shape = arguments.tile.shape();
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
-    let work = Work {
-        observer: Observer::new(model, shape),
-        stop,
-        quiet: globals.quiet,
-        n_done: AtomicUsize::new(0),
-        n_lost: AtomicUsize::new(0),
+    let job = samples::Job {
+        datasets: arguments.datasets.clone(),
+        only: arguments.only.clone(),
+        without: arguments.without.clone(),
+        scenes: Scenes {
+            n: arguments.scenes,
+            subjects: arguments.subjects,
+            frames: arguments.frames,
+            backdrop: arguments.backdrop.clone(),
+            seed: arguments.seed,
+        },
+        tile: arguments.tile.shape(),
     };
-    let all = pool.install(|| -> Result<Vec<Sample>, Failure> {
-        let mut all = scenes::samples(arguments, &work)?;
-        all.extend(people(arguments, &work)?);
-        Ok(all)
-    })?;
-    let n = all.len();
-    if n == 0 {
-        return Err(Failure::new(
-            ExitKind::Input,
-            "not one picture makes a sample",
-        ));
-    }
-    let samples = Samples {
-        tile: [shape.height, shape.width],
-        all,
-    };
-    let bytes = samples.to_bytes().or_fail(ExitKind::Run)?;
-    super::replace(&arguments.out, &bytes)?;
+    let terminal = Terminal::without_bar(globals.quiet, false);
+    let made = pool.install(|| samples::make(&job, &arguments.out, model, (stop, &terminal)))?;
     if !globals.quiet {
-        let n_lost = work.n_lost.load(Ordering::Relaxed);
         output::message(format_args!(
-            "{}: {n} samples, {n_lost} pictures on which nobody was found",
-            arguments.out.display()
+            "{}: {} samples, {} pictures on which nobody was found",
+            arguments.out.display(),
+            made.n,
+            made.n_lost
         ));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// What all threads share.
-pub(super) struct Work {
-    pub(super) observer: Observer,
-    stop: Stop,
-    quiet: bool,
-    n_done: AtomicUsize,
-    n_lost: AtomicUsize,
+/// Reads `FROM-TO`.
+fn subjects(text: &str) -> Result<[u64; 2], String> {
+    let ends = text.split_once('-').unwrap_or((text, text));
+    match (ends.0.trim().parse(), ends.1.trim().parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
+        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
+    }
 }
 
-impl Work {
-    /// Stops where that was asked for.
-    pub(super) fn go_on(&self) -> Result<(), Failure> {
-        if self.stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
-        Ok(())
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    /// Takes note of pictures that were looked at.
-    pub(super) fn done(&self, n: usize, n_lost: usize) {
-        const EVERY: usize = 100;
-        self.n_lost.fetch_add(n_lost, Ordering::Relaxed);
-        let before = self.n_done.fetch_add(n, Ordering::Relaxed);
-        if !self.quiet && before / EVERY != (before + n) / EVERY {
-            output::message(format_args!("{} pictures", before + n));
+    #[test]
+    fn subjects_are_a_range() {
+        assert_eq!(subjects("3-7"), Ok([3, 7]));
+        assert_eq!(subjects("5"), Ok([5, 5]));
+        for wrong in ["", "7-3", "a-b", "-1"] {
+            assert!(subjects(wrong).is_err(), "{wrong}");
         }
     }
-}
-
-/// The samples of data sets.
-fn people(arguments: &Arguments, work: &Work) -> Result<Vec<Sample>, Failure> {
-    let all = &arguments.datasets;
-    let only = deal(all, "--only", &arguments.only, false)?;
-    let without = deal(all, "--without", &arguments.without, false)?;
-    let mut samples = Vec::new();
-    for ((path, only), without) in all.iter().zip(only).zip(without) {
-        let options = ReadOptions {
-            only: selection(&only)?,
-            without: selection(&without)?,
-            n_joints: Some(skeleton::PARSE14.joints.len()),
-            ..ReadOptions::default()
-        };
-        let read = datasets::read(path, &options).map_err(unread)?;
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        let found: Result<Vec<_>, Failure> = read
-            .people
-            .par_iter()
-            .map(|person| {
-                work.go_on()?;
-                let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
-                let file = person
-                    .image
-                    .file_name()
-                    .unwrap_or_default()
-                    .to_string_lossy();
-                let source = format!("{name} {file}");
-                let named = (source.clone(), source);
-                let found = work.observer.observe(picture.view(), &person.joints, named);
-                work.done(1, usize::from(found.is_err()));
-                Ok(found.ok())
-            })
-            .collect();
-        samples.extend(found?.into_iter().flatten());
-    }
-    Ok(samples)
-}
-
-fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
-    let one = values.first().map(|it| Selection::from_argument(it));
-    one.transpose().or_fail(ExitKind::Usage)
 }

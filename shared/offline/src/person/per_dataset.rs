@@ -37,7 +37,7 @@ pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
 /// # Errors
 ///
 /// A value that must name its data set does not.
-pub(super) fn deal<'a>(
+pub(crate) fn deal<'a>(
     datasets: &[PathBuf],
     option: &str,
     arguments: &'a [String],

@@ -9,7 +9,6 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::{N_PARTS, PARSE14};
 
-use crate::output;
 use crate::search::Search;
 
 /// Most detections that are looked through for the one that lies on the person.
@@ -18,19 +17,24 @@ const MOST: usize = 10_000;
 /// Least share of a person's box that a detection on the person covers.
 const COVERED: f64 = 0.3;
 
-/// Tries a model on people, on rayon's current pool; says who was left out.
+/// Tries a model on people, on rayon's current pool.
 ///
 /// * `name`: of the data set.
 /// * `is_over`: whether to give up.
-pub(crate) fn judged(
+/// * `message`: is given a message about everybody who was left out.
+///
+/// # Errors
+///
+/// An image cannot be read; it was given up ([`ExitKind::Interrupted`]).
+pub fn judged(
     search: &Search,
     name: &str,
     people: &People,
     is_over: impl Fn() -> bool + Sync,
+    message: impl Fn(&str),
 ) -> Result<Pictures, Failure> {
     for problem in &people.problems {
-        let (message, fault) = (problem, &problem.fault);
-        output::message(format_args!("left out: {message}: {fault}"));
+        message(&format!("left out: {problem}: {}", problem.fault));
     }
     let find = |person: &Person| {
         if is_over() {
@@ -48,7 +52,11 @@ pub(crate) fn judged(
 }
 
 /// Refuses a model of other parts.
-pub(crate) fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
+///
+/// # Errors
+///
+/// The model has not 26 parts.
+pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
     let n = model.n_parts();
     if n == N_PARTS {
         return Ok(());
@@ -106,7 +114,7 @@ fn around(model: &fmp::Model, pose: &Pose, layout: &Layout) -> (f64, [f64; 4]) {
 }
 
 /// A report for programs: percentages.
-pub(crate) fn numbers(report: &Report) -> Value {
+pub fn numbers(report: &Report) -> Value {
     let sticks = |rule: PcpRule| {
         let each = PARSE_STICKS.iter().zip(report.sticks(rule));
         let mut value: serde_json::Map<String, Value> = each

@@ -1,5 +1,6 @@
 //! Samples of people who do not exist.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use kernels::Rgb8View;
@@ -8,31 +9,36 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Action, Flaws, RigChoice, Scene, Settings, View};
 
-use super::samples::{Arguments, Work};
+use super::work::Work;
 
-/// Reads `FROM-TO`.
-pub(super) fn subjects(text: &str) -> Result<[u64; 2], String> {
-    let ends = text.split_once('-').unwrap_or((text, text));
-    match (ends.0.trim().parse(), ends.1.trim().parse()) {
-        (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
-        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
-    }
+/// Which scenes.
+#[derive(Debug, Clone)]
+pub struct Scenes {
+    /// How many; each gives some pictures of every camera.
+    pub n: u32,
+    /// Numbers of the first and the last of the people in them.
+    pub subjects: [u64; 2],
+    /// Frames of every camera of a scene, some seconds apart.
+    pub frames: u16,
+    /// Photographs without people that stand in the place of every third room.
+    pub backdrop: Option<PathBuf>,
+    /// Seed of everything random.
+    pub seed: u64,
 }
 
 /// The samples of all scenes, in the order of the scenes, whatever the threads.
-pub(super) fn samples(arguments: &Arguments, work: &Work) -> Result<Vec<Sample>, Failure> {
-    let scenes = 0..arguments.scenes;
-    let found: Result<Vec<_>, Failure> = scenes
+pub(super) fn samples(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
+    let found: Result<Vec<_>, Failure> = (0..scenes.n)
         .into_par_iter()
-        .map(|nth| of_scene(arguments, &settings(arguments, nth), work))
+        .map(|nth| of_scene(scenes, &settings(scenes, nth), work))
         .collect();
     Ok(found?.into_iter().flatten().collect())
 }
 
 /// What a scene is, by its number: actions and subjects in turn, all else by chance.
-fn settings(arguments: &Arguments, nth: u32) -> Settings {
-    let mut rng = fastrand::Rng::with_seed(arguments.seed.wrapping_mul(1_000_003) + u64::from(nth));
-    let [from, to] = arguments.subjects;
+fn settings(scenes: &Scenes, nth: u32) -> Settings {
+    let mut rng = fastrand::Rng::with_seed(scenes.seed.wrapping_mul(1_000_003) + u64::from(nth));
+    let [from, to] = scenes.subjects;
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     let rig = match nth % 4 {
         0 => RigChoice::HumanEva,
@@ -59,16 +65,12 @@ fn settings(arguments: &Arguments, nth: u32) -> Settings {
         seed: rng.u64(1..1 << 32),
         // One frame in three quarters of a second: no two show the same pose.
         rate_hz: 4.0 / 3.0,
-        backdrop: arguments.backdrop.clone().filter(|_| is_photo),
+        backdrop: scenes.backdrop.clone().filter(|_| is_photo),
         flaws: if is_bad { flaws } else { Flaws::default() },
     }
 }
 
-fn of_scene(
-    arguments: &Arguments,
-    settings: &Settings,
-    work: &Work,
-) -> Result<Vec<Sample>, Failure> {
+fn of_scene(scenes: &Scenes, settings: &Settings, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
     let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Input)?);
     let group = format!("subject {}", settings.subject);
     let mut samples = Vec::new();
@@ -77,7 +79,7 @@ fn of_scene(
         let size = view.size();
         let mut rgb = vec![0; size.rgb_bytes()];
         let before = samples.len();
-        for frame in 0..u64::from(arguments.frames) {
+        for frame in 0..u64::from(scenes.frames) {
             work.go_on()?;
             let truth = view.picture(frame, &mut rgb);
             let joints = truth.pixels.map(|it| it.unwrap_or([f64::NAN; 2]));
@@ -91,22 +93,8 @@ fn of_scene(
             let named = (group.clone(), source);
             samples.extend(work.observer.observe(picture, &joints, named).ok());
         }
-        let n = usize::from(arguments.frames);
+        let n = usize::from(scenes.frames);
         work.done(n, n - (samples.len() - before));
     }
     Ok(samples)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn subjects_are_a_range() {
-        assert_eq!(subjects("3-7"), Ok([3, 7]));
-        assert_eq!(subjects("5"), Ok([5, 5]));
-        for wrong in ["", "7-3", "a-b", "-1"] {
-            assert!(subjects(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -25,7 +25,7 @@ const PERIOD: Duration = Duration::from_millis(50);
 /// # Panics
 ///
 /// If the work does.
-pub(super) fn unless_stopped<T: Send + 'static>(
+pub fn unless_stopped<T: Send + 'static>(
     stop: &Stop,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<Option<T>, Failure> {

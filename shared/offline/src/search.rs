@@ -13,7 +13,7 @@ const SHARE_OF_RESPONSES: f64 = 1.6;
 #[error(
     "searching all of {width}x{height} takes about {needed_gb:.1} GB of memory, and {free_gb:.1} GB are free"
 )]
-pub(crate) struct TooLarge {
+pub struct TooLarge {
     width: usize,
     height: usize,
     needed_gb: f64,
@@ -32,17 +32,18 @@ fn available_bytes() -> Option<u64> {
 
 /// A model, ready to search images.
 #[derive(Debug)]
-pub(crate) struct Search {
+pub struct Search {
     /// The model.
-    pub(crate) model: Arc<Model>,
+    pub model: Arc<Model>,
     /// Finds its best poses.
-    pub(crate) solver: Solver,
-    extractor: Extractor,
+    pub solver: Solver,
+    /// Computes what its filters answer.
+    pub extractor: Extractor,
 }
 
 impl Search {
     /// Prepares the search.
-    pub(crate) fn new(model: Arc<Model>) -> Self {
+    pub fn new(model: Arc<Model>) -> Self {
         Self {
             extractor: Extractor::new(Arc::clone(&model)),
             solver: Solver::new(Arc::clone(&model)),
@@ -51,7 +52,11 @@ impl Search {
     }
 
     /// The same, in a given precision.
-    pub(crate) fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
+    ///
+    /// # Errors
+    ///
+    /// The machine lacks what the precision needs.
+    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
         Ok(Self {
             extractor: Extractor::in_precision(precision, Arc::clone(&model))?,
             ..Self::new(model)
@@ -59,7 +64,11 @@ impl Search {
     }
 
     /// Refuses a search that this machine has no memory for.
-    pub(crate) fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
+    ///
+    /// # Errors
+    ///
+    /// More memory is needed than is free.
+    pub fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
         let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
         let [width, height] = layout.image_size;
         match available_bytes() {
@@ -74,7 +83,7 @@ impl Search {
     }
 
     /// Runs `look` on what the filters answer to an image, on all levels.
-    pub(crate) fn on<T>(
+    pub fn on<T>(
         &self,
         image: Rgb8View<'_>,
         layout: &Layout,

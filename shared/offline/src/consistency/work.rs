@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use ::consistency::{Grid, Learned, Learner, Point, Settings, Tally, Weights, best};
+use ::consistency::{Grid, Learned, Learner, Point, Settings, Shape, Tally, Weights, best};
 use evaluation::Point as Joint;
 use experiment::{Bench, Combining, Film, FilmSettings, Setup, Terms, Trial, Version, score};
 use fmp::Model;
@@ -12,49 +12,62 @@ use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 
-use super::Arguments;
-use crate::commands::eval::no_film;
-use crate::globals::Globals;
-use crate::{inputs, output};
+use crate::console::Console;
+use crate::failures::film_failure;
 
 /// Numbers of bins that are compared.
 const BINS: [usize; 5] = [3, 6, 9, 12, 18];
 /// Ridges that are compared, in squared sizes of the person.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
-/// What is done.
-pub(super) struct Work<'a> {
-    arguments: &'a Arguments,
-    quiet: bool,
+/// What is learned, and how.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
+    pub tries: usize,
+    /// Learn the pairs of the cameras of this rig by name too.
+    pub rig: Option<String>,
+    /// Whether joints are learned as a map of the parts.
+    pub with_joints: bool,
+    /// How the frames are made.
+    pub film: FilmSettings,
+    /// What identifies the model in the file.
+    pub fingerprint: String,
+}
+
+/// A run of learning.
+#[derive(Debug)]
+pub struct Learning<'a> {
+    job: &'a Job,
+    console: &'a dyn Console,
     model: Arc<Model>,
     stop: Stop,
     begin: Instant,
 }
 
 /// What was found.
-pub(super) struct Done {
-    pub(super) learned: Learned,
+#[derive(Debug)]
+pub struct Done {
+    /// What goes into the file.
+    pub learned: Learned,
     /// Number of bins, and what so many know of the types of people held out.
-    pub(super) bins: Vec<(usize, Option<f64>)>,
+    pub bins: Vec<(usize, Option<f64>)>,
     /// Ridge, and root mean square error of joints of people held out; without a map the first one.
-    pub(super) joints: Vec<(Option<f64>, f64)>,
+    pub joints: Vec<(Option<f64>, f64)>,
     /// Every view alone.
-    pub(super) single: Option<Point>,
+    pub single: Option<Point>,
     /// All weights that were tried.
-    pub(super) surface: Vec<Point>,
-    pub(super) seconds: f64,
+    pub surface: Vec<Point>,
+    /// How long it took.
+    pub seconds: f64,
 }
 
-impl<'a> Work<'a> {
-    pub(super) fn new(
-        arguments: &'a Arguments,
-        globals: Globals,
-        model: Arc<Model>,
-        stop: Stop,
-    ) -> Self {
+impl<'a> Learning<'a> {
+    /// Prepares the run; its time begins.
+    pub fn new(job: &'a Job, console: &'a dyn Console, model: Arc<Model>, stop: Stop) -> Self {
         Self {
-            arguments,
-            quiet: globals.quiet,
+            job,
+            console,
             model,
             stop,
             begin: Instant::now(),
@@ -64,11 +77,15 @@ impl<'a> Work<'a> {
     /// Learns, and chooses.
     ///
     /// * `keep`: is given what was learned before the weights are chosen, with those of the settings, and after.
-    pub(super) fn run(
+    ///
+    /// # Errors
+    ///
+    /// Frames cannot be read; nothing can be learned from them; a stop request ([`ExitKind::Interrupted`]); those of
+    /// `keep`.
+    pub fn run(
         &self,
         train: &[Sequence],
         held: &[Sequence],
-        fingerprint: &str,
         keep: &dyn Fn(&Learned) -> Result<(), Failure>,
     ) -> Result<Done, Failure> {
         let learners = self.look(train, "learning")?;
@@ -82,13 +99,13 @@ impl<'a> Work<'a> {
         let chosen = largest(bins.iter().map(|it| it.1));
         let (learner, other) = (&learners[chosen], &others[chosen]);
         let joints = joint_errors(learner, other);
-        let ridge = smallest(&joints).filter(|_| !self.arguments.no_joints);
-        let first = self.learned(learner, Weights::default(), fingerprint, ridge)?;
+        let ridge = smallest(&joints).filter(|_| self.job.with_joints);
+        let first = self.learned(learner, Weights::default(), ridge)?;
         keep(&first)?;
         let tried = self.thinned(held);
         let (single, surface) = self.choose(&tried, &first)?;
         let weights = best(&surface).map_or(first.weights, |it| it.weights);
-        let mut learned = self.learned(learner, weights, fingerprint, ridge)?;
+        let mut learned = self.learned(learner, weights, ridge)?;
         learned.learned.held_out = tried.iter().map(|it| it.frames.len() as u64).sum();
         keep(&learned)?;
         Ok(Done {
@@ -104,7 +121,7 @@ impl<'a> Work<'a> {
     /// Some instants of people held out, evenly over all of them.
     fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
         let n: usize = held.iter().map(|it| it.frames.len()).sum();
-        let most = self.arguments.tries.min(n);
+        let most = self.job.tries.min(n);
         let mut seen = 0;
         let thin = |sequence: &Sequence| {
             let mut sequence = sequence.clone();
@@ -122,17 +139,16 @@ impl<'a> Work<'a> {
         &self,
         learner: &Learner,
         weights: Weights,
-        fingerprint: &str,
         ridge: Option<f64>,
     ) -> Result<Learned, Failure> {
-        let rig = self.arguments.rig.as_deref();
-        let learned = learner.learned(fingerprint.to_owned(), weights, rig, ridge);
+        let rig = self.job.rig.as_deref();
+        let learned = learner.learned(self.job.fingerprint.clone(), weights, rig, ridge);
         learned.or_fail(ExitKind::Input)
     }
 
     /// What single views show, by every number of bins.
     fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
-        let shape = inputs::shape(&self.model);
+        let shape = shape(&self.model);
         let learner = |n_bins: usize| {
             let settings = Settings {
                 n_bins,
@@ -141,7 +157,7 @@ impl<'a> Work<'a> {
             Learner::new(shape.clone(), settings)
         };
         let mut learners = BINS.map(learner).to_vec();
-        let by_name = self.arguments.rig.is_some();
+        let by_name = self.job.rig.is_some();
         self.frames(sequences, what, &[], |bench, sequence, frame, images| {
             let truth: (&Sequence, &[Option<Joint>]) = (sequence, &frame.joints);
             bench.learn(&mut learners, truth, images, by_name);
@@ -215,15 +231,10 @@ impl<'a> Work<'a> {
         trials: &[Trial],
         mut visit: impl FnMut(&mut Bench, &Sequence, &Frame, &[Option<Rgb8View<'_>>]),
     ) -> Result<(), Failure> {
-        let settings = FilmSettings {
-            size: self.arguments.size,
-            scale: self.arguments.scale,
-            upright: !self.arguments.no_upright,
-        };
         let n: usize = sequences.iter().map(|it| it.frames.len()).sum();
         let (mut done, mut said) = (0, Instant::now());
         for sequence in sequences {
-            let mut film = Film::open(sequence, &settings).map_err(no_film)?;
+            let mut film = Film::open(sequence, &self.job.film).map_err(film_failure)?;
             let mut bench = self.bench(sequence, &film, trials)?;
             for frame in &sequence.frames {
                 if self.stop.is_requested() {
@@ -232,12 +243,13 @@ impl<'a> Work<'a> {
                         "what was learned until then is in OUT, if it came to trying weights",
                     ));
                 }
-                let images = film.at(frame.index).map_err(no_film)?;
+                let images = film.at(frame.index).map_err(film_failure)?;
                 visit(&mut bench, sequence, frame, &images);
                 done += 1;
-                if !self.quiet && (said.elapsed() > Duration::from_secs(5) || done == n) {
+                if said.elapsed() > Duration::from_secs(5) || done == n {
                     said = Instant::now();
-                    output::message(format_args!("{what}: {done} of {n} instants"));
+                    let text = format!("{what}: {done} of {n} instants");
+                    self.console.message(&text);
                 }
             }
         }
@@ -258,6 +270,16 @@ impl<'a> Work<'a> {
         let up = sequence.rig.up_in_world();
         let maps = film.footage_from_frame();
         Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
+    }
+}
+
+/// Types of every part of a model, and the parts on the other side.
+pub fn shape(model: &Model) -> Shape {
+    let parts = 0..model.n_parts();
+    let mirror = model.spec().mirror.clone();
+    Shape {
+        n_types: parts.clone().map(|part| model.n_types(part)).collect(),
+        mirror: mirror.unwrap_or_else(|| parts.collect()),
     }
 }
 

@@ -14,7 +14,7 @@ use super::data::Data;
 
 /// Counts of everything.
 #[derive(Debug)]
-pub(super) struct Report {
+pub struct Report {
     left_out: BTreeMap<&'static str, usize>,
     /// People with sound labels.
     n_sound: usize,
@@ -116,7 +116,7 @@ impl Report {
     }
 
     /// For people.
-    pub(super) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _infallible = self.write(&mut text);
@@ -177,7 +177,7 @@ impl Report {
     }
 
     /// For programs.
-    pub(super) fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         json!({
             "event": "summary",
             "schema_version": 1,

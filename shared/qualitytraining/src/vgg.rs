@@ -4,18 +4,15 @@
 //! "data_offsets": [0, 6912]}, ...}`), and the numbers, little-endian. The top (`classifier`) is passed over: ours is another.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use qualitytraining::network::VGG16;
-use qualitytraining::parameters::{Parameter, Role};
-use runtime::Failure;
 use serde::Deserialize;
 
-use crate::inputs;
+use crate::network::VGG16;
+use crate::parameters::{Parameter, Role};
 
 /// Why bytes are not the weights of VGG-16.
 #[derive(Debug, thiserror::Error)]
-enum VggError {
+pub enum VggError {
     /// The bytes end before what the header says.
     #[error("it is truncated, or no .safetensors file")]
     Truncated,
@@ -53,13 +50,8 @@ struct Entry {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is another network's.
-pub(super) fn read(file: &Path) -> Result<Vec<Parameter>, Failure> {
-    let bytes = std::fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
-    parse(&bytes).map_err(|error| inputs::in_file(file, &error))
-}
-
-fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
+/// The bytes are not such a file, or one of another network.
+pub fn parse(bytes: &[u8]) -> Result<Vec<Parameter>, VggError> {
     let (length, rest) = bytes.split_first_chunk().ok_or(VggError::Truncated)?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok();
     let split = length.and_then(|it| rest.split_at_checked(it));

@@ -1,27 +1,22 @@
 //! What a user sees of a training while it runs.
 
-use core::time::Duration;
 use std::error::Error;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use datasets::Problem;
-use indicatif::{ProgressBar, ProgressStyle};
 use runtime::{ExitKind, Failure, Stop};
 use serde_json::{Map, Value, json};
 use training::{Event, Gap, Step, Watch};
 
-use super::report::Report;
-use crate::output;
+use crate::console::Console;
 
-/// Shows progress: a bar on a terminal, else a line a step; JSON on standard output if asked for.
+/// Tells a console what is being done, and how long it will take.
 #[derive(Debug)]
-pub(super) struct Progress {
-    bar: ProgressBar,
+pub struct Progress {
+    console: Box<dyn Console>,
     stop: Stop,
-    quiet: bool,
-    json: bool,
     state: Mutex<State>,
 }
 
@@ -43,24 +38,13 @@ struct State {
 }
 
 impl Progress {
-    /// Begins.
-    pub(super) fn new(stop: Stop, quiet: bool, json: bool) -> Self {
-        let bar = if quiet || !output::is_lively() {
-            ProgressBar::hidden()
-        } else {
-            ProgressBar::new(0)
-        };
-        if let Ok(style) = ProgressStyle::with_template(
-            "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}",
-        ) {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(500));
+    /// Nothing is done yet.
+    ///
+    /// * `stop`: ends the training.
+    pub fn new(stop: Stop, console: Box<dyn Console>) -> Self {
         Self {
-            bar,
+            console,
             stop,
-            quiet,
-            json,
             state: Mutex::new(State {
                 step: Step::Filters,
                 at: 0,
@@ -76,16 +60,15 @@ impl Progress {
 
     /// Tells of a person who was left out.
     pub(super) fn left_out(&self, problem: &Problem) -> Result<(), Failure> {
-        self.say(&format!("left out: {}", causes::in_one_line(problem)));
-        self.event(|| {
-            json!({
-                "event": "left-out",
-                "file": problem.file,
-                "row": problem.row,
-                "kind": problem.fault.kind().name(),
-                "message": causes::in_one_line(&problem.fault),
-            })
-        })
+        self.console
+            .message(&format!("left out: {}", causes::in_one_line(problem)));
+        self.console.event(&json!({
+            "event": "left-out",
+            "file": problem.file,
+            "row": problem.row,
+            "kind": problem.fault.kind().name(),
+            "message": causes::in_one_line(&problem.fault),
+        }))
     }
 
     /// Tells of an image without people that cannot be read.
@@ -95,29 +78,30 @@ impl Progress {
         error: &(dyn Error + 'static),
     ) -> Result<(), Failure> {
         let message = causes::in_one_line(error);
-        self.say(&format!("left out: {message}"));
-        self.event(|| json!({ "event": "unreadable", "file": image, "message": message }))
+        self.console.message(&format!("left out: {message}"));
+        self.console
+            .event(&json!({ "event": "unreadable", "file": image, "message": message }))
     }
 
     /// Tells what is trained on.
-    pub(super) fn data(&self, report: &Report) -> Result<(), Failure> {
-        self.say(&report.data_text());
-        self.event(|| {
-            let mut event = report.data_json();
-            event["event"] = "data".into();
-            event
-        })
+    pub(super) fn data(&self, text: &str, mut event: Value) -> Result<(), Failure> {
+        self.console.message(text);
+        event["event"] = "data".into();
+        self.console.event(&event)
     }
 
     /// Begins to read the features of a checkpoint's examples again.
     pub(super) fn resuming(&self, n_done: usize) {
-        self.bar.set_prefix(format!("going on after step {n_done}"));
+        self.console
+            .begin(&format!("going on after step {n_done}"), "");
     }
 
     /// Tells that a training goes on.
     pub(super) fn resumed(&self, n_done: usize, n_steps: usize) -> Result<(), Failure> {
-        self.say(&format!("going on after step {n_done} of {n_steps}"));
-        self.event(|| json!({ "event": "resumed", "done": n_done, "steps": n_steps }))
+        self.console
+            .message(&format!("going on after step {n_done} of {n_steps}"));
+        self.console
+            .event(&json!({ "event": "resumed", "done": n_done, "steps": n_steps }))
     }
 
     /// Begins a step.
@@ -128,9 +112,7 @@ impl Progress {
         all.clone_into(&mut state.all);
         state.begin = Instant::now();
         (state.gap, state.placed) = (None, None);
-        self.bar.set_prefix(state.label());
-        self.bar.set_position(0);
-        self.bar.set_message(state.left_text());
+        self.console.begin(&state.label(), &state.left_text());
     }
 
     /// Ends the step.
@@ -142,24 +124,21 @@ impl Progress {
             state.at += 1;
             (state.text(seconds), state.json(seconds))
         };
-        // The bar stands for the steps where there is one.
-        if !output::is_lively() {
-            self.say(&text);
+        if !self.console.shows_bar() {
+            self.console.message(&text);
         }
-        self.event(|| event)
+        self.console.event(&event)
     }
 
     /// Begins to look for false alarms.
     pub(super) fn begin_alarms(&self, n_images: usize) {
-        self.bar.set_prefix("false alarms");
-        self.bar.set_message("");
-        self.bar.set_position(0);
-        self.bar.set_length(n_images as u64);
+        self.console.begin("false alarms", "");
+        self.console.set(0, n_images);
     }
 
     /// One of the images has been looked at.
     pub(super) fn looked_at_one(&self) {
-        self.bar.inc(1);
+        self.console.advance();
     }
 
     /// A failure if somebody stopped it.
@@ -177,22 +156,8 @@ impl Progress {
     }
 
     /// Ends the bar.
-    pub(super) fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
-
-    fn say(&self, text: &str) {
-        if !self.quiet {
-            self.bar.suspend(|| output::message(text));
-        }
-    }
-
-    fn event(&self, event: impl FnOnce() -> Value) -> Result<(), Failure> {
-        if self.json {
-            self.bar.suspend(|| output::json(&event()))
-        } else {
-            Ok(())
-        }
+    pub fn finish(&self) {
+        self.console.finish();
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -205,8 +170,7 @@ impl Watch for Progress {
         let mut state = self.lock();
         match event {
             Event::Images { done, of } => {
-                self.bar.set_length(of as u64);
-                self.bar.set_position(done as u64);
+                self.console.set(done, of);
                 return;
             }
             Event::Placed {
@@ -217,7 +181,8 @@ impl Watch for Progress {
             Event::Collected { held, bytes, .. } => state.held = Some((held, bytes)),
             Event::Gap(gap) => state.gap = Some(gap),
         }
-        self.bar.set_message(state.details() + &state.left_text());
+        self.console
+            .details(&(state.details() + &state.left_text()));
     }
 
     fn go_on(&self) -> bool {

@@ -1,86 +1,53 @@
 //! What a model is trained on: data sets joined, and images without people.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::Args;
-use datasets::{
-    DatasetError, FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable,
-};
+use datasets::{FaultKind, People, Person, Picture, ReadOptions, Selection, Sides, SkeletonTable};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::per_dataset::deal;
 use super::progress::Progress;
-use crate::inputs;
+use crate::failures::dataset_failure;
+use crate::images;
 
 /// Which people, which images without people, and what is made of them.
-#[derive(Debug, Args)]
-pub(super) struct Chosen {
-    /// Annotated people: folders or files, see below.
-    #[arg(value_name = "DATASET", required_unless_present = "print_settings")]
-    datasets: Vec<PathBuf>,
-    /// Folder of images without people, all of which are used; may be given several times.
-    #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
-    negatives: Vec<PathBuf>,
-    /// Who of a data set is trained on, everybody if not given.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    only: Vec<String>,
-    /// Who of a data set is left out: a test set.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    without: Vec<String>,
-    /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
-    /// exchanged; marked if not given.
-    #[arg(long, value_name = "[DATASET=]SIDES")]
-    sides: Vec<String>,
-    /// Train on turned copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
-    #[arg(long, value_name = "[DATASET=]DEGREES,...", allow_hyphen_values = true)]
-    rotate: Vec<String>,
-    /// Do not train on mirror images.
-    #[arg(long)]
-    no_mirror: bool,
-    /// The parts of the model and where they lie between the joints, as TOML; the published 26 parts
-    /// between 14 joints if not given.
-    #[arg(long, value_name = "FILE")]
-    skeleton: Option<PathBuf>,
-    /// Kinds of bad labels that end the training instead of leaving the person out: a list, or `all`.
-    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = fatal)]
-    fatal: Vec<Fatal>,
-}
-
-/// Faults that end the training.
-#[derive(Debug, Clone, Copy)]
-enum Fatal {
-    All,
-    One(FaultKind),
-}
-
-fn fatal(name: &str) -> Result<Fatal, String> {
-    if name == "all" {
-        return Ok(Fatal::All);
-    }
-    let known = FaultKind::ALL.map(FaultKind::name).join(", ");
-    let kind = FaultKind::by_name(name);
-    kind.map(Fatal::One)
-        .ok_or_else(|| format!("expected all, or some of {known}"))
-}
-
-impl Chosen {
+///
+/// Values of `only`, `without`, `sides` and `rotate` may name their data set as it is written in `datasets`:
+/// `DATASET=VALUE`.
+#[derive(Debug, Clone, Default)]
+pub struct Chosen {
+    /// Annotated people: folders or files.
+    pub datasets: Vec<PathBuf>,
+    /// Folders of images without people, all of which are used.
+    pub negatives: Vec<PathBuf>,
+    /// Selections of those who are trained on; everybody if there is none.
+    pub only: Vec<String>,
+    /// Selections of those who are left out.
+    pub without: Vec<String>,
+    /// Whose left and right the labels are: `marked` or `seen`.
+    pub sides: Vec<String>,
+    /// Angles of turned copies, degrees, anticlockwise, separated by commas.
+    pub rotate: Vec<String>,
     /// Whether mirror images are trained on.
-    pub(super) fn with_mirror(&self) -> bool {
-        !self.no_mirror
-    }
+    pub with_mirror: bool,
+    /// Faults of labels that end the training instead of leaving the person out.
+    pub fatal: Vec<FaultKind>,
+}
 
-    /// The skeleton that is trained.
-    pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
-        match &self.skeleton {
-            Some(file) => SkeletonTable::parse(&inputs::text(file)?).map_err(|error| {
-                let message = format!("{}: {}", file.display(), causes::in_one_line(&error));
-                Failure::new(ExitKind::Input, message)
-            }),
-            None => Ok(SkeletonTable::published()),
-        }
-    }
+/// Reads the parts of a model and where they lie between the joints.
+///
+/// * `file`: where `text` is from, for messages.
+///
+/// # Errors
+///
+/// The text is not a skeleton table.
+pub fn parse_skeleton(file: &Path, text: &str) -> Result<SkeletonTable, Failure> {
+    SkeletonTable::parse(text).map_err(|error| {
+        let message = format!("{}: {}", file.display(), causes::in_one_line(&error));
+        Failure::new(ExitKind::Input, message)
+    })
 }
 
 /// Everything that is trained on.
@@ -114,7 +81,7 @@ impl Data {
         let mut data = Self {
             people: Vec::new(),
             left_out: BTreeMap::new(),
-            with_mirror: arguments.with_mirror(),
+            with_mirror: arguments.with_mirror,
             negatives: Vec::new(),
             n_unreadable: 0,
         };
@@ -125,7 +92,8 @@ impl Data {
         for (((path, options), angles), sides) in all.iter().zip(&options).zip(angles).zip(sides) {
             let angles = degrees(&angles)?;
             let sides = self::sides(&sides)?;
-            let People { people, problems } = datasets::read(path, options).map_err(unread)?;
+            let People { people, problems } =
+                datasets::read(path, options).map_err(dataset_failure)?;
             let people = people.into_iter();
             let people = people.map(|it| sides.of(it, table.joint_mirror()));
             for problem in problems {
@@ -177,19 +145,12 @@ pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         let message = format!("{}: no folder of images without people", folder.display());
         return Err(Failure::new(ExitKind::Input, message));
     }
-    inputs::images(folders)
+    images::listed(folders)
 }
 
 /// What of every data set is read.
 fn options(arguments: &Chosen, table: &SkeletonTable) -> Result<Vec<ReadOptions>, Failure> {
     let all = &arguments.datasets;
-    let mut fatal: Vec<FaultKind> = Vec::new();
-    for it in &arguments.fatal {
-        match it {
-            Fatal::All => fatal.extend(FaultKind::ALL),
-            Fatal::One(kind) => fatal.push(*kind),
-        }
-    }
     if let Some((_, twice)) = (1..)
         .zip(all)
         .find(|&(after, path)| all[after..].contains(path))
@@ -206,7 +167,7 @@ fn options(arguments: &Chosen, table: &SkeletonTable) -> Result<Vec<ReadOptions>
                 only: selection("--only", only)?,
                 without: selection("--without", without)?,
                 n_joints: Some(table.n_joints()),
-                fatal: fatal.clone(),
+                fatal: arguments.fatal.clone(),
                 ..ReadOptions::default()
             })
         })
@@ -252,15 +213,6 @@ fn sides(values: &[&str]) -> Result<Sides, Failure> {
         let message = format!("--sides {name}: {error}");
         Failure::new(ExitKind::Usage, message)
     })
-}
-
-/// A selection that means nobody is a slip on the command line, all else is the data set's fault.
-pub(crate) fn unread(error: DatasetError) -> Failure {
-    let kind = match error {
-        DatasetError::Select(_) => ExitKind::Usage,
-        _ => ExitKind::Input,
-    };
-    Failure::new(kind, error)
 }
 
 #[cfg(test)]

@@ -1,34 +1,37 @@
 //! What is said about what was learned.
 
-use runtime::Failure;
+use std::path::Path;
+
 use serde_json::{Value, json};
 
-use super::Arguments;
 use super::work::Done;
-use crate::globals::Globals;
-use crate::output;
 use ::consistency::{Appearance, Point};
 
 /// Version of the JSON.
 const SCHEMA: u32 = 1;
 
-/// Prints the summary.
-pub(super) fn say(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
-    if arguments.json {
-        output::json(&summary(arguments, done))
-    } else if globals.quiet {
-        Ok(())
-    } else {
-        output::line(text(arguments, done))
+impl Done {
+    /// For programs.
+    ///
+    /// * `out`: the file that was written.
+    pub fn json(&self, out: &Path) -> Value {
+        json(out, self)
+    }
+
+    /// For people.
+    ///
+    /// * `out`: the file that was written.
+    pub fn text(&self, out: &Path) -> String {
+        text(out, self)
     }
 }
 
-fn summary(arguments: &Arguments, done: &Done) -> Value {
+fn json(out: &Path, done: &Done) -> Value {
     let bins = done.bins.iter();
     let joints = done.joints.iter();
     json!({
         "schema_version": SCHEMA,
-        "file": arguments.out,
+        "file": out,
         "learned_from": done.learned.learned,
         "weights": done.learned.weights,
         "tau_tenths": done.learned.tau_tenths,
@@ -40,11 +43,11 @@ fn summary(arguments: &Arguments, done: &Done) -> Value {
     })
 }
 
-fn text(arguments: &Arguments, done: &Done) -> String {
+fn text(out: &Path, done: &Done) -> String {
     let from = done.learned.learned;
     let mut lines = vec![format!(
         "{}: {} views of {} instants, weights chosen on {} more, in {:.0} s",
-        arguments.out.display(),
+        out.display(),
         from.views,
         from.instants,
         from.held_out,

@@ -1,50 +1,71 @@
-//! The training itself, in a Parallax that was built with it.
+//! The training of a network, in a build that includes it.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Instant;
 
 use qualitytraining::curves;
 use qualitytraining::judge::Judgement;
+use qualitytraining::parameters::Parameter;
 use qualitytraining::sample::Sample;
 use qualitytraining::settings::Settings;
 use qualitytraining::store::Samples;
 use qualitytraining::trainer::{TrainError, Trainer};
+use qualitytraining::vgg;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::json;
 
-use super::network::Arguments;
-use super::replace;
-use crate::globals::Globals;
-use crate::{inputs, output};
+use super::replace::replace;
+use crate::console::Console;
+use crate::failures::in_file;
 
-/// Trains until the network is written, or it is told to stop.
-pub(super) fn train(
-    arguments: &Arguments,
+/// What a network is trained on, and where to.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Files of samples to learn from and to validate on.
+    pub samples: Vec<PathBuf>,
+    /// Files of samples to judge the network on; every file by itself.
+    pub judge: Vec<PathBuf>,
+    /// The ONNX file to write; the checkpoint and the curves are beside it.
+    pub out: PathBuf,
+    /// Weights of torchvision's VGG-16 to begin with.
+    pub weights: Option<PathBuf>,
+    /// What the file says that it is; its name if not given.
+    pub identity: Option<String>,
+    /// Whether to go on from the checkpoint of an interrupted training, if there is one.
+    pub resume: bool,
+}
+
+/// Trains a network and writes it.
+///
+/// # Errors
+///
+/// Samples, weights or a checkpoint that cannot be used; a file that cannot be written; a stop request
+/// ([`ExitKind::Interrupted`]).
+pub fn train(
+    job: &Job,
     settings: &Settings,
-    globals: Globals,
-) -> Result<ExitCode, Failure> {
-    let out = arguments.out.clone().unwrap_or_default();
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<(), Failure> {
+    let out = &job.out;
     let beside = |ending: &str| {
         let mut path = out.clone().into_os_string();
         path.push(ending);
         PathBuf::from(path)
     };
     let kept = beside(".checkpoint");
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let samples = read_all(&arguments.samples)?;
-    let checkpoint = checkpoint(&kept, arguments.resume)?;
-    let weights = match &arguments.weights {
-        Some(file) => super::weights::read(file)?,
+    let samples = read_all(&job.samples)?;
+    let checkpoint = checkpoint(&kept, job.resume)?;
+    let weights = match &job.weights {
+        Some(file) => weights(file)?,
         None => Vec::new(),
     };
     let trainer = Trainer::new(settings, &samples, &weights, checkpoint.as_deref());
     let mut trainer = trainer.map_err(|error| refused(error, &kept))?;
     let say = Say {
-        quiet: globals.quiet,
-        json: arguments.json,
+        console,
         epochs: settings.epochs as usize,
         begin: Instant::now(),
         before: trainer.passes().len(),
@@ -60,15 +81,15 @@ pub(super) fn train(
         replace(&beside(".svg"), drawn.as_bytes())?;
         say.pass(&trainer)?;
     }
-    let identity = arguments.identity.clone().unwrap_or_else(|| {
+    let identity = job.identity.clone().unwrap_or_else(|| {
         out.file_stem()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned()
     });
-    replace(&out, &trainer.onnx(&identity))?;
+    replace(out, &trainer.onnx(&identity))?;
     say.judged("validation", &trainer.judge(trainer.validated()))?;
-    for file in &arguments.judge {
+    for file in &job.judge {
         let samples = read(file)?;
         let all: Vec<&Sample> = samples.all.iter().collect();
         if samples.tile != settings.network.tile().unwrap_or(samples.tile) {
@@ -77,13 +98,18 @@ pub(super) fn train(
         }
         say.judged(&file.display().to_string(), &trainer.judge(&all))?;
     }
-    fs::remove_file(&kept).map_err(|error| inputs::in_file(&kept, &error))?;
-    Ok(ExitCode::SUCCESS)
+    fs::remove_file(&kept).map_err(|error| in_file(&kept, &error))
+}
+
+/// Weights of torchvision's VGG-16.
+fn weights(file: &Path) -> Result<Vec<Parameter>, Failure> {
+    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    vgg::parse(&bytes).map_err(|error| in_file(file, &error))
 }
 
 fn read(file: &Path) -> Result<Samples, Failure> {
-    let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
-    Samples::from_bytes(&bytes).map_err(|error| inputs::in_file(file, &error))
+    let bytes = fs::read(file).map_err(|error| in_file(file, &error))?;
+    Samples::from_bytes(&bytes).map_err(|error| in_file(file, &error))
 }
 
 /// Several files as one.
@@ -104,7 +130,7 @@ fn read_all(files: &[PathBuf]) -> Result<Samples, Failure> {
 fn checkpoint(path: &Path, resume: bool) -> Result<Option<Vec<u8>>, Failure> {
     match fs::read(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(inputs::in_file(path, &error)),
+        Err(error) => Err(in_file(path, &error)),
         Ok(bytes) if resume => Ok(Some(bytes)),
         Ok(_) => {
             let message = format!("{} is there: a training was interrupted", path.display());
@@ -126,32 +152,27 @@ fn refused(error: TrainError, checkpoint: &Path) -> Failure {
     failure
 }
 
-/// Says how far the training is.
-struct Say {
-    quiet: bool,
-    json: bool,
+/// Reports how far the training is.
+struct Say<'a> {
+    console: &'a dyn Console,
     epochs: usize,
     begin: Instant,
     /// Passes that were done before.
     before: usize,
 }
 
-impl Say {
+impl Say<'_> {
     fn begin(&self, trainer: &Trainer<'_>) -> Result<(), Failure> {
         let [learnt, validated] = trainer.n_samples();
-        if self.json {
-            let n = self.before;
-            return output::json(&json!({
-                "event": "data", "learnt": learnt, "validated": validated, "resumed": n,
-            }));
-        }
-        if !self.quiet {
-            output::message(format_args!(
-                "{learnt} samples to learn from, {validated} to validate on"
-            ));
-            if self.before > 0 {
-                output::message(format_args!("going on after pass {}", self.before));
-            }
+        let console = self.console;
+        console.event(&json!({
+            "event": "data", "learnt": learnt, "validated": validated, "resumed": self.before,
+        }))?;
+        console.message(&format!(
+            "{learnt} samples to learn from, {validated} to validate on"
+        ));
+        if self.before > 0 {
+            console.message(&format!("going on after pass {}", self.before));
         }
         Ok(())
     }
@@ -163,48 +184,39 @@ impl Say {
         let n = trainer.passes().len();
         let each = self.begin.elapsed().as_secs_f64() / (n - self.before).max(1) as f64;
         let left = each * (self.epochs - n) as f64;
-        if self.json {
-            return output::json(&json!({
-                "event": "pass", "pass": n, "passes": self.epochs, "learnt": pass.learnt,
-                "validated": pass.validated, "area": pass.area, "seconds_left": left,
-            }));
-        }
-        if !self.quiet {
-            let best = if trainer.best() == Some(n - 1) {
-                ", the best"
-            } else {
-                ""
-            };
-            output::message(format_args!(
-                "pass {n} of {}: loss {:.4}, validated {:.4}, area {:.3}{best}; {left:.0} s left at most",
-                self.epochs, pass.learnt, pass.validated, pass.area
-            ));
-        }
+        self.console.event(&json!({
+            "event": "pass", "pass": n, "passes": self.epochs, "learnt": pass.learnt,
+            "validated": pass.validated, "area": pass.area, "seconds_left": left,
+        }))?;
+        let best = if trainer.best() == Some(n - 1) {
+            ", the best"
+        } else {
+            ""
+        };
+        self.console.message(&format!(
+            "pass {n} of {}: loss {:.4}, validated {:.4}, area {:.3}{best}; {left:.0} s left at most",
+            self.epochs, pass.learnt, pass.validated, pass.area
+        ));
         Ok(())
     }
 
     fn judged(&self, name: &str, judgement: &Judgement) -> Result<(), Failure> {
-        if self.json {
-            return output::json(&json!({
-                "event": "judged", "samples": name, "judgement": judgement,
-                "mean_area": judgement.mean_area(),
-                "mean_rank_correlation": judgement.mean_rank_correlation(),
-            }));
-        }
-        if !self.quiet {
-            let areas = judgement
-                .area
-                .iter()
-                .map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
-            let areas: Vec<String> = areas.collect();
-            output::line(format_args!(
-                "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
-                judgement.n,
-                judgement.mean_area(),
-                judgement.mean_rank_correlation(),
-                areas.join(" ")
-            ))?;
-        }
-        Ok(())
+        self.console.event(&json!({
+            "event": "judged", "samples": name, "judgement": judgement,
+            "mean_area": judgement.mean_area(),
+            "mean_rank_correlation": judgement.mean_rank_correlation(),
+        }))?;
+        let areas = judgement
+            .area
+            .iter()
+            .map(|it| it.map_or("-".to_owned(), |it| format!("{:.0}", 100.0 * it)));
+        let areas: Vec<String> = areas.collect();
+        self.console.result(&format!(
+            "{name}: {} samples, area under the ROC {:.3}, rank correlation {:.3}\n  area by part, %: {}",
+            judgement.n,
+            judgement.mean_area(),
+            judgement.mean_rank_correlation(),
+            areas.join(" ")
+        ))
     }
 }

@@ -10,11 +10,9 @@ use fmp::Model;
 use runtime::{ExitKind, Failure, OrFail as _};
 use training::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-use super::folder_of;
-
 /// The files of one training. Nothing is being written while the state is not locked.
 #[derive(Debug)]
-pub(super) struct Store {
+pub struct Store {
     out: PathBuf,
     state: Mutex<State>,
     /// Held as long as this training runs; the system lets go of it however the process ends.
@@ -55,7 +53,7 @@ impl Store {
     ///
     /// There is no place for the model, another training is writing it, or there is a checkpoint that is not
     /// to be gone on from.
-    pub(super) fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
+    pub fn new(out: &Path, resume: bool) -> Result<Self, Failure> {
         let wrong = |what: &str| {
             let message = format!("--out {}: {what}", out.display());
             Err(Failure::new(ExitKind::Usage, message))
@@ -178,7 +176,7 @@ impl Store {
 
     /// How a training that was stopped ends: what is left of it, and how to go on. Waits for what is
     /// being written.
-    pub(super) fn interrupted(&self) -> Failure {
+    pub fn interrupted(&self) -> Failure {
         let state = self.lock();
         self.let_go();
         let State {
@@ -252,6 +250,14 @@ fn claim(out: &Path) -> Result<File, Failure> {
             Err(Failure::new(ExitKind::Usage, message)
                 .with_hint("wait for it, or write to another --out"))
         }
+    }
+}
+
+/// The folder that a file lies in, as the operating system wants it named.
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
     }
 }
 

@@ -1,0 +1,27 @@
+//! Work from files to files, away from cameras: training runs, and a model tried on pictures.
+//!
+//! The algorithms are in crates of their own; here they are given files, threads, a [`Stop`](runtime::Stop) and a
+//! [`Console`], and their errors become a [`Failure`](runtime::Failure) with an exit status and a hint.
+//!
+//! * [`person`]: a model that finds people, from annotated people.
+//! * [`consistency`]: what several views of a person have in common, from sequences with truth.
+//! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
+//! * [`judged`]: a model tried on people whose joints are known.
+#![forbid(unsafe_code)]
+
+mod console;
+mod failures;
+mod interrupt;
+mod search;
+
+pub mod images;
+
+pub mod consistency;
+pub mod judged;
+pub mod person;
+pub mod quality;
+
+pub use console::Console;
+pub use failures::{dataset_failure, film_failure, sequence_failure};
+pub use interrupt::unless_stopped;
+pub use search::{Search, TooLarge};

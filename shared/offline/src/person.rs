@@ -1,0 +1,17 @@
+//! A model that finds people, trained from annotated people: from data sets to the model's file.
+
+mod alarms;
+mod album;
+mod data;
+mod per_dataset;
+mod progress;
+mod report;
+mod store;
+mod train;
+
+pub use data::{Chosen, parse_skeleton};
+pub(crate) use per_dataset::deal;
+pub use progress::Progress;
+pub use report::Report;
+pub use store::Store;
+pub use train::{Job, train};

@@ -1,0 +1,12 @@
+//! The network that predicts the errors of single views: its samples, and its training.
+
+#[cfg(feature = "burn")]
+pub mod network;
+pub mod samples;
+
+mod observer;
+mod replace;
+mod scenes;
+mod work;
+
+pub use scenes::Scenes;
