@@ -3,8 +3,6 @@
 use fmp::Model;
 use serde::{Deserialize, Serialize};
 
-use crate::types::TypesBy;
-
 /// Everything about a training that is not its data.
 ///
 /// The defaults are those of Yang & Ramanan 2013, as far as they are known, but for what keeps memory
@@ -59,6 +57,16 @@ pub struct Settings {
     pub passes: usize,
     /// Seed of everything random.
     pub seed: u64,
+}
+
+/// The offsets that define the types of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TypesBy {
+    /// The offset from the parent; of the root, that of its first child (Yang & Ramanan 2013).
+    Parent,
+    /// The offsets from the parent and from all children (the 2014 release).
+    Neighbours,
 }
 
 impl Default for Settings {

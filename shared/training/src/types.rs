@@ -2,17 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::settings::Settings;
-
-/// The offsets that define the types of a part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TypesBy {
-    /// The offset from the parent; of the root, that of its first child (Yang & Ramanan 2013).
-    Parent,
-    /// The offsets from the parent and from all children (the 2014 release).
-    Neighbours,
-}
+use crate::settings::{Settings, TypesBy};
 
 /// The type of every person's part, and the anchors of the types.
 #[derive(Debug, Clone, PartialEq)]
