@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use capture::Feed;
-use consistency::{Appearance, Learned};
+use consistency::{Appearance, Learned, Shape};
 use deployment::Deployment;
 use fmp::Model;
 use footage::{SourceSpec, Turn};
@@ -172,7 +172,7 @@ pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learn
     let bytes = Shipped::Consistency.read(file)?;
     let text = core::str::from_utf8(&bytes).map_err(|_odd| no_text(file))?;
     let learned = Learned::parse(text).map_err(|error| in_file(file, &error))?;
-    let checked = learned.check_model(&offline::consistency::shape(model));
+    let checked = learned.check_model(&Shape::of(model));
     checked.map_err(|error| in_file(file, &error))?;
     Ok(Some(learned))
 }

@@ -2,7 +2,7 @@
 
 use capture::Feed;
 use deployment::Deployment;
-use fmp::Layout;
+use fmp::{Layout, Search};
 use footage::{Fill, Size, SourceSpec, Warp};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
@@ -10,7 +10,6 @@ use nalgebra::{Matrix3, SymmetricEigen, UnitVector3, Vector3};
 use runtime::Failure;
 
 use crate::inputs;
-use offline::Search;
 
 /// Pictures of a camera that are searched, and the frames between them.
 const N_PICTURES: u64 = 2;

@@ -11,6 +11,7 @@ mod file;
 
 mod joints;
 mod learn;
+mod model;
 mod surface;
 
 pub use counts::{Appearance, Counts, Shape, marginals};

@@ -24,6 +24,7 @@ mod precision;
 mod pyramid;
 mod responses;
 mod scope;
+mod search;
 mod solve;
 mod source;
 mod track;
@@ -38,6 +39,7 @@ pub use precision::Precision;
 pub use pyramid::FeaturePyramid;
 pub use responses::Responses;
 pub use scope::{Region, Scope, ScopeError, Window};
+pub use search::Search;
 pub use solve::{CandidateSettings, ExtraTerms, IncrementalSolver, SolveStatistics, Solver};
 pub use track::{FrameTime, TrackSettings, Tracker};
 

@@ -10,7 +10,7 @@ use runtime::Failure;
 use sequences::Sequence;
 
 use crate::failures::sequence_failure;
-pub use work::{Done, Job, Learning, shape};
+pub use work::{Done, Job, Learning};
 
 /// Sequences that were read.
 #[derive(Debug)]

@@ -3,13 +3,11 @@
 use datasets::{People, Person, Picture};
 use evaluation::{PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering};
 use experiment::{Joints, Pictures};
-use fmp::{Layout, Pose};
+use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::{N_PARTS, PARSE14};
-
-use crate::search::Search;
 
 /// Most detections that are looked through for the one that lies on the person.
 const MOST: usize = 10_000;

@@ -12,7 +12,7 @@
 mod console;
 mod failures;
 mod interrupt;
-mod search;
+mod memory;
 
 pub mod images;
 
@@ -24,4 +24,4 @@ pub mod quality;
 pub use console::Console;
 pub use failures::{dataset_failure, film_failure, sequence_failure};
 pub use interrupt::unless_stopped;
-pub use search::{Search, TooLarge};
+pub use memory::{TooLarge, check_memory};

@@ -1,9 +1,6 @@
-//! The exact search of single images, outside the pipeline.
+//! Whether there is memory for the search of an image.
 
-use std::sync::Arc;
-
-use fmp::{Extractor, Layout, Model, Precision, Responses, Solver};
-use kernels::{NoAmx, Rgb8View};
+use fmp::Layout;
 
 /// What a search takes in all, per byte of the responses: 1.53 where it was measured.
 const SHARE_OF_RESPONSES: f64 = 1.6;
@@ -20,7 +17,7 @@ pub struct TooLarge {
     free_gb: f64,
 }
 
-/// Memory that can be had without swapping, as the kernel estimates it; none where it does not say.
+/// Memory that can be had without swapping, bytes, as the kernel estimates it; none where it does not say.
 fn available_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text
@@ -30,68 +27,21 @@ fn available_bytes() -> Option<u64> {
     Some(1024 * kib)
 }
 
-/// A model, ready to search images.
-#[derive(Debug)]
-pub struct Search {
-    /// The model.
-    pub model: Arc<Model>,
-    /// Finds its best poses.
-    pub solver: Solver,
-    /// Computes what its filters answer.
-    pub extractor: Extractor,
-}
-
-impl Search {
-    /// Prepares the search.
-    pub fn new(model: Arc<Model>) -> Self {
-        Self {
-            extractor: Extractor::new(Arc::clone(&model)),
-            solver: Solver::new(Arc::clone(&model)),
-            model,
-        }
-    }
-
-    /// The same, in a given precision.
-    ///
-    /// # Errors
-    ///
-    /// The machine lacks what the precision needs.
-    pub fn in_precision(precision: Precision, model: Arc<Model>) -> Result<Self, NoAmx> {
-        Ok(Self {
-            extractor: Extractor::in_precision(precision, Arc::clone(&model))?,
-            ..Self::new(model)
-        })
-    }
-
-    /// Refuses a search that this machine has no memory for.
-    ///
-    /// # Errors
-    ///
-    /// More memory is needed than is free.
-    pub fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
-        let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
-        let [width, height] = layout.image_size;
-        match available_bytes() {
-            Some(free) if needed > free as f64 => Err(TooLarge {
-                width,
-                height,
-                needed_gb: needed / 1e9,
-                free_gb: free as f64 / 1e9,
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Runs `look` on what the filters answer to an image, on all levels.
-    pub fn on<T>(
-        &self,
-        image: Rgb8View<'_>,
-        layout: &Layout,
-        look: impl FnOnce(&Responses<'_>) -> T,
-    ) -> T {
-        let mut values = vec![0.0; layout.n_responses()];
-        self.extractor.responses(image, layout, &mut values);
-        let levels: Vec<u16> = (0..layout.levels.len() as u16).collect();
-        look(&Responses::new(layout, &values, &levels))
+/// Refuses a search that this machine has no memory for.
+///
+/// # Errors
+///
+/// More memory is needed than is free.
+pub fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
+    let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
+    let [width, height] = layout.image_size;
+    match available_bytes() {
+        Some(free) if needed > free as f64 => Err(TooLarge {
+            width,
+            height,
+            needed_gb: needed / 1e9,
+            free_gb: free as f64 / 1e9,
+        }),
+        _ => Ok(()),
     }
 }

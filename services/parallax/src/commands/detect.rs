@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use fmp::{CandidateSettings, Layout, Pose, Precision};
+use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -17,7 +17,6 @@ use self::pictures::{Picture, Pictures, Searched};
 use crate::describe::{self, Placed};
 use crate::sheet::{Sheet, Skeleton, limbs};
 use crate::{inputs, output};
-use offline::Search;
 
 /// Longest side that is searched unless somebody asks for more, pixels.
 const SIZE: usize = 1280;

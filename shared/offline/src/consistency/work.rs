@@ -148,7 +148,7 @@ impl<'a> Learning<'a> {
 
     /// What single views show, by every number of bins.
     fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
-        let shape = shape(&self.model);
+        let shape = Shape::of(&self.model);
         let learner = |n_bins: usize| {
             let settings = Settings {
                 n_bins,
@@ -270,16 +270,6 @@ impl<'a> Learning<'a> {
         let up = sequence.rig.up_in_world();
         let maps = film.footage_from_frame();
         Bench::new(setup, &film.cameras(), up, maps).or_fail(ExitKind::Input)
-    }
-}
-
-/// Types of every part of a model, and the parts on the other side.
-pub fn shape(model: &Model) -> Shape {
-    let parts = 0..model.n_parts();
-    let mirror = model.spec().mirror.clone();
-    Shape {
-        n_types: parts.clone().map(|part| model.n_types(part)).collect(),
-        mirror: mirror.unwrap_or_else(|| parts.collect()),
     }
 }
 

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::Picture;
-use fmp::{CandidateSettings, Layout, Model};
+use fmp::{CandidateSettings, Layout, Model, Search};
 use rayon::prelude::*;
 use runtime::Failure;
 use serde_json::{Value, json};
 
 use super::progress::Progress;
-use crate::search::Search;
 
 /// Largest share of a better detection's boxes that a worse one may cover, as `detect` has it.
 const OVERLAP: f64 = 0.1;

@@ -2,14 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use fmp::Layout;
+use fmp::{Layout, Search};
 use footage::{Fill, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::Arguments;
 use crate::inputs;
-use offline::Search;
 
 /// A picture as people see it.
 #[derive(Debug)]
@@ -126,7 +125,7 @@ impl Searched {
         let size = bounded(picture.size, longest);
         let layout = Layout::new(&search.model, size.width, size.height);
         let layout = layout.map_err(|error| inputs::in_file(&picture.path, &error))?;
-        Search::check_memory(&layout).map_err(|needed| {
+        offline::check_memory(&layout).map_err(|needed| {
             let message = format!("{}: {needed}", picture.path.display());
             let hint = "leave --full out, or ask for a smaller --size";
             Failure::new(ExitKind::Input, message).with_hint(hint)

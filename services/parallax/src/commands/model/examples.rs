@@ -4,13 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::Picture;
-use fmp::{Layout, Model, Pose};
+use fmp::{Layout, Model, Pose, Search};
 use footage::{Canvas, Fill, Size, Warp, resize_map};
 use rayon::prelude::*;
 use report::model::Examples;
 use runtime::{ExitKind, Failure, OrFail as _};
-
-use offline::Search;
 
 /// Most examples of a type.
 const MOST: usize = 4;
