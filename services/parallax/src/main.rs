@@ -11,7 +11,7 @@
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
 //! | the deployment | [`deployment`](../deployment/index.html): keys, defaults, rules, processes |
 //! | pages | [`report`](../report/index.html) |
-//! | offline | [`offline`](../offline/index.html): the training runs, from files to files; [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
+//! | offline | [`offline`](../offline/index.html): work from files to files; [`training`](../training/index.html), [`qualitytraining`](../qualitytraining/index.html), [`sequences`](../sequences/index.html), [`experiment`](../experiment/index.html): training and evaluation |
 //! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html) |
 //! | method | [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`fmp`](../fmp/index.html): the paper |
 //! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html) |
@@ -46,6 +46,7 @@ mod shipped;
 mod spread;
 mod stage;
 mod summary;
+mod terminal;
 mod trial;
 mod vertical;
 mod views;

@@ -39,8 +39,8 @@ pub trait Console: Debug + Send + Sync {
     /// Moves the bar.
     fn set(&self, done: usize, of: usize);
 
-    /// Moves the bar by one.
-    fn advance(&self);
+    /// Moves the bar by `n`.
+    fn advance(&self, n: usize);
 
     /// Removes the bar.
     fn finish(&self);

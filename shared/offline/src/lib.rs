@@ -1,4 +1,5 @@
-//! Work from files to files, away from cameras: training runs, and a model tried on pictures.
+//! Work from files to files, away from cameras: training runs, the evaluation, a model tried on pictures, sequences of
+//! people who do not exist.
 //!
 //! The algorithms are in crates of their own; here they are given files, threads, a [`Stop`](runtime::Stop) and a
 //! [`Console`], and their errors become a [`Failure`](runtime::Failure) with an exit status and a hint.
@@ -7,6 +8,7 @@
 //! * [`consistency`]: what several views of a person have in common, from sequences with truth.
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
 //! * [`judged`]: a model tried on people whose joints are known.
+//! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
 
 mod console;
@@ -20,6 +22,7 @@ pub mod consistency;
 pub mod judged;
 pub mod person;
 pub mod quality;
+pub mod synth;
 
 pub use console::Console;
 pub use failures::{dataset_failure, film_failure, sequence_failure};

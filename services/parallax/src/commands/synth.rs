@@ -1,27 +1,23 @@
 //! `parallax synth`: sequences of people who do not exist, with the truth.
 
 mod chosen;
-mod files;
 mod motion;
-mod sequence;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
+use offline::synth::{self, Done, Job, Written};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
-use scene::{Action, Flaws, Recording, RigChoice, Settings};
-use serde_json::{Value, json};
+use scene::{Action, Flaws, RigChoice};
+use serde_json::json;
 
 use crate::globals::Globals;
+use crate::terminal::Terminal;
 use crate::{inputs, output};
 pub(crate) use chosen::rate;
 use chosen::{actions, rig, subjects};
 use motion::MotionArguments;
-use sequence::{People, Sequence};
 
 const HELP: &str = "\
 A folder OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), \
@@ -65,6 +61,15 @@ enum Format {
     Png,
     /// Smaller, and as most cameras would have it (quality 95).
     Jpg,
+}
+
+impl From<Format> for synth::Format {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Png => Self::Png,
+            Format::Jpg => Self::Jpg,
+        }
+    }
 }
 
 /// Who does what before which cameras.
@@ -171,97 +176,44 @@ impl FlawArguments {
     }
 }
 
+/// The bar of the progress.
+const BAR: &str = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
+
 /// Frames of every camera where nothing is said.
 const N_FRAMES: u64 = 60;
 
-/// What all sequences of one command share.
-struct Job<'a> {
-    arguments: &'a Arguments,
-    flaws: Flaws,
-    recording: Option<Recording>,
-    /// Of every camera.
-    n_frames: u64,
-}
-
-impl Job<'_> {
-    /// The actions, one of which stands for what was recorded.
-    fn actions(&self) -> &[Action] {
-        match self.recording {
-            Some(_) => &[Action::Walking],
-            None => &self.arguments.actions,
-        }
-    }
-
-    fn n_sequences(&self) -> usize {
-        self.arguments.subjects.len() * self.actions().len()
-    }
-
-    /// The name of a sequence.
-    fn name(&self, subject: u64, action: Action) -> String {
-        let recorded = self.recording.as_ref().map(|it| it.name.as_str());
-        format!("s{subject}-{}", recorded.unwrap_or(action.name()))
-    }
-
-    fn settings(&self, subject: u64, action: Action) -> Settings {
-        let arguments = self.arguments;
-        Settings {
-            rig: absolute(&arguments.rig),
-            subject,
-            action,
-            seed: arguments.seed,
-            rate_hz: arguments.rate,
-            backdrop: arguments.backdrop.as_deref().map(absolute_path),
-            flaws: self.flaws,
-        }
-    }
-}
-
 /// Writes all sequences.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    arguments.rig.rig().map_err(chosen::no_rig)?;
-    let recording = arguments.motion.recording()?;
-    let asked = arguments.frames;
+    let it = arguments;
+    it.rig.rig().map_err(synth::rig_failure)?;
+    let recording = it.motion.recording()?;
     let job = Job {
-        arguments,
-        flaws: arguments.flaws.flaws()?,
-        n_frames: motion::n_frames(asked, arguments.rate, recording.as_ref(), N_FRAMES)?,
+        out: it.out.clone(),
+        rig: it.rig.clone(),
+        subjects: it.subjects.clone(),
+        actions: it.actions.clone(),
+        seed: it.seed,
+        flaws: it.flaws.flaws()?,
+        n_frames: synth::n_frames(it.frames, it.rate, recording.as_ref(), N_FRAMES)?,
         recording,
+        rate_hz: it.rate,
+        format: it.format.into(),
+        with_masks: !it.no_masks,
+        backdrop: it.backdrop.clone(),
+        model: it.model.clone(),
+        live: it.live,
     };
-    begin(&arguments.out)?;
+    begin(&it.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let threads = arguments.threads.map_or(0, usize::from);
+    let threads = it.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|it| format!("synth-{it}"))
         .build()
         .or_fail(ExitKind::Run)?;
-    let bar = bar(&job, globals)?;
-    let begin = Instant::now();
-    let is_one = job.n_sequences() == 1;
-    let mut all = People::default();
-    let mut sequences = Vec::new();
-    for &subject in &arguments.subjects {
-        for &action in job.actions() {
-            let name = job.name(subject, action);
-            let folder = if is_one {
-                arguments.out.clone()
-            } else {
-                arguments.out.join(&name)
-            };
-            let settings = job.settings(subject, action);
-            let sequence = Sequence::new(&job, &settings, &folder, &name)?;
-            let people = pool.install(|| sequence.write(&stop, &bar))?;
-            sequences.push(report(&sequence, &people));
-            people.write(&folder)?;
-            all.append(&name, people);
-        }
-    }
-    bar.finish_and_clear();
-    if !is_one {
-        all.write(&arguments.out)?;
-    }
-    let seconds = begin.elapsed().as_secs_f64();
-    tell(arguments, globals, &sequences, seconds)?;
+    let terminal = Terminal::with_bar(globals.quiet, it.json, BAR);
+    let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
+    tell(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -278,57 +230,14 @@ fn begin(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A rig that is found from any working folder.
-fn absolute(rig: &RigChoice) -> RigChoice {
-    match rig {
-        RigChoice::File(path) => RigChoice::File(absolute_path(path)),
-        other => other.clone(),
-    }
-}
-
-fn absolute_path(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
-}
-
-fn bar(job: &Job<'_>, globals: Globals) -> Result<ProgressBar, Failure> {
-    let rig = job.arguments.rig.rig().map_err(chosen::no_rig)?;
-    let n = job.n_sequences() * rig.cameras().len();
-    let bar = if globals.quiet || !output::is_lively() {
-        ProgressBar::hidden()
-    } else {
-        ProgressBar::new(n as u64 * job.n_frames)
-    };
-    let style = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(style) {
-        bar.set_style(style);
-    }
-    Ok(bar)
-}
-
-fn report(sequence: &Sequence<'_>, people: &People) -> Value {
-    json!({
-        "folder": sequence.folder(),
-        "subject": sequence.settings().subject,
-        "action": sequence.action(),
-        "seed": sequence.settings().seed,
-        "pictures": sequence.n_pictures(),
-        "people": people.len(),
-    })
-}
-
-fn tell(
-    arguments: &Arguments,
-    globals: Globals,
-    sequences: &[Value],
-    seconds: f64,
-) -> Result<(), Failure> {
-    let pictures = sequences.iter().filter_map(|it| it["pictures"].as_u64());
-    let pictures: u64 = pictures.sum();
+fn tell(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+    let Done { sequences, seconds } = done;
+    let pictures: u64 = sequences.iter().map(|it| it.n_pictures).sum();
     let rate = pictures as f64 / seconds.max(1e-9);
     if arguments.json {
         return output::json(&json!({
             "schema_version": 1,
-            "sequences": sequences,
+            "sequences": sequences.iter().map(Written::json).collect::<Vec<_>>(),
             "seconds": seconds,
             "pictures_per_second": rate,
         }));
@@ -346,6 +255,3 @@ fn tell(
     }
     Ok(())
 }
-
-/// The same scene on every thread.
-type Shared = Arc<scene::Scene>;

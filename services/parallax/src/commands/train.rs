@@ -3,7 +3,6 @@
 mod consistency;
 mod people;
 mod quality;
-mod terminal;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,9 +14,12 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use training::Settings;
 
 use crate::globals::Globals;
+use crate::terminal::Terminal;
 use crate::{inputs, output};
 use people::People;
-use terminal::Terminal;
+
+/// The bar of the progress.
+const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}";
 
 const HELP: &str = "\
 DATASET is a folder with labels.mat (PARSE) or joints.mat (LSP), one of these files, or a file of \
@@ -127,7 +129,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         store: Store::new(&out, arguments.resume)?,
         progress: Progress::new(
             stop.clone(),
-            Box::new(Terminal::with_bar(globals.quiet, arguments.json)),
+            Box::new(Terminal::with_bar(globals.quiet, arguments.json, BAR).ticking()),
         ),
         quiet: globals.quiet,
     });

@@ -138,7 +138,7 @@ impl Progress {
 
     /// One of the images has been looked at.
     pub(super) fn looked_at_one(&self) {
-        self.console.advance();
+        self.console.advance(1);
     }
 
     /// A failure if somebody stopped it.

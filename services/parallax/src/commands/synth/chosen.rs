@@ -2,8 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use runtime::{ExitKind, Failure};
-use scene::{Action, RigChoice, RigChoiceError};
+use scene::{Action, RigChoice};
 
 pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
     RigChoice::parse(text).map_err(|it| it.to_string())
@@ -58,16 +57,6 @@ pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
     rate.ok_or_else(|| "expected 0.1 to 1000 frames a second".to_owned())
-}
-
-/// A rig that is not there is an input, one that does not say what is up cannot be used.
-pub(super) fn no_rig(error: RigChoiceError) -> Failure {
-    let kind = match error {
-        RigChoiceError::NoUp | RigChoiceError::Rig(_) => ExitKind::Calibration,
-        RigChoiceError::Form { .. } => ExitKind::Usage,
-        RigChoiceError::Preset(_) | RigChoiceError::File(_) => ExitKind::Input,
-    };
-    Failure::new(kind, error)
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use experiment::FilmSettings;
 use offline::consistency::{Done, Job, Learning, Sequences};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use super::terminal::Terminal;
 use crate::commands::eval::size;
 use crate::globals::Globals;
+use crate::terminal::Terminal;
 use crate::{inputs, output};
 
 const HELP: &str = "\

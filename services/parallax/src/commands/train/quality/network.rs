@@ -106,7 +106,7 @@ fn train(
     settings: &Settings,
     globals: Globals,
 ) -> Result<ExitCode, Failure> {
-    use crate::commands::train::terminal::Terminal;
+    use crate::terminal::Terminal;
 
     let job = offline::quality::network::Job {
         samples: arguments.samples.clone(),

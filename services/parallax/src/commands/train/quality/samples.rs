@@ -8,8 +8,8 @@ use offline::quality::{Scenes, samples};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use viewquality::TileShape;
 
-use crate::commands::train::terminal::Terminal;
 use crate::globals::Globals;
+use crate::terminal::Terminal;
 use crate::{inputs, output};
 
 const HELP: &str = "\

@@ -12,10 +12,19 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use scene::truth::{Frame, Header};
 use scene::{Address, Scene};
 
-use super::{Arguments, Format, absolute_path};
-use crate::inputs;
+use super::{Job, absolute_path};
+use crate::failures::in_file;
 
 const JPEG_QUALITY: u8 = 95;
+
+/// How pictures are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Lossless.
+    Png,
+    /// Smaller, and as most cameras would have it (quality 95).
+    Jpg,
+}
 
 /// The name of a picture with its ending.
 pub(super) fn name(stem: &str, format: Format) -> String {
@@ -86,25 +95,18 @@ pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a deployment says besides what the scene does.
-pub(super) struct Deployed<'a> {
-    /// Of the sequence.
-    pub(super) name: &'a str,
-    pub(super) arguments: &'a Arguments,
-    /// Of every camera.
-    pub(super) n_frames: u64,
-}
-
 /// Writes the deployment.
+///
+/// * `name`: of the sequence.
 pub(super) fn deployment(
     folder: &Path,
-    deployed: &Deployed<'_>,
+    name: &str,
+    job: &Job,
     scene: &Scene,
 ) -> Result<(), Failure> {
-    let (name, arguments) = (deployed.name, deployed.arguments);
     let settings = scene.settings();
     let quoted = |it: &str| toml::Value::from(it).to_string();
-    let model = arguments.model.as_deref().map_or(String::new(), |it| {
+    let model = job.model.as_deref().map_or(String::new(), |it| {
         let file = absolute_path(it).display().to_string();
         format!("model = {}\n", quoted(&file))
     });
@@ -117,11 +119,11 @@ pub(super) fn deployment(
         quoted(&format!("synth-{name}-{seed}")),
     );
     for camera in scene.rig().cameras() {
-        let source = if arguments.live {
+        let source = if job.live {
             let address = Address {
                 settings: settings.clone(),
                 camera: camera.name.clone(),
-                n_frames: deployed.n_frames,
+                n_frames: job.n_frames,
             };
             address.to_string()
         } else {
@@ -130,7 +132,7 @@ pub(super) fn deployment(
         let (name, source) = (quoted(&camera.name), quoted(&source));
         write!(text, "\n[[camera]]\nname = {name}\nsource = {source}\n").or_fail(ExitKind::Run)?;
     }
-    text += if arguments.live {
+    text += if job.live {
         "\n[capture]\nmode = \"realtime\"\npace = \"realtime\"\n"
     } else {
         "\n[capture]\n"
@@ -145,5 +147,5 @@ pub(super) fn text(file: &Path, text: &str) -> Result<(), Failure> {
 }
 
 fn put(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(file, bytes).map_err(|error| inputs::in_file(file, &error))
+    std::fs::write(file, bytes).map_err(|error| in_file(file, &error))
 }

@@ -1,4 +1,4 @@
-//! The progress of a training on standard error, its events on standard output.
+//! The progress of work from files to files on standard error, its events on standard output.
 
 use core::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::output;
 
 /// Shows progress: a bar on a terminal, messages if not quiet; JSON on standard output if asked for.
 #[derive(Debug)]
-pub(super) struct Terminal {
+pub(crate) struct Terminal {
     bar: ProgressBar,
     quiet: bool,
     json: bool,
@@ -19,25 +19,30 @@ pub(super) struct Terminal {
 
 impl Terminal {
     /// Messages and events only.
-    pub(super) fn without_bar(quiet: bool, json: bool) -> Self {
+    pub(crate) fn without_bar(quiet: bool, json: bool) -> Self {
         let bar = ProgressBar::hidden();
         Self { bar, quiet, json }
     }
 
     /// With a bar, where standard error is a terminal.
-    pub(super) fn with_bar(quiet: bool, json: bool) -> Self {
+    ///
+    /// * `template`: how it looks, in the words of `indicatif`.
+    pub(crate) fn with_bar(quiet: bool, json: bool, template: &str) -> Self {
         let bar = if quiet || !output::is_lively() {
             ProgressBar::hidden()
         } else {
             ProgressBar::new(0)
         };
-        if let Ok(style) = ProgressStyle::with_template(
-            "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}",
-        ) {
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(500));
         Self { bar, quiet, json }
+    }
+
+    /// The same; the bar is drawn twice a second, also where nothing moves it.
+    pub(crate) fn ticking(self) -> Self {
+        self.bar.enable_steady_tick(Duration::from_millis(500));
+        self
     }
 }
 
@@ -83,8 +88,8 @@ impl Console for Terminal {
         self.bar.set_position(done as u64);
     }
 
-    fn advance(&self) {
-        self.bar.inc(1);
+    fn advance(&self, n: usize) {
+        self.bar.inc(n as u64);
     }
 
     fn finish(&self) {

@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use datasets::Person;
-use indicatif::ProgressBar;
 use rayon::prelude::*;
-use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use runtime::{ExitKind, Failure, Stop};
 use scene::truth::{Frame, View as Seen};
 use scene::{Scene, SceneError, Settings, View};
 
-use super::{Arguments, Job, Shared, files};
-use crate::inputs;
+use super::people::People;
+use super::{Job, files, rig_failure};
+use crate::console::Console;
+use crate::failures::make_folder;
 
 /// Frames that one thread makes one after the other, of one camera.
 const CHUNK: u64 = 8;
@@ -19,10 +20,9 @@ const CHUNK: u64 = 8;
 /// A sequence to be written.
 #[derive(Debug)]
 pub(super) struct Sequence<'a> {
-    arguments: &'a Arguments,
-    /// Of every camera.
-    n_frames: u64,
-    scene: Shared,
+    job: &'a Job,
+    /// The same scene on every thread.
+    scene: Arc<Scene>,
     folder: PathBuf,
     name: String,
 }
@@ -30,48 +30,38 @@ pub(super) struct Sequence<'a> {
 impl<'a> Sequence<'a> {
     /// Puts the scene together and makes the folders.
     pub(super) fn new(
-        job: &Job<'a>,
+        job: &'a Job,
         settings: &Settings,
         folder: &Path,
         name: &str,
     ) -> Result<Self, Failure> {
-        let arguments = job.arguments;
         let scene = match &job.recording {
             Some(recording) => Scene::of_recording(settings, recording),
             None => Scene::new(settings),
         };
         let it = Self {
-            arguments,
-            n_frames: job.n_frames,
+            job,
             scene: Arc::new(scene.map_err(failed)?),
             folder: folder.to_owned(),
             name: name.to_owned(),
         };
         let mut folders = vec![folder.to_owned()];
         for camera in it.scene.rig().cameras() {
-            if !arguments.live {
+            if !job.live {
                 folders.push(folder.join("cameras").join(&camera.name));
-                if !arguments.no_masks {
+                if job.with_masks {
                     folders.push(folder.join("masks").join(&camera.name));
                 }
             }
         }
         for folder in folders {
-            inputs::make_folder(&folder)?;
+            make_folder(&folder)?;
         }
         Ok(it)
     }
 
-    pub(super) fn settings(&self) -> &Settings {
-        self.scene.settings()
-    }
-
     pub(super) fn action(&self) -> &str {
         self.scene.action()
-    }
-
-    pub(super) fn folder(&self) -> &Path {
-        &self.folder
     }
 
     fn n_cameras(&self) -> usize {
@@ -79,18 +69,17 @@ impl<'a> Sequence<'a> {
     }
 
     pub(super) fn n_pictures(&self) -> u64 {
-        self.n_frames * self.n_cameras() as u64
+        self.job.n_frames * self.n_cameras() as u64
     }
 
     /// Writes everything but the annotated people, which are handed back.
-    pub(super) fn write(&self, stop: &Stop, bar: &ProgressBar) -> Result<People, Failure> {
-        bar.set_message(self.name.clone());
+    pub(super) fn write(&self, stop: &Stop, console: &dyn Console) -> Result<People, Failure> {
         let views: Result<Vec<View>, SceneError> = (0..self.n_cameras())
             .into_par_iter()
             .map(|it| View::new(&self.scene, it))
             .collect();
         let views = views.map_err(failed)?;
-        let n_chunks = self.n_frames.div_ceil(CHUNK);
+        let n_chunks = self.job.n_frames.div_ceil(CHUNK);
         let tasks: Vec<(usize, u64)> = (0..n_chunks)
             .flat_map(|chunk| (0..views.len()).map(move |camera| (camera, chunk)))
             .collect();
@@ -98,14 +87,14 @@ impl<'a> Sequence<'a> {
             .par_iter()
             .map(|&(camera, chunk)| {
                 let mut view = views[camera].clone();
-                let last = (CHUNK * (chunk + 1)).min(self.n_frames);
+                let last = (CHUNK * (chunk + 1)).min(self.job.n_frames);
                 (CHUNK * chunk..last)
                     .map(|frame| {
                         if stop.is_requested() {
                             return Err(Failure::new(ExitKind::Interrupted, "stopped"));
                         }
                         let seen = self.picture(&mut view, frame)?;
-                        bar.inc(1);
+                        console.advance(1);
                         Ok(seen)
                     })
                     .collect()
@@ -118,18 +107,13 @@ impl<'a> Sequence<'a> {
             &frames,
         )?;
         files::rigs(&self.folder, &self.scene)?;
-        let deployed = files::Deployed {
-            name: &self.name,
-            arguments: self.arguments,
-            n_frames: self.n_frames,
-        };
-        files::deployment(&self.folder, &deployed, &self.scene)?;
+        files::deployment(&self.folder, &self.name, self.job, &self.scene)?;
         Ok(self.people(&frames))
     }
 
     /// Makes and writes one picture.
     fn picture(&self, view: &mut View, frame: u64) -> Result<Seen, Failure> {
-        if self.arguments.live {
+        if self.job.live {
             return Ok(view.truth(frame));
         }
         let size = view.size();
@@ -137,8 +121,8 @@ impl<'a> Sequence<'a> {
         let seen = view.picture(frame, &mut rgb);
         let name = format!("{frame:06}");
         let folder = self.folder.join("cameras").join(&seen.camera);
-        files::picture(&folder, &name, self.arguments.format, size, &rgb)?;
-        if !self.arguments.no_masks {
+        files::picture(&folder, &name, self.job.format, size, &rgb)?;
+        if self.job.with_masks {
             let folder = self.folder.join("masks").join(&seen.camera);
             files::mask(&folder.join(format!("{name}.png")), size, &view.mask())?;
         }
@@ -158,13 +142,13 @@ impl<'a> Sequence<'a> {
                 views: (0..n_cameras).map(of_camera).collect(),
             }
         };
-        (0..self.n_frames).map(frame).collect()
+        (0..self.job.n_frames).map(frame).collect()
     }
 
     /// Everybody who is in a picture; a picture that repeats the one before is no other.
     fn people(&self, frames: &[Frame]) -> People {
         let mut people = People::default();
-        if self.arguments.live {
+        if self.job.live {
             return people;
         }
         for frame in frames {
@@ -173,7 +157,7 @@ impl<'a> Sequence<'a> {
                 .iter()
                 .filter(|it| !it.repeated && it.outline.is_some())
             {
-                let file = files::name(&format!("{:06}", frame.frame), self.arguments.format);
+                let file = files::name(&format!("{:06}", frame.frame), self.job.format);
                 let image = Path::new("cameras").join(&seen.camera).join(file);
                 let unknown = [f64::NAN; 2];
                 let person = Person {
@@ -183,63 +167,16 @@ impl<'a> Sequence<'a> {
                     visible: seen.visible.to_vec(),
                 };
                 let name = format!("{}-{}-{:06}", self.name, seen.camera, frame.frame);
-                people.0.push((person, name, seen.from_behind));
+                people.add(person, name, seen.from_behind);
             }
         }
         people
     }
 }
 
-/// Annotated people: the person, the name, and whether they are seen from behind.
-#[derive(Debug, Default)]
-pub(super) struct People(Vec<(Person, String, bool)>);
-
-/// The joint on the other side, in the order of `skeleton::PARSE14`.
-const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
-
-impl People {
-    pub(super) fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Adds those of a sequence in a folder of that name.
-    pub(super) fn append(&mut self, folder: &str, others: Self) {
-        self.0
-            .extend(others.0.into_iter().map(|(mut person, name, behind)| {
-                person.image = Path::new(folder).join(&person.image);
-                (person, name, behind)
-            }));
-    }
-
-    /// Writes both files of annotations; none if there is nobody.
-    pub(super) fn write(&self, folder: &Path) -> Result<(), Failure> {
-        if self.0.is_empty() {
-            return Ok(());
-        }
-        let (mut anatomical, mut as_seen) = (String::new(), String::new());
-        for (person, name, behind) in &self.0 {
-            let line = datasets::to_line(person, Some(name)).or_fail(ExitKind::Run)?;
-            anatomical += &(line.clone() + "\n");
-            let line = if *behind {
-                let mirrored = Person {
-                    joints: MIRROR.map(|it| person.joints[it]).to_vec(),
-                    visible: MIRROR.map(|it| person.visible[it]).to_vec(),
-                    ..person.clone()
-                };
-                datasets::to_line(&mirrored, Some(name)).or_fail(ExitKind::Run)?
-            } else {
-                line
-            };
-            as_seen += &(line + "\n");
-        }
-        files::text(&folder.join("people.jsonl"), &anatomical)?;
-        files::text(&folder.join("people-as-seen.jsonl"), &as_seen)
-    }
-}
-
 fn failed(error: SceneError) -> Failure {
     match error {
-        SceneError::Rig(error) => super::chosen::no_rig(error),
+        SceneError::Rig(error) => rig_failure(error),
         SceneError::Calibration(_) => Failure::new(ExitKind::Usage, error),
         SceneError::Backdrop(_) | SceneError::NoCamera { .. } => {
             Failure::new(ExitKind::Input, error)
