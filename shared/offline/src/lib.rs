@@ -7,6 +7,7 @@
 //! * [`person`]: a model that finds people, from annotated people.
 //! * [`consistency`]: what several views of a person have in common, from sequences with truth.
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
+//! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
@@ -19,6 +20,7 @@ mod memory;
 pub mod images;
 
 pub mod consistency;
+pub mod eval;
 pub mod judged;
 pub mod person;
 pub mod quality;

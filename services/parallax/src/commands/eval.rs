@@ -1,22 +1,24 @@
 //! `parallax eval`: the paper's evaluation on sequences whose joints are known.
 
-mod job;
 mod pictures;
 mod report;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use clap::Args;
+use consistency::Learned;
 use datasets::Selection;
 use deployment::fuse::Config;
 use deployment::fuse_numbers;
 use experiment::{FilmSettings, Version};
+use fmp::Model;
+use offline::eval::{Done, Fusion, Job};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence};
-use viewquality::Forecaster;
+use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
 use crate::claim::Claim;
@@ -24,7 +26,10 @@ use crate::globals::Globals;
 use crate::inputs;
 use crate::nothing;
 use crate::shipped::Shipped;
-use job::Job;
+use crate::terminal::Terminal;
+
+/// The bar of the progress.
+const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
 
 const HELP: &str = "\
 SEQUENCE is a folder of HumanEva-I (the whole, or a subject), UMPM, `parallax synth`, or a description \
@@ -170,14 +175,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;
     let learned = inputs::learned(config.consistency.as_deref(), &model)?;
-    let sigma = match &arguments.sigma {
-        Some(file) => Some(inputs::quality_table(file, model.n_parts())?),
-        None => None,
-    };
-    let network = match &arguments.network {
-        Some(file) => Some(inputs::network(file, model.n_parts())?),
-        None => None,
-    };
+    let (sigma, network) = expected(arguments, model.n_parts())?;
     let _mine = Claim::of(&arguments.out, "eval")?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
@@ -185,6 +183,14 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .or_fail(ExitKind::Run)?;
+    let fusion = |sequence: &Sequence, scale: f32| {
+        fusion(
+            (&config, learned.as_ref(), &model),
+            arguments.candidates,
+            sequence,
+            scale,
+        )
+    };
     let job = Job {
         versions: versions(arguments, &config)?,
         settings: settings_text(arguments, &config)?,
@@ -196,21 +202,22 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         n_candidates: arguments.candidates,
         oracle: arguments.oracle,
         resume: arguments.resume,
-        quiet: globals.quiet,
-        learned,
+        fusion: &fusion,
+        facing: config.facing,
+        learned: learned.as_ref(),
         tau_px: match &config.tau {
             deployment::fuse::Tau::File(it) => inputs::tau(&it.file, model.n_parts())?,
             it => fuse::tau_px(it),
         },
-        model,
-        config,
+        model: Arc::clone(&model),
         sigma,
         forecaster: network.map(|it| Mutex::new(Forecaster::new(it))),
         poses,
         stop,
     };
-    let done = pool.install(|| job.run(&sequences))?;
-    report::write(arguments, &job, &done)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
+    let done = pool.install(|| job.run(&sequences, &terminal))?;
+    report::write(arguments, &config, &job, &done)?;
     if job.stop.is_requested() {
         let failure = Failure::new(ExitKind::Interrupted, "interrupted");
         return Err(failure.with_hint("--resume goes on where it was"));
@@ -218,8 +225,43 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     outcome(&done)
 }
 
+/// The table of expected errors, and the network that predicts them.
+fn expected(
+    arguments: &Arguments,
+    n_parts: usize,
+) -> Result<(Option<Table>, Option<Network>), Failure> {
+    let sigma = match &arguments.sigma {
+        Some(file) => Some(inputs::quality_table(file, n_parts)?),
+        None => None,
+    };
+    let network = match &arguments.network {
+        Some(file) => Some(inputs::network(file, n_parts)?),
+        None => None,
+    };
+    Ok((sigma, network))
+}
+
+/// How the views of a sequence are solved together.
+///
+/// * `scale`: pixels of the frame per pixel of the footage.
+fn fusion(
+    (config, learned, model): (&Config, Option<&Learned>, &Model),
+    n_candidates: usize,
+    sequence: &Sequence,
+    scale: f32,
+) -> Result<Fusion, Failure> {
+    let mut config = config.clone();
+    if let deployment::fuse::Tau::File(tau) = &config.tau {
+        config.tau = deployment::fuse::Tau::Given(inputs::tau(&tau.file, model.n_parts())?);
+    }
+    let settings = fuse::settings(&config, n_candidates, scale, learned);
+    let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
+    let tables = inputs::pair_tables(&config, learned, model, &cameras)?;
+    Ok((settings, tables))
+}
+
 /// Whether all that was asked for was judged.
-fn outcome(done: &job::Done) -> Result<ExitCode, Failure> {
+fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
             let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
@@ -237,7 +279,10 @@ fn outcome(done: &job::Done) -> Result<ExitCode, Failure> {
 
 /// Whether single pictures are to be judged; refuses them besides sequences.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
-    let n = arguments.sequences.iter().filter(|it| pictures::is_one(it));
+    let n = arguments
+        .sequences
+        .iter()
+        .filter(|it| offline::eval::pictures::is_one(it));
     let n = n.count();
     let selects = arguments.only.is_some() || arguments.without.is_some();
     let refuse = |message: &str| Err(Failure::new(ExitKind::Usage, message));

@@ -4,62 +4,78 @@ use std::fs::{File, OpenOptions};
 use std::io::{Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
 use consistency::Learned;
-use deployment::fuse::Config;
 use experiment::{
     Bench, Expectation, Film, FilmSettings, Header, Predicted, Record, Setup, SingleView, Trial,
     Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use fmp::Model;
-use indicatif::{ProgressBar, ProgressStyle};
-use offline::film_failure;
-use pipeline::{SkeletonSettings, ViewSettings};
+use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
 use skeleton::PARSE14;
 use viewquality::{ForecastInput, Forecaster, Table};
 
-use crate::{inputs, output};
+use super::progress::Progress;
+use crate::console::Console;
+use crate::failures::{film_failure, in_file, text};
 
-/// How long a line of progress lasts where it cannot be redrawn.
-const EVERY: Duration = Duration::from_secs(10);
+/// How the views of a sequence are solved together, and the part-type tables of its cameras.
+pub type Fusion = (multiview::Settings, PairTables);
 
 /// What is done with every sequence.
-pub(super) struct Job {
-    pub(super) model: Arc<Model>,
-    pub(super) config: Config,
-    pub(super) learned: Option<Learned>,
-    pub(super) versions: Vec<Version>,
-    pub(super) settings: String,
-    pub(super) film: FilmSettings,
-    pub(super) n_candidates: usize,
-    pub(super) sigma: Option<Table>,
+pub struct Job<'a> {
+    /// The single-view model.
+    pub model: Arc<Model>,
+    /// Gives the fusion of a sequence, by the mean of its pixels of the frame per pixel of the footage.
+    pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
+    /// Whether it is decided for every view which way a person faces.
+    pub facing: bool,
+    /// What was learned about several views.
+    pub learned: Option<&'a Learned>,
+    /// What is compared.
+    pub versions: Vec<Version>,
+    /// All settings that what is found depends on: a run goes on only with the same.
+    pub settings: String,
+    /// How the frames are made.
+    pub film: FilmSettings,
+    /// Most candidates of a view.
+    pub n_candidates: usize,
+    /// Expected errors, pixels of the footage.
+    pub sigma: Option<Table>,
     /// Thresholds of the settings, pixels of the footage; empty without any.
-    pub(super) tau_px: Vec<f32>,
-    pub(super) forecaster: Option<Mutex<Forecaster>>,
-    pub(super) oracle: bool,
-    pub(super) resume: bool,
-    pub(super) quiet: bool,
-    pub(super) poses: PathBuf,
-    pub(super) stop: Stop,
+    pub tau_px: Vec<f32>,
+    /// Predicts the errors.
+    pub forecaster: Option<Mutex<Forecaster>>,
+    /// Whether the true errors are expected.
+    pub oracle: bool,
+    /// Whether to go on with what is in `poses`.
+    pub resume: bool,
+    /// The folder for what is found in every frame.
+    pub poses: PathBuf,
+    /// Ends the run after a frame.
+    pub stop: Stop,
 }
 
 /// What was found.
 #[derive(Debug, Default)]
-pub(super) struct Done {
+pub struct Done {
     /// The sequences that were begun, and their frames.
-    pub(super) sequences: Vec<(Sequence, Vec<Record>)>,
+    pub sequences: Vec<(Sequence, Vec<Record>)>,
     /// Frames whose footage was not there.
-    pub(super) n_missing: usize,
+    pub n_missing: usize,
 }
 
-impl Job {
-    /// Solves all sequences, until it is told to stop.
-    pub(super) fn run(&self, sequences: &[Sequence]) -> Result<Done, Failure> {
+impl Job<'_> {
+    /// Solves all sequences, until it is told to stop, on rayon's current pool.
+    ///
+    /// # Errors
+    ///
+    /// Footage or cameras that cannot be used; a file of what is found that cannot be written, or is of another run.
+    pub fn run(&self, sequences: &[Sequence], console: &dyn Console) -> Result<Done, Failure> {
         let n_frames = sequences.iter().map(|it| it.frames.len()).sum();
-        let mut progress = Progress::new(self.quiet, n_frames);
+        let mut progress = Progress::new(console, n_frames);
         let mut done = Done::default();
         for sequence in sequences {
             if self.stop.is_requested() {
@@ -76,7 +92,7 @@ impl Job {
     fn sequence(
         &self,
         sequence: &Sequence,
-        progress: &mut Progress,
+        progress: &mut Progress<'_>,
     ) -> Result<(Vec<Record>, usize), Failure> {
         let (mut kept, mut records) = self.keep(sequence)?;
         let is_done = |frame: &Frame| records.iter().any(|it: &Record| it.frame == frame.number);
@@ -105,7 +121,7 @@ impl Job {
                 let view = look.view;
                 let joints = truth.as_ref().and_then(|it| it[view].as_ref());
                 if self.oracle {
-                    let sigma = part_errors(look.centres, joints?, self.config.facing)?;
+                    let sigma = part_errors(look.centres, joints?, self.facing)?;
                     return Some(Expectation { sigma, tau: None });
                 }
                 if let Some(forecaster) = &self.forecaster {
@@ -189,7 +205,7 @@ impl Job {
             forecast.tau_px
         };
         let judged = joints.zip(tenth).and_then(|(joints, tenth)| {
-            let errors = part_errors(look.centres, joints, self.config.facing)?;
+            let errors = part_errors(look.centres, joints, self.facing)?;
             Some(Predicted {
                 sigma_px: forecast.sigma_px.clone(),
                 tau_px: tau_px.clone(),
@@ -212,7 +228,7 @@ impl Job {
             .join(name.chars().map(safe).collect::<String>() + ".jsonl");
         let versions = self.versions.iter().map(ToString::to_string).collect();
         let header = Header::new(&sequence.name, &self.settings, versions);
-        let wrong = |error: std::io::Error| inputs::in_file(&file, &error);
+        let wrong = |error: std::io::Error| in_file(&file, &error);
         let (mut records, mut n_bytes) = (Vec::new(), 0);
         if file.exists() {
             if !self.resume {
@@ -220,8 +236,8 @@ impl Job {
                 let failure = Failure::new(ExitKind::Usage, message);
                 return Err(failure.with_hint("--resume goes on with it; or choose another --out"));
             }
-            (records, n_bytes) = read_records(&inputs::text(&file)?, &header).map_err(|error| {
-                let failure = inputs::in_file(&file, &error);
+            (records, n_bytes) = read_records(&text(&file)?, &header).map_err(|error| {
+                let failure = in_file(&file, &error);
                 failure.with_hint("remove it, or choose another --out")
             })?;
         }
@@ -240,13 +256,8 @@ impl Job {
     fn bench(&self, sequence: &Sequence, film: &Film) -> Result<Bench, Failure> {
         let maps = film.footage_from_frame();
         let mean = maps.iter().map(scale).sum::<f32>() / maps.len().max(1) as f32;
-        let mut config = self.config.clone();
-        if let deployment::fuse::Tau::File(tau) = &config.tau {
-            config.tau =
-                deployment::fuse::Tau::Given(inputs::tau(&tau.file, self.model.n_parts())?);
-        }
-        let learned = self.learned.as_ref();
-        let mut fuse = fuse::settings(&config, self.n_candidates, mean, learned);
+        let learned = self.learned;
+        let (mut fuse, tables) = (self.fusion)(sequence, mean)?;
         if self.oracle {
             // The true errors are in tenths of the person's size.
             let tau = learned.filter(|_| !fuse.tau_tenths.is_empty());
@@ -256,8 +267,6 @@ impl Job {
             };
             fuse.rescue_px = Vec::new();
         }
-        let cameras: Vec<&str> = sequence.views.iter().map(|it| it.camera.as_str()).collect();
-        let tables = inputs::pair_tables(&config, learned, &self.model, &cameras)?;
         let trial = |version: &Version| Trial::of(*version, &fuse, &tables);
         let setup = Setup {
             model: Arc::clone(&self.model),
@@ -302,65 +311,4 @@ impl Job {
 fn scale(footage_from_frame: &[[f64; 3]; 2]) -> f32 {
     let [[a, b, _], [c, d, _]] = footage_from_frame;
     (1.0 / (a * d - b * c).abs().sqrt()) as f32
-}
-
-/// Frames done, and the time that is left: a bar on a terminal, else a line now and then.
-struct Progress {
-    bar: ProgressBar,
-    is_lively: bool,
-    quiet: bool,
-    begin: Instant,
-    said: Instant,
-    n_frames: usize,
-    n_solved: usize,
-    n_passed: usize,
-}
-
-impl Progress {
-    fn new(quiet: bool, n_frames: usize) -> Self {
-        let is_lively = output::is_lively() && !quiet;
-        let bar = if is_lively {
-            ProgressBar::new(n_frames as u64)
-        } else {
-            ProgressBar::hidden()
-        };
-        let style = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
-        if let Ok(style) = ProgressStyle::with_template(style) {
-            bar.set_style(style);
-        }
-        Self {
-            bar,
-            is_lively,
-            quiet,
-            begin: Instant::now(),
-            said: Instant::now(),
-            n_frames,
-            n_solved: 0,
-            n_passed: 0,
-        }
-    }
-
-    fn passed_over(&mut self, n: usize) {
-        self.n_passed += n;
-        self.bar.inc(n as u64);
-    }
-
-    fn solved(&mut self, sequence: &str) {
-        self.n_solved += 1;
-        let each = self.begin.elapsed().as_secs_f64() / self.n_solved as f64;
-        let left = self.n_frames - self.n_solved - self.n_passed;
-        let minutes = each * left as f64 / 60.0;
-        let text = format!("{sequence}: {each:.2} s a frame, {minutes:.1} minutes left");
-        self.bar.set_message(text.clone());
-        self.bar.inc(1);
-        if !self.is_lively && !self.quiet && self.said.elapsed() >= EVERY {
-            self.said = Instant::now();
-            let n = self.n_solved + self.n_passed;
-            output::message(format_args!("{n}/{} frames, {text}", self.n_frames));
-        }
-    }
-
-    fn end(&self) {
-        self.bar.finish_and_clear();
-    }
 }
