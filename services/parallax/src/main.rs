@@ -41,7 +41,6 @@ mod recorded;
 mod resolved;
 mod sanity;
 mod scheduling;
-mod sheet;
 mod shipped;
 mod spread;
 mod stage;

@@ -9,6 +9,8 @@
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`judged`]: a model tried on people whose joints are known.
+//! * [`examples`]: what a model takes for each type of its parts.
+//! * [`pictures`]: pictures and videos that are searched; [`sheet`]: thumbnails with what was found.
 //! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
 
@@ -21,12 +23,14 @@ pub mod images;
 
 pub mod consistency;
 pub mod eval;
+pub mod examples;
 pub mod judged;
 pub mod person;
+pub mod pictures;
 pub mod quality;
+pub mod sheet;
 pub mod synth;
 
 pub use console::Console;
 pub use failures::{dataset_failure, film_failure, sequence_failure};
 pub use interrupt::unless_stopped;
-pub use memory::{TooLarge, check_memory};

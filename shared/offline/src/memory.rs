@@ -10,7 +10,7 @@ const SHARE_OF_RESPONSES: f64 = 1.6;
 #[error(
     "searching all of {width}x{height} takes about {needed_gb:.1} GB of memory, and {free_gb:.1} GB are free"
 )]
-pub struct TooLarge {
+pub(crate) struct TooLarge {
     width: usize,
     height: usize,
     needed_gb: f64,
@@ -32,7 +32,7 @@ fn available_bytes() -> Option<u64> {
 /// # Errors
 ///
 /// More memory is needed than is free.
-pub fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
+pub(crate) fn check_memory(layout: &Layout) -> Result<(), TooLarge> {
     let needed = SHARE_OF_RESPONSES * (layout.n_responses() * size_of::<f32>()) as f64;
     let [width, height] = layout.image_size;
     match available_bytes() {

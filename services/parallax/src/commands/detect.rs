@@ -1,7 +1,5 @@
 //! `parallax detect`: people in single images.
 
-mod pictures;
-
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -9,13 +7,13 @@ use clap::Args;
 use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
+use offline::pictures::{self, Frames, Picture, Pictures, Searched};
+use offline::sheet::{Sheet, Skeleton, limbs};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::JointSet;
 
-use self::pictures::{Picture, Pictures, Searched};
 use crate::describe::{self, Placed};
-use crate::sheet::{Sheet, Skeleton, limbs};
 use crate::{inputs, output};
 
 /// Longest side that is searched unless somebody asks for more, pixels.
@@ -98,6 +96,16 @@ pub(crate) struct Arguments {
     precision: Precision,
 }
 
+impl Arguments {
+    /// Which frames of a video are searched.
+    fn wanted(&self) -> Frames {
+        Frames {
+            every: self.every,
+            most: self.frames,
+        }
+    }
+}
+
 /// A side that can be searched.
 fn side(text: &str) -> Result<usize, String> {
     let side = text.parse().ok().filter(|it| (40..=65535).contains(it));
@@ -137,7 +145,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let files = offline::images::listed(&arguments.images)?;
     let mut sheet = arguments.sheet.as_ref().map(|it| {
-        let n_pictures = files.iter().map(|it| pictures::count(it, arguments));
+        let n_pictures = files
+            .iter()
+            .map(|it| pictures::count(it, arguments.wanted()));
         Sheet::new(it.clone(), n_pictures.sum())
     });
     let (mut n_searched, mut n_failed) = (0_u64, 0_usize);
@@ -186,12 +196,12 @@ impl Detector<'_> {
         mut sheet: Option<&mut Sheet>,
         n_searched: &mut u64,
     ) -> Result<Result<(), Failure>, Failure> {
-        let mut pictures = match Pictures::open(path, self.arguments) {
+        let mut pictures = match Pictures::open(path, self.arguments.wanted()) {
             Ok(pictures) => pictures,
             Err(failure) => return Ok(Err(failure)),
         };
         loop {
-            let picture = match pictures.next() {
+            let picture = match pictures.next_picture() {
                 Ok(Some(picture)) => picture,
                 Ok(None) => return Ok(Ok(())),
                 Err(failure) => return Ok(Err(failure)),
@@ -202,7 +212,7 @@ impl Detector<'_> {
                 Ok(searched) => searched,
                 Err(failure) => return Ok(Err(failure)),
             };
-            let found = self.detect(searched.image(&picture)?, &searched.layout);
+            let found = self.detect(searched.image(&picture)?, searched.layout());
             *n_searched += 1;
             self.report(&picture, &searched, &found)?;
             self.draw(&picture, &searched, &found)?;
@@ -219,9 +229,9 @@ impl Detector<'_> {
         searched: &Searched,
         found: &[Pose],
     ) -> Result<(), Failure> {
-        let (layout, model) = (&searched.layout, &self.search.model);
+        let (layout, model) = (searched.layout(), &self.search.model);
         if self.arguments.json {
-            let placed = |it| Placed::new(it, model, layout).enlarged(searched.per_pixel);
+            let placed = |it| Placed::new(it, model, layout).enlarged(searched.per_pixel());
             let detections = found.iter().map(placed);
             let detections: Vec<_> = detections
                 .map(|it| it.json(Some(self.arguments.joints)))
@@ -277,7 +287,7 @@ impl Detector<'_> {
     }
 
     fn skeleton(&self, searched: &Searched, pose: &Pose) -> Skeleton {
-        let centres = pose.centres(&self.search.model, &searched.layout);
+        let centres = pose.centres(&self.search.model, searched.layout());
         Skeleton {
             points: centres
                 .into_iter()

@@ -1,7 +1,5 @@
 //! `parallax model`: what a model is made of, how good it is, and other formats as our own.
 
-mod examples;
-
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -70,7 +68,10 @@ fn draw(file: &Path, html: &Path, images: &[PathBuf]) -> Result<ExitCode, Failur
     let model = inputs::model(file)?;
     let examples = match images {
         [] => None,
-        images => Some(examples::gather(&model, &offline::images::listed(images)?)?),
+        images => {
+            let listed = offline::images::listed(images)?;
+            Some(offline::examples::gather(&model, &listed)?)
+        }
     };
     let page = report::model::html(&model, examples.as_ref());
     std::fs::write(html, page).map_err(|error| inputs::in_file(html, &error))?;

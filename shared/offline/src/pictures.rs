@@ -7,31 +7,44 @@ use footage::{Fill, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
 
-use super::Arguments;
-use crate::inputs;
+use crate::failures::in_file;
+use crate::images::has_image_name;
+use crate::memory::check_memory;
+
+/// Which frames of a video are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frames {
+    /// The first and every so many-th frame after it.
+    pub every: u64,
+    /// At most so many; all if not given.
+    pub most: Option<u64>,
+}
 
 /// A picture as people see it.
 #[derive(Debug)]
-pub(super) struct Picture {
-    /// The file, and the frame of it if it is a video.
-    pub(super) path: PathBuf,
-    pub(super) frame: Option<u64>,
+pub struct Picture {
+    /// The file.
+    pub path: PathBuf,
+    /// The frame of it, if it is a video.
+    pub frame: Option<u64>,
     /// How it was turned.
-    pub(super) turn: Turn,
-    pub(super) size: Size,
-    pub(super) rgb: Vec<u8>,
+    pub turn: Turn,
+    /// Its size, pixels.
+    pub size: Size,
+    /// Its pixels, row by row.
+    pub rgb: Vec<u8>,
 }
 
 impl Picture {
     /// For people: the name of the file, and the frame.
-    pub(super) fn title(&self) -> String {
+    pub fn title(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         let frame = self.frame.map(|it| format!(" {it}"));
         format!("{name}{}", frame.unwrap_or_default())
     }
 
-    /// For files.
-    pub(super) fn stem(&self) -> String {
+    /// For the names of files: that of the file without its ending, and the frame.
+    pub fn stem(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let frame = self.frame.map(|it| format!("-{it:06}"));
         format!("{stem}{}", frame.unwrap_or_default())
@@ -40,7 +53,7 @@ impl Picture {
 
 /// The pictures of a file, one after the other.
 #[derive(Debug)]
-pub(super) enum Pictures {
+pub enum Pictures {
     /// An image; none once it was handed out.
     Image(Option<PathBuf>),
     /// A video.
@@ -49,16 +62,24 @@ pub(super) enum Pictures {
 
 impl Pictures {
     /// Opens a file.
-    pub(super) fn open(path: &Path, arguments: &Arguments) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// It cannot be read, or is neither an image nor a video.
+    pub fn open(path: &Path, frames: Frames) -> Result<Self, Failure> {
         if path.is_file() && footage::is_image(path).or_fail(ExitKind::Input)? {
             return Ok(Self::Image(Some(path.to_path_buf())));
         }
-        let source = Source::open(&spec(path, arguments)).or_fail(ExitKind::Input)?;
+        let source = Source::open(&spec(path, frames)).or_fail(ExitKind::Input)?;
         Ok(Self::Video(path.to_path_buf(), Box::new(source)))
     }
 
     /// The next one; none at the end.
-    pub(super) fn next(&mut self) -> Result<Option<Picture>, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// It cannot be decoded.
+    pub fn next_picture(&mut self) -> Result<Option<Picture>, Failure> {
         match self {
             Self::Image(path) => path.take().map(image).transpose(),
             Self::Video(path, source) => {
@@ -87,45 +108,51 @@ fn image(path: PathBuf) -> Result<Picture, Failure> {
     })
 }
 
-fn spec(path: &Path, arguments: &Arguments) -> SourceSpec {
+fn spec(path: &Path, frames: Frames) -> SourceSpec {
     SourceSpec {
-        step: arguments.every,
-        count: arguments.frames,
+        step: frames.every,
+        count: frames.most,
         ..SourceSpec::new(path.to_string_lossy())
     }
 }
 
 /// How many pictures a file promises; one if it does not say.
-pub(super) fn count(path: &Path, arguments: &Arguments) -> usize {
-    if offline::images::has_image_name(path) {
+pub fn count(path: &Path, frames: Frames) -> usize {
+    if has_image_name(path) {
         return 1;
     }
-    let source = Source::open(&spec(path, arguments));
+    let source = Source::open(&spec(path, frames));
     source.map_or(1, |it| it.info().n_frames as usize)
 }
 
 /// What is searched of a picture.
 #[derive(Debug)]
-pub(super) struct Searched {
+pub struct Searched {
     /// The pyramid of it.
-    pub(super) layout: Layout,
+    layout: Layout,
     /// Pixels of the picture per pixel of it.
-    pub(super) per_pixel: [f64; 2],
+    per_pixel: [f64; 2],
     /// Its pixels; none where they are the picture's own.
     smaller: Option<Vec<u8>>,
 }
 
 impl Searched {
+    /// Prepares a picture for the search.
+    ///
     /// * `longest`: longest side that is searched, pixels; none: all pixels.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    ///
+    /// The picture is too small for the model, or there is no memory for the search.
+    pub fn new(
         picture: &Picture,
         longest: Option<usize>,
         search: &Search,
     ) -> Result<Self, Failure> {
         let size = bounded(picture.size, longest);
         let layout = Layout::new(&search.model, size.width, size.height);
-        let layout = layout.map_err(|error| inputs::in_file(&picture.path, &error))?;
-        offline::check_memory(&layout).map_err(|needed| {
+        let layout = layout.map_err(|error| in_file(&picture.path, &error))?;
+        check_memory(&layout).map_err(|needed| {
             let message = format!("{}: {needed}", picture.path.display());
             let hint = "leave --full out, or ask for a smaller --size";
             Failure::new(ExitKind::Input, message).with_hint(hint)
@@ -151,16 +178,30 @@ impl Searched {
         })
     }
 
-    /// The pixels.
-    pub(super) fn image<'a>(&'a self, picture: &'a Picture) -> Result<Rgb8View<'a>, Failure> {
+    /// The pyramid of what is searched.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Pixels of the picture per pixel that is searched, `[x, y]`.
+    pub fn per_pixel(&self) -> [f64; 2] {
+        self.per_pixel
+    }
+
+    /// The pixels that are searched.
+    ///
+    /// # Errors
+    ///
+    /// Size and pixels of the picture disagree.
+    pub fn image<'a>(&'a self, picture: &'a Picture) -> Result<Rgb8View<'a>, Failure> {
         let [width, height] = self.layout.image_size;
         let rgb = self.smaller.as_deref().unwrap_or(&picture.rgb);
         let image = Rgb8View::new(width, height, rgb);
-        image.map_err(|error| inputs::in_file(&picture.path, &error))
+        image.map_err(|error| in_file(&picture.path, &error))
     }
 
     /// Where a point of it is in the picture.
-    pub(super) fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
+    pub fn in_picture(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (point[axis] + 0.5) * self.per_pixel[axis] - 0.5)
     }
 }

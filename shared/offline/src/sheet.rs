@@ -15,17 +15,17 @@ const SIDE_PX: usize = 220;
 
 /// What is drawn on a thumbnail.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Skeleton {
+pub struct Skeleton {
     /// Pixels of the image.
-    pub(crate) points: Vec<[f64; 2]>,
+    pub points: Vec<[f64; 2]>,
     /// The lines.
-    pub(crate) limbs: Vec<Limb>,
+    pub limbs: Vec<Limb>,
     /// For the caption.
-    pub(crate) score: f32,
+    pub score: f32,
 }
 
 /// A line from every part to its parent, in the colour of its side.
-pub(crate) fn limbs(model: &Model) -> Vec<Limb> {
+pub fn limbs(model: &Model) -> Vec<Limb> {
     let limb = |(to, part): (usize, &fmp::PartSpec)| {
         let side = match &part.name {
             name if name.starts_with("left") => Side::Left,
@@ -43,7 +43,8 @@ pub(crate) fn limbs(model: &Model) -> Vec<Limb> {
 }
 
 /// Thumbnails that wait for their page to be full.
-pub(crate) struct Sheet {
+#[derive(Debug)]
+pub struct Sheet {
     path: PathBuf,
     n_pages: usize,
     page: usize,
@@ -51,8 +52,11 @@ pub(crate) struct Sheet {
 }
 
 impl Sheet {
+    /// Begins the first page.
+    ///
+    /// * `path`: the PNG file; several pages are numbered before the ending.
     /// * `n_images`: how many will be added.
-    pub(crate) fn new(path: PathBuf, n_images: usize) -> Self {
+    pub fn new(path: PathBuf, n_images: usize) -> Self {
         Self {
             path,
             n_pages: n_images.div_ceil(N_TILES),
@@ -62,7 +66,14 @@ impl Sheet {
     }
 
     /// Adds an image; writes the page if it is the last of it.
-    pub(crate) fn add(
+    ///
+    /// * `name`: for the caption.
+    /// * `rgb`: pixels of an image of `size`, row by row.
+    ///
+    /// # Errors
+    ///
+    /// The page cannot be written.
+    pub fn add(
         &mut self,
         name: &str,
         size: Size,
@@ -92,7 +103,11 @@ impl Sheet {
     }
 
     /// Writes what is left.
-    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    ///
+    /// The page cannot be written.
+    pub fn finish(mut self) -> Result<(), Failure> {
         if self.waiting.is_empty() {
             return Ok(());
         }

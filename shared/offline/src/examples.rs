@@ -25,9 +25,13 @@ struct Seen {
     png: Vec<u8>,
 }
 
-/// Cuts out what the best detections of the images are made of: of every type those on the people the
-/// model is most certain of.
-pub(super) fn gather(model: &Arc<Model>, images: &[PathBuf]) -> Result<Examples, Failure> {
+/// Cuts out what the best detections of the images are made of, on rayon's current pool: of every type those on the
+/// people the model is most certain of.
+///
+/// # Errors
+///
+/// An image cannot be read.
+pub fn gather(model: &Arc<Model>, images: &[PathBuf]) -> Result<Examples, Failure> {
     let search = Search::new(Arc::clone(model));
     let seen: Result<Vec<_>, Failure> = images.par_iter().map(|it| of_image(&search, it)).collect();
     let mut seen: Vec<Seen> = seen?.into_iter().flatten().collect();
