@@ -45,6 +45,7 @@ const LAYERS: &[&[&str]] = &[
         "supervise",
         "results",
     ],
+    &["launch"],
     &["parallax"],
 ];
 

@@ -6,6 +6,7 @@
 //!
 //! | layer | crates |
 //! |---|---|
+//! | whole runs | [`launch`](../launch/index.html): a deployment made ready and run, and what became of it |
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
@@ -22,37 +23,20 @@
 //! energy, [`messages`](../messages/index.html) for what travels between processes.
 #![forbid(unsafe_code)]
 
-mod budget;
-mod claim;
 mod cli;
 mod commands;
 mod describe;
 mod exit;
 mod globals;
-mod inputs;
-mod live;
-mod load;
-mod nothing;
-mod output;
-mod padding;
-mod plan;
-mod prepare;
-mod recorded;
-mod resolved;
-mod sanity;
-mod scheduling;
-mod shipped;
 mod spread;
 mod stage;
-mod summary;
 mod terminal;
 mod trial;
-mod vertical;
-mod views;
 
 use std::process::ExitCode;
 
 use clap::Parser as _;
+use launch::{inputs, output, search};
 
 fn main() -> ExitCode {
     if let Err(error) = runtime::guard_process() {

@@ -6,12 +6,11 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand, ValueEnum};
 use geometry::files::{Format, ReadOptions, Unit};
 use geometry::{Camera, Rig, upright_roll};
+use launch::{inputs, output};
 use nalgebra::{Point2, UnitVector3, Vector3};
 use runfiles::ViewLine;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
-
-use crate::{inputs, output};
 
 /// What to do with a calibration.
 #[derive(Debug, Subcommand)]

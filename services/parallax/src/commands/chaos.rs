@@ -18,14 +18,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 use fastrand::Rng;
+use launch::{Planned, inputs, output};
 use runtime::{Delivery, ExitKind, Failure, now_nanos};
 use serde_json::{Value, json};
 
-use super::run::Planned;
 use crate::globals::Globals;
 use crate::trial::cost::{Cost, Trace};
 use crate::trial::strike::{Blow, Strike};
-use crate::{inputs, output};
 use ground::Ground;
 use judge::{Asked, Orphaned};
 use scenario::{Scenario, service_of};

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use deployment::Entry;
+use launch::{load, output, plan};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
-
-use crate::{load, output, plan};
 
 /// What to do with a deployment file.
 #[derive(Debug, Subcommand)]

@@ -10,17 +10,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use launch::{Planned, inputs, load, output};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 
-use super::run::Planned;
 use crate::globals::Globals;
-use crate::load;
 use crate::trial::Point;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 use crate::trial::strike::{Blow, Strike, Times};
-use crate::{inputs, output};
 use limits::Asked;
 use machine::{FULL_RATE_HZ, Gauge, Machine};
 use report::Report;
@@ -162,7 +160,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         Strike::new(Blow::Kill, &format!("capture-{VICTIM}"), at_frame).of_camera(camera)
     });
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let ran = planned.carry_out(globals, &stop, &mut |event| {
+    let ran = planned.carry_out(globals.quiet, &stop, &mut |event| {
         strike
             .as_mut()
             .and_then(|it| it.note(event, now_nanos(), Blow::deal))
@@ -295,7 +293,7 @@ struct Run<'a> {
     /// Names of all processes but the supervisor.
     processes: &'a [String],
     /// What `run` says of it.
-    ran: &'a crate::summary::Report,
+    ran: &'a launch::Report,
     /// The results, and where the joints were.
     moments: &'a [Moment],
     truth: &'a [Vec<Point>],

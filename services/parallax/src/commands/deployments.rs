@@ -3,12 +3,14 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use launch::{
+    live::{self, Live},
+    output,
+};
 use runtime::{ExitKind, Failure, Namespace, Remains, deployments};
 use serde_json::{Value, json};
 
 use crate::commands::top;
-use crate::live::{self, Live};
-use crate::output;
 
 /// What is said of a directory among those of deployments that is none.
 const UNMARKED: &str = "not a deployment: left alone";

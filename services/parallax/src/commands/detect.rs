@@ -7,6 +7,7 @@ use clap::Args;
 use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
+use launch::{inputs, output};
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -14,7 +15,6 @@ use serde_json::json;
 use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
-use crate::{inputs, output};
 
 /// Longest side that is searched unless somebody asks for more, pixels.
 const SIZE: usize = 1280;

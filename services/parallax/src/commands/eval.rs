@@ -15,17 +15,14 @@ use deployment::fuse::Config;
 use deployment::fuse_numbers;
 use experiment::{FilmSettings, Version};
 use fmp::Model;
+use launch::{Claim, Shipped, inputs, nothing};
 use offline::eval::{Done, Fusion, Job};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence};
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
-use crate::claim::Claim;
 use crate::globals::Globals;
-use crate::inputs;
-use crate::nothing;
-use crate::shipped::Shipped;
 use crate::terminal::Terminal;
 
 /// The bar of the progress.

@@ -11,14 +11,13 @@ use footage::{Fill, Size, Source, SourceSpec, Warp};
 use geometry::files::ReadOptions;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
+use launch::{frame_scale, inputs, output};
 use pipeline::{Estimate, Estimator, EstimatorSettings, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
-use crate::prepare::frame_scale;
-use crate::{inputs, output};
 
 /// Which energy ties two views together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -166,7 +165,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         report.print()?;
     }
     let is_found = estimate.skeleton.joints.iter().any(Result::is_ok);
-    crate::nothing::unless(is_found, "no joint has a place in space")
+    launch::nothing::unless(is_found, "no joint has a place in space")
 }
 
 /// The cameras that were given an image, in the rig's order, with their images framed.

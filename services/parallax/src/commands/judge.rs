@@ -7,12 +7,12 @@ use clap::Args;
 use datasets::{ReadOptions, Selection, Sides, SkeletonTable};
 use experiment::Judged;
 use fmp::Search;
+use launch::{inputs, output};
 use offline::judged;
 use runtime::Failure;
 use serde_json::json;
 use skeleton::PARSE14;
 
-use crate::{inputs, output};
 
 /// Which model, and on whom.
 #[derive(Debug, Args)]

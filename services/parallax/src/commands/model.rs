@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 use fmp::{Model, Springs};
+use launch::{inputs, output};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
 use super::judge;
-use crate::{inputs, output};
 
 /// What to do with a model.
 #[derive(Debug, Subcommand)]

@@ -8,14 +8,10 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use deployment::RecordingPlan;
+use launch::{Planned, Resolved, load, output, plan, recorded};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::commands::run::Planned;
 use crate::globals::Globals;
-use crate::load;
-use crate::plan;
-use crate::resolved::Resolved;
-use crate::{output, recorded};
 use room::{Forecast, Growth, PerFrame};
 
 /// Lives of the recording process that are looked for.
@@ -99,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let mut growth = Growth::new(&file, &forecast);
-    let report = planned.carry_out(globals, &stop, &mut |_| growth.note())?;
+    let report = planned.carry_out(globals.quiet, &stop, &mut |_| growth.note())?;
     let recording = recorded::open(&file)?;
     let later = (1..MOST_LIVES).map(|it| record::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
@@ -161,7 +157,7 @@ fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("wait until it ends, or take another name"));
         }
-        std::fs::remove_file(&file).map_err(|error| crate::inputs::in_file(&file, &error))?;
+        std::fs::remove_file(&file).map_err(|error| launch::inputs::in_file(&file, &error))?;
     }
     Ok(())
 }

@@ -5,18 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use deployment::{Replay, Stage};
+use launch::{
+    Planned, Resolved, Shipped, inputs, load, output, plan,
+    recorded::{self, Settings},
+};
 use recording::{Kind, Recording};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-use crate::commands::run::Planned;
 use crate::globals::Globals;
-use crate::load;
-use crate::plan;
-use crate::recorded::{self, Settings};
-use crate::resolved::Resolved;
-use crate::shipped::Shipped;
 use crate::stage;
-use crate::{inputs, output};
 
 /// What to replay.
 #[derive(Debug, Args)]
@@ -112,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let planned = Planned::of(resolved, globals.level())?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
+    let report = planned.carry_out(globals.quiet, &stop, &mut |_| None)?;
     if arguments.json {
         let mut value = report.json();
         value["recording"] = recorded::json(&file, &recording);

@@ -2,25 +2,13 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Args;
-use deployment::Deployment;
-use runtime::{
-    ExitKind, Failure, OrFail as _, Scheduling, Stop, free_shared_memory, needed_bytes, preflight,
-};
-use supervise::{Event, Plan};
-use tracing::Level;
+use launch::{Planned, load, output};
+use runtime::{ExitKind, Failure, OrFail as _, Stop, free_shared_memory, needed_bytes, preflight};
+use supervise::Plan;
 
-use crate::claim::Claim;
 use crate::globals::Globals;
-use crate::inputs;
-use crate::load;
-use crate::plan;
-use crate::prepare::Prepared;
-use crate::resolved::Resolved;
-use crate::summary::{Report, Watcher};
-use crate::{output, scheduling};
 
 /// What to run.
 #[derive(Debug, Args)]
@@ -74,10 +62,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let planned = Planned::new(&loaded.deployment, globals.level())?;
     if arguments.dry_run {
-        return show(&planned.plan);
+        return show(planned.plan());
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let report = planned.carry_out(globals, &stop, &mut |_| None)?;
+    let report = planned.carry_out(globals.quiet, &stop, &mut |_| None)?;
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {
@@ -96,104 +84,6 @@ fn above_zero(text: &str) -> Result<f64, String> {
     let fits = number.is_finite() && number > 0.0;
     fits.then_some(number)
         .ok_or_else(|| "not above 0".to_owned())
-}
-
-/// A deployment that can be started.
-#[derive(Debug)]
-pub(crate) struct Planned {
-    /// What every process is given.
-    resolved: Resolved,
-    /// Its processes and topics.
-    plan: Plan,
-}
-
-impl Planned {
-    /// Reads what the deployment names, and deals the work to processes.
-    pub(crate) fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
-        Self::of(plan::resolve(deployment)?, log)
-    }
-
-    /// Deals the work of a deployment whose footage is known to processes.
-    pub(crate) fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
-        let prepared = Prepared::new(&resolved)?;
-        prepared.check_predictions(&resolved)?;
-        let file = file_of(&resolved.deployment);
-        if let Some(padding) = &prepared.padding {
-            tracing::warn!("{padding}");
-        }
-        let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
-        for warning in scheduling::permit(&mut plan.processes, Scheduling::rehearse) {
-            tracing::warn!("{warning}");
-        }
-        Ok(Self { resolved, plan })
-    }
-
-    /// What every process is given.
-    pub(crate) fn resolved(&self) -> &Resolved {
-        &self.resolved
-    }
-
-    /// Its processes and topics.
-    pub(crate) fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
-    /// The run, which is the time of its planning too: `runtime::now_nanos`.
-    pub(crate) fn session(&self) -> u64 {
-        self.plan.session
-    }
-
-    /// Its processes.
-    pub(crate) fn processes(&self) -> impl Iterator<Item = &str> {
-        self.plan.processes.iter().map(|it| it.name.as_str())
-    }
-
-    /// Has a process compute for ever in its first life, once it has sent something of a later frame.
-    pub(crate) fn spin(&mut self, process: &str, after_frame: u64) {
-        let spec = self.plan.processes.iter_mut().find(|it| it.name == process);
-        if let Some(it) = spec {
-            let args = ["--spin-after".to_owned(), after_frame.to_string()];
-            it.args.extend(args.map(Into::into));
-        }
-    }
-
-    /// Runs it, shows its progress, and says what became of it.
-    ///
-    /// * `stop`: ends it before its footage does.
-    /// * `onlooker`: is told everything that happens; what it answers is shown.
-    pub(crate) fn carry_out(
-        &self,
-        globals: Globals,
-        stop: &Stop,
-        onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
-    ) -> Result<Report, Failure> {
-        let deployment = &self.resolved.deployment;
-        let folder = &deployment.output;
-        inputs::make_folder(folder)?;
-        let _mine = Claim::of(folder, &format!("deployment {}", deployment.name))?;
-        self.resolved.write(&file_of(deployment))?;
-        let begin = Instant::now();
-        let mut watcher = Watcher::new(&self.resolved, globals.quiet);
-        let outcome = supervise::run(&self.plan, stop, &mut |event| {
-            watcher.note(&event);
-            if let Some(said) = onlooker(&event).filter(|_| !globals.quiet) {
-                watcher.say(&said);
-            }
-        });
-        watcher.finish();
-        let elapsed = begin.elapsed();
-        Ok(Report::new(
-            &self.resolved,
-            self.plan.session,
-            &outcome?,
-            elapsed,
-        ))
-    }
-}
-
-/// The resolved deployment, for the user; the processes are given the same in their standard input.
-fn file_of(deployment: &Deployment) -> PathBuf {
-    deployment.output.join("deployment.json")
 }
 
 /// Processes, topics and memory.

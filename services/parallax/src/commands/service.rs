@@ -8,16 +8,13 @@ use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
 use deployment::Stage;
+use launch::{Prepared, Resolved, frame_scale, framing, inputs, recorded};
 use messages::topic;
 use pipeline::{FuseStep, SkeletonStep, ViewStep};
 use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
 use viewquality::Forecaster;
 
-use crate::inputs;
-use crate::prepare::{self, Prepared};
-use crate::recorded;
-use crate::resolved::Resolved;
 use crate::stage;
 
 /// The processes of a deployment.
@@ -131,7 +128,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         source: inputs::source(&deployment.cameras[view], &deployment.capture),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,
-        framing: prepare::framing(resolved, &rig, view)?,
+        framing: framing(resolved, &rig, view)?,
         mode: deployment.capture.mode,
         pace: deployment.capture.pace,
         n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
@@ -178,7 +175,7 @@ fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         view,
         source,
         frame_step: resolved.deployment.capture.frame_step,
-        frame_scale: prepare::frame_scale(&prepared.views[view].framing) as f32,
+        frame_scale: frame_scale(&prepared.views[view].framing) as f32,
         n_consumers: resolved.topology().receivers_of(&topic::view_quality(view)),
         patience: resolved.patience(),
     };

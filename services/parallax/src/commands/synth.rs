@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use launch::{inputs, output};
 use offline::synth::{self, Done, Job, Written};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Action, Flaws, RigChoice};
@@ -14,7 +15,6 @@ use serde_json::json;
 
 use crate::globals::Globals;
 use crate::terminal::Terminal;
-use crate::{inputs, output};
 pub(crate) use chosen::rate;
 use chosen::{actions, rig, subjects};
 use motion::MotionArguments;

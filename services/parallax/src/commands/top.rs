@@ -6,11 +6,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Args;
+use launch::{
+    live::{self, Live},
+    load, output,
+};
 use runtime::{ExitKind, Failure, Keys, Namespace, OrFail as _, Stop, deployments};
-
-use crate::live::{self, Live};
-use crate::load;
-use crate::output;
 
 /// The screen beside the one that scrolls, without a cursor; and back.
 const ENTER: &str = "\x1b[?1049h\x1b[?25l";

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use launch::inputs;
 use runfiles::{CameraTimes, FrameLine, Line, PoseTimes, TimesLine};
 use runtime::Failure;
 use skeleton::PARSE14;
 
 use super::Point;
-use crate::inputs;
 
 /// One result.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use geometry::files::Format as RigFormat;
 use geometry::{Camera, Intrinsics, Rig};
+use launch::inputs;
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Action, Address, RigChoice, Scene, Settings};
 
 use super::Point;
-use crate::inputs;
 
 /// Cameras of a demo, evenly around the stage.
 pub(crate) const N_CAMERAS: usize = 4;

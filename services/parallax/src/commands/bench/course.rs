@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use deployment::Deployment;
+use launch::{Planned, Report, inputs, load};
 use runfiles::Percentiles;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
@@ -12,12 +13,8 @@ use serde_json::{Value, json};
 
 use super::load::Arguments;
 use super::pictures;
-use crate::commands::run::Planned;
 use crate::globals::Globals;
-use crate::inputs;
-use crate::load;
 use crate::spread::Spread;
-use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 use crate::trial::strike::{Blow, Strike};
@@ -242,7 +239,7 @@ impl Course {
         let victim = format!("capture-{}", case.n_views - 1);
         let mut strike = case.has_dead.then(|| Strike::new(Blow::Kill, &victim, 0.0));
         let before = cpu_seconds_of_children()?;
-        let report = planned.carry_out(self.globals, stop, &mut |event| {
+        let report = planned.carry_out(self.globals.quiet, stop, &mut |event| {
             strike
                 .as_mut()
                 .and_then(|it| it.note(event, now_nanos(), Blow::deal))

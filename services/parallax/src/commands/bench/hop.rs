@@ -3,6 +3,7 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use launch::output;
 use messages::{FrameHeader, Stamp, Status, Timing, topic};
 use runtime::{
     Bus, Child, Delivery, ExitKind, Failure, Launch, Limits, Namespace, OrFail as _, Scheduling,
@@ -11,7 +12,6 @@ use runtime::{
 use tracing::Level;
 
 use super::receiver::{Heard, N_PLACED, Spot, WARM_UP, write};
-use crate::output;
 
 /// Name of the other process.
 const RECEIVER: &str = "receiver";

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use launch::output;
 use messages::MAX_VIEWS;
 use report::run::Limit;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -14,7 +15,6 @@ use super::occasion::Occasion;
 use super::report::Report;
 use super::{EXITS, Output};
 use crate::globals::Globals;
-use crate::output;
 use crate::spread::Spread;
 use crate::trial::limit;
 

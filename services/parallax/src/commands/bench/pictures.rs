@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use image::ExtendedColorType;
 use indicatif::ProgressBar;
+use launch::{inputs, output};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Scene, Settings, View};
 
 use crate::globals::Globals;
-use crate::{inputs, output};
 
 /// Writes the first pictures of every camera into a folder of its name; false if it was stopped.
 pub(super) fn draw(

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use launch::output;
 use messages::{FrameHeader, Status, topic};
 use runtime::{Failure, Launch, Mapped, Sample, Service, Woken, mapped_at, now_nanos, run_service};
 use serde::{Deserialize, Serialize};
 
-use crate::output;
 use crate::spread::Spread;
 
 /// Messages before those that are measured: the first few of them are looked at closely.

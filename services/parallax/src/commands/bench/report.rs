@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
+use launch::{inputs, output};
 use report::run::Limit;
 use runtime::{ExitKind, Failure};
 use serde_json::{Value, json};
@@ -12,7 +13,6 @@ use serde_json::{Value, json};
 use super::Output;
 use super::occasion::Occasion;
 use crate::globals::Globals;
-use crate::{inputs, output};
 
 /// What was measured.
 #[derive(Debug)]

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use launch::output;
 use report::run::Limit;
 use runtime::{ExitKind, Failure, OrFail as _, Policy, RealTime, Scheduling, Stop};
 use serde_json::{Value, json};
@@ -13,7 +14,6 @@ use super::occasion::Occasion;
 use super::report::Report;
 use super::{EXITS, Output};
 use crate::globals::Globals;
-use crate::output;
 use crate::spread::Spread;
 use crate::trial::limit;
 

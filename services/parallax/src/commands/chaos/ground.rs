@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use deployment::Deployment;
+use launch::{Planned, Report, inputs, load};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::Action;
 use serde_json::Value;
@@ -11,11 +12,7 @@ use supervise::Event;
 use super::Arguments;
 use super::census;
 use super::judge::Aftermath;
-use crate::commands::run::Planned;
 use crate::globals::Globals;
-use crate::inputs;
-use crate::load;
-use crate::summary::Report;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 
@@ -148,7 +145,7 @@ impl Ground {
         planned: &Planned,
         onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
     ) -> Ran {
-        let report = planned.carry_out(self.globals, &self.stop, onlooker);
+        let report = planned.carry_out(self.globals.quiet, &self.stop, onlooker);
         let deployment = &planned.resolved().deployment;
         let names = deployment.cameras.iter().map(|it| it.name.clone());
         let names: Vec<String> = names.collect();

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use fastrand::Rng;
 use geometry::files::Format;
 use geometry::{Camera, Rig};
+use launch::inputs;
 use nalgebra::{UnitQuaternion, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
@@ -12,7 +13,6 @@ use serde_json::json;
 use super::Arguments;
 use super::ground::Ground;
 use super::verdict::Verdict;
-use crate::inputs;
 use crate::trial::limit::at_least;
 
 /// By so much it is turned.

@@ -7,13 +7,12 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
+use launch::{Planned, inputs};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::census;
 use super::ground::Ground;
 use super::judge::Orphaned;
-use crate::commands::run::Planned;
-use crate::inputs;
 
 /// Results of the first run before its supervisor is killed.
 const RESULTS: usize = 3;

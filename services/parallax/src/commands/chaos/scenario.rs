@@ -1,8 +1,9 @@
 //! The faults that can be asked for, by name.
 
+use launch::SERVICES;
+
 use super::camera::CameraFault;
 use super::{moved, stall};
-use crate::resolved::SERVICES;
 use crate::trial::strike::Blow;
 
 /// A fault.

@@ -1,12 +1,12 @@
 //! The limits by which the demo judges itself.
 
 use clap::Args;
+use launch::ViewReport;
 use report::run::Limit;
 
 use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
-use crate::views::ViewReport;
 
 /// What a process that is killed may hold, and what its last report may not have counted: frames.
 const HELD: u64 = 2;

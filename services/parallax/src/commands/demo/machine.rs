@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use geometry::Camera;
 use kernels::Rgb8View;
+use launch::{Prepared, Resolved};
 use pipeline::Estimator;
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -13,8 +14,6 @@ use scene::{Scene, View};
 use serde_json::{Value, json};
 use statistics::Sorted;
 
-use crate::prepare::Prepared;
-use crate::resolved::Resolved;
 use crate::trial::stage::Stage;
 
 /// Frames a second on a machine that is fast enough.

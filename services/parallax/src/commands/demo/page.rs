@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
+use launch::budget;
 use report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use skeleton::PARSE14;
 
 use super::report::Report;
 use super::{Run, VICTIM};
-use crate::budget;
 use crate::trial::Point;
 use crate::trial::cost::Cost;
 use crate::trial::results::Moment;

@@ -6,13 +6,13 @@ use datasets::People;
 use evaluation::Bootstrap;
 use experiment::{Judged, Pictures};
 use fmp::Search;
+use launch::{inputs, output};
 use offline::eval::pictures;
 use offline::judged;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use super::Arguments;
 use crate::commands::judge;
-use crate::{inputs, output};
 
 /// Evaluates.
 pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failure> {

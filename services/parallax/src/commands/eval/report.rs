@@ -2,11 +2,11 @@
 
 use deployment::fuse::Config;
 use evaluation::Bootstrap;
+use launch::output;
 use offline::eval::{self, Done, Job};
 use runtime::Failure;
 
 use super::Arguments;
-use crate::output;
 
 /// Writes the report, and prints its short form.
 pub(super) fn write(

@@ -11,7 +11,7 @@ use scene::Address;
 
 /// Why there is no deployment.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum LoadError {
+pub enum LoadError {
     /// The file could not be read.
     #[error("cannot read the deployment file {}{why}", file.display())]
     Read {
@@ -39,7 +39,11 @@ impl Fault for LoadError {
 /// Reads a deployment file; `set` are `key=value` pairs that replace what it says.
 ///
 /// Relative paths are relative to the file, whoever gives them.
-pub(crate) fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
+///
+/// # Errors
+///
+/// The file cannot be read, or what it holds is wrong.
+pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     let text = fs::read_to_string(file).map_err(|source| LoadError::Read {
         file: file.to_owned(),
         why: why_not(file, &source),
@@ -49,7 +53,11 @@ pub(crate) fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
 }
 
 /// A deployment that was read before, with other values; see [`Loaded::again`].
-pub(crate) fn again(
+///
+/// # Errors
+///
+/// A value is refused, or wrong.
+pub fn again(
     deployment: &Deployment,
     set: &[String],
     refused: impl Fn(&str) -> Option<String>,
@@ -58,7 +66,11 @@ pub(crate) fn again(
 }
 
 /// The defaults alone.
-pub(crate) fn defaults(set: &[String]) -> Result<Loaded, LoadError> {
+///
+/// # Errors
+///
+/// A value is wrong.
+pub fn defaults(set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::defaults(set)?)
 }
 

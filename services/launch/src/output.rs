@@ -7,7 +7,11 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::Serialize;
 
 /// Writes a line of data. A reader that went away (`| head`) is no failure.
-pub(crate) fn line(text: impl Display) -> Result<(), Failure> {
+///
+/// # Errors
+///
+/// Standard output cannot be written to.
+pub fn line(text: impl Display) -> Result<(), Failure> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::new(ExitKind::Run, error))
@@ -17,22 +21,26 @@ pub(crate) fn line(text: impl Display) -> Result<(), Failure> {
 }
 
 /// Writes a value as one line of JSON.
-pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
+///
+/// # Errors
+///
+/// Standard output cannot be written to, or the value has no form in JSON.
+pub fn json(value: &impl Serialize) -> Result<(), Failure> {
     line(serde_json::to_string(value).or_fail(ExitKind::Run)?)
 }
 
 /// Writes a message for people; there is nobody left to tell if that fails.
-pub(crate) fn message(text: impl Display) {
+pub fn message(text: impl Display) {
     drop(writeln!(io::stderr().lock(), "{text}"));
 }
 
 /// Reports a failure that does not end the program.
-pub(crate) fn failure(failure: &Failure) {
+pub fn failure(failure: &Failure) {
     // There is nobody left to tell if that fails.
     drop(failure.report(&mut io::stderr().lock()));
 }
 
 /// Whether standard error may be redrawn.
-pub(crate) fn is_lively() -> bool {
+pub fn is_lively() -> bool {
     io::stderr().is_terminal()
 }

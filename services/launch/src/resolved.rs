@@ -12,7 +12,7 @@ use crate::inputs::{self, Footage};
 
 /// A deployment with what was found out about its footage: what every process is given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Resolved {
+pub struct Resolved {
     /// The deployment, all paths absolute.
     pub deployment: Deployment,
     /// The footage of every camera.
@@ -26,7 +26,7 @@ pub(crate) struct Resolved {
 }
 
 /// The services, in the order in which a frame passes them.
-pub(crate) const SERVICES: [&str; 6] = [
+pub const SERVICES: [&str; 6] = [
     "capture",
     "pose",
     "quality",
@@ -37,12 +37,12 @@ pub(crate) const SERVICES: [&str; 6] = [
 
 impl Resolved {
     /// Frames that will be used.
-    pub(crate) fn n_frames(&self) -> u64 {
+    pub fn n_frames(&self) -> u64 {
         self.footage.iter().map(|it| it.n_frames).max().unwrap_or(0)
     }
 
     /// Frames of the footage per second, where any camera knows.
-    pub(crate) fn frame_rate_hz(&self) -> Option<f64> {
+    pub fn frame_rate_hz(&self) -> Option<f64> {
         let capture = &self.deployment.capture;
         let step = capture.frame_step as f64;
         let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
@@ -68,7 +68,11 @@ impl Resolved {
     ///
     /// * `file`: the file of the same content; it is read by a process that was started by hand, without anything in
     ///   its input.
-    pub(crate) fn given(file: &Path) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// Neither input nor file hold it, or what they hold is something else.
+    pub fn given(file: &Path) -> Result<Self, Failure> {
         let wrong = |error: &dyn core::error::Error| inputs::in_file(file, error);
         let mut text = String::new();
         if !std::io::stdin().is_terminal() {
@@ -82,7 +86,7 @@ impl Resolved {
     }
 
     /// What happens when a receiver is slower than its sender.
-    pub(crate) fn delivery(&self) -> Delivery {
+    pub fn delivery(&self) -> Delivery {
         match self.deployment.capture.mode {
             deployment::capture::Mode::Lossless => Delivery::Lossless,
             deployment::capture::Mode::Realtime => Delivery::Realtime,
@@ -90,12 +94,12 @@ impl Resolved {
     }
 
     /// How long a stage waits for a view that is late.
-    pub(crate) fn patience(&self) -> Duration {
+    pub fn patience(&self) -> Duration {
         Duration::from_millis(self.deployment.deadline_ms())
     }
 
     /// The processes of the deployment, and who sends to whom.
-    pub(crate) fn topology(&self) -> Topology {
+    pub fn topology(&self) -> Topology {
         let (recording, replay) = (self.recording.as_ref(), self.replay.as_ref());
         Topology::new(&self.deployment, recording, replay)
     }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::{Board, Member};
 
 /// A deployment and all of its processes.
-pub(crate) fn describe(board: &Board) -> Value {
+pub fn describe(board: &Board) -> Value {
     let members: Vec<Value> = board.members.iter().map(member).collect();
     json!({
         "name": board.name,
@@ -34,7 +34,7 @@ fn member(it: &Member) -> Value {
 }
 
 /// What one life of a process has said of itself.
-pub(crate) fn measured(it: &Reading) -> Value {
+pub fn measured(it: &Reading) -> Value {
     let dropped: Map<String, Value> = Cause::ALL
         .into_iter()
         .map(|cause| (key(cause.name()), it.n_dropped_by(cause).into()))

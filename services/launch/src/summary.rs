@@ -23,14 +23,14 @@ use crate::output;
 use crate::resolved::Resolved;
 use crate::views::ViewReport;
 
-pub(crate) use recorded::Recorded;
+pub use recorded::Recorded;
 
 /// Pause between two lines where no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);
 
 /// Shows progress: a bar on a terminal, else a line from time to time.
 #[derive(Debug)]
-pub(crate) struct Watcher {
+pub struct Watcher {
     bar: ProgressBar,
     quiet: bool,
     n_frames: u64,
@@ -43,7 +43,7 @@ pub(crate) struct Watcher {
 
 impl Watcher {
     /// Begins.
-    pub(crate) fn new(resolved: &Resolved, quiet: bool) -> Self {
+    pub fn new(resolved: &Resolved, quiet: bool) -> Self {
         let n_frames = resolved.n_frames();
         let bar = if quiet || !output::is_lively() {
             ProgressBar::hidden()
@@ -68,7 +68,7 @@ impl Watcher {
     }
 
     /// Takes note of what the supervisor tells.
-    pub(crate) fn note(&mut self, event: &Event<'_>) {
+    pub fn note(&mut self, event: &Event<'_>) {
         match event {
             Event::Health { process, health } if *process == "triangulate" => {
                 // By frame, for a restarted process counts anew.
@@ -103,12 +103,12 @@ impl Watcher {
     }
 
     /// Ends the bar.
-    pub(crate) fn finish(&self) {
+    pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 
     /// Shows a line above the bar.
-    pub(crate) fn say(&self, text: &str) {
+    pub fn say(&self, text: &str) {
         self.bar.suspend(|| output::message(text));
     }
 
@@ -127,7 +127,7 @@ impl Watcher {
 
 /// What became of a run.
 #[derive(Debug)]
-pub(crate) struct Report {
+pub struct Report {
     name: String,
     folder: String,
     n_frames: u64,
@@ -153,12 +153,7 @@ impl Report {
     /// Puts together what the supervisor and the recorder know.
     ///
     /// * `session`: the run; what an earlier one left in the folder says nothing about this.
-    pub(crate) fn new(
-        resolved: &Resolved,
-        session: u64,
-        outcome: &Outcome,
-        elapsed: Duration,
-    ) -> Self {
+    pub fn new(resolved: &Resolved, session: u64, outcome: &Outcome, elapsed: Duration) -> Self {
         let folder = &resolved.deployment.output;
         let cameras = resolved.deployment.cameras.iter();
         let cameras: Vec<&str> = cameras.map(|it| it.name.as_str()).collect();
@@ -199,14 +194,14 @@ impl Report {
     }
 
     /// What became of the frames of every view.
-    pub(crate) fn views(&self) -> &[ViewReport] {
+    pub fn views(&self) -> &[ViewReport] {
         &self.views
     }
 
     /// Processes that ended without being asked to more often than they were struck on purpose, or were given up.
     ///
     /// * `struck`: how often a process was.
-    pub(crate) fn failed_by_themselves(&self, struck: impl Fn(&str) -> u32) -> Vec<String> {
+    pub fn failed_by_themselves(&self, struck: impl Fn(&str) -> u32) -> Vec<String> {
         let restarted = self.restarts.iter();
         let by_themselves = restarted
             .filter(|(name, n)| *n > struck(name))
@@ -218,12 +213,12 @@ impl Report {
     }
 
     /// Whether the run was fast enough, if it was asked to be.
-    pub(crate) fn budget(&self) -> Option<&Budget> {
+    pub fn budget(&self) -> Option<&Budget> {
         self.budget.as_ref()
     }
 
     /// Cameras that do not stand where the calibration says.
-    pub(crate) fn misplaced(&self) -> Vec<String> {
+    pub fn misplaced(&self) -> Vec<String> {
         let suspected = self.suspected();
         suspected.map(|(camera, _)| camera.clone()).collect()
     }
@@ -235,12 +230,12 @@ impl Report {
     }
 
     /// What the process `results` wrote about the run.
-    pub(crate) fn recorded(&self) -> &Recorded {
+    pub fn recorded(&self) -> &Recorded {
         &self.recorded
     }
 
     /// How the run ended, if not well.
-    pub(crate) fn kind(&self) -> Option<ExitKind> {
+    pub fn kind(&self) -> Option<ExitKind> {
         let budget = self.budget.as_ref();
         if budget.is_some_and(Budget::is_exceeded) {
             // Live cameras run until they are stopped: that is no excuse.
@@ -282,7 +277,7 @@ impl Report {
     }
 
     /// For programs.
-    pub(crate) fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         json!({
             "schema_version": 1,
             "name": self.name,
@@ -305,7 +300,7 @@ impl Report {
     }
 
     /// For people.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _infallible = self.write(&mut text);

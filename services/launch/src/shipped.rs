@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use deployment::{SHIPPED, is_shipped};
 use runtime::{ExitKind, Failure};
 
-use crate::inputs;
+use crate::file::in_file;
 
 /// A file that ships; their cards lie beside them in `configs/models`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shipped {
+pub enum Shipped {
     /// The person model.
     Model,
     /// The network that predicts the errors of its parts.
@@ -23,7 +23,7 @@ pub(crate) enum Shipped {
 
 impl Shipped {
     /// What it holds.
-    pub(crate) fn bytes(self) -> &'static [u8] {
+    pub fn bytes(self) -> &'static [u8] {
         match self {
             Self::Model => include_bytes!("../../../configs/models/person.fmp"),
             Self::Network => include_bytes!("../../../configs/models/person.quality.onnx"),
@@ -32,7 +32,7 @@ impl Shipped {
     }
 
     /// What it is called where the word alone would not tell which.
-    pub(crate) fn name(self) -> PathBuf {
+    pub fn name(self) -> PathBuf {
         let kind = match self {
             Self::Model => "model",
             Self::Network => "network",
@@ -42,18 +42,22 @@ impl Shipped {
     }
 
     /// The file of that name.
-    pub(crate) fn of_name(name: &Path) -> Option<Self> {
+    pub fn of_name(name: &Path) -> Option<Self> {
         let mut all = [Self::Model, Self::Network, Self::Consistency].into_iter();
         all.find(|it| it.name() == name)
     }
 
     /// What a file of this kind holds: the one that is named, or the one that ships.
-    pub(crate) fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// The file is not there, cannot be read, or is empty.
+    pub fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
         if is_shipped(file) {
             return Ok(Cow::Borrowed(self.bytes()));
         }
         let bytes = fs::read(file).map_err(|error| {
-            let failure = inputs::in_file(file, &error);
+            let failure = in_file(file, &error);
             let is_absent = error.kind() == ErrorKind::NotFound;
             if is_absent {
                 failure.with_hint(self.hint())

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use runtime::{ExitKind, Failure};
 
-use crate::inputs;
+use crate::file::in_file;
 
 /// The file in the folder that is locked. It stays: only its lock says that somebody writes, and that ends with the
 /// process, however it ends.
@@ -14,7 +14,7 @@ const FILE: &str = ".parallax.lock";
 
 /// The right to write to a folder, as long as it lives.
 #[derive(Debug)]
-pub(crate) struct Claim {
+pub struct Claim {
     /// None where the file system cannot lock, which is no reason not to run.
     _file: Option<File>,
 }
@@ -23,15 +23,19 @@ impl Claim {
     /// Claims a folder, which is made if it is not there.
     ///
     /// * `what`: who claims it, for whoever comes second.
-    pub(crate) fn of(folder: &Path, what: &str) -> Result<Self, Failure> {
-        let in_folder = |error: &std::io::Error| inputs::in_file(folder, error);
+    ///
+    /// # Errors
+    ///
+    /// The folder cannot be made or written to, or somebody else writes there, who is named.
+    pub fn of(folder: &Path, what: &str) -> Result<Self, Failure> {
+        let in_folder = |error: &std::io::Error| in_file(folder, error);
         std::fs::create_dir_all(folder).map_err(|error| in_folder(&error))?;
         let path = folder.join(FILE);
         let mut options = OpenOptions::new();
         let options = options.create(true).truncate(false).read(true).write(true);
         let mut file = options
             .open(&path)
-            .map_err(|error| inputs::in_file(&path, &error))?;
+            .map_err(|error| in_file(&path, &error))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::Error(_)) => return Ok(Self { _file: None }),
@@ -41,7 +45,7 @@ impl Claim {
             .set_len(0)
             .and_then(|()| file.rewind())
             .and_then(|()| writeln!(file, "process {}, {what}", std::process::id()));
-        told.map_err(|error| inputs::in_file(&path, &error))?;
+        told.map_err(|error| in_file(&path, &error))?;
         Ok(Self { _file: Some(file) })
     }
 }

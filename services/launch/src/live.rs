@@ -12,8 +12,8 @@ use runtime::{Failure, Keys, Namespace, ObservedProcess, Observer, OrFail as _, 
 
 use crate::resolved::SERVICES;
 
-pub(crate) use describe::{describe, measured};
-pub(crate) use table::table;
+pub use describe::{describe, measured};
+pub use table::table;
 
 /// A process that has said nothing for so long hangs, or is stopped: several times the second after
 /// which it should have.
@@ -24,7 +24,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 
 /// How a process stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Standing {
+pub enum Standing {
     /// It works.
     Runs,
     /// It has seen the end of the footage and passed it on.
@@ -39,7 +39,7 @@ pub(crate) enum Standing {
 
 impl Standing {
     /// In a word.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Runs => "runs",
             Self::Done => "done",
@@ -52,7 +52,7 @@ impl Standing {
 
 /// One process.
 #[derive(Debug, Clone)]
-pub(crate) struct Member {
+pub struct Member {
     /// Its name in the deployment.
     pub process: String,
     /// Its process id, while it lives.
@@ -69,7 +69,7 @@ pub(crate) struct Member {
 
 /// All processes of a deployment at one moment.
 #[derive(Debug, Clone)]
-pub(crate) struct Board {
+pub struct Board {
     /// The name of the deployment.
     pub name: String,
     /// The process that runs it.
@@ -90,7 +90,7 @@ impl Board {
     }
 
     /// The names of the views, as far as a process has said them.
-    pub(crate) fn views(&self) -> BTreeMap<usize, &str> {
+    pub fn views(&self) -> BTreeMap<usize, &str> {
         let readings = self.members.iter().filter_map(|it| it.reading.as_ref());
         readings
             .filter_map(|it| it.view.as_ref())
@@ -144,14 +144,18 @@ fn place(process: &str) -> (usize, usize, String) {
 
 /// Looks at a deployment for as long as it runs.
 #[derive(Debug)]
-pub(crate) struct Live {
+pub struct Live {
     name: String,
     observer: Observer,
 }
 
 impl Live {
     /// Begins to look.
-    pub(crate) fn open(namespace: &Namespace) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// The deployment does not run, or cannot be looked into.
+    pub fn open(namespace: &Namespace) -> Result<Self, Failure> {
         Ok(Self {
             name: namespace.name().to_owned(),
             observer: Observer::open(namespace)?,
@@ -159,14 +163,22 @@ impl Live {
     }
 
     /// What is to be seen now.
-    pub(crate) fn look(&mut self) -> Result<Board, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// What it says cannot be received.
+    pub fn look(&mut self) -> Result<Board, Failure> {
         let supervisor = self.observer.supervisor();
         let seen = self.observer.observe()?;
         Ok(Board::new(&self.name, supervisor, &seen, now_nanos()))
     }
 
     /// The same once everybody has said something, or two seconds are over.
-    pub(crate) fn first_look(&mut self) -> Result<Board, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// As of [`Self::look`].
+    pub fn first_look(&mut self) -> Result<Board, Failure> {
         let begin = Instant::now();
         loop {
             let board = self.look()?;
@@ -178,12 +190,16 @@ impl Live {
     }
 
     /// Whether the deployment ends, and this has to be dropped.
-    pub(crate) fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         self.observer.is_over()
     }
 
     /// Waits for a key, at most until it is time to look again; answers early if the deployment ends.
-    pub(crate) fn rest(
+    ///
+    /// # Errors
+    ///
+    /// The terminal cannot be read.
+    pub fn rest(
         &self,
         keys: &mut Keys,
         stop: &Stop,

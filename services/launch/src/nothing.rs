@@ -8,7 +8,11 @@ use runtime::{ExitKind, Failure};
 use crate::views::ViewReport;
 
 /// Ends a command that found nothing as degraded.
-pub(crate) fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
+///
+/// # Errors
+///
+/// Nothing was found: `ExitKind::Degraded`, with the words.
+pub fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
     let failure = || Failure::new(ExitKind::Degraded, what);
     is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)
 }
@@ -16,7 +20,7 @@ pub(crate) fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
 /// Why a run has no result in space, if that is for a reason other than that nobody was to be seen.
 ///
 /// * `summary`: of the process `results`.
-pub(crate) fn why(summary: &Summary, views: &[ViewReport]) -> Option<String> {
+pub fn why(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     if views.iter().all(|it| it.frames == 0) {
         return Some("the footage has no frame".to_owned());
     }

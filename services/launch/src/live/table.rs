@@ -11,7 +11,7 @@ use super::{Board, Member, Standing};
 const NONE: &str = "-";
 
 /// A deployment as lines of text. Every cell stands under its title, whose unit it is in.
-pub(crate) fn table(board: &Board) -> String {
+pub fn table(board: &Board) -> String {
     let alive = board.members.iter().filter(|it| it.pid.is_some()).count();
     let mut text = format!(
         "{}: run by process {}, {alive} of {} processes live\n\n",

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 /// What the process `results` wrote about the run.
 #[derive(Debug)]
-pub(crate) enum Recorded {
+pub enum Recorded {
     /// Nothing about this run.
     Nothing,
     /// A file that cannot be read, and why.
@@ -34,12 +34,12 @@ impl Recorded {
     }
 
     /// What was seen and what was missed, if that is known.
-    pub(crate) fn summary(&self) -> Option<&Summary> {
+    pub fn summary(&self) -> Option<&Summary> {
         self.written().map(|it| &it.summary)
     }
 
     /// Where the time went, if that is known.
-    pub(crate) fn latency(&self) -> Option<&LatencyReport> {
+    pub fn latency(&self) -> Option<&LatencyReport> {
         self.written().map(|it| &it.latency)
     }
 

@@ -12,7 +12,7 @@ use crate::resolved::Resolved;
 
 /// What became of the frames of one view: all counts but the first add up to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct ViewReport {
+pub struct ViewReport {
     /// The camera.
     pub name: String,
     /// Frames of the footage.
@@ -40,11 +40,7 @@ impl ViewReport {
     /// Puts together what the supervisor and the process `results` know.
     ///
     /// * `summary`: of `results`, if there is one.
-    pub(crate) fn all(
-        resolved: &Resolved,
-        outcome: &Outcome,
-        summary: Option<&Summary>,
-    ) -> Vec<Self> {
+    pub fn all(resolved: &Resolved, outcome: &Outcome, summary: Option<&Summary>) -> Vec<Self> {
         let counts = |process: String| {
             let found = outcome.processes.iter().find(|it| it.name == process);
             found.map_or_else(Counts::default, |it| it.counts)
@@ -93,7 +89,7 @@ impl ViewReport {
     }
 
     /// Whether it is missing for a reason that nobody asked for.
-    pub(crate) fn is_lost(&self, is_lossless: bool) -> bool {
+    pub fn is_lost(&self, is_lossless: bool) -> bool {
         let is_asked_for = |reason: &Missing| match reason {
             Missing::Late | Missing::Dropped => !is_lossless,
             other => other.text() == Status::NO_DETECTION.reason(),

@@ -19,7 +19,7 @@ use crate::resolved::Resolved;
 
 /// One view, ready.
 #[derive(Debug, Clone)]
-pub(crate) struct View {
+pub struct View {
     /// The camera's name.
     pub name: String,
     /// From its footage to the frames of the pipeline.
@@ -30,7 +30,7 @@ pub(crate) struct View {
 
 /// What the stages of a deployment work with.
 #[derive(Debug)]
-pub(crate) struct Prepared {
+pub struct Prepared {
     /// The model.
     pub model: Arc<Model>,
     /// The views, as they are numbered.
@@ -48,7 +48,11 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Reads model and rig, and prepares the views.
-    pub(crate) fn new(resolved: &Resolved) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    ///
+    /// A file that the deployment names cannot be read, does not go with the others, or contradicts the deployment.
+    pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
         Self::read(resolved).map_err(told)
     }
@@ -69,10 +73,14 @@ impl Prepared {
             });
         }
         let settings = settings(deployment, &model, &views)?;
+        let named = views.iter().map(|it| it.name.as_str()).zip(sizes);
+        let named: Vec<_> = named.collect();
+        let size = deployment.capture.size;
+        let padding = size.and_then(|it| padding::warning(it, &named));
         Ok(Self {
             pairs: resolved.topology().pairs().to_vec(),
             up_in_world: rig.up_in_world(),
-            padding: padding::warning(deployment, &views, &sizes),
+            padding,
             model,
             views,
             settings,
@@ -80,7 +88,11 @@ impl Prepared {
     }
 
     /// What knows the expected errors of a view, if there is a table of them.
-    pub(crate) fn predictor(
+    ///
+    /// # Errors
+    ///
+    /// The table cannot be read, or does not speak of the view.
+    pub fn predictor(
         &self,
         resolved: &Resolved,
         view: usize,
@@ -98,7 +110,11 @@ impl Prepared {
 
     /// Sees that the network, if there is one, can be run; and that the table of expected errors, if there
     /// is one, speaks of every view; warns where it speaks of none of the frames.
-    pub(crate) fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    ///
+    /// Network or table cannot be read, or do not go with the model.
+    pub fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
         let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
         self.predict(resolved).map_err(told)
     }
@@ -132,13 +148,17 @@ impl Prepared {
     }
 
     /// The prepared views, as the steps take them.
-    pub(crate) fn plans(&self) -> Vec<Arc<ViewPlan>> {
+    pub fn plans(&self) -> Vec<Arc<ViewPlan>> {
         self.views.iter().map(|it| Arc::clone(&it.plan)).collect()
     }
 }
 
 /// From the footage of one camera to its frames.
-pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
+///
+/// # Errors
+///
+/// The calibration lacks the camera, or does not fit the footage.
+pub fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
     let deployment = &resolved.deployment;
     let entry = &deployment.cameras[index];
     let camera = rig.camera(&entry.name).ok_or_else(|| {
@@ -231,7 +251,7 @@ fn settings(
 }
 
 /// Pixels of the frame per pixel of the footage.
-pub(crate) fn frame_scale(framing: &Framing) -> f64 {
+pub fn frame_scale(framing: &Framing) -> f64 {
     let [[a, b, _], [c, d, _]] = framing.source_from_output();
     1.0 / (a * d - b * c).abs().sqrt()
 }

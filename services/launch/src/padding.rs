@@ -1,29 +1,22 @@
 //! How much of the frames is padding, because their size has another aspect than the camera's image.
 
-use deployment::Deployment;
-
-use crate::prepare::View;
-
 /// Shares of padding below this are not worth a word.
 const WORTH_A_WORD: f64 = 0.1;
 
 /// A warning about the cameras of whose frames much is padding; none if there are none.
-pub(crate) fn warning(
-    deployment: &Deployment,
-    views: &[View],
-    sizes: &[[u32; 2]],
-) -> Option<String> {
-    let frame = deployment.capture.size?;
-    let padded = views
+///
+/// * `frame`: width and height of the frames, pixels.
+/// * `cameras`: the name of each, and width and height of its image, pixels.
+pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option<String> {
+    let padded = cameras
         .iter()
-        .zip(sizes)
-        .filter(|it| share(*it.1, frame) > WORTH_A_WORD);
-    let padded: Vec<(&View, [u32; 2])> = padded.map(|it| (it.0, *it.1)).collect();
+        .filter(|it| share(it.1, frame) > WORTH_A_WORD);
+    let padded: Vec<(&str, [u32; 2])> = padded.copied().collect();
     let (_, image) = *padded.first()?;
     let names: Vec<&str> = padded
         .iter()
         .filter(|it| it.1 == image)
-        .map(|it| it.0.name.as_str())
+        .map(|it| it.0)
         .collect();
     let [width, height] = fitting(image, frame);
     Some(format!(

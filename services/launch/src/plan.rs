@@ -24,7 +24,11 @@ use crate::vertical;
 const EVEN: u32 = 3;
 
 /// Looks at the footage of a deployment, and whether it can be that of its cameras; says what is doubtful.
-pub(crate) fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
+///
+/// # Errors
+///
+/// Footage or calibration cannot be read, or cannot give joints in space.
+pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     let footage = inputs::footage(deployment);
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
@@ -42,7 +46,11 @@ pub(crate) fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
 }
 
 /// Reads everything that the deployment names, and says what it is.
-pub(crate) fn check(deployment: &Deployment) -> Result<String, Failure> {
+///
+/// # Errors
+///
+/// Something that the deployment names cannot be read or used.
+pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     let resolved = resolve(deployment)?;
     let prepared = Prepared::new(&resolved)?;
     prepared.check_predictions(&resolved)?;

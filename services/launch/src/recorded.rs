@@ -22,7 +22,7 @@ const MOST_NAMED: usize = 10;
 
 /// The settings of a run, as they stand in its recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Settings {
+pub struct Settings {
     /// What every process was given.
     pub resolved: Resolved,
     /// Fingerprints of the files that they read, by name.
@@ -30,7 +30,11 @@ pub(crate) struct Settings {
 }
 
 /// What the recording of a run says about itself; the process that writes it adds the session.
-pub(crate) fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure> {
+///
+/// # Errors
+///
+/// A file that the deployment names cannot be read.
+pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure> {
     let settings = Settings {
         files: fingerprints(&resolved.deployment)?,
         resolved: Resolved {
@@ -79,18 +83,22 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
 }
 
 /// Finds all messages of a recording.
-pub(crate) fn open(file: &Path) -> Result<Recording, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is no recording.
+pub fn open(file: &Path) -> Result<Recording, Failure> {
     let mut input = File::open(file).map_err(|error| inputs::in_file(file, &error))?;
     recording::scan(&mut input).map_err(|error| inputs::in_file(file, &error))
 }
 
 /// Whether everything that was sent is in the file, as far as the file can say.
-pub(crate) fn is_whole(recording: &Recording) -> bool {
+pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0
 }
 
 /// Whether everything that was written is still there, as far as it can be told without reading the messages.
-pub(crate) fn is_undamaged(recording: &Recording) -> bool {
+pub fn is_undamaged(recording: &Recording) -> bool {
     let extent = &recording.extent;
     extent.is_complete
         && extent.damage.is_empty()
@@ -99,7 +107,11 @@ pub(crate) fn is_undamaged(recording: &Recording) -> bool {
 }
 
 /// Reads what is replayed, and finds the messages that are not what was written.
-pub(crate) fn damaged(
+///
+/// # Errors
+///
+/// The file cannot be read.
+pub fn damaged(
     file: &Path,
     recording: &Recording,
     resolved: &Resolved,
@@ -120,7 +132,7 @@ pub(crate) fn damaged(
 }
 
 /// Names the messages that are not what was written, the first ones at length.
-pub(crate) fn damaged_text(damaged: &[Damaged]) -> Option<String> {
+pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     let mut text = format!(
         "  {} damaged messages are left out: they are not what their checksums say",
         damaged.len()
@@ -138,7 +150,7 @@ pub(crate) fn damaged_text(damaged: &[Damaged]) -> Option<String> {
 }
 
 /// The same for programs.
-pub(crate) fn damaged_json(damaged: &[Damaged]) -> Value {
+pub fn damaged_json(damaged: &[Damaged]) -> Value {
     let damaged = damaged
         .iter()
         .map(|it| json!({ "topic": it.topic, "frame": it.frame, "offset": it.offset }));
@@ -146,7 +158,7 @@ pub(crate) fn damaged_json(damaged: &[Damaged]) -> Value {
 }
 
 /// What a file holds, for people: a line, and another for each thing that is wrong with it.
-pub(crate) fn text(file: &Path, recording: &Recording) -> String {
+pub fn text(file: &Path, recording: &Recording) -> String {
     let extent = &recording.extent;
     let mut text = format!(
         "{}: {} messages of {} topics in {:.1} MB",
@@ -207,7 +219,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
 }
 
 /// The same for programs.
-pub(crate) fn json(file: &Path, recording: &Recording) -> Value {
+pub fn json(file: &Path, recording: &Recording) -> Value {
     let extent = &recording.extent;
     let topics = recording.tracks.iter().map(|(topic, it)| {
         let lost = recording.counts.get(topic).map(|it| it.lost);

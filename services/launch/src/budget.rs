@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 /// The longest time from capture to result that 99 of 100 frames may take, and what they took.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Budget {
+pub struct Budget {
     /// What was asked for, milliseconds.
     limit_ms: f64,
     /// Frames that were measured.
@@ -22,7 +22,7 @@ impl Budget {
     /// Judges a run.
     ///
     /// * `latency`: where the time went; none if that is not known.
-    pub(crate) fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
+    pub fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
         let measured = latency.map(|it| it.end_to_end);
         let measured = measured.filter(|it| it.count > 0);
         Self {
@@ -34,17 +34,17 @@ impl Budget {
     }
 
     /// Whether frames were measured, and were fast enough.
-    pub(crate) fn is_held(&self) -> bool {
+    pub fn is_held(&self) -> bool {
         self.p99_ms.is_some_and(|it| it <= self.limit_ms)
     }
 
     /// Whether frames were measured, and were too slow.
-    pub(crate) fn is_exceeded(&self) -> bool {
+    pub fn is_exceeded(&self) -> bool {
         self.p99_ms.is_some() && !self.is_held()
     }
 
     /// In one line.
-    pub(crate) fn verdict(&self) -> String {
+    pub fn verdict(&self) -> String {
         let Self {
             limit_ms, n_frames, ..
         } = self;
@@ -60,7 +60,7 @@ impl Budget {
     }
 
     /// The same with where the time went, for a run that fails by it.
-    pub(crate) fn complaint(&self) -> String {
+    pub fn complaint(&self) -> String {
         let text = format!("latency budget of {}", self.verdict());
         if self.table.is_empty() {
             text
@@ -70,7 +70,7 @@ impl Budget {
     }
 
     /// For programs.
-    pub(crate) fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         json!({
             "budget_ms": self.limit_ms,
             "p99_ms": self.p99_ms,
@@ -81,7 +81,7 @@ impl Budget {
 }
 
 /// Percentiles of every stage and of the whole, with a title; empty where nothing was measured.
-pub(crate) fn table(latency: &LatencyReport) -> String {
+pub fn table(latency: &LatencyReport) -> String {
     let mut text = String::new();
     for (name, it) in rows(latency).filter(|(_, it)| it.count > 0) {
         if text.is_empty() {
@@ -96,7 +96,7 @@ pub(crate) fn table(latency: &LatencyReport) -> String {
 }
 
 /// The stages that were measured, in the order of the data, and the whole.
-pub(crate) fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
+pub fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
     let names = ["capture", "pose", "quality", "fuse", "triangulate"].into_iter();
     let stages = names.filter_map(|name| Some((name, *latency.stages.get(name)?)));
     stages.chain([("end to end", latency.end_to_end)])

@@ -4,7 +4,6 @@ mod advice;
 
 use std::borrow::Cow;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -22,15 +21,27 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
+use crate::file::no_text;
+use crate::output;
 use crate::shipped::Shipped;
 
+pub use crate::file::{in_file, text};
+
 /// The named model, or the one that ships with Parallax.
-pub(crate) fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is no model.
+pub fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
     path.map_or_else(shipped_model, model)
 }
 
 /// The bytes of the named model file, or of the model that ships with Parallax.
-pub(crate) fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is empty.
+pub fn model_bytes(path: Option<&Path>) -> Result<Cow<'static, [u8]>, Failure> {
     path.map_or_else(
         || Ok(Cow::Borrowed(Shipped::Model.bytes())),
         |path| Shipped::Model.read(path),
@@ -43,7 +54,11 @@ fn shipped_model() -> Result<Arc<Model>, Failure> {
 }
 
 /// Reads the model, of whichever format.
-pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is no model.
+pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
     if deployment::is_shipped(path) {
         return shipped_model();
     }
@@ -55,7 +70,11 @@ pub(crate) fn model(path: &Path) -> Result<Arc<Model>, Failure> {
 /// Reads the calibration, of whichever format.
 ///
 /// * `paths`: several if every camera has its own file.
-pub(crate) fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
+///
+/// # Errors
+///
+/// A file cannot be read, or is no calibration; a hint says what to try.
+pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
     let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
     geometry::files::read_many(&paths, options).map_err(|error| {
         let kind = match error {
@@ -72,7 +91,11 @@ pub(crate) fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<R
 }
 
 /// Reads the calibration of a deployment, in its unit, and with its up.
-pub(crate) fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
+///
+/// # Errors
+///
+/// As of [`rig`]; or the deployment's `up` does not go with it.
+pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
         unit: deployment.unit.map(Into::into),
         ..ReadOptions::default()
@@ -88,7 +111,7 @@ pub(crate) fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
 
 /// What is known of a camera's footage before it is read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Footage {
+pub struct Footage {
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// Frames that will be used.
@@ -98,7 +121,7 @@ pub(crate) struct Footage {
 }
 
 /// What of a camera's footage is to be used.
-pub(crate) fn source(
+pub fn source(
     camera: &deployment::capture::Camera,
     config: &deployment::capture::Config,
 ) -> SourceSpec {
@@ -133,9 +156,9 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
 }
 
 /// Says that pictures of a calibrated camera are taken as they are stored, where a tag asks for more.
-pub(crate) fn say_what_is_not_turned(whose: &str, turn: Turn) {
+pub fn say_what_is_not_turned(whose: &str, turn: Turn) {
     if !turn.is_none() {
-        crate::output::message(format_args!(
+        output::message(format_args!(
             "warning: {whose}: the orientation tag of its first picture asks for {turn}, which is not done: a \
              calibration speaks of pixels as they are stored; if this one was made of pictures as they are seen, \
              store these so (`mogrify -auto-orient`)"
@@ -144,7 +167,11 @@ pub(crate) fn say_what_is_not_turned(whose: &str, turn: Turn) {
 }
 
 /// Reads the part-type tables of a pair: `first wrt second` and `second wrt first`.
-pub(crate) fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
+///
+/// # Errors
+///
+/// A file cannot be read, has other types than the model, or contradicts the other.
+pub fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
     let n_types: Vec<usize> = (0..model.n_parts())
         .map(|part| model.n_types(part))
         .collect();
@@ -165,7 +192,11 @@ pub(crate) fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables
 }
 
 /// Reads what was learned about several views, if a file is named, and sees that it goes with the model.
-pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or was learned with another model.
+pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
     let Some(file) = file else {
         return Ok(None);
     };
@@ -178,7 +209,11 @@ pub(crate) fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learn
 }
 
 /// The part-type tables of some cameras: those that are named, and of the other pairs what was learned.
-pub(crate) fn pair_tables(
+///
+/// # Errors
+///
+/// A table cannot be read, or the rig that `fuse.consistency_rig` names was not learned.
+pub fn pair_tables(
     config: &deployment::fuse::Config,
     learned: Option<&Learned>,
     model: &Model,
@@ -222,18 +257,30 @@ pub(crate) fn pair_tables(
 }
 
 /// Reads a table of expected errors.
-pub(crate) fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is no table of so many parts.
+pub fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
 }
 
 /// Reads a network that predicts errors.
-pub(crate) fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or is no network of so many parts.
+pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
     let bytes = Shipped::Network.read(file)?.into_owned();
     Network::parse(bytes, n_parts).map_err(|error| refused(file, &error))
 }
 
 /// Reads the network of a deployment, if it has one.
-pub(crate) fn own_network(
+///
+/// # Errors
+///
+/// The file cannot be read or is no network of so many parts, or ONNX Runtime is asked for and not to be had.
+pub fn own_network(
     config: &deployment::quality::Config,
     n_parts: usize,
 ) -> Result<Option<Network>, Failure> {
@@ -286,13 +333,21 @@ fn refused(file: &Path, error: &NetworkError) -> Failure {
 }
 
 /// Reads thresholds of the expected errors.
-pub(crate) fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
+///
+/// # Errors
+///
+/// The file cannot be read, or does not hold a threshold for every part.
+pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
     let tau = Tau::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))?;
     Ok(tau.px().to_vec())
 }
 
 /// Makes a folder for results.
-pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+///
+/// # Errors
+///
+/// It cannot be made; a hint says what to try.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
 
@@ -306,21 +361,4 @@ pub(crate) fn of_deployment(failure: Failure, deployment: &Deployment) -> Failur
     }
 }
 
-/// Reads a text file, and names it if that fails.
-pub(crate) fn text(file: &Path) -> Result<String, Failure> {
-    fs::read_to_string(file).map_err(|error| match error.kind() {
-        ErrorKind::InvalidData => no_text(file),
-        _ => in_file(file, &error),
-    })
-}
-
-/// A file that should be text.
-fn no_text(file: &Path) -> Failure {
-    let message = format!("{} is no text: it is not UTF-8", file.display());
-    Failure::new(ExitKind::Input, message)
-}
-
-/// An input that is wrong: the file, then what is wrong with it.
-pub(crate) fn in_file(file: &Path, error: &dyn std::error::Error) -> Failure {
-    Failure::new(ExitKind::Input, format!("{}: {error}", file.display()))
 }
