@@ -46,6 +46,7 @@ const LAYERS: &[&[&str]] = &[
         "results",
     ],
     &["launch"],
+    &["trials"],
     &["parallax"],
 ];
 

@@ -5,6 +5,16 @@ use std::io::{self, IsTerminal as _, Write as _};
 
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::Serialize;
+use tracing::Level;
+
+/// How much is said to people.
+#[derive(Debug, Clone, Copy)]
+pub struct Verbosity {
+    /// Nothing but what went wrong.
+    pub quiet: bool,
+    /// The least important events that are logged, here and by processes that are started.
+    pub level: Level,
+}
 
 /// Writes a line of data. A reader that went away (`| head`) is no failure.
 ///

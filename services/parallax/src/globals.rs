@@ -1,6 +1,7 @@
 //! Options of every command.
 
 use clap::{ArgAction, Args};
+use launch::output::Verbosity;
 use tracing::Level;
 
 /// Options of every command.
@@ -15,6 +16,14 @@ pub(crate) struct Globals {
 }
 
 impl Globals {
+    /// How much is said, for work that is done elsewhere.
+    pub(crate) fn verbosity(self) -> Verbosity {
+        Verbosity {
+            quiet: self.quiet,
+            level: self.level(),
+        }
+    }
+
     /// The least important events that are logged.
     pub(crate) fn level(self) -> Level {
         match (self.quiet, self.verbose) {

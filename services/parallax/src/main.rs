@@ -6,6 +6,7 @@
 //!
 //! | layer | crates |
 //! |---|---|
+//! | trials | [`trials`](../trials/index.html): runs with a fault made on purpose, and measured ones |
 //! | whole runs | [`launch`](../launch/index.html): a deployment made ready and run, and what became of it |
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
@@ -28,10 +29,8 @@ mod commands;
 mod describe;
 mod exit;
 mod globals;
-mod spread;
 mod stage;
 mod terminal;
-mod trial;
 
 use std::process::ExitCode;
 

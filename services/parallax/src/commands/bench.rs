@@ -1,22 +1,18 @@
 //! `parallax bench`: how fast messages travel between processes, and how fast whole deployments are.
 
-mod course;
-mod hop;
 mod load;
-mod occasion;
-mod pictures;
-mod receiver;
-mod report;
 mod transport;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use runtime::Failure;
+use launch::output;
+use runtime::{ExitKind, Failure};
+use trials::bench::{self, Kind, Report};
 
 use crate::globals::Globals;
-use load::Kind;
 
 /// What to measure.
 #[derive(Debug, Subcommand)]
@@ -31,7 +27,15 @@ pub(crate) enum Command {
     Scale(load::Arguments),
     /// Become the receiving process of `transport`.
     #[command(hide = true)]
-    Receive(receiver::Arguments),
+    Receive(Receiver),
+}
+
+/// What the sending process says to the other one.
+#[derive(Debug, Args)]
+pub(crate) struct Receiver {
+    /// About the deployment.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    rest: Vec<OsString>,
 }
 
 /// Where numbers go.
@@ -53,11 +57,43 @@ could not be measured; 2 the command line is wrong; 3, 4, 5 the deployment or it
 
 /// Measures.
 pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
+    let verbosity = globals.verbosity();
+    let load = |kind: Kind, it: &load::Arguments| {
+        let report = bench::load(kind, &it.options(), verbosity)?;
+        publish(report, &it.output, globals)
+    };
     match command {
-        Command::Transport(it) => transport::run(it, globals),
-        Command::Latency(it) => load::run(Kind::Latency, it, globals),
-        Command::Throughput(it) => load::run(Kind::Throughput, it, globals),
-        Command::Scale(it) => load::run(Kind::Scale, it, globals),
-        Command::Receive(it) => receiver::run(it),
+        Command::Transport(it) => {
+            let report = bench::transport(&it.options(), verbosity)?;
+            publish(report, &it.output, globals)
+        }
+        Command::Latency(it) => load(Kind::Latency, it),
+        Command::Throughput(it) => load(Kind::Throughput, it),
+        Command::Scale(it) => load(Kind::Scale, it),
+        Command::Receive(it) => bench::receive(&it.rest),
     }
+}
+
+/// Prints what was measured, and appends it to the record; the exit code.
+///
+/// * `report`: none if it was stopped.
+fn publish(report: Option<Report>, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
+    let Some(report) = report else {
+        output::message("stopped: nothing is reported");
+        return Ok(ExitCode::from(ExitKind::Interrupted.status()));
+    };
+    if let Some(file) = &to.record {
+        report.append(file)?;
+    }
+    if to.json {
+        output::json(&report.json())?;
+    } else if !globals.quiet {
+        output::line(report.text())?;
+    }
+    let status = if report.is_held() {
+        0
+    } else {
+        ExitKind::Limit.status()
+    };
+    Ok(ExitCode::from(status))
 }

@@ -1,27 +1,16 @@
 //! `parallax demo`: four cameras that do not exist, every process, one of them killed on purpose, and a report.
 
-mod limits;
-mod machine;
-mod page;
-mod report;
-mod score;
-
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use launch::{Planned, inputs, load, output};
-use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
+use launch::output;
+use runtime::{ExitKind, Failure};
 use scene::Action;
+use trials::demo::{self, Options};
 
+use super::synth::rate;
 use crate::globals::Globals;
-use crate::trial::Point;
-use crate::trial::results::{self, Moment};
-use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
-use crate::trial::strike::{Blow, Strike, Times};
-use limits::Asked;
-use machine::{FULL_RATE_HZ, Gauge, Machine};
-use report::Report;
 
 const HELP: &str = "\
 Nothing is needed but this program: the pictures are made by the camera processes while they run (a person who does \
@@ -70,10 +59,10 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
     seconds: Option<u32>,
     /// Frames a second; what this machine is found to be able to, at most 5, if not given.
-    #[arg(long, value_name = "HZ", value_parser = super::synth::rate)]
+    #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
     /// What the person does; `parallax synth --help` names the actions.
-    #[arg(long, value_name = "NAME", default_value = "walking", value_parser = stage::action)]
+    #[arg(long, value_name = "NAME", default_value = "walking", value_parser = action)]
     action: Action,
     /// Number of the person: shape, clothes, manners.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -89,7 +78,7 @@ pub(crate) struct Arguments {
     no_kill: bool,
     /// Limits that can be asked for.
     #[command(flatten)]
-    limits: Asked,
+    limits: Limits,
     /// Name of the deployment: two that run at once need two.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
@@ -98,207 +87,75 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// How long a stage waits for a late view where the cameras take all frames they can, milliseconds.
-const DEADLINE_MS: u64 = 500;
+/// Limits that can be asked for.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Limits")]
+struct Limits {
+    /// Least share of the frames with a result, percent; slow machines pass frames over, which is counted.
+    #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
+    min_results: f64,
+    /// Least share of the results with a skeleton, percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
+    min_skeletons: f64,
+    /// Least PCP3D at gamma 0.5 over all results, percent.
+    #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
+    min_pcp3d: f64,
+    /// Longest time until the killed camera has a frame in a result again, milliseconds on a machine that keeps up
+    /// with 5 frames a second.
+    #[arg(long, value_name = "MS", default_value_t = 8000.0)]
+    max_return_ms: f64,
+    /// Longest time without a result while the killed camera is away, milliseconds on a machine that keeps up with
+    /// 5 frames a second.
+    #[arg(long, value_name = "MS", default_value_t = 2000.0)]
+    max_pause_ms: f64,
+}
 
-/// How long the cameras run, and how many frames at least, if nobody says.
-const USUAL_S: f64 = 20.0;
-const LEAST_FRAMES: u64 = 30;
+/// The action of a name, for the command line.
+fn action(name: &str) -> Result<Action, String> {
+    let known = || Action::ALL.map(Action::name).join(", ");
+    Action::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
+}
 
 impl Arguments {
-    fn n_frames(&self, rate_hz: f64) -> u64 {
-        let of = |seconds: f64| (seconds * rate_hz).round() as u64;
-        match (self.frames, self.seconds) {
-            (Some(frames), _) => frames,
-            (None, Some(seconds)) => of(seconds.into()).max(1),
-            (None, None) => of(USUAL_S).max(LEAST_FRAMES),
-        }
-    }
-
-    /// * `machine`: what was measured, if something was.
-    fn cast(&self, machine: Option<&Machine>) -> Cast<'_> {
-        let rate_hz = self.rate.or(machine.map(Machine::rate_hz));
-        let rate_hz = rate_hz.unwrap_or(FULL_RATE_HZ);
-        let needed = machine.map_or(0, |_| (1500.0 / rate_hz) as u64);
-        Cast {
-            subject: self.subject,
+    fn options(&self) -> Options {
+        let limits = &self.limits;
+        Options {
+            out: self.out.clone(),
+            frames: self.frames,
+            seconds: self.seconds,
+            rate_hz: self.rate,
             action: self.action,
+            subject: self.subject,
             seed: self.seed,
-            rate_hz,
-            n_frames: self.n_frames(rate_hz),
-            n_cameras: N_CAMERAS,
-            deadline_ms: self.deadline_ms.unwrap_or(DEADLINE_MS.max(needed)),
-            name: &self.name,
-            command: "demo",
+            deadline_ms: self.deadline_ms,
+            kills: !self.no_kill,
+            limits: demo::Limits {
+                min_results: limits.min_results,
+                min_skeletons: limits.min_skeletons,
+                min_pcp3d: limits.min_pcp3d,
+                max_return_ms: limits.max_return_ms,
+                max_pause_ms: limits.max_pause_ms,
+            },
+            name: self.name.clone(),
         }
     }
 }
 
-/// What is written at the end: for programs, for people.
-const REPORTS: [&str; 2] = ["report.json", "report.html"];
-
-/// The camera that is killed, from 0.
-const VICTIM: usize = 2;
-/// When: after this share of the frames.
-const KILL_AFTER: f64 = 0.4;
-
-/// Runs the demo, and judges it.
+/// Runs the demo, and says what it found out.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let folder = stage::absolute(&arguments.out)?;
-    let mut gauge = gauge(arguments, &folder, globals)?;
-    let before = gauge.as_mut().map(Gauge::measure).transpose()?;
-    let cast = arguments.cast(before.as_ref());
-    let stage = Stage::new(&cast, folder)?;
-    remove_reports(&stage)?;
-    let loaded = load::read(&stage.write(&cast)?, &[])?;
-    let planned = Planned::new(&loaded.deployment, globals.level())?;
-    let processes: Vec<String> = planned.processes().map(str::to_owned).collect();
-    announce(&cast, before.as_ref(), globals, &stage, processes.len());
-    let mut strike = (!arguments.no_kill).then(|| {
-        let camera = &stage.rig.cameras()[VICTIM].name;
-        let at_frame = KILL_AFTER * cast.n_frames as f64;
-        Strike::new(Blow::Kill, &format!("capture-{VICTIM}"), at_frame).of_camera(camera)
-    });
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let ran = planned.carry_out(globals.quiet, &stop, &mut |event| {
-        strike
-            .as_mut()
-            .and_then(|it| it.note(event, now_nanos(), Blow::deal))
-    })?;
-    if ran.kind() == Some(ExitKind::Interrupted) {
+    let Some(outcome) = demo::run(&arguments.options(), globals.verbosity())? else {
         output::message("stopped: nothing is judged, and no report written");
         return Ok(ExitCode::from(ExitKind::Interrupted.status()));
-    }
-    let after = gauge.as_mut().map(Gauge::measure).transpose()?;
-    let cameras = stage.rig.cameras().iter();
-    let cameras: Vec<String> = cameras.map(|it| it.name.clone()).collect();
-    let moments = results::read(&loaded.deployment.output, &cameras)?;
-    let run = Run {
-        cameras: &cameras,
-        n_frames: cast.n_frames,
-        rate_hz: cast.rate_hz,
-        deadline_ms: cast.deadline_ms as f64,
-        machine: before
-            .zip(after)
-            .map(|(before, after)| before.slower(after)),
-        processes: &processes,
-        ran: &ran,
-        truth: &stage.truth(moments.iter().map(|it| it.frame))?,
-        moments: &moments,
-        killed: strike.as_ref().map(Strike::times),
-        session: planned.session(),
     };
-    conclude(
-        arguments,
-        globals,
-        &stage,
-        (&run, &loaded.deployment.output),
-    )
-}
-
-/// What measures this machine, if nobody says how many frames a second the cameras take.
-fn gauge(arguments: &Arguments, folder: &Path, globals: Globals) -> Result<Option<Gauge>, Failure> {
-    if arguments.rate.is_some() {
-        return Ok(None);
-    }
-    if !globals.quiet {
-        output::message("measuring this machine for about two seconds");
-    }
-    let cast = arguments.cast(None);
-    let stage = Stage::new(&cast, folder.to_path_buf())?;
-    let loaded = load::read(&stage.write(&cast)?, &[])?;
-    let planned = Planned::new(&loaded.deployment, globals.level())?;
-    Gauge::new(&stage, planned.resolved()).map(Some)
-}
-
-/// Judges a run that is over, writes the reports and says what they say.
-fn conclude(
-    arguments: &Arguments,
-    globals: Globals,
-    stage: &Stage,
-    (run, results): (&Run<'_>, &Path),
-) -> Result<ExitCode, Failure> {
-    let report = Report::new(run, &arguments.limits);
-    let json = report.json(run);
-    let page = page::page(run, &report, stage, results);
-    write_reports(stage, [format!("{json:#}\n"), ::report::run::html(&page)])?;
     if arguments.json {
-        output::json(&json)?;
+        output::json(&outcome.json)?;
     } else if !globals.quiet {
-        output::line(run.ran.text())?;
-        output::line(report.text(&stage.folder))?;
-        if let Some(machine) = run.machine {
-            output::line(format_args!("{}", machine.text()))?;
-        }
+        output::line(outcome.text)?;
     }
-    let status = if report.is_held() {
+    let status = if outcome.is_held {
         0
     } else {
         ExitKind::Limit.status()
     };
     Ok(ExitCode::from(status))
-}
-
-/// Those of an earlier demo must not be taken for this one's.
-fn remove_reports(stage: &Stage) -> Result<(), Failure> {
-    for name in REPORTS {
-        let file = stage.folder.join(name);
-        if file.exists() {
-            std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
-        }
-    }
-    Ok(())
-}
-
-fn write_reports(stage: &Stage, texts: [String; 2]) -> Result<(), Failure> {
-    for (name, text) in REPORTS.into_iter().zip(texts) {
-        let file = stage.folder.join(name);
-        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
-    }
-    Ok(())
-}
-
-fn announce(
-    cast: &Cast<'_>,
-    machine: Option<&Machine>,
-    globals: Globals,
-    stage: &Stage,
-    n_processes: usize,
-) {
-    if globals.quiet {
-        return;
-    }
-    if let Some(machine) = machine {
-        output::message(machine.text());
-    }
-    let (frames, rate) = (cast.n_frames, cast.rate_hz);
-    output::message(format_args!(
-        "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
-        stage.folder.display()
-    ));
-}
-
-/// A run that is over, and all that is known of it.
-#[derive(Debug, Clone, Copy)]
-struct Run<'a> {
-    /// Names, in the order of the rig.
-    cameras: &'a [String],
-    /// Frames of every camera, and how many a second.
-    n_frames: u64,
-    rate_hz: f64,
-    /// How long a stage waits for a view that is late.
-    deadline_ms: f64,
-    /// What was measured of the machine, before the run or after it, whichever is slower.
-    machine: Option<Machine>,
-    /// Names of all processes but the supervisor.
-    processes: &'a [String],
-    /// What `run` says of it.
-    ran: &'a launch::Report,
-    /// The results, and where the joints were.
-    moments: &'a [Moment],
-    truth: &'a [Vec<Point>],
-    /// What became of the camera that was to be killed, if one was.
-    killed: Option<Times>,
-    /// When the run was planned.
-    session: u64,
 }

@@ -1,21 +1,9 @@
 //! `parallax bench transport`: one hop between two processes, woken by an event and polling.
 
-use std::process::ExitCode;
-use std::time::Duration;
-
 use clap::Args;
-use launch::output;
-use report::run::Limit;
-use runtime::{ExitKind, Failure, OrFail as _, Policy, RealTime, Scheduling, Stop};
-use serde_json::{Value, json};
+use trials::bench::Transport;
 
-use super::hop::{self, Measured, Series};
-use super::occasion::Occasion;
-use super::report::Report;
 use super::{EXITS, Output};
-use crate::globals::Globals;
-use crate::spread::Spread;
-use crate::trial::limit;
 
 const HELP: &str = "\
 One process writes messages into shared memory at a steady pace, another receives them. A hop is the time from just \
@@ -63,7 +51,7 @@ pub(crate) struct Arguments {
     name: String,
     /// Where numbers go.
     #[command(flatten)]
-    output: Output,
+    pub(super) output: Output,
 }
 
 /// Bytes of a message, for the command line.
@@ -72,166 +60,19 @@ fn bytes(text: &str) -> Result<usize, String> {
     n.ok_or_else(|| "expected 16 to 1073741824 bytes".to_owned())
 }
 
-/// One row of the table.
-struct Row {
-    spins: bool,
-    bytes: usize,
-    measured: Measured,
-}
-
-/// Measures all series.
-pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let [sender, receiver] = arguments.scheduling()?;
-    let occasion = Occasion::now();
-    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    for denied in sender.apply() {
-        tracing::warn!("{denied}; going on without. Try: {}", denied.hint());
-    }
-    let mut rows = Vec::new();
-    for spins in [false, true] {
-        if arguments.spin && !spins {
-            continue;
-        }
-        for &bytes in &arguments.bytes {
-            let series = Series {
-                name: arguments.name.clone(),
-                bytes,
-                n_messages: arguments.messages,
-                interval: Duration::from_micros(arguments.interval_us),
-                receiver: Scheduling {
-                    spin: spins,
-                    ..receiver.clone()
-                },
-                log: globals.level(),
-            };
-            if !globals.quiet {
-                let (how, n) = (how(spins), arguments.messages);
-                output::message(format_args!("{n} messages of {bytes} bytes, {how} ..."));
-            }
-            let Some(measured) = hop::measure(&series, &stop)? else {
-                output::message("stopped: nothing is reported");
-                return Ok(ExitCode::from(ExitKind::Interrupted.status()));
-            };
-            rows.push(Row {
-                spins,
-                bytes,
-                measured,
-            });
-        }
-    }
-    arguments
-        .report(occasion, &rows)
-        .publish(&arguments.output, globals)
-}
-
-fn how(spins: bool) -> &'static str {
-    if spins {
-        "polling"
-    } else {
-        "woken by an event"
-    }
-}
-
 impl Arguments {
-    /// Of the sender and the receiver.
-    fn scheduling(&self) -> Result<[Scheduling; 2], Failure> {
-        if ![0, 2].contains(&self.cores.len()) {
-            let message = "--cores takes two: the sender's and the receiver's";
-            return Err(Failure::new(ExitKind::Usage, message));
+    /// What is to be measured.
+    pub(super) fn options(&self) -> Transport {
+        Transport {
+            messages: self.messages,
+            interval_us: self.interval_us,
+            bytes: self.bytes.clone(),
+            spin: self.spin,
+            cores: self.cores.clone(),
+            priority: self.priority,
+            max_event_us: self.max_event_us,
+            max_polled_us: self.max_polled_us,
+            name: self.name.clone(),
         }
-        let of = |index: usize| Scheduling {
-            cores: self.cores.get(index).copied().into_iter().collect(),
-            real_time: self.priority.map(|priority| RealTime {
-                policy: Policy::Fifo,
-                priority,
-            }),
-            ..Scheduling::default()
-        };
-        Ok([of(0), of(1)])
-    }
-
-    fn report(&self, occasion: Occasion, rows: &[Row]) -> Report {
-        let heads = ["receiver", "bytes", "p50", "p99", "p99.9", "max", "lost"];
-        let table = [heads.map(str::to_owned).to_vec()].into_iter();
-        let [sender, receiver] = [0, 1].map(|it| {
-            let core = self.cores.get(it).map(ToString::to_string);
-            core.unwrap_or_else(|| "any".to_owned())
-        });
-        Report {
-            bench: "transport",
-            title: "one hop between two processes, microseconds".to_owned(),
-            occasion,
-            settings: json!({
-                "messages": self.messages,
-                "interval_us": self.interval_us,
-                "sender_core": sender,
-                "receiver_core": receiver,
-                "real_time_priority": self.priority.map_or_else(|| "none".to_owned(), |it| it.to_string()),
-            }),
-            table: table.chain(rows.iter().map(Row::cells)).collect(),
-            notes: Vec::new(),
-            limits: self.limits(rows),
-            numbers: rows.iter().map(Row::json).collect(),
-        }
-    }
-
-    /// What was asked for, and what must always hold.
-    fn limits(&self, rows: &[Row]) -> Vec<Limit> {
-        let mut limits = Vec::new();
-        for (spins, most) in [(false, self.max_event_us), (true, self.max_polled_us)] {
-            let Some(most) = most else { continue };
-            for row in rows.iter().filter(|it| it.spins == spins) {
-                let what = format!("p50 of {} bytes {}, us", row.bytes, how(spins));
-                let got = row.measured.heard.hop_us.map(|it| it.p50);
-                limits.push(limit::at_most(&what, most, got));
-            }
-        }
-        let sum = |of: fn(&Measured) -> u64| rows.iter().map(|it| of(&it.measured)).sum::<u64>();
-        let compared = sum(|it| it.n_compared as u64);
-        limits.extend([
-            limit::at_least("messages asked where they lie", 1.0, Some(compared as f64)),
-            limit::at_most(
-                "of these elsewhere than they were written",
-                0.0,
-                Some((compared - sum(|it| it.n_same_place as u64)) as f64),
-            ),
-            limit::at_most("bytes copied", 0.0, Some(sum(|it| it.copied_bytes) as f64)),
-            limit::at_most(
-                "messages with another content",
-                0.0,
-                Some(sum(|it| it.heard.broken) as f64),
-            ),
-        ]);
-        limits
-    }
-}
-
-impl Row {
-    fn lost(&self) -> u64 {
-        self.measured
-            .sent
-            .saturating_sub(self.measured.heard.received)
-    }
-
-    fn cells(&self) -> Vec<String> {
-        let mut cells = vec![how(self.spins).to_owned(), self.bytes.to_string()];
-        cells.extend(Spread::cells(self.measured.heard.hop_us, 2));
-        cells.push(self.lost().to_string());
-        cells
-    }
-
-    fn json(&self) -> Value {
-        let it = &self.measured;
-        json!({
-            "receiver": if self.spins { "poll" } else { "event" },
-            "bytes": self.bytes,
-            "sent": it.sent,
-            "received": it.heard.received,
-            "lost": self.lost(),
-            "broken": it.heard.broken,
-            "hop_us": it.heard.hop_us,
-            "places": { "compared": it.n_compared, "same": it.n_same_place },
-            "copied_bytes": it.copied_bytes,
-        })
     }
 }

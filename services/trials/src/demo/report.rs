@@ -6,7 +6,8 @@ use std::path::Path;
 use report::run::Limit;
 use serde_json::{Value, json};
 
-use super::limits::{self, Asked, Measured};
+use super::limits::{self, Measured};
+use super::options::Limits;
 use super::score::{GAMMA, Score, score};
 use super::{Run, VICTIM};
 use crate::trial::cost::{Cost, Trace};
@@ -25,7 +26,7 @@ pub(super) struct Report {
 
 impl Report {
     /// Judges a run.
-    pub(super) fn new(run: &Run<'_>, asked: &Asked) -> Self {
+    pub(super) fn new(run: &Run<'_>, asked: &Limits) -> Self {
         let of = |wanted: &dyn Fn(&Moment) -> bool| {
             let pairs = run.moments.iter().zip(run.truth);
             let those = pairs.filter(|it| wanted(it.0));

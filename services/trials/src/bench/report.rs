@@ -3,63 +3,53 @@
 use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
-use std::process::ExitCode;
 
-use launch::{inputs, output};
+use launch::inputs;
 use report::run::Limit;
-use runtime::{ExitKind, Failure};
+use runtime::Failure;
 use serde_json::{Value, json};
 
-use super::Output;
 use super::occasion::Occasion;
-use crate::globals::Globals;
 
 /// What was measured.
 #[derive(Debug)]
-pub(super) struct Report {
+pub struct Report {
     /// Which bench: a word.
-    pub bench: &'static str,
+    pub(super) bench: &'static str,
     /// What the table shows, in a line.
-    pub title: String,
+    pub(super) title: String,
     /// When, where and of what; as it began.
-    pub occasion: Occasion,
+    pub(super) occasion: Occasion,
     /// What was set, by name.
-    pub settings: Value,
+    pub(super) settings: Value,
     /// The table: heads, then rows.
-    pub table: Vec<Vec<String>>,
+    pub(super) table: Vec<Vec<String>>,
     /// Lines below it.
-    pub notes: Vec<String>,
+    pub(super) notes: Vec<String>,
     /// What had to hold.
-    pub limits: Vec<Limit>,
+    pub(super) limits: Vec<Limit>,
     /// The numbers, for programs.
-    pub numbers: Value,
+    pub(super) numbers: Value,
 }
 
 impl Report {
-    /// Prints it, and appends it to the record; the exit code.
-    pub(super) fn publish(&self, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
-        if let Some(file) = &to.record {
-            self.append(file)
-                .map_err(|error| inputs::in_file(file, &error))?;
-        }
-        if to.json {
-            output::json(&self.json())?;
-        } else if !globals.quiet {
-            output::line(self.text())?;
-        }
-        let status = if self.is_held() {
-            0
-        } else {
-            ExitKind::Limit.status()
-        };
-        Ok(ExitCode::from(status))
-    }
-
-    fn is_held(&self) -> bool {
+    /// Whether no limit was missed.
+    pub fn is_held(&self) -> bool {
         self.limits.iter().all(|it| it.held)
     }
 
-    fn append(&self, file: &Path) -> std::io::Result<()> {
+    /// Appends it to a record, as Markdown with date, machine, commit and settings. The file and its folder are made if
+    /// they are not there.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written to.
+    pub fn append(&self, file: &Path) -> Result<(), Failure> {
+        let added = self.add(file);
+        added.map_err(|error| inputs::in_file(file, &error))
+    }
+
+    fn add(&self, file: &Path) -> std::io::Result<()> {
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder)?;
         }
@@ -75,7 +65,7 @@ impl Report {
     }
 
     /// For programs.
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         let limits = self.limits.iter().map(
             |it| json!({ "what": it.what, "asked": it.asked, "got": it.got, "held": it.held }),
         );
@@ -91,7 +81,7 @@ impl Report {
     }
 
     /// For people.
-    fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let mut lines = vec![self.title.clone()];
         lines.extend(self.occasion.text().lines().map(str::to_owned));
         lines.push(settings(&self.settings));

@@ -8,10 +8,12 @@ use serde::Serialize;
 use serde_json::json;
 use supervise::Event;
 
+use super::aim::{STRIKE_AFTER, frame_at};
 use super::ground::Ground;
-use super::judge::{Aftermath, Asked};
+use super::judge::Aftermath;
+use super::options::{Limits, Options};
+use super::scenario::STALL;
 use super::verdict::{Verdict, ms};
-use super::{Arguments, STRIKE_AFTER, frame_at};
 use crate::trial::limit::{at_least, at_most};
 
 /// How long it stands still, nanoseconds.
@@ -20,8 +22,6 @@ const STALL_NANOS: u64 = 3_000_000_000;
 const PATIENT: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
 /// Where the latest frame wins, results go on at no less than this share of the rate before.
 const SHARE: f64 = 0.5;
-/// What is tried.
-pub(super) const NAME: &str = "stall-results";
 
 /// A recorder that is to stand still, or has.
 #[derive(Debug, Default)]
@@ -126,7 +126,7 @@ impl Stall {
 
 /// What must hold: in realtime the others go on; where nothing may be lost, nothing is.
 fn judge(
-    asked: &Asked,
+    asked: &Limits,
     it: Option<&Stalled>,
     every_frame: Option<u64>,
     after: &Aftermath,
@@ -149,8 +149,8 @@ fn judge(
 }
 
 /// Stops the recorder for some seconds.
-pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
-    let planned = ground.plan(NAME, &PATIENT)?;
+pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
+    let planned = ground.plan(STALL, &PATIENT)?;
     let mut stall = Stall::new(frame_at(&planned, STRIKE_AFTER) as u64);
     let ran = ground.watch(&planned, &mut |event| {
         stall.note(event, runtime::now_nanos(), |stops, pid| {
@@ -167,7 +167,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     let every_frame = is_lossless.then(|| planned.resolved().n_frames());
     let [before, meanwhile] = it.map_or([0.0; 2], |it| it.rates_hz);
     Ok(Verdict {
-        scenario: NAME.to_owned(),
+        scenario: STALL.to_owned(),
         measured: format!(
             "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
             ms(it.map(|it| it.stall_ms)),
@@ -175,7 +175,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
         ),
         more: Vec::new(),
         numbers: json!(it),
-        limits: judge(&arguments.limits, it.as_ref(), every_frame, &after),
+        limits: judge(&options.limits, it.as_ref(), every_frame, &after),
         run: ran.json(),
     })
 }
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn who_is_held_up_has_missed_and_who_loses_nothing_may_be() {
-        let asked = Asked {
+        let asked = Limits {
             max_return_ms: 1000.0,
             max_pause_ms: 1000.0,
         };

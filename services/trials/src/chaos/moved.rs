@@ -10,15 +10,14 @@ use nalgebra::{UnitQuaternion, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
-use super::Arguments;
 use super::ground::Ground;
+use super::options::Options;
+use super::scenario::MOVED;
 use super::verdict::Verdict;
 use crate::trial::limit::at_least;
 
 /// By so much it is turned.
 const DEGREES: f64 = 2.0;
-/// What is tried.
-pub(super) const NAME: &str = "camera-moved";
 
 /// Turns a camera of a rig a little, up, down or to a side.
 fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
@@ -37,17 +36,17 @@ fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
 }
 
 /// Runs the deployment with the calibration of one camera wrong.
-pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
-    let plain = ground.plan(NAME, &[])?;
+pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
+    let plain = ground.plan(MOVED, &[])?;
     let deployment = &plain.resolved().deployment;
-    let mut random = Rng::with_seed(arguments.seed);
+    let mut random = Rng::with_seed(options.seed);
     let cameras = &deployment.cameras;
     let camera = cameras[random.usize(..cameras.len())].name.clone();
     let rig = inputs::rig_of(deployment)?;
     let rig = moved(&rig, &camera, &mut random)?;
     let file: PathBuf = ground.folder.join("moved-rig.toml");
     geometry::files::write(&file, Format::Own, &rig).or_fail(ExitKind::Input)?;
-    let planned = ground.plan_with(NAME, &[], &|it| {
+    let planned = ground.plan_with(MOVED, &[], &|it| {
         it.rig.clone_from(&file);
         it.unit = None;
     })?;
@@ -74,7 +73,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
     let named = at_least("it is named", 1.0, Some(f64::from(u8::from(is_named))));
     let limits = [named].into_iter().chain(after.judge(0)).collect();
     Ok(Verdict {
-        scenario: NAME.to_owned(),
+        scenario: MOVED.to_owned(),
         measured,
         more: Vec::new(),
         numbers: json!({ "camera": camera, "fits": fits }),

@@ -1,9 +1,9 @@
 //! What must hold when a process is struck: numbers in, verdicts out.
 
-use clap::Args;
 use report::run::Limit;
 
 use super::census::Sample;
+use super::options::Limits;
 use super::scenario::service_of;
 use crate::spread::Spread;
 use crate::trial::cost::Cost;
@@ -21,19 +21,6 @@ const HELD: u64 = 2;
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
-
-/// Limits that can be asked for.
-#[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "Limits")]
-pub(super) struct Asked {
-    /// Longest time from the kill until the process has a part in a result again (or, of those that no result names,
-    /// until it has done something), milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 8000.0)]
-    pub max_return_ms: f64,
-    /// Longest time without a result while a process is away without which others can go on, milliseconds.
-    #[arg(long, value_name = "MS", default_value_t = 2000.0)]
-    pub max_pause_ms: f64,
-}
 
 /// What is left of a run that is over.
 #[derive(Debug, Clone, Default)]
@@ -82,7 +69,7 @@ impl Aftermath {
 /// * `hang_ms`: how long a stopped process may give no sign of life, or a spinning one of work, before the supervisor
 ///   ends it.
 pub(super) fn once(
-    asked: &Asked,
+    asked: &Limits,
     blow: Blow,
     process: &str,
     hang_ms: f64,
@@ -123,7 +110,7 @@ pub(super) struct Barraged {
 }
 
 /// Judges a run in which one process after the other was killed.
-pub(super) fn random(asked: &Asked, it: &Barraged, after: &Aftermath) -> Vec<Limit> {
+pub(super) fn random(asked: &Limits, it: &Barraged, after: &Aftermath) -> Vec<Limit> {
     let mut limits = vec![
         at_least("kills", 1.0, Some(it.n_kills as f64)),
         at_least(
@@ -178,7 +165,7 @@ pub(super) struct Orphaned {
 /// Judges a run whose supervisor was killed, and the next one.
 ///
 /// * `after`: of the next one.
-pub(super) fn supervisor(asked: &Asked, it: &Orphaned, after: &Aftermath) -> Vec<Limit> {
+pub(super) fn supervisor(asked: &Limits, it: &Orphaned, after: &Aftermath) -> Vec<Limit> {
     let mut limits = vec![
         at_most("its processes ended after, ms", NOTICE_MS, it.ended_ms),
         at_most(
@@ -195,7 +182,7 @@ pub(super) fn supervisor(asked: &Asked, it: &Orphaned, after: &Aftermath) -> Vec
 mod tests {
     use super::*;
 
-    const ASKED: Asked = Asked {
+    const ASKED: Limits = Limits {
         max_return_ms: 8000.0,
         max_pause_ms: 2000.0,
     };

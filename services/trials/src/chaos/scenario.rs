@@ -2,13 +2,17 @@
 
 use launch::SERVICES;
 
-use super::camera::CameraFault;
-use super::{moved, stall};
+use super::fault::CameraFault;
 use crate::trial::strike::Blow;
+
+/// The name of the scenario in which a camera was moved.
+pub(super) const MOVED: &str = "camera-moved";
+/// The name of the scenario in which the recorder stops reading.
+pub(super) const STALL: &str = "stall-results";
 
 /// A fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Scenario {
+pub enum Scenario {
     /// One process of a service is struck once.
     Once(Blow, &'static str),
     /// Processes chosen at random are killed, one after the other.
@@ -25,7 +29,7 @@ pub(super) enum Scenario {
 
 impl Scenario {
     /// All of them.
-    pub(super) fn all() -> Vec<Self> {
+    pub fn all() -> Vec<Self> {
         let once = |blow| SERVICES.map(|it| Self::Once(blow, it));
         let mut all = Vec::from(once(Blow::Kill));
         all.push(Self::Random);
@@ -40,13 +44,17 @@ impl Scenario {
     }
 
     /// The one of a name, for the command line.
-    pub(super) fn by_name(name: &str) -> Result<Self, String> {
+    ///
+    /// # Errors
+    ///
+    /// There is none of that name: in words, for people.
+    pub fn by_name(name: &str) -> Result<Self, String> {
         let found = Self::all().into_iter().find(|it| it.name() == name);
         found.ok_or_else(|| "there is none of this name; --list names them all".to_owned())
     }
 
     /// Its name.
-    pub(super) fn name(self) -> String {
+    pub fn name(self) -> String {
         match self {
             Self::Once(Blow::Kill, service) => format!("kill-{service}"),
             Self::Once(Blow::Stop, service) => format!("hang-{service}"),
@@ -54,13 +62,13 @@ impl Scenario {
             Self::Random => "kill-random".to_owned(),
             Self::Supervisor => "kill-supervisor".to_owned(),
             Self::Camera(it) => it.words()[0].to_owned(),
-            Self::Moved => moved::NAME.to_owned(),
-            Self::Stall => stall::NAME.to_owned(),
+            Self::Moved => MOVED.to_owned(),
+            Self::Stall => STALL.to_owned(),
         }
     }
 
     /// What happens, for people.
-    pub(super) fn says(self) -> String {
+    pub fn says(self) -> String {
         match self {
             Self::Once(Blow::Kill, service) => format!("a {service} process is killed (SIGKILL)"),
             Self::Once(Blow::Stop, service) => {
@@ -84,7 +92,7 @@ impl Scenario {
     }
 
     /// Whether a deployment has the processes for it.
-    pub(super) fn is_possible(self, processes: &[String]) -> bool {
+    pub fn is_possible(self, processes: &[String]) -> bool {
         match self {
             Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,

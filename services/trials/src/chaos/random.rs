@@ -3,13 +3,15 @@
 use runtime::{Failure, now_nanos};
 use serde_json::json;
 
+use super::aim::{frame_at, trace_of};
 use super::barrage::{Barrage, Kill};
 use super::census::{self, Census};
 use super::ground::Ground;
 use super::judge::{self, Barraged};
+use super::options::Options;
 use super::scenario::Scenario;
+use super::series;
 use super::verdict::{self, Verdict};
-use super::{Arguments, frame_at, series, trace_of};
 use crate::spread::Spread;
 
 /// Nobody is killed after this share of the frames.
@@ -18,11 +20,11 @@ const UNTIL: f64 = 0.8;
 const PERIOD: u64 = 2_000_000_000;
 
 /// Kills one process after the other, chosen at random, and judges what became of the run.
-pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict, Failure> {
+pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
     let scenario = Scenario::Random.name();
     let planned = ground.plan(&scenario, &[])?;
     let until = frame_at(&planned, UNTIL) as u64;
-    let mut barrage = Barrage::new(arguments.seed, PERIOD, until);
+    let mut barrage = Barrage::new(options.seed, PERIOD, until);
     let mut census = Census::default();
     let namespace = &planned.plan().namespace;
     let ran = ground.watch(&planned, &mut |event| {
@@ -44,7 +46,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
         away_ms: Spread::of(kills.iter().filter_map(away_ms).collect()),
         held: census.ends(),
     };
-    let length = u64::from(arguments.part_seconds) * 1_000_000_000;
+    let length = u64::from(options.part_seconds) * 1_000_000_000;
     let parts = series::parts(length, session, kills, &census, &ran.moments);
     Ok(Verdict {
         scenario,
@@ -56,7 +58,7 @@ pub(super) fn attempt(ground: &Ground, arguments: &Arguments) -> Result<Verdict,
             "parts": parts,
         }),
         more: series::table(&parts),
-        limits: judge::random(&arguments.limits, &it, &after),
+        limits: judge::random(&options.limits, &it, &after),
         run: ran.json(),
     })
 }

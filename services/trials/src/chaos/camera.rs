@@ -1,16 +1,17 @@
 //! A camera that fails while the run goes on: what is said of its frames, and when it is back.
 
 use fastrand::Rng;
-use messages::Status;
 use report::run::Limit;
 use runtime::Failure;
 use serde::Serialize;
 use serde_json::json;
 
+use super::aim::{STRIKE_AFTER, frame_at};
+use super::fault::CameraFault;
 use super::ground::Ground;
-use super::judge::{Aftermath, Asked};
+use super::judge::Aftermath;
+use super::options::{Limits, Options};
 use super::verdict::{Verdict, ms};
-use super::{Arguments, STRIKE_AFTER, frame_at};
 use crate::trial::limit::{at_least, at_most};
 use crate::trial::results::Moment;
 
@@ -18,86 +19,6 @@ use crate::trial::results::Moment;
 const SHARE: f64 = 0.2;
 /// Repetitions from which on a picture is called frozen, so that a short run shows it.
 const FROZEN_AFTER: &str = "capture.frozen_after=2";
-
-/// How a camera fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CameraFault {
-    /// It is gone.
-    Unplug,
-    /// Its picture stays as it is.
-    Freeze,
-    /// Its clock jumps, goes back and stands still.
-    Clock,
-    /// Its pictures have another size.
-    Size,
-    /// It leaves out every second frame.
-    Slow,
-    /// Its pictures cannot be decoded.
-    Damage,
-}
-
-impl CameraFault {
-    /// All of them.
-    pub(super) const ALL: [Self; 6] = [
-        Self::Unplug,
-        Self::Freeze,
-        Self::Clock,
-        Self::Size,
-        Self::Slow,
-        Self::Damage,
-    ];
-
-    /// Its name, and what happens, for people.
-    pub(super) fn words(self) -> [&'static str; 2] {
-        match self {
-            Self::Unplug => [
-                "camera-unplug",
-                "a camera is unplugged, and plugged in again",
-            ],
-            Self::Freeze => [
-                "camera-freeze",
-                "a camera gives the same picture again and again",
-            ],
-            Self::Clock => [
-                "camera-clock",
-                "the clock of a camera jumps, goes back and stands still",
-            ],
-            Self::Size => ["camera-size", "a camera gives pictures of another size"],
-            Self::Slow => ["camera-slow", "a camera leaves out every second frame"],
-            Self::Damage => [
-                "camera-damage",
-                "the pictures of a camera cannot be decoded",
-            ],
-        }
-    }
-
-    /// Faults of the source that make it up, which share the time, and what is to be said of each.
-    fn parts(self) -> &'static [(&'static str, Status)] {
-        match self {
-            Self::Unplug => &[("unplug", Status::UNPLUGGED)],
-            Self::Freeze => &[("freeze", Status::FROZEN)],
-            Self::Clock => &[
-                ("jump", Status::CLOCK_JUMPED),
-                ("back", Status::TIME_WENT_BACK),
-                ("repeat", Status::TIME_REPEATED),
-            ],
-            Self::Size => &[("size", Status::WRONG_SIZE)],
-            Self::Slow => &[("slow", Status::LEFT_OUT)],
-            Self::Damage => &[("damage", Status::DAMAGED)],
-        }
-    }
-
-    /// As a setting of a camera.
-    ///
-    /// * `span`: first frame, and one beyond the last.
-    fn setting(self, [from, to]: [u64; 2]) -> String {
-        let parts = self.parts();
-        let each = ((to - from) / parts.len() as u64).max(1);
-        let faults = parts.iter().zip(0_u64..);
-        let faults = faults.map(|((name, _), nth)| format!("{name}@{}+{each}", from + nth * each));
-        faults.collect::<Vec<_>>().join(", ")
-    }
-}
 
 /// What became of a run in which a camera failed. Times are milliseconds.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -154,7 +75,7 @@ impl Failed {
     }
 
     /// What must hold.
-    pub(super) fn judge(&self, asked: &Asked, after: &Aftermath) -> Vec<Limit> {
+    pub(super) fn judge(&self, asked: &Limits, after: &Aftermath) -> Vec<Limit> {
         let flagged = self.flagged.iter();
         let flagged = flagged
             .map(|(cause, n)| at_least(&format!("frames called {cause}"), 1.0, Some(*n as f64)));
@@ -194,13 +115,13 @@ impl Failed {
 /// Lets a camera chosen at random fail.
 pub(super) fn attempt(
     ground: &Ground,
-    arguments: &Arguments,
+    options: &Options,
     fault: CameraFault,
 ) -> Result<Verdict, Failure> {
     let [scenario, _] = fault.words();
     let plain = ground.plan(scenario, &[])?;
     let cameras = &plain.resolved().deployment.cameras;
-    let view = Rng::with_seed(arguments.seed).usize(..cameras.len());
+    let view = Rng::with_seed(options.seed).usize(..cameras.len());
     let camera = cameras[view].name.clone();
     let [from, to] =
         [STRIKE_AFTER, STRIKE_AFTER + SHARE].map(|share| frame_at(&plain, share) as u64);
@@ -219,7 +140,7 @@ pub(super) fn attempt(
         measured: it.measured(after.n_results),
         more: Vec::new(),
         numbers: json!(it),
-        limits: it.judge(&arguments.limits, &after),
+        limits: it.judge(&options.limits, &after),
         run: ran.json(),
     })
 }
@@ -228,15 +149,6 @@ pub(super) fn attempt(
 mod tests {
     use super::*;
     use crate::trial::results::Seen;
-
-    #[test]
-    fn every_fault_is_one_that_a_camera_can_have() {
-        for it in CameraFault::ALL {
-            let faults: deployment::capture::Faults = it.setting([40, 60]).parse().unwrap();
-            assert!(faults.at(39).is_none() && faults.at(40).is_some(), "{it:?}");
-            assert!(faults.at(57).is_some() && faults.at(60).is_none(), "{it:?}");
-        }
-    }
 
     /// A result of two views, the second of which is missing for a reason.
     fn moment(frame: u64, sent_ms: f64, missing: Option<&str>) -> Moment {
@@ -258,7 +170,7 @@ mod tests {
     }
 
     fn missed(it: &Failed) -> Vec<String> {
-        let asked = Asked {
+        let asked = Limits {
             max_return_ms: 500.0,
             max_pause_ms: 200.0,
         };

@@ -1,38 +1,15 @@
 //! The limits by which the demo judges itself.
 
-use clap::Args;
 use launch::ViewReport;
 use report::run::Limit;
 
+use super::options::Limits;
 use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 
 /// What a process that is killed may hold, and what its last report may not have counted: frames.
 const HELD: u64 = 2;
-
-/// Limits that can be asked for.
-#[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "Limits")]
-pub(super) struct Asked {
-    /// Least share of the frames with a result, percent; slow machines pass frames over, which is counted.
-    #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
-    min_results: f64,
-    /// Least share of the results with a skeleton, percent.
-    #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
-    min_skeletons: f64,
-    /// Least PCP3D at gamma 0.5 over all results, percent.
-    #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
-    min_pcp3d: f64,
-    /// Longest time until the killed camera has a frame in a result again, milliseconds on a machine that keeps up
-    /// with 5 frames a second.
-    #[arg(long, value_name = "MS", default_value_t = 8000.0)]
-    max_return_ms: f64,
-    /// Longest time without a result while the killed camera is away, milliseconds on a machine that keeps up with
-    /// 5 frames a second.
-    #[arg(long, value_name = "MS", default_value_t = 2000.0)]
-    max_pause_ms: f64,
-}
 
 /// What is judged.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +37,7 @@ pub(super) struct Measured<'a> {
 }
 
 /// Judges a run.
-pub(super) fn judge(asked: &Asked, it: &Measured<'_>) -> Vec<Limit> {
+pub(super) fn judge(asked: &Limits, it: &Measured<'_>) -> Vec<Limit> {
     let [results, skeletons] = it.n_results;
     let mut limits = vec![
         at_least(
@@ -121,7 +98,7 @@ fn share(n: usize, of: usize) -> Option<f64> {
 mod tests {
     use super::*;
 
-    const ASKED: Asked = Asked {
+    const ASKED: Limits = Limits {
         min_results: 10.0,
         min_skeletons: 90.0,
         min_pcp3d: 50.0,

@@ -7,7 +7,7 @@ use supervise::Event;
 
 /// What is done to a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Blow {
+pub enum Blow {
     /// It ends at once, as by a crash.
     Kill,
     /// It stands still from then on.

@@ -10,23 +10,23 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Scene, Settings, View};
 
-use crate::globals::Globals;
-
 /// Writes the first pictures of every camera into a folder of its name; false if it was stopped.
+///
+/// * `quiet`: shows no progress.
 pub(super) fn draw(
     settings: &Settings,
     n_frames: u64,
     folder: &Path,
     stop: &Stop,
-    globals: Globals,
+    quiet: bool,
 ) -> Result<bool, Failure> {
     let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Run)?);
     let cameras = scene.rig().cameras();
     let n_pictures = n_frames * cameras.len() as u64;
-    if !globals.quiet {
+    if !quiet {
         output::message(format_args!("making {n_pictures} pictures ..."));
     }
-    let bar = if globals.quiet || !output::is_lively() {
+    let bar = if quiet || !output::is_lively() {
         ProgressBar::hidden()
     } else {
         ProgressBar::new(n_pictures)

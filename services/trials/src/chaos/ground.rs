@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 
 use deployment::Deployment;
+use launch::output::Verbosity;
 use launch::{Planned, Report, inputs, load};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::Action;
 use serde_json::Value;
 use supervise::Event;
 
-use super::Arguments;
 use super::census;
 use super::judge::Aftermath;
-use crate::globals::Globals;
+use super::options::Options;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
 
@@ -30,7 +30,7 @@ pub(super) struct Ground {
     /// What is replaced in the file.
     pub set: Vec<String>,
     /// How much is said.
-    pub globals: Globals,
+    pub verbosity: Verbosity,
     /// Ends everything.
     pub stop: Stop,
 }
@@ -48,23 +48,23 @@ pub(super) struct Ran {
 
 impl Ground {
     /// Looks at the deployment, or makes the one with cameras that do not exist.
-    pub(super) fn new(arguments: &Arguments, globals: Globals) -> Result<Self, Failure> {
-        let folder = stage::absolute(&arguments.out)?;
+    pub(super) fn new(options: &Options, verbosity: Verbosity) -> Result<Self, Failure> {
+        let folder = stage::absolute(&options.out)?;
         inputs::make_folder(&folder)?;
         let mut ground = Self {
             file: PathBuf::new(),
             folder,
             set: Vec::new(),
-            globals,
+            verbosity,
             stop: Stop::on_signals().or_fail(ExitKind::Run)?,
         };
-        let mut name = arguments.name.clone();
-        if let Some(file) = &arguments.deployment {
+        let mut name = options.name.clone();
+        if let Some(file) = &options.deployment {
             ground.file = stage::absolute(file)?;
-            let its_name = ground.shorten(arguments.seconds)?;
+            let its_name = ground.shorten(options.seconds)?;
             name.get_or_insert(format!("{its_name}-chaos"));
         } else {
-            ground.file = ground.play(arguments)?;
+            ground.file = ground.play(options)?;
         }
         if let Some(name) = name {
             ground.set.push(format!("name={}", toml::Value::from(name)));
@@ -75,13 +75,13 @@ impl Ground {
     }
 
     /// Writes the deployment with cameras that do not exist; its file.
-    fn play(&self, arguments: &Arguments) -> Result<PathBuf, Failure> {
+    fn play(&self, options: &Options) -> Result<PathBuf, Failure> {
         let cast = Cast {
             subject: 1,
             action: Action::Walking,
-            seed: arguments.seed,
+            seed: options.seed,
             rate_hz: RATE_HZ,
-            n_frames: (RATE_HZ * f64::from(arguments.seconds)) as u64,
+            n_frames: (RATE_HZ * f64::from(options.seconds)) as u64,
             n_cameras: N_CAMERAS,
             deadline_ms: DEADLINE_MS,
             name: "chaos",
@@ -134,7 +134,7 @@ impl Ground {
         let mut loaded = load::read(&self.file, &self.set(more))?;
         loaded.deployment.output = self.output(scenario);
         change(&mut loaded.deployment);
-        Planned::new(&loaded.deployment, self.globals.level())
+        Planned::new(&loaded.deployment, self.verbosity.level)
     }
 
     /// Runs it to its end, whatever that is.
@@ -145,7 +145,7 @@ impl Ground {
         planned: &Planned,
         onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
     ) -> Ran {
-        let report = planned.carry_out(self.globals.quiet, &self.stop, onlooker);
+        let report = planned.carry_out(self.verbosity.quiet, &self.stop, onlooker);
         let deployment = &planned.resolved().deployment;
         let names = deployment.cameras.iter().map(|it| it.name.clone());
         let names: Vec<String> = names.collect();

@@ -5,15 +5,15 @@ use std::fs;
 use std::path::PathBuf;
 
 use deployment::Deployment;
+use launch::output::Verbosity;
 use launch::{Planned, Report, inputs, load};
 use runfiles::Percentiles;
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use scene::Action;
 use serde_json::{Value, json};
 
-use super::load::Arguments;
+use super::options::Options;
 use super::pictures;
-use crate::globals::Globals;
 use crate::spread::Spread;
 use crate::trial::results::{self, Moment};
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
@@ -129,22 +129,22 @@ pub(super) struct Course {
     /// What is replaced in the file for all runs.
     set: Vec<String>,
     n_views: usize,
-    globals: Globals,
+    verbosity: Verbosity,
 }
 
 impl Course {
     /// Looks at the deployment, or makes the one with cameras that do not exist. `None` if it was stopped meanwhile.
     pub(super) fn new(
-        arguments: &Arguments,
-        globals: Globals,
+        options: &Options,
+        verbosity: Verbosity,
         stop: &Stop,
     ) -> Result<Option<Self>, Failure> {
-        let folder = stage::absolute(&arguments.out)?;
+        let folder = stage::absolute(&options.out)?;
         inputs::make_folder(&folder)?;
-        let name = toml::Value::from(arguments.name.clone());
-        let mut set = arguments.set.clone();
+        let name = toml::Value::from(options.name.clone());
+        let mut set = options.set.clone();
         set.extend([format!("name={name}"), "results.overlay_every=0".to_owned()]);
-        if arguments.spin {
+        if options.spin {
             set.push("runtime.spin=true".to_owned());
         }
         let mut course = Self {
@@ -152,16 +152,16 @@ impl Course {
             folder,
             pictures: None,
             set,
-            n_views: arguments.views.unwrap_or(N_CAMERAS),
-            globals,
+            n_views: options.views.unwrap_or(N_CAMERAS),
+            verbosity,
         };
-        let is_ready = match &arguments.deployment {
+        let is_ready = match &options.deployment {
             Some(file) => {
                 course.file = stage::absolute(file)?;
-                course.shorten(arguments)?;
+                course.shorten(options)?;
                 true
             }
-            None => course.play(arguments, stop)?,
+            None => course.play(options, stop)?,
         };
         Ok(is_ready.then_some(course))
     }
@@ -172,13 +172,13 @@ impl Course {
     }
 
     /// Writes the deployment with cameras that do not exist, and their pictures; false if it was stopped.
-    fn play(&mut self, arguments: &Arguments, stop: &Stop) -> Result<bool, Failure> {
-        let n_frames = (arguments.rate * f64::from(arguments.seconds)).round() as u64;
+    fn play(&mut self, options: &Options, stop: &Stop) -> Result<bool, Failure> {
+        let n_frames = (options.rate_hz * f64::from(options.seconds)).round() as u64;
         let cast = Cast {
             subject: 1,
             action: Action::Walking,
-            seed: arguments.seed,
-            rate_hz: arguments.rate,
+            seed: options.seed,
+            rate_hz: options.rate_hz,
             n_frames: n_frames.max(1),
             n_cameras: self.n_views,
             deadline_ms: DEADLINE_MS,
@@ -187,29 +187,35 @@ impl Course {
         };
         let stage = Stage::new(&cast, self.folder.clone())?;
         self.file = stage.write(&cast)?;
-        if arguments.live {
+        if options.live {
             return Ok(true);
         }
         let folder = self.folder.join("pictures");
-        let is_done = pictures::draw(&stage.settings, cast.n_frames, &folder, stop, self.globals)?;
+        let is_done = pictures::draw(
+            &stage.settings,
+            cast.n_frames,
+            &folder,
+            stop,
+            self.verbosity.quiet,
+        )?;
         self.pictures = Some(folder);
         Ok(is_done)
     }
 
     /// Takes no more of the footage than some seconds, and no more cameras than there are.
-    fn shorten(&mut self, arguments: &Arguments) -> Result<(), Failure> {
+    fn shorten(&mut self, options: &Options) -> Result<(), Failure> {
         let deployment = load::read(&self.file, &self.set)?.deployment;
         let n_cameras = deployment.cameras.len();
-        self.n_views = arguments.views.unwrap_or(n_cameras);
+        self.n_views = options.views.unwrap_or(n_cameras);
         if self.n_views > n_cameras {
             let message = format!("--views {}: the deployment has {n_cameras}", self.n_views);
             return Err(Failure::new(ExitKind::Usage, message));
         }
-        let planned = Planned::new(&deployment, self.globals.level())?;
+        let planned = Planned::new(&deployment, self.verbosity.level)?;
         let resolved = planned.resolved();
         if let Some(hz) = resolved.frame_rate_hz() {
             let step = deployment.capture.frame_step.max(1) as f64;
-            let n_frames = ((hz * f64::from(arguments.seconds) / step) as u64).max(1);
+            let n_frames = ((hz * f64::from(options.seconds) / step) as u64).max(1);
             if n_frames < resolved.n_frames() {
                 self.set.push(format!("capture.n_frames={n_frames}"));
             }
@@ -235,11 +241,11 @@ impl Course {
     /// Runs it. `None` if it was stopped.
     pub(super) fn measure(&self, case: Case, stop: &Stop) -> Result<Option<Measured>, Failure> {
         let deployment = self.deployment(case)?;
-        let planned = Planned::new(&deployment, self.globals.level())?;
+        let planned = Planned::new(&deployment, self.verbosity.level)?;
         let victim = format!("capture-{}", case.n_views - 1);
         let mut strike = case.has_dead.then(|| Strike::new(Blow::Kill, &victim, 0.0));
         let before = cpu_seconds_of_children()?;
-        let report = planned.carry_out(self.globals.quiet, stop, &mut |event| {
+        let report = planned.carry_out(self.verbosity.quiet, stop, &mut |event| {
             strike
                 .as_mut()
                 .and_then(|it| it.note(event, now_nanos(), Blow::deal))

@@ -1,10 +1,9 @@
-//! The receiving process of `parallax bench transport`: takes in what is sent, and says how long it was on its way.
+//! The receiving process of a series of messages: takes in what is sent, and says how long it was on its way.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::Args;
 use launch::output;
 use messages::{FrameHeader, Status, topic};
 use runtime::{Failure, Launch, Mapped, Sample, Service, Woken, mapped_at, now_nanos, run_service};
@@ -16,14 +15,6 @@ use crate::spread::Spread;
 pub(super) const WARM_UP: u64 = 64;
 /// Of these, how many are asked where they lie.
 pub(super) const N_PLACED: u64 = 32;
-
-/// What the other process says.
-#[derive(Debug, Args)]
-pub(crate) struct Arguments {
-    /// About the deployment.
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    rest: Vec<OsString>,
-}
 
 /// Where the bytes of a message lie: file and place in it. The same numbers in two processes are the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,13 +54,19 @@ pub(super) struct Heard {
     pub copied_bytes: u64,
 }
 
-/// Becomes the receiver.
-pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let (launch, _) = Launch::from_args(arguments.rest.iter().cloned())?;
-    Ok(run_service(launch, receive))
+/// Becomes the receiving process of [`transport`](super::transport).
+///
+/// * `arguments`: what that process says about the deployment.
+///
+/// # Errors
+///
+/// The arguments are not those of a process.
+pub fn receive(arguments: &[OsString]) -> Result<ExitCode, Failure> {
+    let (launch, _) = Launch::from_args(arguments.iter().cloned())?;
+    Ok(run_service(launch, hear))
 }
 
-fn receive(service: &Service) -> Result<(), Failure> {
+fn hear(service: &Service) -> Result<(), Failure> {
     let bus = service.bus();
     let mut waiter = bus.waiter();
     let port = bus.slice_subscriber::<u8, FrameHeader>(&topic::frame(0), &mut waiter)?;

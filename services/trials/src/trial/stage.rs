@@ -156,12 +156,6 @@ fn smaller(camera: &Camera) -> Camera {
     }
 }
 
-/// The action of a name, for the command line.
-pub(crate) fn action(name: &str) -> Result<Action, String> {
-    let known = || Action::ALL.map(Action::name).join(", ");
-    Action::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
-}
-
 /// An absolute path, for processes that work in any folder.
 pub(crate) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
     std::path::absolute(folder).or_fail(ExitKind::Usage)

@@ -1,0 +1,188 @@
+//! Whole deployments under load.
+
+use launch::output::{self, Verbosity};
+use report::run::Limit;
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use serde_json::{Value, json};
+
+use super::course::{Case, Course, Measured};
+use super::occasion::Occasion;
+use super::options::Options;
+use super::report::Report;
+use crate::spread::Spread;
+use crate::trial::limit;
+
+/// Which runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// All cameras at the pace of the clock; one dead.
+    Latency,
+    /// All cameras, every frame.
+    Throughput,
+    /// One camera more from run to run; one dead.
+    Scale,
+}
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Latency => "latency",
+            Self::Throughput => "throughput",
+            Self::Scale => "scale",
+        }
+    }
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Latency => "from capture to result at the pace of the clock, milliseconds",
+            Self::Throughput => "every frame as fast as it is taken, milliseconds",
+            Self::Scale => "one camera more from run to run, milliseconds",
+        }
+    }
+
+    /// The runs with so many cameras.
+    fn cases(self, n_views: usize) -> Vec<Case> {
+        let case = |n_views| Case {
+            n_views,
+            is_lossless: self == Self::Throughput,
+            has_dead: false,
+        };
+        let mut cases = match self {
+            Self::Latency | Self::Throughput => vec![case(n_views)],
+            Self::Scale => (1..=n_views).map(case).collect(),
+        };
+        if self != Self::Throughput && n_views > 1 {
+            cases.push(Case {
+                has_dead: true,
+                ..case(n_views)
+            });
+        }
+        cases
+    }
+}
+
+/// Measures a deployment under load. `None` if it was stopped.
+///
+/// # Errors
+///
+/// The deployment cannot be read or used, has fewer cameras than were asked for, or a run of it fails.
+pub fn load(
+    kind: Kind,
+    options: &Options,
+    verbosity: Verbosity,
+) -> Result<Option<Report>, Failure> {
+    let occasion = Occasion::now();
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let Some(course) = Course::new(options, verbosity, &stop)? else {
+        return Ok(None);
+    };
+    let cases = kind.cases(course.n_views());
+    let mut all = Vec::new();
+    for (index, case) in cases.iter().enumerate() {
+        if !verbosity.quiet {
+            let (nth, of, seconds) = (index + 1, cases.len(), options.seconds);
+            output::message(format_args!(
+                "run {nth} of {of}: {case}, {seconds} s of footage"
+            ));
+        }
+        match course.measure(*case, &stop)? {
+            Some(measured) => all.push(measured),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(Report {
+        bench: kind.name(),
+        title: kind.title().to_owned(),
+        occasion,
+        settings: options.settings(course.n_views()),
+        table: table(&all),
+        notes: Vec::new(),
+        limits: options.limits(&all),
+        numbers: all.iter().map(Measured::json).collect(),
+    }))
+}
+
+impl Options {
+    fn settings(&self, n_views: usize) -> Value {
+        let file = self.deployment.as_ref();
+        let pictures = match file {
+            Some(file) => file.display().to_string(),
+            None if self.live => format!("made while it runs, seed {}", self.seed),
+            None => format!("made beforehand, seed {}", self.seed),
+        };
+        json!({
+            "views": n_views,
+            "seconds": self.seconds,
+            "rate_hz": file.is_none().then_some(self.rate_hz),
+            "pictures": pictures,
+            "spin": self.spin,
+            "set": self.set.join(" "),
+        })
+    }
+
+    /// What was asked of the run with all cameras, none of them dead.
+    fn limits(&self, all: &[Measured]) -> Vec<Limit> {
+        let whole = all.iter().rfind(|it| !it.case.has_dead);
+        let end_to_end = whole.and_then(|it| it.end_to_end);
+        let rate = whole.and_then(|it| it.rate_hz);
+        let limits = [
+            self.max_p50_ms
+                .map(|it| limit::at_most("p50, ms", it, end_to_end.map(|it| it.p50))),
+            self.max_p99_ms
+                .map(|it| limit::at_most("p99, ms", it, end_to_end.map(|it| it.p99))),
+            self.min_rate_hz
+                .map(|it| limit::at_least("results a second", it, rate)),
+        ];
+        limits.into_iter().flatten().collect()
+    }
+}
+
+/// A row for every run, and below it one for every stage.
+fn table(all: &[Measured]) -> Vec<Vec<String>> {
+    let heads = [
+        "run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
+    ];
+    let mut rows = vec![heads.map(str::to_owned).to_vec()];
+    for it in all {
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| format!("{it:.1}"));
+        let mut row = vec![
+            it.case.to_string(),
+            it.n_results.to_string(),
+            number(it.rate_hz),
+        ];
+        row.extend(Spread::cells(it.end_to_end, 1));
+        row.extend([number(it.cpu_ms_per_result()), it.n_dropped.to_string()]);
+        rows.push(row);
+        for (stage, spread) in &it.stages {
+            let mut row = vec![format!("  {stage}"), String::new(), String::new()];
+            row.extend(Spread::cells(Some(*spread), 1));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(kind: Kind, n_views: usize) -> Vec<String> {
+        let cases = kind.cases(n_views);
+        cases.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_camera_dies_after_all_runs_in_which_none_does() {
+        assert_eq!(
+            names(Kind::Scale, 3),
+            ["1 view", "2 views", "3 views", "3 views, one dead"]
+        );
+        assert_eq!(names(Kind::Latency, 2), ["2 views", "2 views, one dead"]);
+        assert_eq!(names(Kind::Throughput, 4), ["4 views, every frame"]);
+    }
+
+    #[test]
+    fn the_only_camera_does_not_die() {
+        assert_eq!(names(Kind::Latency, 1), ["1 view"]);
+    }
+}
