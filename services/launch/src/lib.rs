@@ -7,6 +7,7 @@
 //! | what every process is given | [`plan::resolve`], [`Resolved`] |
 //! | what the stages work with | [`Prepared`] |
 //! | processes and topics; the run itself | [`Planned`] |
+//! | one of its processes | [`process`] |
 //! | progress, and what became of the run | [`Watcher`], [`Report`] |
 //! | a run as seen from outside | [`live`] |
 //! | what a recording says of its run | [`recorded`] |
@@ -34,13 +35,14 @@ pub mod load;
 pub mod nothing;
 pub mod output;
 pub mod plan;
+pub mod process;
 pub mod recorded;
 pub mod search;
 pub mod summary;
 
 pub use claim::Claim;
 pub use planned::Planned;
-pub use prepare::{Prepared, View, frame_scale, framing};
+pub use prepare::{Prepared, View, frame_scale};
 pub use resolved::{Resolved, SERVICES};
 
 pub use shipped::Shipped;

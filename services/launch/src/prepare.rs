@@ -158,7 +158,7 @@ impl Prepared {
 /// # Errors
 ///
 /// The calibration lacks the camera, or does not fit the footage.
-pub fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
+pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
     let deployment = &resolved.deployment;
     let entry = &deployment.cameras[index];
     let camera = rig.camera(&entry.name).ok_or_else(|| {

@@ -5,6 +5,7 @@ mod machine;
 mod options;
 mod page;
 mod report;
+mod run;
 mod score;
 
 use std::path::Path;
@@ -14,12 +15,12 @@ use launch::{Planned, inputs, load};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use serde_json::Value;
 
-use crate::trial::Point;
-use crate::trial::results::{self, Moment};
+use crate::trial::results;
 use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
-use crate::trial::strike::{Blow, Strike, Times};
+use crate::trial::strike::{Blow, Strike};
 use machine::{FULL_RATE_HZ, Gauge, Machine};
 use report::Report;
+use run::{Run, VICTIM};
 
 pub use options::{Limits, Options};
 
@@ -62,9 +63,7 @@ impl Options {
 /// What is written at the end: for programs, for people.
 const REPORTS: [&str; 2] = ["report.json", "report.html"];
 
-/// The camera that is killed, from 0.
-const VICTIM: usize = 2;
-/// When: after this share of the frames.
+/// The camera is killed after this share of the frames.
 const KILL_AFTER: f64 = 0.4;
 
 /// What the demo found out.
@@ -204,29 +203,4 @@ fn announce(
         "{n_processes} processes and their supervisor; {frames} frames at {rate} a second; results in {}",
         stage.folder.display()
     ));
-}
-
-/// A run that is over, and all that is known of it.
-#[derive(Debug, Clone, Copy)]
-struct Run<'a> {
-    /// Names, in the order of the rig.
-    cameras: &'a [String],
-    /// Frames of every camera, and how many a second.
-    n_frames: u64,
-    rate_hz: f64,
-    /// How long a stage waits for a view that is late.
-    deadline_ms: f64,
-    /// What was measured of the machine, before the run or after it, whichever is slower.
-    machine: Option<Machine>,
-    /// Names of all processes but the supervisor.
-    processes: &'a [String],
-    /// What `run` says of it.
-    ran: &'a launch::Report,
-    /// The results, and where the joints were.
-    moments: &'a [Moment],
-    truth: &'a [Vec<Point>],
-    /// What became of the camera that was to be killed, if one was.
-    killed: Option<Times>,
-    /// When the run was planned.
-    session: u64,
 }

@@ -4,7 +4,7 @@ use messages::Cause;
 use metrics::{Reading, Timed};
 use serde_json::{Map, Value, json};
 
-use super::{Board, Member};
+use super::board::{Board, Member};
 
 /// A deployment and all of its processes.
 pub fn describe(board: &Board) -> Value {
@@ -79,7 +79,7 @@ fn key(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::board;
+    use super::super::board::tests::board;
     use super::*;
 
     #[test]

@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use messages::Cause;
 use metrics::{Reading, Timed};
 
-use super::{Board, Member, Standing};
+use super::board::{Board, Member, Standing};
 
 /// What is not known.
 const NONE: &str = "-";
@@ -183,7 +183,7 @@ fn push<const N: usize>(text: &mut String, titles: &[&str; N], rows: &[Vec<Strin
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::board;
+    use super::super::board::tests::board;
     use super::*;
 
     #[test]

@@ -3,17 +3,11 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Duration;
 
 use clap::{Args, Parser, ValueEnum};
 use deployment::Stage;
-use launch::{Prepared, Resolved, frame_scale, framing, inputs, recorded};
-use messages::topic;
-use pipeline::{FuseStep, SkeletonStep, ViewStep};
-use rayon::ThreadPoolBuilder;
-use runtime::{ExitKind, Failure, Launch, OrFail as _, Service, run_service};
-use viewquality::Forecaster;
+use launch::process;
+use runtime::{ExitKind, Failure, Launch, OrFail as _, run_service};
 
 use crate::stage;
 
@@ -66,264 +60,38 @@ struct Own {
     spin_after: Option<u64>,
 }
 
+impl Name {
+    fn process(self) -> process::Name {
+        match self {
+            Self::Capture => process::Name::Capture,
+            Self::Pose => process::Name::Pose,
+            Self::Quality => process::Name::Quality,
+            Self::Fuse => process::Name::Fuse,
+            Self::Triangulate => process::Name::Triangulate,
+            Self::Results => process::Name::Results,
+            Self::Record => process::Name::Record,
+            Self::Replay => process::Name::Replay,
+        }
+    }
+}
+
 /// Becomes the process.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (launch, rest) = Launch::from_args(arguments.rest.iter().cloned())?;
-    let own = Own::try_parse_from(rest).or_fail(ExitKind::Usage)?;
-    let name = arguments.name;
+    let Own {
+        plan,
+        index,
+        stage,
+        spin_after,
+    } = Own::try_parse_from(rest).or_fail(ExitKind::Usage)?;
+    let own = process::Own {
+        plan,
+        index,
+        stage,
+        spin_after,
+    };
+    let name = arguments.name.process();
     Ok(run_service(launch, |service| {
-        become_it(service, name, &own)
+        process::become_it(service, name, &own)
     }))
-}
-
-fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
-    let resolved = Resolved::given(&own.plan)?;
-    let n_views = resolved.deployment.cameras.len();
-    let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
-    if per_view && own.index >= n_views {
-        let message = format!("there is no view {}, only {n_views}", own.index);
-        return Err(Failure::new(ExitKind::Usage, message));
-    }
-    if per_view {
-        let camera = &resolved.deployment.cameras[own.index].name;
-        service.health().belongs_to(own.index, camera);
-    }
-    if let Some(frame) = own.spin_after.filter(|_| service.epoch() == 0) {
-        service.health().spin_after(frame);
-    }
-    let n_threads = if name == Name::Pose {
-        resolved.deployment.pose.threads
-    } else {
-        1
-    };
-    pool(n_threads).build_global().or_fail(ExitKind::Run)?;
-    match name {
-        Name::Capture => capture(service, &resolved, own.index),
-        Name::Pose => pose(service, &resolved, own.index),
-        Name::Quality => quality(service, &resolved, own.index),
-        Name::Fuse => fuse(service, &resolved, own.index),
-        Name::Triangulate => triangulate(service, &resolved),
-        Name::Results => results(service, &resolved),
-        Name::Record => record(service, &resolved),
-        Name::Replay => replay(service, &resolved, own),
-    }
-}
-
-/// Threads of a process. Where there are several the caller, who does the work, is one of them: from outside a pool
-/// levels are not spread over it.
-fn pool(n_threads: usize) -> ThreadPoolBuilder {
-    let pool = ThreadPoolBuilder::new().num_threads(n_threads);
-    if n_threads > 1 {
-        pool.use_current_thread()
-    } else {
-        pool
-    }
-}
-
-fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
-    let deployment = &resolved.deployment;
-    let rig = inputs::rig_of(deployment)?;
-    let job = capture::Job {
-        view,
-        source: inputs::source(&deployment.cameras[view], &deployment.capture),
-        faults: deployment.cameras[view].fault.clone(),
-        frozen_after: deployment.capture.frozen_after,
-        framing: framing(resolved, &rig, view)?,
-        mode: deployment.capture.mode,
-        pace: deployment.capture.pace,
-        n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
-        patience: resolved.patience(),
-    };
-    capture::run(service, &job)
-}
-
-fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let topology = resolved.topology();
-    let layout = Arc::new(prepared.views[view].plan.layout().clone());
-    let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
-    let job = pose::Job {
-        view,
-        step: step.or_fail(ExitKind::Config)?,
-        n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
-        n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
-        start_frame: resolved.deployment.capture.start_frame,
-        frame_step: resolved.deployment.capture.frame_step,
-        frame_rate_hz: resolved.frame_rate_hz(),
-        patience: resolved.patience(),
-    };
-    pose::run(service, &job)
-}
-
-fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let network = inputs::own_network(&resolved.deployment.quality, prepared.model.n_parts())?;
-    let source = match network {
-        Some(network) => quality::Source::Network(Box::new(quality::NetworkSource {
-            forecaster: Forecaster::new(network),
-            model: Arc::clone(&prepared.model),
-            layout: Arc::new(prepared.views[view].plan.layout().clone()),
-        })),
-        None => quality::Source::Table(
-            prepared
-                .predictor(resolved, view)?
-                .ok_or("there is no quality.table and no quality.network")
-                .or_fail(ExitKind::Config)?,
-        ),
-    };
-    let mut job = quality::Job {
-        view,
-        source,
-        frame_step: resolved.deployment.capture.frame_step,
-        frame_scale: frame_scale(&prepared.views[view].framing) as f32,
-        n_consumers: resolved.topology().receivers_of(&topic::view_quality(view)),
-        patience: resolved.patience(),
-    };
-    quality::run(service, &mut job)
-}
-
-fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let topology = resolved.topology();
-    let plans = prepared.plans();
-    let job = fuse::Job {
-        worker,
-        views: prepared.settings.views,
-        pairs: topology.pairs_of(worker),
-        step: Arc::new(FuseStep::new(
-            prepared.model,
-            prepared.settings.fuse,
-            plans.clone(),
-            prepared.settings.tables,
-        )),
-        plans,
-        has_quality: resolved.deployment.has_quality(),
-        quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
-        quality_max_age: Duration::from_millis(resolved.deployment.quality.max_age_ms),
-        frame_step: resolved.deployment.capture.frame_step.max(1),
-        n_consumers: topology.receivers_of(&topic::pair_pose(worker)),
-        patience: resolved.patience(),
-    };
-    fuse::run(service, &job)
-}
-
-fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let topology = resolved.topology();
-    let plans = prepared.plans();
-    let step = SkeletonStep::new(
-        plans.clone(),
-        prepared.up_in_world,
-        prepared.settings.skeleton,
-    );
-    let job = triangulate::Job {
-        plans,
-        views: prepared.settings.views,
-        n_workers: topology.n_workers(),
-        n_consumers: topology.receivers_of(&topic::pose3d()),
-        pairs: prepared.pairs,
-        // A pair that waits for a view takes this long itself.
-        patience: 2 * resolved.patience(),
-    };
-    triangulate::run(service, &job, step)
-}
-
-fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let topology = resolved.topology();
-    let deployment = &resolved.deployment;
-    let views = prepared.views.iter().map(|it| results::View {
-        name: it.name.clone(),
-        framing: it.framing.clone(),
-        layout: Arc::new(it.plan.layout().clone()),
-    });
-    let scene = results::Scene {
-        views: views.collect(),
-        model: prepared.model,
-        joints: prepared.settings.skeleton.joints,
-        frame_rate_hz: resolved.frame_rate_hz(),
-        frame_step: deployment.capture.frame_step,
-        up_in_world: prepared.up_in_world,
-    };
-    let job = results::Job {
-        scene,
-        config: deployment.results.clone(),
-        output: deployment.output.clone(),
-        start_frame: deployment.capture.start_frame,
-        n_workers: topology.n_workers(),
-        has_quality: resolved.deployment.has_quality(),
-    };
-    results::run(service, job)
-}
-
-fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
-    let prepared = Prepared::new(resolved)?;
-    let topology = resolved.topology();
-    let plan = resolved.recording.as_ref();
-    let plan = plan
-        .ok_or("there is no recording")
-        .or_fail(ExitKind::Config)?;
-    let job = record::Job {
-        file: plan.file.clone(),
-        about: recorded::about(resolved, plan)?,
-        topics: record::Topics {
-            n_views: prepared.views.len(),
-            n_workers: topology.n_workers(),
-            has_quality: resolved.deployment.has_quality(),
-            processes: topology
-                .processes()
-                .iter()
-                .map(|it| it.name.clone())
-                .collect(),
-        },
-        queue_bytes: plan.queue_mb.saturating_mul(1_000_000),
-    };
-    record::run(service, job)
-}
-
-fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {
-    let recording = resolved.replay.as_ref().zip(own.stage);
-    let (it, stage) = recording
-        .ok_or("there is no recording, or no --stage")
-        .or_fail(ExitKind::Config)?;
-    let topology = resolved.topology();
-    let mut processes = topology.processes().iter();
-    let replayed = processes.find(|process| {
-        let index = process.index.unwrap_or(0);
-        process.service == stage.name() && index == own.index
-    });
-    let replayed = replayed
-        .ok_or("there is no such process in this deployment")
-        .or_fail(ExitKind::Usage)?;
-    let output = |topic: &String| replay::Output {
-        topic: topic.clone(),
-        n_receivers: topology.receivers_of(topic),
-    };
-    let job = replay::Job {
-        file: it.file.clone(),
-        outputs: replayed.outputs.iter().map(output).collect(),
-        pace: it.speed.map_or(replay::Pace::Max, replay::Pace::Times),
-        frame_step: resolved.deployment.capture.frame_step.max(1),
-        patience: resolved.patience(),
-    };
-    replay::run(service, &job)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn who_may_use_several_threads_works_inside_their_pool() {
-        let threads_of = |n| {
-            let inside = move || {
-                let _pool = pool(n).build();
-                rayon::current_thread_index().map(|_| rayon::current_num_threads())
-            };
-            let thread = std::thread::Builder::new().name("caller".to_owned());
-            let caller = thread.spawn(inside).ok()?;
-            caller.join().ok().flatten()
-        };
-        assert_eq!([threads_of(1), threads_of(2)], [None, Some(2)]);
-    }
 }

@@ -54,7 +54,7 @@ pub(super) struct Heard {
     pub copied_bytes: u64,
 }
 
-/// Becomes the receiving process of [`transport`](super::transport).
+/// Becomes the receiving process of [`transport()`](super::transport()).
 ///
 /// * `arguments`: what that process says about the deployment.
 ///

@@ -8,7 +8,7 @@ use report::run::{Eye, Mark, Page, Picture, Space, Strip, Table};
 use skeleton::PARSE14;
 
 use super::report::Report;
-use super::{Run, VICTIM};
+use super::run::{Run, VICTIM};
 use crate::trial::Point;
 use crate::trial::cost::Cost;
 use crate::trial::results::Moment;

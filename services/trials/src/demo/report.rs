@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use super::limits::{self, Measured};
 use super::options::Limits;
+use super::run::{Run, VICTIM};
 use super::score::{GAMMA, Score, score};
-use super::{Run, VICTIM};
 use crate::trial::cost::{Cost, Trace};
 use crate::trial::results::Moment;
 
