@@ -6,7 +6,7 @@ use std::path::Path;
 
 use runtime::{ExitKind, Failure};
 
-use crate::file::in_file;
+use runtime::in_file;
 
 /// The file in the folder that is locked. It stays: only its lock says that somebody writes, and that ends with the
 /// process, however it ends.

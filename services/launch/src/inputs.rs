@@ -21,11 +21,11 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use viewquality::{Network, NetworkError, Table, Tau};
 
-use crate::file::no_text;
 use crate::output;
 use crate::shipped::Shipped;
+use runtime::no_text;
 
-pub use crate::file::{in_file, text};
+pub use runtime::{in_file, read_text as text};
 
 /// The named model, or the one that ships with Parallax.
 ///
@@ -359,6 +359,4 @@ pub(crate) fn of_deployment(failure: Failure, deployment: &Deployment) -> Failur
         }
         _ => failure,
     }
-}
-
 }

@@ -16,7 +16,6 @@
 #![forbid(unsafe_code)]
 
 mod claim;
-mod file;
 mod padding;
 mod planned;
 mod prepare;
@@ -37,7 +36,6 @@ pub mod output;
 pub mod plan;
 pub mod process;
 pub mod recorded;
-pub mod search;
 pub mod summary;
 
 pub use claim::Claim;

@@ -104,7 +104,7 @@ impl Prepared {
         let table = inputs::quality_table(file, self.model.n_parts())?;
         let name = config.name_in_table(&resolved.deployment.cameras[view].name);
         let predictor = Predictor::from_table(&table, quality::selection(config), name);
-        let predictor = predictor.map_err(|error| inputs::in_file(file, &error))?;
+        let predictor = predictor.map_err(|error| runtime::in_file(file, &error))?;
         Ok(Some(predictor))
     }
 

@@ -13,7 +13,6 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::inputs;
 use crate::resolved::Resolved;
 use crate::shipped::Shipped;
 
@@ -62,7 +61,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         .into_iter()
         .flatten()
     {
-        let bytes = std::fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
+        let bytes = std::fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
         files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
     for (kind, file) in [
@@ -88,8 +87,8 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
 ///
 /// The file cannot be read, or is no recording.
 pub fn open(file: &Path) -> Result<Recording, Failure> {
-    let mut input = File::open(file).map_err(|error| inputs::in_file(file, &error))?;
-    recording::scan(&mut input).map_err(|error| inputs::in_file(file, &error))
+    let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
+    recording::scan(&mut input).map_err(|error| runtime::in_file(file, &error))
 }
 
 /// Whether everything that was sent is in the file, as far as the file can say.
@@ -126,9 +125,9 @@ pub fn damaged(
         Some(Kind::PairPose) => from > Stage::Fuse,
         Some(Kind::Pose3d | Kind::Health) | None => false,
     };
-    let mut input = File::open(file).map_err(|error| inputs::in_file(file, &error))?;
+    let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
     recording::check(&mut input, recording, is_replayed)
-        .map_err(|error| inputs::in_file(file, &error))
+        .map_err(|error| runtime::in_file(file, &error))
 }
 
 /// Names the messages that are not what was written, the first ones at length.

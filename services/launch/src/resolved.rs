@@ -8,7 +8,7 @@ use deployment::{Deployment, RecordingPlan, Replay, Topology};
 use runtime::{Delivery, ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 
-use crate::inputs::{self, Footage};
+use crate::inputs::Footage;
 
 /// A deployment with what was found out about its footage: what every process is given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,7 +55,7 @@ impl Resolved {
 
     /// Writes it for the user to read.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
-        std::fs::write(file, self.to_text()?).map_err(|error| inputs::in_file(file, &error))
+        std::fs::write(file, self.to_text()?).map_err(|error| runtime::in_file(file, &error))
     }
 
     /// What every process is given.
@@ -73,14 +73,14 @@ impl Resolved {
     ///
     /// Neither input nor file hold it, or what they hold is something else.
     pub fn given(file: &Path) -> Result<Self, Failure> {
-        let wrong = |error: &dyn core::error::Error| inputs::in_file(file, error);
+        let wrong = |error: &dyn core::error::Error| runtime::in_file(file, error);
         let mut text = String::new();
         if !std::io::stdin().is_terminal() {
             let read = std::io::stdin().read_to_string(&mut text);
             read.map_err(|error| wrong(&error))?;
         }
         if text.is_empty() {
-            text = inputs::text(file)?;
+            text = runtime::read_text(file)?;
         }
         serde_json::from_str(&text).map_err(|error| wrong(&error))
     }

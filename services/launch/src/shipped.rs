@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use deployment::{SHIPPED, is_shipped};
 use runtime::{ExitKind, Failure};
 
-use crate::file::in_file;
+use runtime::in_file;
 
 /// A file that ships; their cards lie beside them in `configs/models`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -35,7 +35,6 @@ mod terminal;
 use std::process::ExitCode;
 
 use clap::Parser as _;
-use launch::{inputs, output, search};
 
 fn main() -> ExitCode {
     if let Err(error) = runtime::guard_process() {

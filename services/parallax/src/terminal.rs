@@ -7,7 +7,7 @@ use offline::Console;
 use runtime::Failure;
 use serde_json::Value;
 
-use crate::output;
+use launch::output;
 
 /// Shows progress: a bar on a terminal, messages if not quiet; JSON on standard output if asked for.
 #[derive(Debug)]

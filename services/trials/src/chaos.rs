@@ -17,8 +17,8 @@ mod stall;
 mod verdict;
 
 use fastrand::Rng;
+use launch::Planned;
 use launch::output::{self, Verbosity};
-use launch::{Planned, inputs};
 use runtime::{Delivery, ExitKind, Failure, now_nanos};
 use serde_json::{Value, json};
 
@@ -76,7 +76,8 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     let scenarios: Vec<Value> = verdicts.iter().map(Verdict::json).collect();
     let json = json!({ "schema_version": 1, "held": is_held, "scenarios": scenarios });
     let file = ground.folder.join("chaos.json");
-    std::fs::write(&file, format!("{json:#}\n")).map_err(|error| inputs::in_file(&file, &error))?;
+    std::fs::write(&file, format!("{json:#}\n"))
+        .map_err(|error| runtime::in_file(&file, &error))?;
     Ok(Some(Outcome {
         is_held,
         json,

@@ -11,7 +11,7 @@ mod score;
 use std::path::Path;
 
 use launch::output::{self, Verbosity};
-use launch::{Planned, inputs, load};
+use launch::{Planned, load};
 use runtime::{ExitKind, Failure, OrFail as _, Stop, now_nanos};
 use serde_json::Value;
 
@@ -171,7 +171,7 @@ fn remove_reports(stage: &Stage) -> Result<(), Failure> {
     for name in REPORTS {
         let file = stage.folder.join(name);
         if file.exists() {
-            std::fs::remove_file(&file).map_err(|error| inputs::in_file(&file, &error))?;
+            std::fs::remove_file(&file).map_err(|error| runtime::in_file(&file, &error))?;
         }
     }
     Ok(())
@@ -180,7 +180,7 @@ fn remove_reports(stage: &Stage) -> Result<(), Failure> {
 fn write_reports(stage: &Stage, texts: [String; 2]) -> Result<(), Failure> {
     for (name, text) in REPORTS.into_iter().zip(texts) {
         let file = stage.folder.join(name);
-        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
+        std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
     }
     Ok(())
 }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use datasets::Picture;
 use fmp::{Layout, Model, Pose, Search};
 use footage::{Canvas, Fill, Size, Warp, resize_map};
-use launch::search::Search;
 use rayon::prelude::*;
 use report::model::Examples;
 use runtime::{ExitKind, Failure, OrFail as _};

@@ -1,8 +1,6 @@
 //! Exit status of the errors of data sets, sequences and films.
 
-use std::error::Error;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::Path;
 
 use datasets::DatasetError;
@@ -39,17 +37,6 @@ pub fn film_failure(error: FilmError) -> Failure {
     Failure::new(kind, error)
 }
 
-/// Reads a text file, and names it if that fails.
-pub(crate) fn text(file: &Path) -> Result<String, Failure> {
-    fs::read_to_string(file).map_err(|error| match error.kind() {
-        ErrorKind::InvalidData => {
-            let message = format!("{} is no text: it is not UTF-8", file.display());
-            Failure::new(ExitKind::Input, message)
-        }
-        _ => in_file(file, &error),
-    })
-}
-
 /// Makes a folder for results, with those above it.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| {
@@ -57,9 +44,4 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
         Failure::new(ExitKind::Input, message)
             .with_hint("results go to the folder `output` of the deployment file, or to --out: name one that can be written")
     })
-}
-
-/// An input that is wrong: the file, then what is wrong with it.
-pub(crate) fn in_file(file: &Path, error: &dyn Error) -> Failure {
-    Failure::new(ExitKind::Input, format!("{}: {error}", file.display()))
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use runtime::{ExitKind, Failure};
 
-use crate::failures::in_file;
+use runtime::in_file;
 
 /// The images that are named, those of folders in the order of their names.
 ///

@@ -7,9 +7,9 @@ use footage::{Fill, Size, Source, SourceSpec, Turn, Warp, resize_map};
 use kernels::Rgb8View;
 use runtime::{ExitKind, Failure, OrFail as _};
 
-use crate::failures::in_file;
 use crate::images::has_image_name;
 use crate::memory::check_memory;
+use runtime::in_file;
 
 /// Which frames of a video are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -29,6 +29,7 @@ mod clock;
 mod failure;
 mod guard;
 mod health;
+mod input;
 mod launch;
 mod log;
 mod observer;
@@ -53,6 +54,7 @@ pub use deployment::{
 pub use failure::{ExitKind, Failure, Fault, OrFail};
 pub use guard::guard_process;
 pub use health::{HEARTBEAT, Health, HealthError};
+pub use input::{in_file, no_text, read_text};
 pub use launch::{Launch, LaunchError};
 pub use lock::{DeploymentLock, LockError};
 pub use log::init_logging;

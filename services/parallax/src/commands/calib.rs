@@ -248,8 +248,8 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
 fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failure> {
     let n_cameras = rig.cameras().len();
     let mut frames = std::collections::BTreeMap::<u64, Vec<Vec<Option<Point2<f64>>>>>::new();
-    for line in runfiles::lines::<ViewLine>(&inputs::text(file)?) {
-        let line = line.map_err(|error| inputs::in_file(file, &error))?;
+    for line in runfiles::lines::<ViewLine>(&runtime::read_text(file)?) {
+        let line = line.map_err(|error| runtime::in_file(file, &error))?;
         let Some(camera) = rig.cameras().iter().position(|it| it.name == line.view) else {
             continue;
         };

@@ -337,7 +337,7 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
     let Some(file) = file else {
         return Ok(Config::default());
     };
-    let text = inputs::text(file)?;
+    let text = runtime::read_text(file)?;
     let mut config: Config = toml::from_str(&text).map_err(|error| {
         let message = format!("{}: {error}", file.display());
         Failure::new(ExitKind::Config, message)
@@ -385,7 +385,7 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
 /// All that what is found depends on, besides the sequence and its frames.
 fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
-        let bytes = fs::read(file).map_err(|error| inputs::in_file(file, &error))?;
+        let bytes = fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
         Ok::<_, Failure>(checksum::fnv1a(&bytes))
     };
     let of = |kind: Shipped, file: &PathBuf| Ok::<_, Failure>(checksum::fnv1a(&kind.read(file)?));

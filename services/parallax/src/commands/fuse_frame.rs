@@ -318,7 +318,7 @@ fn sigma(
     let Some(file) = file else {
         return Ok(vec![None; scales.len()]);
     };
-    let text = inputs::text(file)?;
+    let text = runtime::read_text(file)?;
     let lines: Vec<&str> = text.lines().filter(|it| !it.trim().is_empty()).collect();
     let wrong =
         |message: String| Failure::new(ExitKind::Input, format!("{}: {message}", file.display()));

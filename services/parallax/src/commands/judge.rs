@@ -13,7 +13,6 @@ use runtime::Failure;
 use serde_json::json;
 use skeleton::PARSE14;
 
-
 /// Which model, and on whom.
 #[derive(Debug, Args)]
 #[command(after_help = "\

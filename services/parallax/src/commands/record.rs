@@ -157,7 +157,7 @@ fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("wait until it ends, or take another name"));
         }
-        std::fs::remove_file(&file).map_err(|error| launch::inputs::in_file(&file, &error))?;
+        std::fs::remove_file(&file).map_err(|error| runtime::in_file(&file, &error))?;
     }
     Ok(())
 }

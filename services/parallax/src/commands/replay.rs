@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use deployment::{Replay, Stage};
 use launch::{
-    Planned, Resolved, Shipped, inputs, load, output, plan,
+    Planned, Resolved, Shipped, load, output, plan,
     recorded::{self, Settings},
 };
 use recording::{Kind, Recording};
@@ -133,9 +133,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 /// The settings of the recorded run.
 fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
     let about = recording.about.as_ref();
-    let about = about.map_err(|error| inputs::in_file(file, error))?;
+    let about = about.map_err(|error| runtime::in_file(file, error))?;
     serde_json::from_str(&about.settings).map_err(|error| {
-        let failure = inputs::in_file(file, &error);
+        let failure = runtime::in_file(file, &error);
         let (theirs, ours) = (&about.version, env!("CARGO_PKG_VERSION"));
         failure.with_hint(format!(
             "recorded by version {theirs}, this is version {ours}"

@@ -220,7 +220,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
 /// Makes the folder; refuses one in which something lies.
 fn begin(out: &Path) -> Result<(), Failure> {
     inputs::make_folder(out)?;
-    let mut inside = std::fs::read_dir(out).map_err(|error| inputs::in_file(out, &error))?;
+    let mut inside = std::fs::read_dir(out).map_err(|error| runtime::in_file(out, &error))?;
     if inside.next().is_some() {
         let message = format!("{} is not empty", out.display());
         return Err(

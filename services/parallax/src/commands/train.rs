@@ -15,7 +15,7 @@ use training::Settings;
 
 use crate::globals::Globals;
 use crate::terminal::Terminal;
-use crate::{inputs, output};
+use launch::output;
 use people::People;
 
 /// The bar of the progress.
@@ -161,7 +161,7 @@ struct Shared {
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
     let mut settings = match &arguments.settings {
         None => Settings::default(),
-        Some(file) => toml::from_str(&inputs::text(file)?).map_err(|error| {
+        Some(file) => toml::from_str(&runtime::read_text(file)?).map_err(|error| {
             Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
         })?,
     };

@@ -65,7 +65,7 @@ fn draw_view(
         let file = folder.join(format!("{frame:06}.png"));
         let [width, height] = [size.width as u32, size.height as u32];
         image::save_buffer(&file, &rgb, width, height, ExtendedColorType::Rgb8)
-            .map_err(|error| inputs::in_file(&file, &error))?;
+            .map_err(|error| runtime::in_file(&file, &error))?;
         if is_enough() {
             break;
         }

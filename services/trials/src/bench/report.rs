@@ -4,7 +4,6 @@ use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
 
-use launch::inputs;
 use report::run::Limit;
 use runtime::Failure;
 use serde_json::{Value, json};
@@ -46,7 +45,7 @@ impl Report {
     /// The file cannot be written to.
     pub fn append(&self, file: &Path) -> Result<(), Failure> {
         let added = self.add(file);
-        added.map_err(|error| inputs::in_file(file, &error))
+        added.map_err(|error| runtime::in_file(file, &error))
     }
 
     fn add(&self, file: &Path) -> std::io::Result<()> {

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-use launch::{Planned, inputs};
+use launch::Planned;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::census;
@@ -37,7 +37,7 @@ pub(super) fn kill(
     let output = ground.output(scenario);
     let results = output.join("pose3d.jsonl.part");
     if results.exists() {
-        fs::remove_file(&results).map_err(|error| inputs::in_file(&results, &error))?;
+        fs::remove_file(&results).map_err(|error| runtime::in_file(&results, &error))?;
     }
     let mut command = Command::new(std::env::current_exe().or_fail(ExitKind::Run)?);
     command

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use launch::inputs;
 use runfiles::{CameraTimes, FrameLine, Line, PoseTimes, TimesLine};
 use runtime::Failure;
 use skeleton::PARSE14;
@@ -60,9 +59,9 @@ pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<Moment>, Fai
 /// Reads a file of lines.
 fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     let file = folder.join(L::FILE);
-    let text = inputs::text(&file)?;
+    let text = runtime::read_text(&file)?;
     let lines = runfiles::lines(&text).collect::<Result<_, _>>();
-    lines.map_err(|error| inputs::in_file(&file, &error))
+    lines.map_err(|error| runtime::in_file(&file, &error))
 }
 
 /// Results that stand in one of the two files only are left out: they were not written.

@@ -87,7 +87,7 @@ impl Stage {
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
         let file = self.folder.join("deployment.toml");
         let text = self.deployment(cast);
-        std::fs::write(&file, text).map_err(|error| inputs::in_file(&file, &error))?;
+        std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
         Ok(file)
     }
 

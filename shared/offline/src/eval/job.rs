@@ -19,7 +19,8 @@ use viewquality::{ForecastInput, Forecaster, Table};
 
 use super::progress::Progress;
 use crate::console::Console;
-use crate::failures::{film_failure, in_file, text};
+use crate::failures::film_failure;
+use runtime::{in_file, read_text};
 
 /// How the views of a sequence are solved together, and the part-type tables of its cameras.
 pub type Fusion = (multiview::Settings, PairTables);
@@ -236,7 +237,7 @@ impl Job<'_> {
                 let failure = Failure::new(ExitKind::Usage, message);
                 return Err(failure.with_hint("--resume goes on with it; or choose another --out"));
             }
-            (records, n_bytes) = read_records(&text(&file)?, &header).map_err(|error| {
+            (records, n_bytes) = read_records(&read_text(&file)?, &header).map_err(|error| {
                 let failure = in_file(&file, &error);
                 failure.with_hint("remove it, or choose another --out")
             })?;

@@ -11,8 +11,8 @@ use report::evaluation::pictures_html;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
-use crate::failures::in_file;
 use crate::judged;
+use runtime::in_file;
 
 /// Whether a path is a data set of single pictures, by what lies there.
 pub fn is_one(path: &Path) -> bool {

@@ -9,7 +9,7 @@ use report::evaluation::{Page, html};
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use super::Done;
-use crate::failures::in_file;
+use runtime::in_file;
 
 impl Done {
     /// Scores what was found.

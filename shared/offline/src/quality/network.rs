@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::replace::replace;
 use crate::console::Console;
-use crate::failures::in_file;
+use runtime::in_file;
 
 /// What a network is trained on, and where to.
 #[derive(Debug, Clone)]

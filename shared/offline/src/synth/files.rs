@@ -13,7 +13,7 @@ use scene::truth::{Frame, Header};
 use scene::{Address, Scene};
 
 use super::{Job, absolute_path};
-use crate::failures::in_file;
+use runtime::in_file;
 
 const JPEG_QUALITY: u8 = 95;
 

@@ -12,7 +12,7 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use crate::commands::eval::size;
 use crate::globals::Globals;
 use crate::terminal::Terminal;
-use crate::{inputs, output};
+use launch::{inputs, output};
 
 const HELP: &str = "\
 SEQUENCE is what `parallax eval` takes: a folder of HumanEva-I, of UMPM, of `parallax synth`, or a description. \
@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let learning = Learning::new(&job, &terminal, model, stop);
     let keep = |learned: &Learned| {
         let text = learned.write().or_fail(ExitKind::Run)?;
-        let wrong = |error: std::io::Error| inputs::in_file(&arguments.out, &error);
+        let wrong = |error: std::io::Error| runtime::in_file(&arguments.out, &error);
         std::fs::write(&arguments.out, text).map_err(wrong)
     };
     let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &keep))?;

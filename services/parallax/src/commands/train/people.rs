@@ -7,8 +7,6 @@ use datasets::{FaultKind, SkeletonTable};
 use offline::person::{Chosen, parse_skeleton};
 use runtime::Failure;
 
-use crate::inputs;
-
 /// Which people, which images without people, and what is made of them.
 #[derive(Debug, Args)]
 pub(super) struct People {
@@ -69,7 +67,7 @@ impl People {
     /// The skeleton that is trained.
     pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
         match &self.skeleton {
-            Some(file) => parse_skeleton(file, &inputs::text(file)?),
+            Some(file) => parse_skeleton(file, &runtime::read_text(file)?),
             None => Ok(SkeletonTable::published()),
         }
     }

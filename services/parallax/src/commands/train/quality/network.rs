@@ -9,7 +9,7 @@ use qualitytraining::settings::Settings;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::globals::Globals;
-use crate::{inputs, output};
+use launch::output;
 
 const HELP: &str = "\
 The samples are made by `parallax train quality-samples`; a share of their groups (subjects, images) is validated on, \
@@ -133,7 +133,7 @@ fn train(_: &Arguments, _: &Settings, _: Globals) -> Result<ExitCode, Failure> {
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
     let mut settings = match &arguments.settings {
         None => Settings::default(),
-        Some(file) => toml::from_str(&inputs::text(file)?).map_err(|error| {
+        Some(file) => toml::from_str(&runtime::read_text(file)?).map_err(|error| {
             Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
         })?,
     };

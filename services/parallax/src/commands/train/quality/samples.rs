@@ -10,7 +10,7 @@ use viewquality::TileShape;
 
 use crate::globals::Globals;
 use crate::terminal::Terminal;
-use crate::{inputs, output};
+use launch::{inputs, output};
 
 const HELP: &str = "\
 Two sources, together or alone: scenes that do not exist (--scenes N, of the subjects of --subjects, every one of \

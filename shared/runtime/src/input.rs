@@ -1,25 +1,25 @@
-//! A file that is wrong is named, whatever is wrong with it.
+//! Input files as text; an error names the file, then what is wrong with it.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use runtime::{ExitKind, Failure};
+use crate::{ExitKind, Failure};
 
 /// Reads a text file, and names it if that fails.
 ///
 /// # Errors
 ///
 /// It cannot be read, or is not UTF-8.
-pub fn text(file: &Path) -> Result<String, Failure> {
+pub fn read_text(file: &Path) -> Result<String, Failure> {
     fs::read_to_string(file).map_err(|error| match error.kind() {
         ErrorKind::InvalidData => no_text(file),
         _ => in_file(file, &error),
     })
 }
 
-/// A file that should be text.
-pub(crate) fn no_text(file: &Path) -> Failure {
+/// A file that should be text and is not UTF-8.
+pub fn no_text(file: &Path) -> Failure {
     let message = format!("{} is no text: it is not UTF-8", file.display());
     Failure::new(ExitKind::Input, message)
 }
