@@ -1,6 +1,9 @@
 //! What is wrong with the value of a key, and the kinds of value that are asked for.
 
+use core::fmt::Display;
+
 use crate::ConfigError;
+use crate::ranges::range;
 
 /// A value that cannot be.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,17 +40,6 @@ pub(super) fn demand(holds: bool, key: &str, got: &str, expected: &str) -> Resul
     })
 }
 
-/// A number of things from `least` to `most`.
-pub(super) fn within(key: &str, got: usize, least: usize, most: usize) -> Result<(), Complaint> {
-    let expected = format!("{least} to {most}");
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &expected,
-    )
-}
-
 /// A number above 0.
 pub(super) fn positive(key: &str, got: f64) -> Result<(), Complaint> {
     demand(
@@ -68,22 +60,20 @@ pub(super) fn not_negative(key: &str, got: f64) -> Result<(), Complaint> {
     )
 }
 
-/// A number from `least` to `most`.
-pub(super) fn between(key: &str, got: f64, least: f64, most: f64) -> Result<(), Complaint> {
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &format!("{least} to {most}"),
-    )
+/// A number from the least to the most of its key.
+pub(super) fn between(key: &str, got: f64) -> Result<(), Complaint> {
+    in_range(key, got, &got.to_string())
 }
 
-/// A whole number from `least` to `most`.
-pub(super) fn whole(key: &str, got: u64, least: u64, most: u64) -> Result<(), Complaint> {
-    demand(
-        (least..=most).contains(&got),
-        key,
-        &got.to_string(),
-        &format!("{least} to {most}"),
-    )
+/// A whole number from the least to the most of its key.
+pub(super) fn whole<T: TryInto<i64> + Display + Copy>(key: &str, got: T) -> Result<(), Complaint> {
+    // What does not fit is larger than anything that is allowed.
+    let value = got.try_into().unwrap_or(i64::MAX);
+    in_range(key, value as f64, &got.to_string())
+}
+
+fn in_range(key: &str, value: f64, got: &str) -> Result<(), Complaint> {
+    let [least, most] = range(key);
+    let expected = format!("{least} to {most}");
+    demand((least..=most).contains(&value), key, got, &expected)
 }

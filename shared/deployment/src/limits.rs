@@ -1,15 +1,7 @@
-//! Between which numbers every key of a deployment file lies, and which of them are doubtful.
+//! Sees that every number of a deployment file is in its range, and names those that are doubtful.
 
 use crate::complaint::{Complaint, between, demand, whole};
 use crate::{Deployment, Runtime, capture, fuse, pose};
-
-/// One hour, and one day, milliseconds.
-const HOUR_MS: u64 = 3_600_000;
-const DAY_MS: u64 = 24 * HOUR_MS;
-/// A year, seconds.
-const YEAR_S: u64 = 366 * 86_400;
-/// The most frames of any footage: a thousand years of video.
-const MOST_FRAMES: u64 = 1_000_000_000_000;
 
 /// Checks every number against the least and the most that it can mean.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -25,82 +17,69 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     capture(&it.capture)?;
     pose(&it.pose)?;
     let quality = &it.quality;
-    whole("quality.deadline_ms", quality.deadline_ms, 0, HOUR_MS)?;
-    whole("quality.max_age_ms", quality.max_age_ms, 0, DAY_MS)?;
-    demand(
-        quality.frame_offset.unsigned_abs() <= MOST_FRAMES,
-        "quality.frame_offset",
-        &quality.frame_offset.to_string(),
-        &format!("-{MOST_FRAMES} to {MOST_FRAMES}"),
-    )?;
-    let step = u64::from(quality.frame_step);
-    whole("quality.frame_step", step, 1, 1_000_000)?;
+    whole("quality.deadline_ms", quality.deadline_ms)?;
+    whole("quality.max_age_ms", quality.max_age_ms)?;
+    whole("quality.frame_offset", quality.frame_offset)?;
+    whole("quality.frame_step", quality.frame_step)?;
     let triangulate = &it.triangulate;
-    between("triangulate.loss_px", triangulate.loss_px, 0.01, 1e4)?;
-    between(
-        "triangulate.error_weight",
-        triangulate.error_weight,
-        0.0,
-        1e3,
-    )?;
-    let part = it.results.epipolar_part as u64;
-    whole("results.epipolar_part", part, 1, 1000)?;
+    between("triangulate.loss_px", triangulate.loss_px)?;
+    between("triangulate.error_weight", triangulate.error_weight)?;
+    whole("results.epipolar_part", it.results.epipolar_part)?;
     supervise(it)
 }
 
 /// Checks the numbers of the section `[fuse]`.
 pub(super) fn fuse(it: &fuse::Config) -> Result<(), Complaint> {
-    between("fuse.alpha", it.alpha.unwrap_or(0.0), 0.0, 1e6)?;
-    between("fuse.beta", it.beta.unwrap_or(0.0), 0.0, 1e6)?;
-    between("fuse.epsilon_px", it.epsilon_px, 0.0, 1e4)?;
+    between("fuse.alpha", it.alpha.unwrap_or(0.0))?;
+    between("fuse.beta", it.beta.unwrap_or(0.0))?;
+    between("fuse.epsilon_px", it.epsilon_px)?;
     if let Some(cells) = it.max_distance_cells {
-        between("fuse.max_distance_cells", cells, 1e-3, 1e6)?;
+        between("fuse.max_distance_cells", cells)?;
     }
     for &tau in it.tau.given() {
-        between("fuse.tau", f64::from(tau), 0.0, 1e6)?;
+        between("fuse.tau", f64::from(tau))?;
     }
     Ok(())
 }
 
 fn capture(it: &capture::Config) -> Result<(), Complaint> {
     if let Some(scale) = it.scale {
-        between("capture.scale", scale, 0.001, 8.0)?;
+        between("capture.scale", scale)?;
     }
     if let Some(rate) = it.frame_rate_hz {
-        between("capture.frame_rate_hz", rate, 0.001, 1e5)?;
+        between("capture.frame_rate_hz", rate)?;
     }
-    whole("capture.start_frame", it.start_frame, 0, MOST_FRAMES)?;
-    whole("capture.frame_step", it.frame_step, 1, 1_000_000_000)?;
+    whole("capture.start_frame", it.start_frame)?;
+    whole("capture.frame_step", it.frame_step)?;
     let n_frames = it.n_frames.unwrap_or(1);
-    whole("capture.n_frames", n_frames, 1, MOST_FRAMES)
+    whole("capture.n_frames", n_frames)
 }
 
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
-    between("pose.min_separation", it.min_separation, 0.0, 1e3)?;
-    between("pose.tracked_margin", it.tracked_margin, 0.0, 100.0)?;
+    between("pose.min_separation", it.min_separation)?;
+    between("pose.tracked_margin", it.tracked_margin)?;
     let drop = f64::from(it.tracked_max_drop);
-    between("pose.tracked_max_drop", drop, 0.0, 1e6)?;
-    between("pose.tracked_speed", it.tracked_speed, 0.0, 1e3)?;
+    between("pose.tracked_max_drop", drop)?;
+    between("pose.tracked_speed", it.tracked_speed)?;
     let (gap, every) = (it.tracked_max_gap_ms, it.tracked_full_every_ms);
-    between("pose.tracked_max_gap_ms", gap, 0.0, 3.6e6)?;
-    between("pose.tracked_full_every_ms", every, 0.0, 3.6e6)?;
+    between("pose.tracked_max_gap_ms", gap)?;
+    between("pose.tracked_full_every_ms", every)?;
     let every = it.tracked_full_every;
-    whole("pose.tracked_full_every", every, 1, 1_000_000)?;
-    whole("pose.tracked_max_gap", it.tracked_max_gap, 1, 1_000_000)
+    whole("pose.tracked_full_every", every)?;
+    whole("pose.tracked_max_gap", it.tracked_max_gap)
 }
 
 fn supervise(deployment: &Deployment) -> Result<(), Complaint> {
     let it = &deployment.supervise;
     let deadline = it.deadline_ms.unwrap_or(1);
-    whole("supervise.deadline_ms", deadline, 1, HOUR_MS)?;
+    whole("supervise.deadline_ms", deadline)?;
     let hang = it.hang_limit_s.unwrap_or(1);
-    whole("supervise.hang_limit_s", hang, 1, 86_400)?;
+    whole("supervise.hang_limit_s", hang)?;
     let window = it.restart_window_s;
-    whole("supervise.restart_window_s", window, 1, YEAR_S)?;
-    let restarts = u64::from(it.max_restarts);
-    whole("supervise.max_restarts", restarts, 0, 1_000_000)?;
+    whole("supervise.restart_window_s", window)?;
+    whole("supervise.max_restarts", it.max_restarts)?;
     if let Some(budget) = it.latency_budget_ms {
-        between("supervise.latency_budget_ms", budget, 1e-3, DAY_MS as f64)?;
+        between("supervise.latency_budget_ms", budget)?;
     }
     Ok(())
 }

@@ -1,17 +1,12 @@
 //! What must hold of a deployment before anything is started.
 
-use messages::{MAX_CANDIDATES, MAX_VIEWS};
-
-use crate::complaint::{Complaint, demand, not_negative, positive, within};
+use crate::complaint::{Complaint, demand, not_negative, positive, whole};
 use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
 
 /// Most cameras that can be solved at once: the starts that are tried double with every one.
 const MOST_AT_ONCE: usize = 8;
-
-/// Most cores of a machine that Linux numbers.
-pub const MAX_CORES: usize = 1024;
 
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
@@ -24,8 +19,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     if let Some(budget) = it.supervise.latency_budget_ms {
         positive("supervise.latency_budget_ms", budget)?;
     }
-    let beats = it.supervise.missed_beats as usize;
-    within("supervise.missed_beats", beats, 1, 1_000_000)?;
+    whole("supervise.missed_beats", it.supervise.missed_beats)?;
     runtime(it)?;
     limits::check(it)?;
     let joints = &it.triangulate.joints;
@@ -67,7 +61,7 @@ fn name(name: &str) -> Result<(), Complaint> {
 
 fn cameras(it: &Deployment) -> Result<(), Complaint> {
     let n = it.cameras.len();
-    within("camera", n, 1, MAX_VIEWS)?;
+    whole("camera", n)?;
     for (index, camera) in it.cameras.iter().enumerate() {
         let twin = it.cameras[..index]
             .iter()
@@ -96,8 +90,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
         "either of the two",
     )?;
     if let Some([width, height]) = it.size {
-        within("capture.size", width, 1, 16_384)?;
-        within("capture.size", height, 1, 16_384)?;
+        whole("capture.size", width)?;
+        whole("capture.size", height)?;
     }
     if let Some(scale) = it.scale {
         positive("capture.scale", scale)?;
@@ -115,8 +109,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
 }
 
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
-    within("pose.candidates", it.candidates, 1, MAX_CANDIDATES)?;
-    within("pose.threads", it.threads, 1, 256)?;
+    whole("pose.candidates", it.candidates)?;
+    whole("pose.threads", it.threads)?;
     not_negative("pose.tracked_margin", it.tracked_margin)?;
     not_negative("pose.tracked_max_drop", f64::from(it.tracked_max_drop))?;
     not_negative("pose.tracked_speed", it.tracked_speed)?;
@@ -162,8 +156,8 @@ fn quality(deployment: &Deployment) -> Result<(), Complaint> {
 ///
 /// The first number that cannot be.
 pub fn fuse_numbers(it: &fuse::Config) -> Result<(), Complaint> {
-    within("fuse.workers", it.workers, 1, MAX_VIEWS)?;
-    within("fuse.max_iterations", it.max_iterations, 1, 1000)?;
+    whole("fuse.workers", it.workers)?;
+    whole("fuse.max_iterations", it.max_iterations)?;
     not_negative("fuse.alpha", it.alpha.unwrap_or(0.0))?;
     not_negative("fuse.beta", it.beta.unwrap_or(0.0))?;
     not_negative("fuse.epsilon_px", it.epsilon_px)?;
@@ -255,12 +249,12 @@ fn runtime(deployment: &Deployment) -> Result<(), Complaint> {
             "at least one core",
         )?;
         for &core in cores {
-            within("runtime.cores", core, 0, MAX_CORES - 1)?;
+            whole("runtime.cores", core)?;
         }
     }
     for (name, &priority) in &it.priority {
         is_process(deployment, "runtime.priority", name)?;
-        within("runtime.priority", usize::from(priority), 1, 99)?;
+        whole("runtime.priority", priority)?;
     }
     Ok(())
 }

@@ -4,13 +4,70 @@ use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
 use crate::Deployment;
+use crate::ranges::RANGES;
 
 /// The JSON schema (draft 2020-12) of a deployment file, made from the structs that read it.
 pub fn schema() -> Value {
     let generator = SchemaSettings::draft2020_12().into_generator();
     let mut schema = generator.into_root_schema_for::<Deployment>();
     schema.insert("title".to_owned(), "Parallax deployment".into());
-    schema.to_value()
+    let mut schema = schema.to_value();
+    for (key, least, most) in RANGES {
+        if let Some(numbers) = numbers_of(&schema, key) {
+            for number in numbers {
+                if let Some(Value::Object(number)) = schema.pointer_mut(&number) {
+                    number.insert("minimum".to_owned(), as_written(least));
+                    number.insert("maximum".to_owned(), as_written(most));
+                }
+            }
+        }
+    }
+    schema
+}
+
+/// Where the schema speaks of the numbers of a key, as JSON pointers.
+fn numbers_of(schema: &Value, key: &str) -> Option<Vec<String>> {
+    let mut at = String::new();
+    for name in key.split('.') {
+        at = format!("{}/properties/{name}", resolved(schema, at)?);
+    }
+    let mut found = Vec::new();
+    let mut waiting = vec![at];
+    while let Some(at) = waiting.pop() {
+        let at = resolved(schema, at)?;
+        let node = schema.pointer(&at)?;
+        for choice in ["anyOf", "oneOf"] {
+            let n = node[choice].as_array().map_or(0, Vec::len);
+            waiting.extend((0..n).map(|index| format!("{at}/{choice}/{index}")));
+        }
+        for inner in ["items", "additionalProperties"] {
+            let is_one = node[inner].is_object();
+            waiting.extend(is_one.then(|| format!("{at}/{inner}")));
+        }
+        let kinds = [&node["type"]];
+        let mut kinds = kinds
+            .into_iter()
+            .chain(node["type"].as_array().into_iter().flatten());
+        if kinds.any(|it| it == "integer" || it == "number") {
+            found.push(at);
+        }
+    }
+    Some(found)
+}
+
+/// A pointer to what a reference refers to; anything else is itself.
+fn resolved(schema: &Value, at: String) -> Option<String> {
+    let reference = schema.pointer(&at)?["$ref"].as_str();
+    Some(reference.map_or(at, |it| it.trim_start_matches('#').to_owned()))
+}
+
+/// A whole number without a point.
+fn as_written(number: f64) -> Value {
+    if number.fract() == 0.0 {
+        Value::from(number as i64)
+    } else {
+        Value::from(number)
+    }
 }
 
 /// A key of a deployment file.
@@ -121,6 +178,70 @@ mod tests {
             .collect();
         required.sort_unstable();
         assert_eq!(required, ["camera", "name", "output", "rig"]);
+    }
+
+    /// Numbers that their type or their meaning bounds, and no range.
+    const WITHOUT_RANGE: [&str; 5] = [
+        "up",
+        "capture.frozen_after",
+        "pose.evidence_window",
+        "pose.tracked_levels",
+        "results.overlay_every",
+    ];
+
+    #[test]
+    fn every_number_has_the_range_that_the_rules_have() {
+        let schema = schema();
+        for (key, least, most) in RANGES.into_iter().filter(|it| it.0 != "camera") {
+            let places = numbers_of(&schema, key).unwrap_or_default();
+            assert!(!places.is_empty(), "{key} has no number");
+            for place in places {
+                let number = schema.pointer(&place).unwrap();
+                let bounds = ["minimum", "maximum"].map(|it| number[it].as_f64());
+                assert_eq!(bounds, [Some(least), Some(most)], "{place}");
+            }
+        }
+        for key in crate::keys()
+            .iter()
+            .filter(|it| it.takes.contains("number"))
+        {
+            let has_range = RANGES.iter().any(|it| it.0 == key.name);
+            let needs_none = WITHOUT_RANGE.contains(&key.name.as_str());
+            assert!(has_range != needs_none, "{}: what may it be?", key.name);
+        }
+        assert_eq!(
+            schema["$defs"]["Quality"]["properties"]["frame_step"]["maximum"],
+            1_000_000
+        );
+    }
+
+    #[test]
+    fn the_ends_of_a_range_are_taken_and_what_is_beyond_is_refused() {
+        let read = |key: &str, value: f64| {
+            let text = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
+                        [[camera]]\nname = 'a'\nsource = 'a.mp4'\n";
+            let value = match key {
+                "capture.size" => format!("[{value}, {value}]"),
+                "fuse.tau" => format!("[{value:?}]"),
+                "runtime.cores" => format!("{{ pose = [{value}] }}"),
+                "runtime.priority" => format!("{{ pose = {value} }}"),
+                _ => value.to_string(),
+            };
+            let file = std::path::Path::new("deployment.toml");
+            crate::Loaded::parse(text, file, &[format!("{key}={value}")], &crate::AnyMachine)
+        };
+        for (key, least, most) in RANGES {
+            if key == "camera" {
+                continue; // the length of the list
+            }
+            for value in [least, most] {
+                let said = read(key, value).map_or_else(|it| it.to_string(), |_| String::new());
+                assert_eq!(said, "", "{key} = {value}");
+            }
+            for value in [least - 1.0, most + 1.0] {
+                assert!(read(key, value).is_err(), "{key} = {value} is taken");
+            }
+        }
     }
 
     #[test]

@@ -1,0 +1,69 @@
+//! The least and the most of every number of a deployment file.
+
+use messages::{MAX_CANDIDATES, MAX_VIEWS};
+
+/// Most cores of a machine that Linux numbers.
+pub const MAX_CORES: usize = 1024;
+
+/// One hour, and one day, milliseconds.
+const HOUR_MS: f64 = 3_600_000.0;
+const DAY_MS: f64 = 24.0 * HOUR_MS;
+/// A day, and a year, seconds.
+const DAY_S: f64 = 86_400.0;
+const YEAR_S: f64 = 366.0 * DAY_S;
+/// The most frames of any footage: a thousand years of video.
+const MOST_FRAMES: f64 = 1e12;
+
+/// The key of a number, of a list of numbers or of a table of such, with the least and the most that it can be; of
+/// `camera` the length of the list.
+///
+/// Whole numbers are among them: all of these are exact.
+pub(crate) const RANGES: [(&str, f64, f64); 39] = [
+    ("capture.size", 1.0, 16_384.0),
+    ("capture.scale", 0.001, 8.0),
+    ("capture.frame_rate_hz", 0.001, 1e5),
+    ("capture.start_frame", 0.0, MOST_FRAMES),
+    ("capture.frame_step", 1.0, 1e9),
+    ("capture.n_frames", 1.0, MOST_FRAMES),
+    ("pose.candidates", 1.0, MAX_CANDIDATES as f64),
+    ("pose.threads", 1.0, 256.0),
+    ("pose.min_separation", 0.0, 1e3),
+    ("pose.tracked_margin", 0.0, 100.0),
+    ("pose.tracked_max_drop", 0.0, 1e6),
+    ("pose.tracked_speed", 0.0, 1e3),
+    ("pose.tracked_max_gap_ms", 0.0, HOUR_MS),
+    ("pose.tracked_full_every_ms", 0.0, HOUR_MS),
+    ("pose.tracked_full_every", 1.0, 1e6),
+    ("pose.tracked_max_gap", 1.0, 1e6),
+    ("quality.deadline_ms", 0.0, HOUR_MS),
+    ("quality.max_age_ms", 0.0, DAY_MS),
+    ("quality.frame_offset", -MOST_FRAMES, MOST_FRAMES),
+    ("quality.frame_step", 1.0, 1e6),
+    ("fuse.alpha", 0.0, 1e6),
+    ("fuse.beta", 0.0, 1e6),
+    ("fuse.epsilon_px", 0.0, 1e4),
+    ("fuse.max_distance_cells", 1e-3, 1e6),
+    ("fuse.tau", 0.0, 1e6),
+    ("fuse.workers", 1.0, MAX_VIEWS as f64),
+    ("fuse.max_iterations", 1.0, 1000.0),
+    ("triangulate.loss_px", 0.01, 1e4),
+    ("triangulate.error_weight", 0.0, 1e3),
+    ("results.epipolar_part", 1.0, 1000.0),
+    ("supervise.deadline_ms", 1.0, HOUR_MS),
+    ("supervise.hang_limit_s", 1.0, DAY_S),
+    ("supervise.missed_beats", 1.0, 1e6),
+    ("supervise.restart_window_s", 1.0, YEAR_S),
+    ("supervise.max_restarts", 0.0, 1e6),
+    ("supervise.latency_budget_ms", 1e-3, DAY_MS),
+    ("runtime.cores", 0.0, (MAX_CORES - 1) as f64),
+    ("runtime.priority", 1.0, 99.0),
+    ("camera", 1.0, MAX_VIEWS as f64),
+];
+
+/// The least and the most of a key; of one without a row, none.
+pub(crate) fn range(key: &str) -> [f64; 2] {
+    let row = RANGES.iter().find(|it| it.0 == key);
+    row.map_or([f64::NEG_INFINITY, f64::INFINITY], |&(_, least, most)| {
+        [least, most]
+    })
+}
