@@ -265,16 +265,12 @@ fn is_process(deployment: &Deployment, key: &str, name: &str) -> Result<(), Comp
     let is_one = services.iter().any(|&(service, n)| {
         name == service || (0..n).any(|index| name == process_name(service, Some(index)))
     });
-    let newer = OLDER.iter().find(|it| it.0 == name);
-    let expected = match newer {
-        Some((_, newer)) => format!("{newer:?}, which is what this process is called today"),
-        None => {
-            let names: Vec<&str> = services.iter().map(|it| it.0).collect();
-            format!(
-                "{}, or one process of these, such as pose-0",
-                names.join(", ")
-            )
-        }
+    let expected = if let Some((_, newer)) = OLDER.iter().find(|it| it.0 == name) {
+        format!("{newer:?}, which is what this process is called today")
+    } else {
+        let names: Vec<&str> = services.iter().map(|it| it.0).collect();
+        let names = names.join(", ");
+        format!("{names}, or one process of these, such as pose-0")
     };
     demand(is_one, key, &format!("{name:?}"), &expected)
 }
