@@ -7,7 +7,7 @@ mod table;
 use core::time::Duration;
 use std::time::Instant;
 
-use runtime::{Failure, Keys, Namespace, Observer, OrFail as _, Stop, now_nanos};
+use runtime::{Failure, Namespace, Observer, now_nanos};
 
 pub use board::{Board, Member, Standing};
 pub use describe::{describe, measured};
@@ -67,31 +67,5 @@ impl Live {
     /// Whether the deployment ends, and this has to be dropped.
     pub fn is_over(&self) -> bool {
         self.observer.is_over()
-    }
-
-    /// Waits for a key, at most until it is time to look again; answers early if the deployment ends.
-    ///
-    /// # Errors
-    ///
-    /// The terminal cannot be read.
-    pub fn rest(
-        &self,
-        keys: &mut Keys,
-        stop: &Stop,
-        pause: Duration,
-    ) -> Result<Option<u8>, Failure> {
-        const TURN: Duration = Duration::from_millis(100);
-        let begin = Instant::now();
-        while !stop.is_requested() && !self.is_over() {
-            let left = pause.saturating_sub(begin.elapsed());
-            if left.is_zero() {
-                break;
-            }
-            let key = keys.next(left.min(TURN), stop);
-            if let Some(key) = key.or_fail(runtime::ExitKind::Run)? {
-                return Ok(Some(key));
-            }
-        }
-        Ok(None)
     }
 }

@@ -39,7 +39,6 @@ mod progress;
 mod remains;
 mod scheduling;
 mod stop;
-mod terminal;
 
 pub use bus::Bus;
 pub use bus_error::BusError;
@@ -76,6 +75,5 @@ pub use scheduling::{
 pub use service::PortError;
 pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
-pub use terminal::Keys;
 pub use topic::{Topic, TopicPlan};
 pub use waiter::{WaitError, Waiter, Woken};

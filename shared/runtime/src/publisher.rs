@@ -350,6 +350,9 @@ impl<E: Message, H: Header> Port<E, H> {
             // Receivers check their buffers from time to time in any case.
             tracing::debug!(topic = %self.topic, ?error, "cannot wake the receivers");
         }
+        if sent.is_err() {
+            self.stop.wait_for_unasked_end();
+        }
         let topic = || Arc::clone(&self.topic);
         sent.map_err(|source| match source {
             // A signal also interrupts a wait inside iceoryx2, which reports an internal error.

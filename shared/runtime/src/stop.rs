@@ -10,6 +10,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::Instant;
 
 use libc::siginfo_t;
 use signal_hook::consts::{SIGALRM, SIGHUP, SIGINT, SIGTERM};
@@ -131,6 +132,19 @@ impl Stop {
     /// Whether stop was requested.
     pub fn is_requested(&self) -> bool {
         self.inner.requested.load(Ordering::Acquire)
+    }
+
+    /// After a signal that is not from the supervisor: waits until it ends the process, or stop is requested. Such a
+    /// signal interrupts a wait inside iceoryx2, which then reports an error that is none.
+    pub(crate) fn wait_for_unasked_end(&self) {
+        let limit = Duration::from_secs(u64::from(UNASKED_SECONDS) + 1);
+        let begin = Instant::now();
+        while self.inner.unasked.load(Ordering::Acquire) != 0
+            && !self.is_requested()
+            && begin.elapsed() < limit
+        {
+            std::thread::sleep(Duration::from_millis(10));
+        }
     }
 
     /// The number of the last signal, if there was one.
