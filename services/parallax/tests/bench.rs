@@ -5,7 +5,7 @@ use crate::common;
 
 use std::fs;
 
-use common::{Case, Ended, PACED, PLAIN};
+use common::{Case, Ended, PLAIN};
 use messages::{PairPose, ViewPose};
 use serde_json::{Value, json};
 
@@ -85,38 +85,6 @@ fn a_hop_that_takes_longer_than_the_limit_is_a_missed_limit() {
 }
 
 #[test]
-fn a_deployment_is_measured_with_all_cameras_and_with_a_dead_one() {
-    let case = Case::new("latency", &[60; 3], PACED);
-    let words = [
-        "latency",
-        "deployment.toml",
-        "--views",
-        "2",
-        "--seconds",
-        "2",
-    ];
-    let more = ["--out", "bench", "--spin", "--min-rate", "1000000"];
-    let (ended, report) = bench(&case, &[&words[..], &more].concat());
-    assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
-    assert_eq!(report["limits"][0]["held"], false, "nobody is that fast");
-    let [whole, dead] = &report["numbers"].as_array().unwrap()[..] else {
-        panic!("{report:#}")
-    };
-    assert_eq!(whole["run"], "2 views");
-    assert_eq!(whole["summary"]["restarts"], json!([]));
-    assert!(whole["results"].as_u64() > Some(0), "{whole:#}");
-    let ms = |value: &Value| value["p50"].as_f64().unwrap();
-    let pose = ms(&whole["stages_ms"]["pose"]);
-    assert!(
-        pose > 0.0 && ms(&whole["end_to_end_ms"]) > pose,
-        "{whole:#}"
-    );
-    assert!(whole["cpu_seconds"].as_f64() > Some(0.0), "{whole:#}");
-    assert_eq!(dead["run"], "2 views, one dead");
-    assert_eq!(dead["summary"]["given_up"], json!(["capture-1"]));
-}
-
-#[test]
 fn measuring_more_cameras_than_exist_is_refused() {
     let case = Case::new("views", &[2; 2], "");
     let (ended, _) = bench(&case, &["scale", "deployment.toml", "--views", "3"]);
@@ -177,4 +145,44 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
         evidence as usize * N_FRAMES > fuse,
         "which is far more: {evidence} a frame"
     );
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use crate::common::PACED;
+
+    use super::*;
+
+    #[test]
+    fn a_deployment_is_measured_with_all_cameras_and_with_a_dead_one() {
+        let case = Case::new("latency", &[60; 3], PACED);
+        let words = [
+            "latency",
+            "deployment.toml",
+            "--views",
+            "2",
+            "--seconds",
+            "2",
+        ];
+        let more = ["--out", "bench", "--spin", "--min-rate", "1000000"];
+        let (ended, report) = bench(&case, &[&words[..], &more].concat());
+        assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
+        assert_eq!(report["limits"][0]["held"], false, "nobody is that fast");
+        let [whole, dead] = &report["numbers"].as_array().unwrap()[..] else {
+            panic!("{report:#}")
+        };
+        assert_eq!(whole["run"], "2 views");
+        assert_eq!(whole["summary"]["restarts"], json!([]));
+        assert!(whole["results"].as_u64() > Some(0), "{whole:#}");
+        let ms = |value: &Value| value["p50"].as_f64().unwrap();
+        let pose = ms(&whole["stages_ms"]["pose"]);
+        assert!(
+            pose > 0.0 && ms(&whole["end_to_end_ms"]) > pose,
+            "{whole:#}"
+        );
+        assert!(whole["cpu_seconds"].as_f64() > Some(0.0), "{whole:#}");
+        assert_eq!(dead["run"], "2 views, one dead");
+        assert_eq!(dead["summary"]["given_up"], json!(["capture-1"]));
+    }
 }

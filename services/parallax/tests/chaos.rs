@@ -5,10 +5,7 @@ use crate::common;
 use std::fs;
 
 use common::{Case, Ended, PACED};
-use serde_json::{Value, json};
-
-/// Two seconds of results are enough; generous limits for a loaded machine.
-const PATIENT: [&str; 4] = ["--max-return-ms", "60000", "--max-pause-ms", "60000"];
+use serde_json::Value;
 
 /// Runs scenarios on a small deployment; returns its exit, and `chaos.json`.
 fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
@@ -28,122 +25,6 @@ fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
     let report = fs::read_to_string(case.path("chaos/chaos.json")).unwrap_or_default();
     let report = serde_json::from_str(&report).unwrap_or(Value::Null);
     (ended, report)
-}
-
-#[test]
-fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
-    let case = Case::new("chaos", &[80; 3], PACED);
-    let (ended, report) = chaos(
-        &case,
-        "kill-pose,spin-capture,kill-supervisor,stall-results",
-        &PATIENT,
-    );
-    assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
-    let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(printed, report, "the same on standard output");
-
-    let [pose, spin, supervisor, stall] = &report["scenarios"].as_array().unwrap()[..] else {
-        panic!("{report:#}")
-    };
-    assert_eq!(pose["scenario"], "kill-pose");
-    let process = &pose["measured"]["process"];
-    assert!(process.as_str().unwrap().starts_with("pose-"), "{process}");
-    let restarts = json!([{ "process": process, "restarts": 1 }]);
-    assert_eq!(pose["run"]["restarts"], restarts);
-    let cost = &pose["measured"]["cost"];
-    let ms = |key: &str| cost[key].as_f64().unwrap();
-    assert!(ms("noticed_ms") < ms("restarted_ms"), "{cost:#}");
-    assert!(ms("restarted_ms") < ms("back_ms"), "{cost:#}");
-    assert!(ms("longest_pause_ms") > 0.0, "{cost:#}");
-
-    let cost = &spin["measured"]["cost"];
-    assert!(cost["noticed_ms"].as_f64() > Some(1000.0), "{spin:#}");
-    assert!(cost["back_ms"].is_number(), "{spin:#}");
-    let restarts = spin["run"]["restarts"].as_array().unwrap();
-    assert_eq!(restarts.len(), 1, "{spin:#}");
-
-    let measured = &supervisor["measured"];
-    assert!(measured["files_left"].as_u64() > Some(10), "{measured:#}");
-    assert!(measured["children_ended_ms"].is_number(), "{measured:#}");
-    assert_eq!(
-        supervisor["run"]["restarts"],
-        json!([]),
-        "no process was killed"
-    );
-    // With lossless delivery senders wait for a suspended results process, and nothing is lost.
-    let limits = stall["limits"].as_array().unwrap().iter();
-    let written = limits.clone().find(|it| it["what"] == "results written");
-    assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");
-    assert_eq!(
-        case.lines("pose3d.jsonl").len(),
-        0,
-        "not into its own folder"
-    );
-}
-
-#[test]
-fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
-    // The time limit alone would detect it after ten minutes.
-    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
-    let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
-    let case = Case::new("chaos-spin", &[240; 3], &patient);
-    let (ended, report) = chaos(&case, "spin-pose,spin-fuse,spin-triangulate", &PATIENT);
-    let scenarios = report["scenarios"].as_array().unwrap();
-    assert_eq!(scenarios.len(), 3, "{}", ended.stderr);
-    for it in scenarios {
-        let measured = &it["measured"];
-        let expected = json!([{ "process": measured["process"], "restarts": 1 }]);
-        // On a loaded machine the footage may end before the process is back.
-        assert_eq!(it["run"]["restarts"], expected, "{it:#}");
-    }
-}
-
-#[test]
-fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
-    let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
-    let case = Case::new("chaos-camera", &[160; 3], &live);
-    let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);
-    let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {
-        panic!("{}\n{report:#}", ended.stderr)
-    };
-    let flagged = |it: &Value| {
-        let causes = it["measured"]["flagged"].as_array().unwrap().iter();
-        let causes = causes.map(|it| (it[0].as_str().unwrap().to_owned(), it[1].as_u64().unwrap()));
-        causes.collect::<Vec<_>>()
-    };
-    for (it, n_causes) in [(unplug, 1), (clock, 3)] {
-        let flagged = flagged(it);
-        assert_eq!(flagged.len(), n_causes);
-        assert!(
-            flagged.iter().all(|it| it.1 > 0),
-            "{flagged:?}\n{}",
-            ended.stderr
-        );
-        assert!(it["measured"]["back_ms"].is_number(), "{it:#}");
-        let camera = &it["measured"]["camera"];
-        let views = it["run"]["views"].as_array().unwrap();
-        let view = views.iter().find(|it| it["name"] == *camera).unwrap();
-        for (cause, n) in flagged {
-            assert!(
-                view["faults"][&cause].as_u64() >= Some(n),
-                "{cause}: {view:#}"
-            );
-        }
-        assert_eq!(
-            it["run"]["restarts"],
-            json!([]),
-            "the process itself is well"
-        );
-    }
-    assert!(
-        stall["measured"]["stall_ms"].as_f64() >= Some(3000.0),
-        "{stall:#}"
-    );
-    assert_eq!(
-        stall["run"]["restarts"],
-        json!([]),
-        "it must not count as hung"
-    );
 }
 
 #[test]
@@ -178,4 +59,132 @@ fn scenarios_are_listed_and_impossible_ones_refused() {
     let (ended, _) = chaos(&case, "kill-nobody", &[]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     assert!(ended.stderr.contains("--list"), "{}", ended.stderr);
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use serde_json::json;
+
+    use super::*;
+
+    /// Two seconds of results are enough; generous limits for a loaded machine.
+    const PATIENT: [&str; 4] = ["--max-return-ms", "60000", "--max-pause-ms", "60000"];
+
+    #[test]
+    fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
+        // The time limit alone would detect it after ten minutes.
+        let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+        let patient = format!("{live}[supervise]\nhang_limit_s = 600\n");
+        let case = Case::new("chaos-spin", &[240; 3], &patient);
+        let (ended, report) = chaos(&case, "spin-pose,spin-fuse,spin-triangulate", &PATIENT);
+        let scenarios = report["scenarios"].as_array().unwrap();
+        assert_eq!(scenarios.len(), 3, "{}", ended.stderr);
+        for it in scenarios {
+            let measured = &it["measured"];
+            let expected = json!([{ "process": measured["process"], "restarts": 1 }]);
+            // On a loaded machine the footage may end before the process is back.
+            assert_eq!(it["run"]["restarts"], expected, "{it:#}");
+        }
+    }
+
+    #[test]
+    fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
+        let case = Case::new("chaos", &[80; 3], PACED);
+        let (ended, report) = chaos(
+            &case,
+            "kill-pose,spin-capture,kill-supervisor,stall-results",
+            &PATIENT,
+        );
+        assert_eq!(ended.status.code(), Some(0), "{}\n{report:#}", ended.stderr);
+        let printed: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(printed, report, "the same on standard output");
+
+        let [pose, spin, supervisor, stall] = &report["scenarios"].as_array().unwrap()[..] else {
+            panic!("{report:#}")
+        };
+        assert_eq!(pose["scenario"], "kill-pose");
+        let process = &pose["measured"]["process"];
+        assert!(process.as_str().unwrap().starts_with("pose-"), "{process}");
+        let restarts = json!([{ "process": process, "restarts": 1 }]);
+        assert_eq!(pose["run"]["restarts"], restarts);
+        let cost = &pose["measured"]["cost"];
+        let ms = |key: &str| cost[key].as_f64().unwrap();
+        assert!(ms("noticed_ms") < ms("restarted_ms"), "{cost:#}");
+        assert!(ms("restarted_ms") < ms("back_ms"), "{cost:#}");
+        assert!(ms("longest_pause_ms") > 0.0, "{cost:#}");
+
+        let cost = &spin["measured"]["cost"];
+        assert!(cost["noticed_ms"].as_f64() > Some(1000.0), "{spin:#}");
+        assert!(cost["back_ms"].is_number(), "{spin:#}");
+        let restarts = spin["run"]["restarts"].as_array().unwrap();
+        assert_eq!(restarts.len(), 1, "{spin:#}");
+
+        let measured = &supervisor["measured"];
+        assert!(measured["files_left"].as_u64() > Some(10), "{measured:#}");
+        assert!(measured["children_ended_ms"].is_number(), "{measured:#}");
+        assert_eq!(
+            supervisor["run"]["restarts"],
+            json!([]),
+            "no process was killed"
+        );
+        // With lossless delivery senders wait for a suspended results process, and nothing is lost.
+        let limits = stall["limits"].as_array().unwrap().iter();
+        let written = limits.clone().find(|it| it["what"] == "results written");
+        assert_eq!(written.unwrap()["measured"], "80", "{stall:#}");
+        assert_eq!(
+            case.lines("pose3d.jsonl").len(),
+            0,
+            "not into its own folder"
+        );
+    }
+
+    #[test]
+    fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
+        let live = PACED.replace("pace =", "mode = \"realtime\"\npace =");
+        let case = Case::new("chaos-camera", &[160; 3], &live);
+        let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);
+        let [unplug, clock, stall] = &report["scenarios"].as_array().unwrap()[..] else {
+            panic!("{}\n{report:#}", ended.stderr)
+        };
+        let flagged = |it: &Value| {
+            let causes = it["measured"]["flagged"].as_array().unwrap().iter();
+            let causes =
+                causes.map(|it| (it[0].as_str().unwrap().to_owned(), it[1].as_u64().unwrap()));
+            causes.collect::<Vec<_>>()
+        };
+        for (it, n_causes) in [(unplug, 1), (clock, 3)] {
+            let flagged = flagged(it);
+            assert_eq!(flagged.len(), n_causes);
+            assert!(
+                flagged.iter().all(|it| it.1 > 0),
+                "{flagged:?}\n{}",
+                ended.stderr
+            );
+            assert!(it["measured"]["back_ms"].is_number(), "{it:#}");
+            let camera = &it["measured"]["camera"];
+            let views = it["run"]["views"].as_array().unwrap();
+            let view = views.iter().find(|it| it["name"] == *camera).unwrap();
+            for (cause, n) in flagged {
+                assert!(
+                    view["faults"][&cause].as_u64() >= Some(n),
+                    "{cause}: {view:#}"
+                );
+            }
+            assert_eq!(
+                it["run"]["restarts"],
+                json!([]),
+                "the process itself is well"
+            );
+        }
+        assert!(
+            stall["measured"]["stall_ms"].as_f64() >= Some(3000.0),
+            "{stall:#}"
+        );
+        assert_eq!(
+            stall["run"]["restarts"],
+            json!([]),
+            "it must not count as hung"
+        );
+    }
 }

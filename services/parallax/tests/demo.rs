@@ -135,33 +135,39 @@ fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
     }
 }
 
-#[test]
-fn a_missed_limit_of_the_demo_is_named_and_has_its_own_exit_code() {
-    let impossible = ["--frames", "12", "--no-kill", "--min-pcp3d", "101"];
-    let (case, ended, report) = demo("demo-missed", &impossible);
-    assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
-    assert!(missed(&report).contains(&"PCP3D at 0.5, %"), "{report:#}");
-    assert_eq!(
-        (&report["held"], &report["killed"]),
-        (&json!(false), &Value::Null)
-    );
-    assert_eq!(
-        report["run"]["restarts"],
-        json!([]),
-        "no process was killed"
-    );
-    // The machine is measured before and after; the slower result is reported, with the resulting frame rate.
-    let machine = &report["machine"];
-    let [frame_ms, rate_hz, slowness] =
-        ["frame_ms", "rate_hz", "slowness"].map(|key| machine[key].as_f64().unwrap());
-    let cameras_hz = report["frame_rate_hz"].as_f64().unwrap();
-    assert!(frame_ms > 0.0 && slowness >= 1.0, "{machine:#}");
-    assert!((rate_hz..=5.0).contains(&cameras_hz), "{machine:#}");
-    assert!(
-        ended.stderr.contains("a frame of 4 cameras takes"),
-        "{}",
-        ended.stderr
-    );
-    let page = fs::read_to_string(case.path("demo/report.html")).unwrap();
-    assert!(page.contains("limits missed"));
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use super::*;
+
+    #[test]
+    fn a_missed_limit_of_the_demo_is_named_and_has_its_own_exit_code() {
+        let impossible = ["--frames", "12", "--no-kill", "--min-pcp3d", "101"];
+        let (case, ended, report) = demo("demo-missed", &impossible);
+        assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
+        assert!(missed(&report).contains(&"PCP3D at 0.5, %"), "{report:#}");
+        assert_eq!(
+            (&report["held"], &report["killed"]),
+            (&json!(false), &Value::Null)
+        );
+        assert_eq!(
+            report["run"]["restarts"],
+            json!([]),
+            "no process was killed"
+        );
+        // The machine is measured before and after; the slower result is reported, with the resulting frame rate.
+        let machine = &report["machine"];
+        let [frame_ms, rate_hz, slowness] =
+            ["frame_ms", "rate_hz", "slowness"].map(|key| machine[key].as_f64().unwrap());
+        let cameras_hz = report["frame_rate_hz"].as_f64().unwrap();
+        assert!(frame_ms > 0.0 && slowness >= 1.0, "{machine:#}");
+        assert!((rate_hz..=5.0).contains(&cameras_hz), "{machine:#}");
+        assert!(
+            ended.stderr.contains("a frame of 4 cameras takes"),
+            "{}",
+            ended.stderr
+        );
+        let page = fs::read_to_string(case.path("demo/report.html")).unwrap();
+        assert!(page.contains("limits missed"));
+    }
 }

@@ -220,27 +220,6 @@ fn impossible_evaluations_are_refused() {
 }
 
 #[test]
-fn consistency_between_views_is_learned_and_used() {
-    let case = two_people();
-    let out = ["--out", "a.consistency", "--rig", "hall", "--tries", "1"];
-    let ended = learn(&case, &[&out[..], &["--json", "--quiet"]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(said["learned_from"]["views"], 3, "{said}");
-    assert_eq!(said["learned_from"]["held_out"], 1, "{said}");
-    assert!(said["surface"].as_array().unwrap().len() > 20, "{said}");
-
-    case.write(
-        "hall.toml",
-        "consistency = \"a.consistency\"\nconsistency_rig = \"hall\"\n",
-    );
-    let used = ["eval", "people", "--scale", "0.4", "--out", "out", "--json"];
-    let versions = ["--versions", "appearance", "--fuse", "hall.toml"];
-    let used = case.start(&[&used[..], &versions].concat()).wait();
-    assert_eq!(used.status.code(), Some(0), "{}", used.stderr);
-}
-
-#[test]
 fn learned_consistency_does_not_depend_on_the_number_of_threads() {
     let case = two_people();
     let learned = ["1", "3"].map(|threads| {
@@ -297,4 +276,31 @@ fn an_unusable_consistency_file_is_refused() {
         "{}",
         ended.stderr
     );
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use super::*;
+
+    #[test]
+    fn consistency_between_views_is_learned_and_used() {
+        let case = two_people();
+        let out = ["--out", "a.consistency", "--rig", "hall", "--tries", "1"];
+        let ended = learn(&case, &[&out[..], &["--json", "--quiet"]].concat());
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(said["learned_from"]["views"], 3, "{said}");
+        assert_eq!(said["learned_from"]["held_out"], 1, "{said}");
+        assert!(said["surface"].as_array().unwrap().len() > 20, "{said}");
+
+        case.write(
+            "hall.toml",
+            "consistency = \"a.consistency\"\nconsistency_rig = \"hall\"\n",
+        );
+        let used = ["eval", "people", "--scale", "0.4", "--out", "out", "--json"];
+        let versions = ["--versions", "appearance", "--fuse", "hall.toml"];
+        let used = case.start(&[&used[..], &versions].concat()).wait();
+        assert_eq!(used.status.code(), Some(0), "{}", used.stderr);
+    }
 }

@@ -171,25 +171,6 @@ fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
 }
 
 #[test]
-fn a_process_whose_model_is_gone_at_its_restart_is_given_up_and_the_run_goes_on() {
-    let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
-    let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
-    let mut started = case.start(&["run", "deployment.toml", "--json"]);
-    started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
-    fs::remove_file(case.path("model.plx")).unwrap();
-    signal("KILL", started.pid_of("pose --index 1").into());
-    let ended = started.wait();
-    case.assert_nothing_left();
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-    assert!(ended.stderr.contains("model.plx"), "{}", ended.stderr);
-    let last = case.lines("pose3d.jsonl").pop().unwrap();
-    assert_eq!(last["frame"], json!(N_FRAMES - 1));
-    assert_eq!(last["views_present"], json!(["a", "c"]));
-}
-
-#[test]
 fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
     let run = Signalled::new(PACED, "KILL", "fuse --index 0");
     run.assert_every_frame();
@@ -286,4 +267,29 @@ fn assert_back_after_a_gap(lines: &[Value]) {
     let lost = last(|it| it["views_missing"]["b"] == "process lost");
     let there = last(|it| it["views_missing"]["b"].is_null());
     assert!(there > lost, "it is not back: {lines:?}");
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use super::*;
+
+    #[test]
+    fn a_process_whose_model_is_gone_at_its_restart_is_given_up_and_the_run_goes_on() {
+        let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
+        let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
+        let mut started = case.start(&["run", "deployment.toml", "--json"]);
+        started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
+        fs::remove_file(case.path("model.plx")).unwrap();
+        signal("KILL", started.pid_of("pose --index 1").into());
+        let ended = started.wait();
+        case.assert_nothing_left();
+        assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+        let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
+        assert!(ended.stderr.contains("model.plx"), "{}", ended.stderr);
+        let last = case.lines("pose3d.jsonl").pop().unwrap();
+        assert_eq!(last["frame"], json!(N_FRAMES - 1));
+        assert_eq!(last["views_present"], json!(["a", "c"]));
+    }
 }

@@ -12,6 +12,7 @@ mod eval;
 mod faults;
 mod full;
 mod live;
+#[cfg(feature = "long-tests")]
 mod memory;
 mod nonsense;
 mod parity;

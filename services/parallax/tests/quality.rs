@@ -5,7 +5,6 @@ use crate::common;
 
 use std::sync::Arc;
 
-use common::started::signal;
 use common::{Case, PLAIN, planted};
 use fmp::{Layout, Scope};
 use kernels::Rgb8View;
@@ -162,46 +161,6 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
     assert_eq!(joints(&answers, 0.0), unaware);
 }
 
-/// Lines about a view.
-fn of_view(case: &Case, name: &str) -> Vec<Value> {
-    let lines = case.lines("pose2d.jsonl");
-    lines.into_iter().filter(|it| it["view"] == name).collect()
-}
-
-#[test]
-fn no_frame_waits_for_a_suspended_network() {
-    let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
-                frame_rate_hz = 5\n[results]\noverlay_every = 0\n\
-                [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
-                [supervise]\nmissed_beats = 1000\n";
-    let case = Case::new("stopped", &[100; 2], more);
-    case.write("q.onnx", network(0.02).file());
-    let mut started = case.start(&["run", "deployment.toml", "--json"]);
-    let used = || -> Vec<Option<u64>> {
-        let lines = of_view(&case, "b").into_iter();
-        let fused = lines.filter(|it| !it["fused"].is_null());
-        fused.map(|it| it["sigma_used"].as_u64()).collect()
-    };
-    started.until("predictions", |_| used().contains(&Some(0)));
-    let stopped = started.pid_of("quality --index 1");
-    let n_before = used().len();
-    signal("STOP", stopped.into());
-    let after = || used().split_off(n_before);
-    started.until("the last prediction while it is fresh", |_| {
-        after().iter().flatten().any(|it| *it > 0)
-    });
-    started.until("and none when it no longer is", |_| {
-        after().last() == Some(&None)
-    });
-    signal("CONT", stopped.into());
-    let ended = started.wait();
-    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
-    let of_other = of_view(&case, "a");
-    let n_of_other = of_other.iter().filter(|it| !it["sigma_used"].is_null());
-    assert!(n_of_other.count() > 5, "the other view has its own");
-}
-
 #[test]
 fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     let more = PLAIN.to_owned() + "[quality]\nnetwork = \"q.onnx\"\n";
@@ -266,4 +225,52 @@ fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
     let expected = json!([{ "process": process, "restarts": 1 }]);
     // On a loaded machine the footage may end before the process is back.
     assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use crate::common::started::signal;
+
+    use super::*;
+
+    /// Lines about a view.
+    fn of_view(case: &Case, name: &str) -> Vec<Value> {
+        let lines = case.lines("pose2d.jsonl");
+        lines.into_iter().filter(|it| it["view"] == name).collect()
+    }
+
+    #[test]
+    fn no_frame_waits_for_a_suspended_network() {
+        let more = "[capture]\nupright = false\nmode = \"realtime\"\npace = \"realtime\"\n\
+                    frame_rate_hz = 5\n[results]\noverlay_every = 0\n\
+                    [quality]\nnetwork = \"q.onnx\"\ndeadline_ms = 200\nmax_age_ms = 1500\n\
+                    [supervise]\nmissed_beats = 1000\n";
+        let case = Case::new("stopped", &[100; 2], more);
+        case.write("q.onnx", network(0.02).file());
+        let mut started = case.start(&["run", "deployment.toml", "--json"]);
+        let used = || -> Vec<Option<u64>> {
+            let lines = of_view(&case, "b").into_iter();
+            let fused = lines.filter(|it| !it["fused"].is_null());
+            fused.map(|it| it["sigma_used"].as_u64()).collect()
+        };
+        started.until("predictions", |_| used().contains(&Some(0)));
+        let stopped = started.pid_of("quality --index 1");
+        let n_before = used().len();
+        signal("STOP", stopped.into());
+        let after = || used().split_off(n_before);
+        started.until("the last prediction while it is fresh", |_| {
+            after().iter().flatten().any(|it| *it > 0)
+        });
+        started.until("and none when it no longer is", |_| {
+            after().last() == Some(&None)
+        });
+        signal("CONT", stopped.into());
+        let ended = started.wait();
+        let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
+        let of_other = of_view(&case, "a");
+        let n_of_other = of_other.iter().filter(|it| !it["sigma_used"].is_null());
+        assert!(n_of_other.count() > 5, "the other view has its own");
+    }
 }

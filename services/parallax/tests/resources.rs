@@ -25,44 +25,6 @@ fn assert_no_bus_error(ended: &Ended) {
 }
 
 #[test]
-fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
-    let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
-    let case = Case::new("filled", &[300; 3], &more);
-    // The processes are children of the run; one of them is killed when there is no room to start another.
-    let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
-        \"$PARALLAX\" run deployment.toml --json & run=$!\n\
-        while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
-          kill -0 $run; sleep 0.05\n\
-        done\n\
-        cat /dev/zero >/dev/shm/filler 2>/dev/null || true\n\
-        stat -f -c %a /dev/shm >free\n\
-        for dir in /proc/[0-9]*; do\n\
-          line=$(tr '\\0' ' ' <$dir/cmdline 2>/dev/null || true)\n\
-          case \"$line\" in *\"$PWD\"*\" --index 1\"*) case \"$line\" in\n\
-            *\" service pose \"*) kill -9 ${dir#/proc/};; esac;; esac\n\
-        done\n\
-        code=0; wait $run || code=$?; exit $code";
-    let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
-        eprintln!("skipped: no private file system may be mounted here");
-        return;
-    };
-    let ended = started.wait();
-    assert_eq!(fs::read_to_string(case.path("free")).unwrap().trim(), "0");
-    assert_no_bus_error(&ended);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    let report: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-    let why = "process \"pose-1\" needs 1048 KB of shared memory for its queues";
-    assert!(ended.stderr.contains(why), "{}", ended.stderr);
-    for restarted in report["restarts"].as_array().unwrap() {
-        assert_eq!(restarted["process"], "pose-1", "{}", ended.stderr);
-    }
-    let summary = &report["recorded"]["summary"];
-    assert_eq!(summary["frames"], json!(300), "{}", ended.stderr);
-    assert_eq!(summary["views_present"]["a"], json!(300));
-}
-
-#[test]
 fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal() {
     let more = PLAIN.to_owned() + "[supervise]\nmax_restarts = 2\ndeadline_ms = 2000\n";
     let case = Case::new("filling", &[20; 3], &more);
@@ -311,4 +273,48 @@ fn no_process_of_a_run_has_a_network_socket() {
     // The sockets for wake-ups have names in the file system: so the listing does find sockets.
     assert!(n_sockets > 10, "{n_sockets}");
     assert_eq!(started.wait().status.code(), Some(0));
+}
+
+/// What takes long; see `.ci/run`.
+#[cfg(feature = "long-tests")]
+mod long {
+    use super::*;
+
+    #[test]
+    fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
+        let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
+        let case = Case::new("filled", &[300; 3], &more);
+        // The processes are children of the run; one of them is killed when there is no room to start another.
+        let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
+            \"$PARALLAX\" run deployment.toml --json & run=$!\n\
+            while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
+              kill -0 $run; sleep 0.05\n\
+            done\n\
+            cat /dev/zero >/dev/shm/filler 2>/dev/null || true\n\
+            stat -f -c %a /dev/shm >free\n\
+            for dir in /proc/[0-9]*; do\n\
+              line=$(tr '\\0' ' ' <$dir/cmdline 2>/dev/null || true)\n\
+              case \"$line\" in *\"$PWD\"*\" --index 1\"*) case \"$line\" in\n\
+                *\" service pose \"*) kill -9 ${dir#/proc/};; esac;; esac\n\
+            done\n\
+            code=0; wait $run || code=$?; exit $code";
+        let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
+            eprintln!("skipped: no private file system may be mounted here");
+            return;
+        };
+        let ended = started.wait();
+        assert_eq!(fs::read_to_string(case.path("free")).unwrap().trim(), "0");
+        assert_no_bus_error(&ended);
+        assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+        let report: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
+        let why = "process \"pose-1\" needs 1048 KB of shared memory for its queues";
+        assert!(ended.stderr.contains(why), "{}", ended.stderr);
+        for restarted in report["restarts"].as_array().unwrap() {
+            assert_eq!(restarted["process"], "pose-1", "{}", ended.stderr);
+        }
+        let summary = &report["recorded"]["summary"];
+        assert_eq!(summary["frames"], json!(300), "{}", ended.stderr);
+        assert_eq!(summary["views_present"]["a"], json!(300));
+    }
 }
