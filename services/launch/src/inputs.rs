@@ -301,12 +301,12 @@ fn by_onnx_runtime(
     file: &Path,
     n_parts: usize,
 ) -> Result<Network, Failure> {
-    let device = match device {
-        deployment::quality::Device::Cpu => viewquality::Device::Cpu,
-        deployment::quality::Device::Cuda => viewquality::Device::Cuda,
-    };
-    let runtime = viewquality::OnnxRuntime::load(library, device);
+    let runtime = viewquality::OnnxRuntime::load(library);
     let runtime = runtime.map_err(|error| refused(library, &error))?;
+    let runtime = match device {
+        deployment::quality::Device::Cpu => runtime,
+        deployment::quality::Device::Cuda => runtime.on_cuda(),
+    };
     let bytes = Shipped::Network.read(file)?;
     Network::parse_with(&runtime, &bytes, n_parts).map_err(|error| refused(file, &error))
 }

@@ -7,7 +7,6 @@
 #![forbid(unsafe_code)]
 
 mod card;
-mod device;
 mod evidence;
 mod forecast;
 mod network;
@@ -17,7 +16,6 @@ mod tau;
 mod tile;
 
 pub use card::{Card, CardError, Unit, key};
-pub use device::Device;
 pub use evidence::{
     EVIDENCE_VERSION, EvidenceError, FAR, N_TYPES, PART_NUMBERS, POSE_NUMBERS, evidence,
     evidence_name, n_evidence,

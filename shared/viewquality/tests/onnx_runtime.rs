@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use testkit::networks::of_colours;
-use viewquality::{Device, Network, NetworkError, OnnxRuntime, TileShape, n_evidence};
+use viewquality::{Network, NetworkError, OnnxRuntime, TileShape, n_evidence};
 
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.quality.onnx");
 const N_PARTS: usize = 26;
@@ -18,13 +18,12 @@ fn library() -> PathBuf {
 }
 
 fn runtime() -> OnnxRuntime {
-    OnnxRuntime::load(&library(), Device::Cpu).unwrap()
+    OnnxRuntime::load(&library()).unwrap()
 }
 
 #[test]
 fn a_missing_library_is_named() {
-    let error =
-        OnnxRuntime::load(Path::new("/nowhere/libonnxruntime.so"), Device::Cpu).unwrap_err();
+    let error = OnnxRuntime::load(Path::new("/nowhere/libonnxruntime.so")).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(matches!(error, NetworkError::Library(_)), "{error}");
     assert!(cause.contains("/nowhere/libonnxruntime.so"), "{cause}");
@@ -86,7 +85,7 @@ fn unknown_operations_and_truncated_files_are_rejected() {
 
 #[test]
 fn an_unsupported_device_is_rejected() {
-    let runtime = OnnxRuntime::load(&library(), Device::Cuda).unwrap();
+    let runtime = OnnxRuntime::load(&library()).unwrap().on_cuda();
     let error = Network::parse_with(&runtime, SHIPPED, N_PARTS).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(cause.contains("CUDA"), "{cause}");

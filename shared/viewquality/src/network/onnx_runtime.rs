@@ -10,27 +10,26 @@ use ort::value::{TensorRef, ValueType};
 
 use super::NetworkError;
 use super::engine::{Description, Engine, EngineError, Input, InputInfo, Output, Side};
-use crate::Device;
 
 /// The library of this process: only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 
-/// The loaded library, and the device for networks.
+/// The loaded library, and what it runs networks on.
 #[derive(Debug)]
 pub struct OnnxRuntime {
     environment: Environment,
-    device: Device,
+    on_cuda: bool,
 }
 
 impl OnnxRuntime {
-    /// Loads the library, once in a process.
+    /// Loads the library, once in a process. It runs networks on one thread of the processor.
     ///
     /// * `library`: its file, for example `/usr/lib/libonnxruntime.so`; ONNX Runtime 1.17 or newer.
     ///
     /// # Errors
     ///
     /// [`NetworkError::Library`] if it cannot be loaded or is too old, or if another one has been loaded before.
-    pub fn load(library: &Path, device: Device) -> Result<Self, NetworkError> {
+    pub fn load(library: &Path) -> Result<Self, NetworkError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {
             Some((file, environment)) if file == library => environment.clone(),
@@ -47,8 +46,18 @@ impl OnnxRuntime {
         };
         Ok(Self {
             environment,
-            device,
+            on_cuda: false,
         })
+    }
+
+    /// Runs networks on the first GPU of NVIDIA's, which the library must have been built for: else no network can be
+    /// loaded.
+    #[must_use]
+    pub fn on_cuda(self) -> Self {
+        Self {
+            on_cuda: true,
+            ..self
+        }
     }
 
     pub(super) fn load_network(&self, file: &[u8]) -> Result<(Loaded, Description), NetworkError> {
@@ -65,14 +74,13 @@ impl OnnxRuntime {
         let builder = builder
             .with_inter_threads(1)
             .map_err(|error| plain(&error))?;
-        let mut builder = match self.device {
-            Device::Cpu => builder,
-            Device::Cuda => {
-                let cuda = ort::ep::CUDA::default().build().error_on_failure();
-                builder
-                    .with_execution_providers([cuda])
-                    .map_err(|error| plain(&error))?
-            }
+        let mut builder = if self.on_cuda {
+            let cuda = ort::ep::CUDA::default().build().error_on_failure();
+            builder
+                .with_execution_providers([cuda])
+                .map_err(|error| plain(&error))?
+        } else {
+            builder
         };
         Ok(builder.commit_from_memory(file)?)
     }
