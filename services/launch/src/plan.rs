@@ -15,6 +15,7 @@ use tracing::Level;
 
 use crate::inputs;
 use crate::prepare::Prepared;
+use crate::process::Name;
 use crate::resolved::Resolved;
 use crate::sanity;
 use crate::scheduling;
@@ -128,7 +129,11 @@ fn process(it: &Process, topology: &Topology, resolved: &Resolved, file: &Path) 
     }
     let is_hurried = resolved.delivery() == Delivery::Realtime && !it.is_replayed;
     let is_even = Stage::of_name(it.service).is_some();
-    let service = if it.is_replayed { "replay" } else { it.service };
+    let service = if it.is_replayed {
+        Name::Replay.name()
+    } else {
+        it.service
+    };
     ProcessSpec {
         name: it.name.clone(),
         service: service.to_owned(),

@@ -37,6 +37,53 @@ pub enum Name {
     Replay,
 }
 
+impl Name {
+    /// All of them, in the order of the pipeline.
+    pub const ALL: [Self; 8] = [
+        Self::Capture,
+        Self::Pose,
+        Self::Quality,
+        Self::Fuse,
+        Self::Triangulate,
+        Self::Results,
+        Self::Record,
+        Self::Replay,
+    ];
+
+    /// What the command line calls it: the service of [`deployment::Process`], or `replay`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Capture => Stage::Capture.name(),
+            Self::Pose => Stage::Pose.name(),
+            Self::Quality => Stage::Quality.name(),
+            Self::Fuse => Stage::Fuse.name(),
+            Self::Triangulate => Stage::Triangulate.name(),
+            Self::Results => "results",
+            Self::Record => "record",
+            Self::Replay => "replay",
+        }
+    }
+
+    /// The process of that name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.name() == name)
+    }
+
+    /// What it does, for the help of the command line.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Capture => "One a view: footage to frames",
+            Self::Pose => "One a view: frames to candidates and evidence",
+            Self::Quality => "One a view: expected errors",
+            Self::Fuse => "One a worker: pairs of views",
+            Self::Triangulate => "Joints in the world",
+            Self::Results => "The output folder",
+            Self::Record => "Every message into one file",
+            Self::Replay => "What a recording holds of another process",
+        }
+    }
+}
+
 /// What a process is told of itself; what it is told of the deployment stands in its standard input.
 #[derive(Debug, Clone)]
 pub struct Own {
@@ -290,7 +337,32 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use deployment::{AnyMachine, Loaded, RecordingPlan, Topology};
+
     use super::*;
+
+    #[test]
+    fn every_process_of_a_deployment_is_one_of_these() {
+        let text = "name = 'a'\nrig = 'r'\noutput = 'o'\n[quality]\nnetwork = 'shipped'\n\
+            [[camera]]\nname = 'b'\nsource = 's'\n[[camera]]\nname = 'c'\nsource = 's'\n";
+        let loaded = Loaded::parse(text, Path::new("d.toml"), &[], &AnyMachine).unwrap();
+        let recording = RecordingPlan {
+            file: PathBuf::new(),
+            without_pixels: false,
+            without_evidence: false,
+            queue_mb: 1,
+        };
+        let topology = Topology::new(&loaded.deployment, Some(&recording), None);
+        let services = topology.processes().iter().map(|it| it.service);
+        let mut found: Vec<Name> = services.map(|it| Name::of_name(it).unwrap()).collect();
+        found.dedup();
+        let mut all = Name::ALL.to_vec();
+        assert_eq!(all.pop(), Some(Name::Replay), "no process of its own");
+        assert_eq!(found.len(), all.len());
+        assert!(all.iter().all(|it| found.contains(it)), "{found:?}");
+    }
 
     #[test]
     fn who_may_use_several_threads_works_inside_their_pool() {

@@ -4,38 +4,19 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser};
 use deployment::Stage;
-use launch::process;
+use launch::process::{self, Name};
 use runtime::{ExitKind, Failure, Launch, OrFail as _, run_service};
 
 use crate::stage;
-
-/// The processes of a deployment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Name {
-    /// One a view: footage to frames.
-    Capture,
-    /// One a view: frames to candidates and evidence.
-    Pose,
-    /// One a view: expected errors.
-    Quality,
-    /// One a worker: pairs of views.
-    Fuse,
-    /// Joints in the world.
-    Triangulate,
-    /// The output folder.
-    Results,
-    /// Every message into one file.
-    Record,
-    /// What a recording holds of another process.
-    Replay,
-}
 
 /// Which process.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Which process to become.
+    #[arg(value_parser = names())]
     name: Name,
     /// What the supervisor says: --plan, --index, and about the deployment.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -60,19 +41,11 @@ struct Own {
     spin_after: Option<u64>,
 }
 
-impl Name {
-    fn process(self) -> process::Name {
-        match self {
-            Self::Capture => process::Name::Capture,
-            Self::Pose => process::Name::Pose,
-            Self::Quality => process::Name::Quality,
-            Self::Fuse => process::Name::Fuse,
-            Self::Triangulate => process::Name::Triangulate,
-            Self::Results => process::Name::Results,
-            Self::Record => process::Name::Record,
-            Self::Replay => process::Name::Replay,
-        }
-    }
+/// A parser of the names of processes, which `--help` explains.
+fn names() -> impl TypedValueParser<Value = Name> {
+    let values = Name::ALL.map(|it| PossibleValue::new(it.name()).help(it.help()));
+    PossibleValuesParser::new(values)
+        .try_map(|name| Name::of_name(&name).ok_or("there is no such process"))
 }
 
 /// Becomes the process.
@@ -90,8 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         stage,
         spin_after,
     };
-    let name = arguments.name.process();
     Ok(run_service(launch, |service| {
-        process::become_it(service, name, &own)
+        process::become_it(service, arguments.name, &own)
     }))
 }
