@@ -121,33 +121,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrameScore, Measured, summarise};
-
-    fn made_up() -> (Summary, Vec<Version>) {
-        let versions: Vec<Version> = ["fmp", "geometry", "geometry+all-views"]
-            .map(|it| it.parse().unwrap())
-            .to_vec();
-        let score = |error: f64| FrameScore {
-            segments: vec![Some(error); 12],
-            joints_m: vec![Some(0.1 * error); 14],
-            views: vec![Some((Some([[10.0 * error, 0.0]; 14]), [[0.0; 2]; 14]))],
-            iterations: vec![4],
-            ..FrameScore::default()
-        };
-        let measured = |subject: &str| Measured {
-            dataset: "HumanEva".to_owned(),
-            subject: subject.to_owned(),
-            action: "Box".to_owned(),
-            scores: vec![[0.7, 0.45, 0.3].map(score).to_vec(); 5],
-        };
-        let names: Vec<String> = versions.iter().map(ToString::to_string).collect();
-        let summary = summarise(
-            &[measured("S1"), measured("S2")],
-            &names,
-            &Bootstrap::default(),
-        );
-        (summary, versions)
-    }
+    use crate::testing::made_up;
 
     #[test]
     fn the_tables_have_our_numbers_and_the_papers() {

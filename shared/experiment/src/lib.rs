@@ -25,6 +25,9 @@ mod latex;
 mod pictures;
 mod published;
 
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+
 pub use bench::{Bench, ErrorPredictor, Expectation, Setup, SingleView, Trial};
 pub use film::{Film, FilmError, FilmSettings};
 pub use latex::{latex, number, overall, pictures_latex};
