@@ -28,6 +28,7 @@ mod joins;
 mod message;
 mod output;
 mod port;
+mod receivers;
 mod shelf;
 mod slots;
 mod stage;

@@ -10,6 +10,7 @@ use runtime::{
     now_nanos,
 };
 
+use crate::receivers::Receivers;
 use crate::{Stamped, Turn};
 
 /// A topic that a stage publishes.
@@ -84,65 +85,71 @@ pub(crate) enum EndStamp {
     Input,
 }
 
+/// Sends the end of a stream: with the stamp of the input's end, if there is one, or of the session.
+type SendEnd = dyn Fn(Option<Stamp>, u64) -> Result<(), SendError>;
+
 /// An output of any message type.
-pub(crate) trait Outgoing {
+pub(crate) struct Outgoing {
+    receivers: Rc<dyn Receivers>,
+    n_receivers: usize,
+    /// Arrays have none.
+    send_end: Option<Box<SendEnd>>,
+}
+
+impl Outgoing {
+    pub(crate) fn messages<M: Message + Stamped>(
+        publisher: &Rc<Publisher<M>>,
+        n_receivers: usize,
+        end_stamp: EndStamp,
+    ) -> Self {
+        let receivers = Rc::clone(publisher);
+        let publisher = Rc::clone(publisher);
+        let send_end = move |of_input: Option<Stamp>, session: u64| {
+            let of_session = Stamp {
+                session,
+                ..Stamp::default()
+            };
+            let stamp = match end_stamp {
+                EndStamp::Session => of_session,
+                EndStamp::Input => of_input.unwrap_or(of_session),
+            };
+            publisher.send(&M::end(stamp)).map(drop)
+        };
+        Self {
+            receivers,
+            n_receivers,
+            send_end: Some(Box::new(send_end)),
+        }
+    }
+
+    /// Arrays have no end of stream of their own: they belong to messages that have one.
+    pub(crate) fn arrays<E: Element, H: Header>(
+        publisher: &Rc<SlicePublisher<E, H>>,
+        n_receivers: usize,
+    ) -> Self {
+        let receivers = Rc::clone(publisher);
+        Self {
+            receivers,
+            n_receivers,
+            send_end: None,
+        }
+    }
+
     /// Waits for the receivers; returns how many are connected, and how many are expected.
-    fn wait(&self, patience: Patience) -> [usize; 2];
-    fn n_connected(&self) -> usize;
+    pub(crate) fn wait(&self, patience: Patience) -> [usize; 2] {
+        let n = self.receivers.wait_for(self.n_receivers, patience);
+        [n, self.n_receivers]
+    }
+
+    /// How many processes are connected that the end of the stream is for.
+    pub(crate) fn n_connected(&self) -> usize {
+        let send = self.send_end.as_ref();
+        send.map_or(0, |_| self.receivers.n_connected())
+    }
+
     /// Sends the end of the stream, if this topic has one.
-    fn end(&self, of_input: Option<Stamp>, session: u64) -> Result<(), SendError>;
-}
-
-pub(crate) struct Messages<M: Message> {
-    pub(crate) publisher: Rc<Publisher<M>>,
-    pub(crate) n_receivers: usize,
-    pub(crate) end_stamp: EndStamp,
-}
-
-impl<M: Message + Stamped> Outgoing for Messages<M> {
-    fn wait(&self, patience: Patience) -> [usize; 2] {
-        let n = self
-            .publisher
-            .wait_for_subscribers(self.n_receivers, patience);
-        [n, self.n_receivers]
-    }
-
-    fn n_connected(&self) -> usize {
-        self.publisher.n_connected()
-    }
-
-    fn end(&self, of_input: Option<Stamp>, session: u64) -> Result<(), SendError> {
-        let of_session = Stamp {
-            session,
-            ..Stamp::default()
-        };
-        let stamp = match self.end_stamp {
-            EndStamp::Session => of_session,
-            EndStamp::Input => of_input.unwrap_or(of_session),
-        };
-        self.publisher.send(&M::end(stamp)).map(drop)
-    }
-}
-
-/// Arrays. They have no end of stream of their own: they belong to messages that have one.
-pub(crate) struct Arrays<E: Element, H: Header> {
-    pub(crate) publisher: Rc<SlicePublisher<E, H>>,
-    pub(crate) n_receivers: usize,
-}
-
-impl<E: Element, H: Header> Outgoing for Arrays<E, H> {
-    fn wait(&self, patience: Patience) -> [usize; 2] {
-        let n = self
-            .publisher
-            .wait_for_subscribers(self.n_receivers, patience);
-        [n, self.n_receivers]
-    }
-
-    fn n_connected(&self) -> usize {
-        0
-    }
-
-    fn end(&self, _: Option<Stamp>, _: u64) -> Result<(), SendError> {
-        Ok(())
+    pub(crate) fn end(&self, of_input: Option<Stamp>, session: u64) -> Result<(), SendError> {
+        let send = self.send_end.as_ref();
+        send.map_or(Ok(()), |send| send(of_input, session))
     }
 }

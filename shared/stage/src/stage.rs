@@ -18,7 +18,7 @@ use crate::inbox::{Inbox, Optional, Rules};
 use crate::input::{Input, Typed};
 use crate::joins::Copier;
 use crate::message::BulkHeader;
-use crate::output::{Arrays, EndStamp, Messages, Outgoing};
+use crate::output::{EndStamp, Outgoing};
 use crate::shelf::{HELD_REALTIME, Shelf};
 use crate::slots::Slots;
 use crate::{Context, Frame, Held, Item, Output, Port, Sender, Stamped, Turn};
@@ -38,7 +38,7 @@ pub struct Stage<'a, T> {
     optional: Vec<Optional>,
     max_age: Duration,
     held: Vec<Rc<dyn Bulk>>,
-    outgoing: Vec<Box<dyn Outgoing>>,
+    outgoing: Vec<Outgoing>,
     skips: Option<u64>,
 }
 
@@ -256,11 +256,8 @@ impl<'a, T: 'a> Stage<'a, T> {
         end_stamp: EndStamp,
     ) -> Result<Output<'a, M>, Failure> {
         let publisher = Rc::new(self.service.bus().publisher::<M>(topic)?);
-        self.outgoing.push(Box::new(Messages {
-            publisher: Rc::clone(&publisher),
-            n_receivers,
-            end_stamp,
-        }));
+        self.outgoing
+            .push(Outgoing::messages(&publisher, n_receivers, end_stamp));
         Ok(Output::new(self.service, publisher))
     }
 
@@ -275,10 +272,8 @@ impl<'a, T: 'a> Stage<'a, T> {
         n_receivers: usize,
     ) -> Result<Rc<SlicePublisher<E, H>>, Failure> {
         let publisher = Rc::new(self.service.bus().slice_publisher(topic)?);
-        self.outgoing.push(Box::new(Arrays {
-            publisher: Rc::clone(&publisher),
-            n_receivers,
-        }));
+        self.outgoing
+            .push(Outgoing::arrays(&publisher, n_receivers));
         Ok(publisher)
     }
 
@@ -421,7 +416,7 @@ impl<'a, T: 'a> Stage<'a, T> {
                 tracing::debug!(%error, "cannot discard what comes after the end");
             }
             let outputs = self.outgoing.iter();
-            outputs.map(|output| output.n_connected()).sum()
+            outputs.map(Outgoing::n_connected).sum()
         };
         self.end_with(n_connected, send_end)
     }

@@ -8,6 +8,8 @@ use runtime::{
     SlicePublisher,
 };
 
+use crate::receivers::Receivers;
+
 /// The sending end of one topic.
 #[derive(Debug)]
 pub struct Sender {
@@ -48,27 +50,23 @@ impl Sender {
 
     /// See [`SlicePublisher::wait_for_subscribers`].
     pub fn wait_for_subscribers(&self, n: usize, patience: Patience) -> usize {
-        match &self.port {
-            Port::Frame(port) => port.wait_for_subscribers(n, patience),
-            Port::Evidence(port) => port.wait_for_subscribers(n, patience),
-            Port::ViewPose(port) => port.wait_for_subscribers(n, patience),
-            Port::ViewQuality(port) => port.wait_for_subscribers(n, patience),
-            Port::PairPose(port) => port.wait_for_subscribers(n, patience),
-            Port::Pose3d(port) => port.wait_for_subscribers(n, patience),
-            Port::Health => 0,
-        }
+        self.receivers().map_or(0, |it| it.wait_for(n, patience))
     }
 
     /// Processes that are subscribed.
     pub fn n_connected(&self) -> usize {
+        self.receivers().map_or(0, Receivers::n_connected)
+    }
+
+    fn receivers(&self) -> Option<&dyn Receivers> {
         match &self.port {
-            Port::Frame(port) => port.n_connected(),
-            Port::Evidence(port) => port.n_connected(),
-            Port::ViewPose(port) => port.n_connected(),
-            Port::ViewQuality(port) => port.n_connected(),
-            Port::PairPose(port) => port.n_connected(),
-            Port::Pose3d(port) => port.n_connected(),
-            Port::Health => 0,
+            Port::Frame(port) => Some(port),
+            Port::Evidence(port) => Some(port),
+            Port::ViewPose(port) => Some(port),
+            Port::ViewQuality(port) => Some(port),
+            Port::PairPose(port) => Some(port),
+            Port::Pose3d(port) => Some(port),
+            Port::Health => None,
         }
     }
 
