@@ -11,7 +11,7 @@ mod springs;
 
 use fmp::{Model, files::describe};
 
-use crate::html::{STYLE, escaped, put};
+use crate::html::{Html, STYLE, html, put};
 use figure::Figure;
 
 pub use examples::Examples;
@@ -27,32 +27,35 @@ pub use examples::Examples;
 ///
 /// Parts and types count from 1, as in everything a user sees.
 pub fn html(model: &Model, examples: Option<&Examples>) -> String {
-    let title = escaped(&model.spec().name);
+    let title = &model.spec().name;
     let figure = Figure::new(model);
-    let mut page = String::from("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
-    page.push_str("<meta charset=\"utf-8\"/>\n");
-    page.push_str("<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n");
-    put(
-        &mut page,
-        format_args!("<title>{title}</title>\n<style>{STYLE}{MORE_STYLE}</style>\n"),
+    let mut page = html!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n");
+    put!(page, "<meta charset=\"utf-8\"/>\n");
+    put!(
+        page,
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
     );
-    put(
-        &mut page,
-        format_args!("</head>\n<body>\n<h1>{title}</h1>\n"),
+    put!(
+        page,
+        "<title>{title}</title>\n<style>{}{}</style>\n",
+        [title],
+        Html::constant(STYLE),
+        Html::constant(MORE_STYLE)
     );
-    page.push_str(&numbers(model));
-    page.push_str(&glyph::symbols(model));
-    page.push_str("<h2>The body</h2>\n<div class=\"row\">\n");
-    page.push_str(&figure.filters(model));
-    page.push_str(&figure.tree(model));
-    page.push_str("</div>\n");
-    page.push_str(LEGEND);
-    page.push_str("<h2>The parts</h2>\n");
+    put!(page, "</head>\n<body>\n<h1>{title}</h1>\n", [title]);
+    put!(page, "{}", numbers(model));
+    put!(page, "{}", glyph::symbols(model));
+    put!(page, "<h2>The body</h2>\n<div class=\"row\">\n");
+    put!(page, "{}", figure.filters(model));
+    put!(page, "{}", figure.tree(model));
+    put!(page, "</div>\n");
+    put!(page, "{}", Html::constant(LEGEND));
+    put!(page, "<h2>The parts</h2>\n");
     for part in 0..model.n_parts() {
-        page.push_str(&card(model, part, examples));
+        put!(page, "{}", card(model, part, examples));
     }
-    page.push_str("</body>\n</html>\n");
-    page
+    put!(page, "</body>\n</html>\n");
+    page.into_page()
 }
 
 /// How much of the score a part loses on the ellipse that is drawn for its spring.
@@ -87,7 +90,7 @@ const LEGEND: &str = "<p class=\"legend\">Glyphs: a stroke is an edge that the f
 (of every part the type that rests nearest to the mean of all of its types), each part where its spring would rest. Right: the same tree; the ellipse of a part is where its spring costs 0.05, dots are \
 where the other types would rest. Axes of the springs are cells from the parent, whose place is the cross.</p>\n";
 
-fn numbers(model: &Model) -> String {
+fn numbers(model: &Model) -> Html {
     let summary = describe(model);
     let [rows, cols] = model.max_filter();
     let [low, high] = summary.bias_range.unwrap_or([0.0; 2]);
@@ -117,44 +120,46 @@ fn numbers(model: &Model) -> String {
         ("springs, one a", kind.to_owned()),
         ("mirror", mirror.to_owned()),
     ];
-    let mut out = String::from("<ul class=\"numbers\">\n");
+    let mut out = html!("<ul class=\"numbers\">\n");
     for (name, value) in items {
-        put(
-            &mut out,
-            format_args!("<li><b>{value}</b><span>{name}</span></li>\n"),
+        put!(
+            out,
+            "<li><b>{value}</b><span>{name}</span></li>\n",
+            [value, name]
         );
     }
-    out.push_str("</ul>\n");
+    put!(out, "</ul>\n");
     out
 }
 
 /// Everything about one part.
-fn card(model: &Model, part: usize, examples: Option<&Examples>) -> String {
+fn card(model: &Model, part: usize, examples: Option<&Examples>) -> Html {
     let spec = &model.spec().parts[part];
     let n_types = model.n_types(part);
     let parent = spec.edge.as_ref().map_or("the root".to_owned(), |edge| {
-        let name = escaped(&model.spec().parts[edge.parent].name);
+        let name = &model.spec().parts[edge.parent].name;
         format!("hangs on {} {name}", edge.parent + 1)
     });
     let s = if n_types == 1 { "" } else { "s" };
-    let mut out = format!(
+    let mut out = html!(
         "<section class=\"card\">\n<h3>{} {}<small>{parent}, {n_types} type{s}</small></h3>\n<div class=\"row\">\n",
+        [parent, n_types, s],
         part + 1,
-        escaped(&spec.name)
+        spec.name
     );
     for mixture in 0..n_types {
-        out.push_str("<div>\n");
-        out.push_str(&glyph::of_type(model, part, mixture));
+        put!(out, "<div>\n");
+        put!(out, "{}", glyph::of_type(model, part, mixture));
         if let Some(examples) = examples {
-            out.push_str(&examples::of_type(examples, part, mixture));
+            put!(out, "{}", examples::of_type(examples, part, mixture));
         }
-        out.push_str("</div>\n");
+        put!(out, "</div>\n");
     }
     if let Some(edge) = &spec.edge {
-        out.push_str(&springs::panel(edge));
-        out.push_str(&biases::table(edge));
+        put!(out, "{}", springs::panel(edge));
+        put!(out, "{}", biases::table(edge));
     }
-    out.push_str("</div>\n</section>\n");
+    put!(out, "</div>\n</section>\n");
     out
 }
 

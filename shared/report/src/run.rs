@@ -9,7 +9,7 @@ mod timeline;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::html::{STYLE, escaped, in_script, put};
+use crate::html::{Html, STYLE, html, put};
 
 pub use space::{Eye, Moment, Point, Space};
 pub use timeline::Mark;
@@ -85,16 +85,16 @@ const SCRIPT: &str = include_str!("run/space.js");
 
 /// One page that needs no other file and asks for none.
 pub fn html(page: &Page) -> String {
-    let mut out = String::from("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n");
-    put(
-        &mut out,
-        format_args!(
-            "<meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}</title>\n<style>\n{STYLE}</style>\n\
+    let mut out = html!("<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n");
+    put!(
+        out,
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"{2}\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{0}</title>\n<style>\n{3}</style>\n\
              <h1>{0}</h1>\n<p class=\"lead\">{1}</p>\n",
-            escaped(&page.title),
-            escaped(&page.lead)
-        ),
+        page.title,
+        page.lead,
+        Html::constant(POLICY),
+        Html::constant(STYLE)
     );
     verdict(&mut out, &page.limits);
     space(&mut out, page);
@@ -103,31 +103,32 @@ pub fn html(page: &Page) -> String {
         tabulate(&mut out, table);
     }
     pictures(&mut out, page);
-    put(
-        &mut out,
-        format_args!(
-            "<script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{SCRIPT}</script>\n</html>\n",
-            in_script(&page.space.json())
-        ),
+    put!(
+        out,
+        "<script type=\"application/json\" id=\"data\">{}</script>\n<script>\n{}</script>\n</html>\n",
+        Html::in_script(&page.space.json()),
+        Html::constant(SCRIPT)
     );
-    out
+    out.into_page()
 }
 
-fn verdict(out: &mut String, limits: &[Limit]) {
+fn verdict(out: &mut Html, limits: &[Limit]) {
     let n_missed = limits.iter().filter(|it| !it.held).count();
     let (class, verdict) = match n_missed {
         0 => ("held", format!("All {} limits held", limits.len())),
         n => ("missed", format!("{n} of {} limits missed", limits.len())),
     };
-    put(
+    put!(
         out,
-        format_args!("<p class=\"verdict {class}\">{verdict}</p>\n"),
+        "<p class=\"verdict {class}\">{verdict}</p>\n",
+        [class, verdict]
     );
 }
 
-fn limits(out: &mut String, limits: &[Limit]) {
-    out.push_str(
-        "<h2>Limits</h2>\n<div class=\"scroll\"><table>\n<tr><th>limit<th>asked<th>measured<th>verdict</tr>\n",
+fn limits(out: &mut Html, limits: &[Limit]) {
+    put!(
+        out,
+        "<h2>Limits</h2>\n<div class=\"scroll\"><table>\n<tr><th>limit<th>asked<th>measured<th>verdict</tr>\n"
     );
     for it in limits {
         let (class, word) = if it.held {
@@ -135,99 +136,85 @@ fn limits(out: &mut String, limits: &[Limit]) {
         } else {
             ("missed", "missed")
         };
-        put(
+        put!(
             out,
-            format_args!(
-                "<tr><td>{}<td>{}<td>{}<td class=\"{class}\">{word}</tr>\n",
-                escaped(&it.what),
-                escaped(&it.asked),
-                escaped(&it.got)
-            ),
+            "<tr><td>{}<td>{}<td>{}<td class=\"{class}\">{word}</tr>\n",
+            [class, word],
+            it.what,
+            it.asked,
+            it.got
         );
     }
-    out.push_str("</table></div>\n");
+    put!(out, "</table></div>\n");
 }
 
-fn space(out: &mut String, page: &Page) {
-    out.push_str(
+fn space(out: &mut Html, page: &Page) {
+    put!(
+        out,
         "<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
          aria-label=\"the skeleton in space, beside the truth\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
          <label><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
          <p class=\"note\">Drag to turn, wheel to come nearer. Colours: <b class=\"right\">right</b>, \
          <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found; grey: where it is. \
          The squares of the floor are a metre wide; a red camera has no part in the frame.</p>\n\
-         <h2>Who was there</h2>\n<div class=\"scroll\">\n",
+         <h2>Who was there</h2>\n<div class=\"scroll\">\n"
     );
-    out.push_str(&timeline::svg(&page.space, &page.marks));
-    out.push_str(
-        "</div>\n<p class=\"note\">A tick is a result in space, green where the view has a part in it.</p>\n",
+    put!(out, "{}", timeline::svg(&page.space, &page.marks));
+    put!(
+        out,
+        "</div>\n<p class=\"note\">A tick is a result in space, green where the view has a part in it.</p>\n"
     );
 }
 
-fn tabulate(out: &mut String, table: &Table) {
-    put(out, format_args!("<h2>{}</h2>\n", escaped(&table.heading)));
+fn tabulate(out: &mut Html, table: &Table) {
+    put!(out, "<h2>{}</h2>\n", table.heading);
     if !table.note.is_empty() {
-        put(
-            out,
-            format_args!("<p class=\"note\">{}</p>\n", escaped(&table.note)),
-        );
+        put!(out, "<p class=\"note\">{}</p>\n", table.note);
     }
-    out.push_str("<div class=\"scroll\"><table>\n");
+    put!(out, "<div class=\"scroll\"><table>\n");
     if table.columns.iter().any(|it| !it.is_empty()) {
-        out.push_str("<tr>");
+        put!(out, "<tr>");
         for column in &table.columns {
-            put(out, format_args!("<th>{}", escaped(column)));
+            put!(out, "<th>{}", column);
         }
-        out.push_str("</tr>\n");
+        put!(out, "</tr>\n");
     }
     for row in &table.rows {
-        out.push_str("<tr>");
+        put!(out, "<tr>");
         for cell in row {
-            put(out, format_args!("<td>{}", escaped(cell)));
+            put!(out, "<td>{}", cell);
         }
-        out.push_str("</tr>\n");
+        put!(out, "</tr>\n");
     }
-    out.push_str("</table></div>\n");
+    put!(out, "</table></div>\n");
 }
 
-fn pictures(out: &mut String, page: &Page) {
+fn pictures(out: &mut Html, page: &Page) {
     if page.strips.is_empty() {
         return;
     }
-    put(
+    put!(
         out,
-        format_args!(
-            "<h2>What the cameras saw</h2>\n<p class=\"note\">{}</p>\n",
-            escaped(&page.legend)
-        ),
+        "<h2>What the cameras saw</h2>\n<p class=\"note\">{}</p>\n",
+        page.legend
     );
     for strip in &page.strips {
-        put(
-            out,
-            format_args!(
-                "<h3>{}</h3>\n<div class=\"strip\">\n",
-                escaped(&strip.caption)
-            ),
-        );
+        put!(out, "<h3>{}</h3>\n<div class=\"strip\">\n", strip.caption);
         for picture in &strip.pictures {
-            let name = escaped(&picture.caption);
+            let name = &picture.caption;
             match &picture.jpeg {
                 Ok(bytes) => {
                     let data = STANDARD.encode(bytes);
-                    put(
+                    put!(
                         out,
-                        format_args!(
-                            "<img alt=\"{name}\" src=\"data:image/jpeg;base64,{data}\">\n"
-                        ),
+                        "<img alt=\"{name}\" src=\"data:image/jpeg;base64,{data}\">\n",
+                        [name, data]
                     );
                 }
-                Err(why) => put(
-                    out,
-                    format_args!("<div class=\"none\">{name}: {}</div>\n", escaped(why)),
-                ),
+                Err(why) => put!(out, "<div class=\"none\">{name}: {}</div>\n", [name], why),
             }
         }
-        out.push_str("</div>\n");
+        put!(out, "</div>\n");
     }
 }
 

@@ -3,7 +3,7 @@
 use evaluation::SEGMENT_NAMES;
 use experiment::{ChangesOf, Group};
 
-use crate::html::{escaped, put};
+use crate::html::{Html, put};
 
 /// One colour for each version, distinguishable with colour blindness and on light and dark backgrounds.
 const COLOURS: [&str; 8] = [
@@ -17,7 +17,7 @@ pub(super) fn colour(version: usize) -> &'static str {
 /// A plot of percentages: 0 to 100 upwards.
 struct Plot {
     width: f64,
-    out: String,
+    out: Html,
 }
 
 const HEIGHT: f64 = 220.0;
@@ -29,28 +29,28 @@ const BOTTOM: f64 = 34.0;
 impl Plot {
     /// * `most`: the value at the top.
     fn new(width: f64, most: f64, unit: &str) -> Self {
-        let mut out = String::new();
+        let mut out = Html::default();
         let total = [LEFT + width + RIGHT, TOP + HEIGHT + BOTTOM];
-        put(
-            &mut out,
-            format_args!(
-                "<svg class=\"chart\" viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\">",
-                total[0], total[1], total[0], total[1]
-            ),
+        put!(
+            out,
+            "<svg class=\"chart\" viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\">",
+            total[0],
+            total[1],
+            total[0],
+            total[1]
         );
         for nth in 0..=4 {
             let share = f64::from(nth) / 4.0;
             let y = TOP + HEIGHT * (1.0 - share);
-            put(
-                &mut out,
-                format_args!(
-                    "<line x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" class=\"grid\"/>\
+            put!(
+                out,
+                "<line x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\" class=\"grid\"/>\
                  <text x=\"{}\" y=\"{:.1}\" class=\"end\">{}{unit}</text>",
-                    LEFT + width,
-                    LEFT - 4.0,
-                    y + 4.0,
-                    tick(share * most)
-                ),
+                [LEFT, y, unit],
+                LEFT + width,
+                LEFT - 4.0,
+                y + 4.0,
+                tick(share * most)
             );
         }
         Self { width, out }
@@ -58,30 +58,29 @@ impl Plot {
 
     fn label(&mut self, x: f64, text: &str) {
         let y = TOP + HEIGHT + 16.0;
-        let text = escaped(text);
-        put(
-            &mut self.out,
-            format_args!("<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"mid\">{text}</text>"),
+        put!(
+            self.out,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" class=\"mid\">{text}</text>",
+            [x, y, text]
         );
     }
 
     fn bar(&mut self, x: [f64; 2], share: f64, colour: &str, title: &str) {
         let height = HEIGHT * share.clamp(0.0, 1.0);
-        put(
-            &mut self.out,
-            format_args!(
-                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{height:.1}\" fill=\"{colour}\">\
+        put!(
+            self.out,
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{height:.1}\" fill=\"{colour}\">\
              <title>{}</title></rect>",
-                x[0],
-                TOP + HEIGHT - height,
-                x[1] - x[0],
-                escaped(title)
-            ),
+            [height, colour],
+            x[0],
+            TOP + HEIGHT - height,
+            x[1] - x[0],
+            title
         );
     }
 
-    fn end(mut self) -> String {
-        self.out.push_str("</svg>\n");
+    fn end(mut self) -> Html {
+        put!(self.out, "</svg>\n");
         self.out
     }
 }
@@ -109,7 +108,7 @@ pub(super) fn top(most: f64) -> f64 {
 }
 
 /// PCP3D of every part, a bar for each version.
-pub(super) fn bars(group: &Group, titles: &[String]) -> String {
+pub(super) fn bars(group: &Group, titles: &[String]) -> Html {
     let n = SEGMENT_NAMES.len() as f64;
     let mut plot = Plot::new(72.0 * n, 100.0, "%");
     let slot = plot.width / n;
@@ -130,7 +129,7 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> String {
 }
 
 /// PCP3D over the threshold, a curve for each version.
-pub(super) fn curves(group: &Group, titles: &[String]) -> String {
+pub(super) fn curves(group: &Group, titles: &[String]) -> Html {
     let mut plot = Plot::new(420.0, 100.0, "%");
     let ends = group.versions.iter().filter_map(|it| it.curve.last());
     let most = ends.map(|it| it[0]).fold(0.0, f64::max);
@@ -142,14 +141,12 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
             format!("{x:.1},{y:.1}")
         };
         let points: Vec<String> = it.curve.iter().map(point).collect();
-        put(
-            &mut plot.out,
-            format_args!(
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"><title>{}</title></polyline>",
-                points.join(" "),
-                colour(version),
-                escaped(title)
-            ),
+        put!(
+            plot.out,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"><title>{}</title></polyline>",
+            points.join(" "),
+            colour(version),
+            title
         );
     }
     for nth in 0..=4 {
@@ -160,7 +157,7 @@ pub(super) fn curves(group: &Group, titles: &[String]) -> String {
 }
 
 /// Improvements (to the right) and deteriorations of one version.
-pub(super) fn histogram(changes: &ChangesOf) -> String {
+pub(super) fn histogram(changes: &ChangesOf) -> Html {
     // The two bins around 0 would dwarf all others: they are cut off.
     let far = changes
         .bins

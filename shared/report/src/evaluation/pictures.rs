@@ -4,7 +4,7 @@ use evaluation::Bootstrap;
 use experiment::{Pictures, number};
 
 use super::{about_table, head};
-use crate::html::{escaped, put};
+use crate::html::put;
 
 /// One page that needs no other file.
 ///
@@ -17,32 +17,31 @@ pub fn pictures_html(
     let mut out = head();
     about_table(&mut out, about);
     for table in sets.iter().flat_map(|it| it.tables(bootstrap)) {
-        put(
-            &mut out,
-            format_args!(
-                "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<tr><th>",
-                escaped(&table.title)
-            ),
+        put!(
+            out,
+            "<h2>{}</h2>\n<div class=\"scroll\"><table>\n<tr><th>",
+            table.title
         );
         for column in &table.columns {
-            put(&mut out, format_args!("<th>{}", escaped(column)));
+            put!(out, "<th>{}", column);
         }
         let confidence = 100.0 * bootstrap.confidence;
-        put(
-            &mut out,
-            format_args!("<th>{confidence:.0} % interval over pictures</tr>\n"),
+        put!(
+            out,
+            "<th>{confidence:.0} % interval over pictures</tr>\n",
+            [confidence]
         );
         for (name, values, interval) in &table.rows {
-            put(&mut out, format_args!("<tr><td>{}", escaped(name)));
+            put!(out, "<tr><td>{}", name);
             for value in values {
-                put(&mut out, format_args!("<td>{value:.1}"));
+                put!(out, "<td>{value:.1}", [value]);
             }
             let ends = interval.map_or([None; 2], |it| it.map(Some));
             let [low, high] = ends.map(|it| number(it, 1));
-            put(&mut out, format_args!("<td>{low} to {high}</tr>\n"));
+            put!(out, "<td>{low} to {high}</tr>\n", [low, high]);
         }
-        out.push_str("</table></div>\n");
+        put!(out, "</table></div>\n");
     }
-    out.push_str("</html>\n");
-    out
+    put!(out, "</html>\n");
+    out.into_page()
 }

@@ -3,8 +3,8 @@
 #![expect(clippy::print_stderr, reason = "a test reports that it is skipped")]
 
 use evaluation::{Bootstrap, SEGMENT_NAMES};
-use experiment::Pictures;
 use experiment::testing::made_up;
+use experiment::{Judgement, Pictures};
 
 use super::figure::{tick, top};
 use super::*;
@@ -37,6 +37,33 @@ fn the_page_is_self_contained_with_every_table_and_figure() {
     for outside in ["http:", "https:", "src=", "@import", "NaN", "inf"] {
         assert!(!page.contains(outside), "{outside}");
     }
+}
+
+#[test]
+fn no_name_of_a_sequence_or_a_part_becomes_markup() {
+    let (mut summary, versions) = made_up();
+    let evil = || "<script>'\"&".to_owned();
+    for group in &mut summary.groups {
+        (group.dataset, group.subject, group.action) = (evil(), evil(), evil());
+    }
+    summary.predictions = vec![Judgement {
+        part: evil(),
+        n: 1,
+        above: None,
+        caught: None,
+        wasted: None,
+        auc: None,
+        rank_correlation: None,
+    }];
+    let page = html(&Page {
+        summary: &summary,
+        versions: &versions,
+        about: &[(evil(), evil())],
+    });
+    assert!(!page.contains("<script"));
+    // What was run, the part, every group in the table, and the one group with a heading of its own.
+    let escaped = page.matches("&lt;script&gt;&#39;&quot;&amp;").count();
+    assert_eq!(escaped, 2 + 1 + 3 * summary.groups.len() + 3);
 }
 
 #[test]

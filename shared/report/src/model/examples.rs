@@ -3,7 +3,7 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::html::put;
+use crate::html::{Html, html, put};
 
 /// Side of an example on the page, pixels.
 const SIDE: usize = 42;
@@ -17,18 +17,17 @@ pub struct Examples {
 }
 
 /// The examples of a type, in rows.
-pub(super) fn of_type(examples: &Examples, part: usize, mixture: usize) -> String {
+pub(super) fn of_type(examples: &Examples, part: usize, mixture: usize) -> Html {
     let found = examples.png.get(part).and_then(|it| it.get(mixture));
-    let mut out = String::from("<div class=\"examples\">");
+    let mut out = html!("<div class=\"examples\">");
     for png in found.into_iter().flatten() {
         let data = STANDARD.encode(png);
-        put(
-            &mut out,
-            format_args!(
-                "<img alt=\"\" width=\"{SIDE}\" height=\"{SIDE}\" src=\"data:image/png;base64,{data}\"/>"
-            ),
+        put!(
+            out,
+            "<img alt=\"\" width=\"{SIDE}\" height=\"{SIDE}\" src=\"data:image/png;base64,{data}\"/>",
+            [SIDE, data]
         );
     }
-    out.push_str("</div>\n");
+    put!(out, "</div>\n");
     out
 }

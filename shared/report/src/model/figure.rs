@@ -5,7 +5,7 @@ use fmp::Model;
 use super::colours::part_colour;
 use super::glyph::CELL;
 use super::springs::{Ellipse, ellipses, of_pair};
-use crate::html::{escaped, put};
+use crate::html::{Html, html, put};
 
 /// Where every part is drawn.
 #[derive(Debug)]
@@ -52,88 +52,88 @@ impl Figure {
     }
 
     /// The filters, each where its spring would rest.
-    pub(super) fn filters(&self, model: &Model) -> String {
+    pub(super) fn filters(&self, model: &Model) -> Html {
         let mut out = self.open("dark", CELL);
         for (part, [x, y]) in self.corner.iter().enumerate() {
             let index = model.spec().parts[part].filter_of_type[self.types[part]];
-            put(
-                &mut out,
-                format_args!(
-                    "<use href=\"#f{index}\" x=\"{:.1}\" y=\"{:.1}\" style=\"mix-blend-mode:lighten\"/>",
-                    x * CELL,
-                    y * CELL
-                ),
+            put!(
+                out,
+                "<use href=\"#f{index}\" x=\"{:.1}\" y=\"{:.1}\" style=\"mix-blend-mode:lighten\"/>",
+                [index],
+                x * CELL,
+                y * CELL
             );
         }
-        out.push_str("</svg><figcaption>filters</figcaption></figure>\n");
+        put!(out, "</svg><figcaption>filters</figcaption></figure>\n");
         out
     }
 
     /// The tree, with ellipses for the springs.
-    pub(super) fn tree(&self, model: &Model) -> String {
+    pub(super) fn tree(&self, model: &Model) -> Html {
         let mut out = self.open("light", 1.0);
         let centre = |part: usize| {
             let filter = model.filter(part, self.types[part]);
             let [x, y] = self.corner[part];
             [x + filter.cols as f64 / 2.0, y + filter.rows as f64 / 2.0]
         };
-        let (mut edges, mut springs, mut nodes) = (String::new(), String::new(), String::new());
+        let (mut edges, mut springs, mut nodes) =
+            (Html::default(), Html::default(), Html::default());
         for (part, spec) in model.spec().parts.iter().enumerate() {
             let ([x, y], colour) = (centre(part), part_colour(&spec.name));
             if let (Some(edge), Some(spring)) = (&spec.edge, &self.spring[part]) {
                 let [u, v] = centre(edge.parent);
-                put(
-                    &mut edges,
-                    format_args!(
-                        "<path d=\"M{u:.2} {v:.2}L{x:.2} {y:.2}\" stroke=\"{colour}\" stroke-width=\".14\"/>"
-                    ),
+                put!(
+                    edges,
+                    "<path d=\"M{u:.2} {v:.2}L{x:.2} {y:.2}\" stroke=\"{colour}\" stroke-width=\".14\"/>",
+                    [u, v, x, y, colour]
                 );
                 let [rx, ry] = spring.radius;
-                put(
-                    &mut springs,
-                    format_args!(
-                        "<ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" rx=\"{rx:.2}\" ry=\"{ry:.2}\" fill=\"{colour}\" fill-opacity=\".07\" \
-                     stroke=\"{colour}\" stroke-opacity=\".45\" stroke-width=\".05\"/>"
-                    ),
+                put!(
+                    springs,
+                    "<ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" rx=\"{rx:.2}\" ry=\"{ry:.2}\" fill=\"{colour}\" fill-opacity=\".07\" \
+                     stroke=\"{colour}\" stroke-opacity=\".45\" stroke-width=\".05\"/>",
+                    [x, y, rx, ry, colour]
                 );
                 for (_, other) in ellipses(edge) {
                     let [dx, dy] = [0, 1].map(|it| other.centre[it] - spring.centre[it]);
-                    put(
-                        &mut springs,
-                        format_args!(
-                            "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\".1\" fill=\"{colour}\" fill-opacity=\".5\"/>",
-                            x + dx,
-                            y + dy
-                        ),
+                    put!(
+                        springs,
+                        "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\".1\" fill=\"{colour}\" fill-opacity=\".5\"/>",
+                        [colour],
+                        x + dx,
+                        y + dy
                     );
                 }
             }
-            put(
-                &mut nodes,
-                format_args!(
-                    "<g><circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\".42\" fill=\"{colour}\"/><text x=\"{x:.2}\" y=\"{:.2}\" \
+            put!(
+                nodes,
+                "<g><circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\".42\" fill=\"{colour}\"/><text x=\"{x:.2}\" y=\"{:.2}\" \
                  font-size=\".5\" text-anchor=\"middle\" fill=\"#fff\">{}</text><title>{} {}, type {}</title></g>",
-                    y + 0.18,
-                    part + 1,
-                    part + 1,
-                    escaped(&spec.name),
-                    self.types[part] + 1
-                ),
+                [x, y, colour],
+                y + 0.18,
+                part + 1,
+                part + 1,
+                spec.name,
+                self.types[part] + 1
             );
         }
-        out.push_str(&springs);
-        out.push_str(&edges);
-        out.push_str(&nodes);
-        out.push_str("</svg><figcaption>tree and springs</figcaption></figure>\n");
+        put!(out, "{}", springs);
+        put!(out, "{}", edges);
+        put!(out, "{}", nodes);
+        put!(
+            out,
+            "</svg><figcaption>tree and springs</figcaption></figure>\n"
+        );
         out
     }
 
     /// * `unit`: of the picture's coordinates, per cell.
-    fn open(&self, class: &str, unit: f64) -> String {
+    fn open(&self, class: &str, unit: f64) -> Html {
         let [left, top, width, height] = self.frame;
         let scale = SCALE.min(500.0 / width.max(1.0));
-        format!(
+        html!(
             "<figure><svg class=\"{class}\" width=\"{:.0}\" height=\"{:.0}\" viewBox=\"{:.2} {:.2} {:.2} {:.2}\">",
+            [class],
             width * scale,
             height * scale,
             left * unit,

@@ -2,7 +2,7 @@
 
 use fmp::{Filter, Model, N_CHANNELS};
 
-use crate::html::put;
+use crate::html::{Html, html, put};
 
 /// Undirected orientations of the features.
 const N_ORIENTATIONS: usize = 9;
@@ -14,29 +14,27 @@ pub(super) const CELL: f64 = 10.0;
 const N_STEPS: usize = 6;
 
 /// Definitions of all glyphs, `f0` and on, for `<use>`.
-pub(super) fn symbols(model: &Model) -> String {
-    let mut out = String::from("<svg class=\"hidden\"><defs>\n");
+pub(super) fn symbols(model: &Model) -> Html {
+    let mut out = html!("<svg class=\"hidden\"><defs>\n");
     for (index, filter) in model.spec().filters.iter().enumerate() {
-        put(
-            &mut out,
-            format_args!("<g id=\"f{index}\" stroke-linecap=\"round\">"),
-        );
-        out.push_str(&strokes(filter));
-        out.push_str("</g>\n");
+        put!(out, "<g id=\"f{index}\" stroke-linecap=\"round\">", [index]);
+        put!(out, "{}", strokes(filter));
+        put!(out, "</g>\n");
     }
-    out.push_str("</defs></svg>\n");
+    put!(out, "</defs></svg>\n");
     out
 }
 
 /// The glyph of a type, with its number and the largest weight of an orientation.
-pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> String {
+pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> Html {
     let index = model.spec().parts[part].filter_of_type[mixture];
     let filter = model.filter(part, mixture);
     let [width, height] = [filter.cols, filter.rows].map(|it| it as f64 * CELL);
     let largest = orientations(filter).into_iter().fold(0.0, f64::max);
-    format!(
+    html!(
         "<figure><svg class=\"dark\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {width} {height}\">\
          <use href=\"#f{index}\"/></svg><figcaption>type {2} \u{b7} {largest:.3}</figcaption></figure>\n",
+        [width, height, index, largest],
         width * 1.7,
         height * 1.7,
         mixture + 1
@@ -62,10 +60,10 @@ fn orientations(filter: &Filter) -> Vec<f64> {
         .collect()
 }
 
-fn strokes(filter: &Filter) -> String {
+fn strokes(filter: &Filter) -> Html {
     let weights = orientations(filter);
     let largest = weights.iter().copied().fold(0.0, f64::max);
-    let mut paths = vec![String::new(); N_STEPS];
+    let mut paths = vec![Html::default(); N_STEPS];
     for (at, &weight) in weights.iter().enumerate() {
         let share = if largest > 0.0 { weight / largest } else { 0.0 };
         let step = (share * N_STEPS as f64).floor() as usize;
@@ -81,20 +79,23 @@ fn strokes(filter: &Filter) -> String {
         let length = CELL * (0.2 + 0.28 * share);
         let (dy, dx) = angle.sin_cos();
         let (dx, dy) = (dx * length, dy * length);
-        put(
-            &mut paths[step.min(N_STEPS - 1)],
-            format_args!("M{:.1} {:.1}L{:.1} {:.1}", x - dx, y - dy, x + dx, y + dy),
+        put!(
+            paths[step.min(N_STEPS - 1)],
+            "M{:.1} {:.1}L{:.1} {:.1}",
+            x - dx,
+            y - dy,
+            x + dx,
+            y + dy
         );
     }
-    let mut out = String::new();
+    let mut out = Html::default();
     for (step, path) in paths.iter().enumerate().filter(|it| !it.1.is_empty()) {
         let grey = 55 + 200 * step / (N_STEPS - 1);
         let width = 0.7 + 0.9 * step as f64 / (N_STEPS - 1) as f64;
-        put(
-            &mut out,
-            format_args!(
-                "<path d=\"{path}\" stroke=\"rgb({grey},{grey},{grey})\" stroke-width=\"{width:.2}\"/>"
-            ),
+        put!(
+            out,
+            "<path d=\"{path}\" stroke=\"rgb({grey},{grey},{grey})\" stroke-width=\"{width:.2}\"/>",
+            [path, grey, width]
         );
     }
     out

@@ -4,7 +4,7 @@ use fmp::{Edge, Spring, Springs};
 
 use super::SPRING_COST;
 use super::colours::type_colour;
-use crate::html::put;
+use crate::html::{Html, html, put};
 
 /// Where a spring rests, and where it costs [`SPRING_COST`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,52 +53,55 @@ pub(super) fn of_pair(edge: &Edge, parent_type: usize, own_type: usize) -> Optio
 }
 
 /// All springs of a part around the parent, in cells.
-pub(super) fn panel(edge: &Edge) -> String {
+pub(super) fn panel(edge: &Edge) -> Html {
     const SIDE: f64 = 150.0;
     let all = ellipses(edge);
     let reach = all
         .iter()
         .flat_map(|(_, it)| [0, 1].map(|axis| it.centre[axis].abs() + it.radius[axis].min(20.0)));
     let reach = reach.fold(3.0, f64::max).ceil();
-    let mut out = format!(
+    let mut out = html!(
         "<figure><svg class=\"light\" width=\"{SIDE}\" height=\"{SIDE}\" viewBox=\"{0} {0} {1} {1}\">",
+        [SIDE],
         -reach,
         2.0 * reach
     );
-    let mut ticks = String::new();
+    let mut ticks = Html::default();
     for tick in -(reach as i32)..=reach as i32 {
-        put(
-            &mut ticks,
-            format_args!("M{tick} {0}V{1}M{0} {tick}H{1}", -reach, reach),
+        put!(
+            ticks,
+            "M{tick} {0}V{1}M{0} {tick}H{1}",
+            [tick],
+            -reach,
+            reach
         );
     }
     let hair = reach / SIDE;
-    put(
-        &mut out,
-        format_args!(
-            "<path d=\"{ticks}\" stroke=\"#eef0f3\" stroke-width=\"{hair:.3}\"/>\
+    put!(
+        out,
+        "<path d=\"{ticks}\" stroke=\"#eef0f3\" stroke-width=\"{hair:.3}\"/>\
          <path d=\"M-.5 0H.5M0 -.5V.5\" stroke=\"#1d2430\" stroke-width=\"{:.3}\"/>",
-            3.0 * hair
-        ),
+        [ticks, hair],
+        3.0 * hair
     );
     for (own, it) in &all {
         let colour = type_colour(*own);
         let [[x, y], [rx, ry]] = [it.centre, it.radius];
-        put(
-            &mut out,
-            format_args!(
-                "<g stroke=\"{colour}\" stroke-width=\"{:.3}\" fill=\"{colour}\"><ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" \
+        put!(
+            out,
+            "<g stroke=\"{colour}\" stroke-width=\"{:.3}\" fill=\"{colour}\"><ellipse cx=\"{x:.2}\" cy=\"{y:.2}\" \
              rx=\"{rx:.2}\" ry=\"{ry:.2}\" fill-opacity=\".08\"/><circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{:.2}\"/>\
              <title>type {}: ({x:.2}, {y:.2}) cells, half axes {rx:.2} and {ry:.2}</title></g>",
-                2.0 * hair,
-                5.0 * hair,
-                own + 1
-            ),
+            [colour, x, y, rx, ry],
+            2.0 * hair,
+            5.0 * hair,
+            own + 1
         );
     }
-    put(
-        &mut out,
-        format_args!("</svg><figcaption>springs, \u{b1}{reach} cells</figcaption></figure>\n"),
+    put!(
+        out,
+        "</svg><figcaption>springs, \u{b1}{reach} cells</figcaption></figure>\n",
+        [reach]
     );
     out
 }

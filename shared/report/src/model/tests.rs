@@ -89,6 +89,15 @@ fn examples_stand_under_their_type() {
 }
 
 #[test]
+fn no_name_of_a_model_or_a_part_becomes_markup() {
+    let page = page(planted("<script>'\"&"));
+    assert!(!page.contains("<script"));
+    // The title twice; every part in the figure and on its card; the parent on two cards.
+    let escaped = page.matches("&lt;script&gt;&#39;&quot;&amp;").count();
+    assert_eq!(escaped, 2 + 3 + 3 + 2);
+}
+
+#[test]
 fn nothing_comes_from_elsewhere() {
     let page = page(planted("person"));
     for word in ["<script", "http", "@import", "url(", "src="] {

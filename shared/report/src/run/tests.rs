@@ -182,3 +182,39 @@ fn nothing_is_wider_than_a_telephone() {
         }
     }
 }
+
+#[test]
+fn no_text_of_the_page_becomes_markup() {
+    let evil = || "<script>'\"&".to_owned();
+    let mut page = page();
+    page.title = evil();
+    page.lead = evil();
+    page.legend = evil();
+    for limit in &mut page.limits {
+        (limit.what, limit.asked, limit.got) = (evil(), evil(), evil());
+    }
+    page.space.joints = vec![evil(); 2];
+    for eye in &mut page.space.eyes {
+        eye.name = evil();
+    }
+    page.space.moments[0].views[0] = Some(evil());
+    page.marks[0].what = evil();
+    let table = &mut page.tables[0];
+    (table.heading, table.note) = (evil(), evil());
+    table.columns = vec![evil(); 2];
+    table.rows = vec![vec![evil(); 2]];
+    page.strips[0].caption = evil();
+    for picture in &mut page.strips[0].pictures {
+        picture.caption = evil();
+        if picture.jpeg.is_err() {
+            picture.jpeg = Err(evil());
+        }
+    }
+    let html = html(&page);
+    // The data and the script of the page itself.
+    assert_eq!(html.matches("<script").count(), 2);
+    // The title twice, lead, legend, 2 limits of 3, 2 cameras, a view's absence, a mark, 6 of the table, the strip, and
+    // its pictures: one with a name, one with a name and why it is not there.
+    let escaped = html.matches("&lt;script&gt;&#39;&quot;&amp;").count();
+    assert_eq!(escaped, 2 + 2 + 6 + 2 + 1 + 1 + 6 + 1 + 3);
+}
