@@ -4,11 +4,11 @@ use core::time::Duration;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use deployment::{Deployment, Process, Stage, Topology};
-use messages::topic;
+use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
+use messages::{EvidenceHeader, FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
 use runtime::{
-    Delivery, DeploymentPlan, ExitKind, Failure, HEARTBEAT, Namespace, OrFail as _, TopicPlan,
-    now_nanos,
+    Delivery, ExitKind, Failure, HEARTBEAT, Limits, Namespace, OrFail as _, TopicPlan, now_nanos,
+    process_topics,
 };
 use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
@@ -71,41 +71,49 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
 }
 
 /// The topics of a deployment.
-pub(crate) fn topics(
-    resolved: &Resolved,
-    prepared: &Prepared,
-    names: Vec<String>,
-) -> Vec<TopicPlan> {
-    let topology = resolved.topology();
-    let views = prepared.views.iter().enumerate();
-    let plan = DeploymentPlan {
-        delivery: resolved.delivery(),
-        views: views
-            .map(|(view, it)| runtime::ViewPlan {
-                frame_bytes: it
-                    .framing
-                    .out_size()
-                    .map(|side| side as usize)
-                    .iter()
-                    .product::<usize>()
-                    * 3,
-                evidence_values: it.plan.layout().n_responses(),
-                n_workers: topology.receivers_of(&topic::evidence(view)),
-            })
-            .collect(),
-        n_workers: topology.n_workers(),
-        n_recorders: topology.n_recorders(),
-        held: 1,
-        held_frames: if resolved.deployment.has_network()
-            && resolved.delivery() == Delivery::Realtime
-        {
-            quality::HELD_REALTIME
-        } else {
-            1
-        },
-        processes: names,
+pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String]) -> Vec<TopicPlan> {
+    let sizes = prepared.views.iter().map(|it| ViewSize {
+        frame_bytes: it
+            .framing
+            .out_size()
+            .map(|side| side as usize)
+            .iter()
+            .product::<usize>()
+            * 3,
+        evidence_values: it.plan.layout().n_responses(),
+    });
+    let delivery = resolved.delivery();
+    let held_frames = if resolved.deployment.has_network() && delivery == Delivery::Realtime {
+        quality::HELD_REALTIME
+    } else {
+        1
     };
-    plan.topics()
+    let mode = resolved.deployment.capture.mode;
+    let sizes: Vec<ViewSize> = sizes.collect();
+    let rooms = resolved.topology().rooms(mode, &sizes, held_frames);
+    let between = rooms.into_iter().map(|it| topic_of(it, delivery));
+    let of_processes = names.iter().flat_map(|it| process_topics(it));
+    between.chain(of_processes).collect()
+}
+
+/// A topic with that room.
+fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
+    let limits = Limits::new(room.receivers, room.queued, room.borrowed);
+    let (topic, longest) = (room.topic, room.longest);
+    let plan = match room.content {
+        Content::Frame => TopicPlan::slices::<u8, FrameHeader>(topic, delivery, limits, longest),
+        Content::Evidence => {
+            TopicPlan::slices::<f32, EvidenceHeader>(topic, delivery, limits, longest)
+        }
+        Content::ViewPose => TopicPlan::messages::<ViewPose>(topic, delivery, limits),
+        Content::ViewQuality => TopicPlan::messages::<ViewQuality>(topic, delivery, limits),
+        Content::PairPose => TopicPlan::messages::<PairPose>(topic, delivery, limits),
+        Content::Pose3d => TopicPlan::messages::<Pose3d>(topic, delivery, limits),
+    };
+    match room.usual {
+        Some(usual) => plan.with_few_chunks(usual),
+        None => plan,
+    }
 }
 
 /// The processes of a deployment, receivers before senders.
@@ -158,7 +166,7 @@ pub(crate) fn plan(
     log: Level,
 ) -> Result<Plan, Failure> {
     let processes = processes(resolved, file);
-    let names = processes.iter().map(|it| it.name.clone()).collect();
+    let names: Vec<String> = processes.iter().map(|it| it.name.clone()).collect();
     let settings = &resolved.deployment.supervise;
     Ok(Plan {
         executable: executable()?,
@@ -166,7 +174,7 @@ pub(crate) fn plan(
         namespace: Namespace::new(&resolved.deployment.name)?,
         session: now_nanos(),
         delivery: resolved.delivery(),
-        topics: topics(resolved, prepared, names),
+        topics: topics(resolved, prepared, &names),
         processes,
         policy: Policy {
             max_restarts: settings.max_restarts as usize,

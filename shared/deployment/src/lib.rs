@@ -51,7 +51,9 @@ pub use reference::reference;
 pub use rules::fuse_numbers;
 pub use schema::{Key, schema};
 pub use shipped::{SHIPPED, is_shipped, relative_to};
-pub use topology::{Process, RecordingPlan, Replay, Role, Stage, Topology};
+pub use topology::{
+    Content, Process, RecordingPlan, Replay, Role, Room, Stage, Topology, ViewSize,
+};
 
 /// Everything that a deployment file can set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,7 +1,8 @@
-//! The processes of a deployment, and who sends to whom.
+//! The processes of a deployment, who sends to whom, and how much room topics have.
 //!
 //! One place counts: a topic has as many receivers as there are processes that list it among their inputs.
 
+mod rooms;
 #[cfg(test)]
 mod tests;
 
@@ -11,6 +12,8 @@ use messages::topic;
 use serde::{Deserialize, Serialize};
 
 use crate::{Deployment, fuse};
+
+pub use rooms::{Content, Room, ViewSize};
 
 /// A stage of the pipeline, in the order in which a frame passes them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

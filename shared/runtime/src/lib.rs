@@ -2,8 +2,8 @@
 //! operating system.
 
 mod delivery;
-mod deployment;
 mod namespace;
+mod preflight;
 mod topic;
 
 mod beneath;
@@ -47,9 +47,6 @@ pub use clean::Cleaner;
 pub use clock::now_nanos;
 pub use copies::Copies;
 pub use delivery::{Delivery, Limits};
-pub use deployment::{
-    DeploymentPlan, PreflightError, ViewPlan, needed_bytes, preflight, process_topics,
-};
 pub use failure::{ExitKind, Failure, Fault, OrFail};
 pub use guard::guard_process;
 pub use health::{HEARTBEAT, Health, HealthError};
@@ -64,6 +61,7 @@ pub use namespace::{Namespace, NamespaceError};
 pub use observer::{ObservedProcess, Observer, ObserverError};
 pub use payload::{Element, Header, Message};
 pub use place::Place;
+pub use preflight::{PreflightError, needed_bytes, preflight, process_topics};
 pub use private::PrivacyError;
 pub use process::{Service, raise_file_limit, run_command, run_service};
 pub use progress::Progress;

@@ -10,33 +10,52 @@ use messages::{
     EvidenceHeader, FrameHeader, Health, PairPose, Pose3d, ViewPose, ViewQuality, topic,
 };
 use runtime::{
-    Bus, Delivery, DeploymentPlan, Publisher, SlicePublisher, SliceSubscriber, Subscriber,
-    TopicPlan, ViewPlan, Waiter,
+    Bus, Delivery, Limits, Publisher, SlicePublisher, SliceSubscriber, Subscriber, TopicPlan,
+    Waiter, process_topics,
 };
 
 const N_VIEWS: usize = 8;
 const N_WORKERS: usize = 3;
 
-fn plan(delivery: Delivery) -> DeploymentPlan {
+/// The names of all processes.
+fn processes() -> Vec<String> {
     let stages = ["capture", "pose", "quality"];
     let per_view = (0..N_VIEWS).flat_map(|view| stages.map(|stage| format!("{stage}-{view}")));
-    let view = ViewPlan {
-        frame_bytes: 30_000,
-        evidence_values: 50_000,
-        n_workers: N_WORKERS,
-    };
-    DeploymentPlan {
-        delivery,
-        views: vec![view; N_VIEWS],
-        n_workers: N_WORKERS,
-        n_recorders: 1,
-        held: 2,
-        held_frames: 2,
-        processes: per_view
-            .chain((0..N_WORKERS).map(|worker| format!("fuse-{worker}")))
-            .chain(["triangulate".to_owned(), "results".to_owned()])
-            .collect(),
+    per_view
+        .chain((0..N_WORKERS).map(|worker| format!("fuse-{worker}")))
+        .chain(["triangulate".to_owned(), "results".to_owned()])
+        .collect()
+}
+
+/// Room for exactly the ports that the test opens.
+fn topics(delivery: Delivery) -> Vec<TopicPlan> {
+    let large = |receivers| Limits::new(receivers, 1, 2);
+    let small = |receivers| Limits::new(receivers, 8, 2);
+    let mut topics = Vec::new();
+    for view in 0..N_VIEWS {
+        let frame = topic::frame(view);
+        let frames = TopicPlan::slices::<u8, FrameHeader>(frame, delivery, large(2), 30_000);
+        let evidence = topic::evidence(view);
+        let evidence =
+            TopicPlan::slices::<f32, EvidenceHeader>(evidence, delivery, large(N_WORKERS), 50_000);
+        let (pose, quality) = (topic::view_pose(view), topic::view_quality(view));
+        topics.extend([
+            frames,
+            evidence.with_few_chunks(3),
+            TopicPlan::messages::<ViewPose>(pose, delivery, small(N_WORKERS + 3)),
+            TopicPlan::messages::<ViewQuality>(quality, delivery, small(N_WORKERS + 1)),
+        ]);
     }
+    topics.extend((0..N_WORKERS).map(|worker| {
+        TopicPlan::messages::<PairPose>(topic::pair_pose(worker), delivery, small(2))
+    }));
+    topics.push(TopicPlan::messages::<Pose3d>(
+        topic::pose3d(),
+        delivery,
+        small(1),
+    ));
+    topics.extend(processes().iter().flat_map(|it| process_topics(it)));
+    topics
 }
 
 /// The ports of all processes, each with a bus of its own.
@@ -139,11 +158,11 @@ impl Ports {
 fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
     runtime::raise_file_limit();
     for delivery in [Delivery::Realtime, Delivery::Lossless] {
-        let plan = plan(delivery);
-        let topics = plan.topics();
+        let topics = topics(delivery);
+        let processes = processes();
         let deployment = Deployment::new(&topics);
         let mut ports = Ports::default();
-        for process in &plan.processes {
+        for process in &processes {
             ports.open(&deployment, process);
         }
         // One of everything, so that all queues exist.
@@ -166,7 +185,7 @@ fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
             })
             .sum();
         let pools: u64 = topics.iter().map(TopicPlan::pool_bytes).sum();
-        let overhead = used.saturating_sub(pools) / plan.processes.len() as u64;
+        let overhead = used.saturating_sub(pools) / processes.len() as u64;
         assert!(
             overhead <= 1 << 20,
             "{overhead} bytes a process beyond the pools of {pools}"

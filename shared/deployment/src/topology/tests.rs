@@ -6,6 +6,7 @@ use std::path::Path;
 use proptest::prelude::*;
 
 use super::*;
+use crate::capture::Mode;
 use crate::{AnyMachine, Loaded};
 
 /// A deployment of so many cameras.
@@ -110,6 +111,71 @@ fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
     assert_eq!(names.join(" "), expected);
 }
 
+const SIZE: ViewSize = ViewSize {
+    frame_bytes: 272 * 480 * 3,
+    evidence_values: 10_000_000,
+};
+
+/// What a test of numbers looks at: name, receivers, queue, borrowed, longest, usual.
+type Numbers<'a> = (&'a str, usize, usize, usize, usize, Option<usize>);
+
+fn numbers(rooms: &[Room]) -> Vec<Numbers<'_>> {
+    let mut all = Vec::new();
+    for it in rooms {
+        let topic = it.topic.as_str();
+        all.push((
+            topic,
+            it.receivers,
+            it.queued,
+            it.borrowed,
+            it.longest,
+            it.usual,
+        ));
+    }
+    all
+}
+
+#[test]
+fn topics_have_this_room() {
+    let settings = "[quality]\nnetwork = 'n'\n[fuse]\nworkers = 2\n";
+    let topology = Topology::new(&deployment(3, settings), None, None);
+    let rooms = topology.rooms(Mode::Realtime, &[SIZE; 3], 4);
+    assert_eq!(rooms.len(), 4 * 3 + 2 + 1);
+    let of_last_view_and_later: [Numbers<'_>; 7] = [
+        ("frame/v1/2", 3, 1, 4, 391_680, None),
+        ("evidence/v3/2", 2, 1, 1, 10_000_000, Some(2)),
+        ("view-pose/v3/2", 7, 4, 2, 1, None),
+        ("view-quality/v2/2", 7, 4, 2, 1, None),
+        ("pair-pose/v3/0", 4, 4, 2, 1, None),
+        ("pair-pose/v3/1", 4, 4, 2, 1, None),
+        ("pose3d/v1", 3, 4, 2, 1, None),
+    ];
+    assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
+
+    // Recorded, and nothing may be dropped.
+    let recording = recording(false);
+    let topology = Topology::new(&deployment(3, settings), Some(&recording), None);
+    let rooms = topology.rooms(Mode::Lossless, &[SIZE; 3], 1);
+    let of_last_view_and_later: [Numbers<'_>; 7] = [
+        ("frame/v1/2", 4, 1, 1, 391_680, None),
+        ("evidence/v3/2", 3, 1, 1, 10_000_000, Some(2)),
+        ("view-pose/v3/2", 8, 16, 2, 1, None),
+        ("view-quality/v2/2", 8, 16, 2, 1, None),
+        ("pair-pose/v3/0", 5, 16, 2, 1, None),
+        ("pair-pose/v3/1", 5, 16, 2, 1, None),
+        ("pose3d/v1", 4, 16, 2, 1, None),
+    ];
+    assert_eq!(numbers(&rooms[8..]), of_last_view_and_later);
+}
+
+#[test]
+fn the_answers_about_one_frame_of_many_views_find_room() {
+    let all = deployment(7, "[fuse]\nviews = 'all'\n");
+    let rooms = Topology::new(&all, None, None).rooms(Mode::Realtime, &[SIZE; 7], 1);
+    let answers = rooms.iter().find(|it| it.content == Content::PairPose);
+    assert_eq!(answers.map(|it| it.queued), Some(7));
+}
+
 #[test]
 fn every_pair_has_one_worker() {
     for most in 1..12 {
@@ -196,6 +262,15 @@ proptest! {
         for topic in &outputs {
             let lists = all.iter().filter(|it| it.inputs.contains(topic)).count();
             prop_assert_eq!(topology.receivers_of(topic), lists);
+        }
+
+        // Every topic has room for all of its receivers, and a name of its own.
+        let rooms = topology.rooms(Mode::Realtime, &vec![SIZE; n_views], 1);
+        for topic in &outputs {
+            let mut its = rooms.iter().filter(|it| it.topic == **topic);
+            let room = its.next().map_or(0, |it| it.receivers);
+            prop_assert!(room >= topology.receivers_of(topic), "{topic}: {room}");
+            prop_assert!(its.next().is_none(), "{topic}: twice");
         }
 
         // Senders start after their receivers.

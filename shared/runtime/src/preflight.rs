@@ -1,23 +1,14 @@
-//! All topics of a deployment, their memory, and whether there is room for it.
+//! Whether there is room for the topics of a deployment; the topics of every process.
 
 use std::io;
 
-use messages::{
-    EvidenceHeader, FrameHeader, Health, Metrics, PairPose, Pose3d, ViewPose, ViewQuality, topic,
-};
-
+use messages::{Health, Metrics, topic};
 use rustix::process::{Resource, getrlimit};
 
 use crate::room::OVERHEAD_BYTES;
 use crate::{Delivery, ExitKind, Fault, Limits, TopicPlan, free_shared_memory};
 
-/// Queue of small messages of one subscriber with realtime delivery.
-const SMALL_BUFFER_REALTIME: usize = 4;
-/// Queue of small messages of one subscriber with lossless delivery.
-const SMALL_BUFFER_LOSSLESS: usize = 16;
-/// Queue of images or response maps of one subscriber.
-const LARGE_BUFFER: usize = 1;
-/// Subscribers of small topics beyond those of the deployment: the command line tools.
+/// Subscribers of heartbeats beyond the supervisor: the command line tools.
 const SPARE: usize = 2;
 /// Observers at the same time, besides the supervisor.
 const ONLOOKERS: usize = 4;
@@ -25,35 +16,6 @@ const ONLOOKERS: usize = 4;
 const DESCRIPTORS: u64 = 40;
 /// Open files per topic in the process that keeps it alive: 6.6 were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
-/// The parameters that determine the topics of a deployment.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DeploymentPlan {
-    /// What happens when a receiver is slower than its sender.
-    pub delivery: Delivery,
-    /// The views.
-    pub views: Vec<ViewPlan>,
-    /// Number of fusion processes.
-    pub n_workers: usize,
-    /// Number of processes that write results.
-    pub n_recorders: usize,
-    /// Response maps of one view that one process may borrow at the same time.
-    pub held: usize,
-    /// Images that one process may borrow at the same time.
-    pub held_frames: usize,
-    /// The names of all processes.
-    pub processes: Vec<String>,
-}
-
-/// The parameters that determine the topics of one view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ViewPlan {
-    /// Largest image, bytes.
-    pub frame_bytes: usize,
-    /// Longest response maps, values.
-    pub evidence_values: usize,
-    /// Fusion processes that read this view.
-    pub n_workers: usize,
-}
 
 /// There is not enough shared memory for a deployment.
 #[derive(Debug, thiserror::Error)]
@@ -104,68 +66,6 @@ impl Fault for PreflightError {
             )),
             Self::Unknown(_) => None,
         }
-    }
-}
-
-impl DeploymentPlan {
-    /// All topics.
-    pub fn topics(&self) -> Vec<TopicPlan> {
-        let mut topics = Vec::new();
-        for (index, view) in self.views.iter().enumerate() {
-            // Images: pose, quality and the recorders.
-            topics.push(TopicPlan::slices::<u8, FrameHeader>(
-                topic::frame(index),
-                self.delivery,
-                Limits::new(2 + self.n_recorders, LARGE_BUFFER, self.held_frames),
-                view.frame_bytes,
-            ));
-            let evidence = TopicPlan::slices::<f32, EvidenceHeader>(
-                topic::evidence(index),
-                self.delivery,
-                Limits::new(view.n_workers.max(1), LARGE_BUFFER, self.held),
-                view.evidence_values,
-            );
-            // One chunk to write while others are read. These are by far the largest messages: a queued
-            // one would cost as much memory again without saving time.
-            topics.push(evidence.with_few_chunks(1 + self.held));
-            // Poses and expected errors: quality, triangulate, fusion and the recorders.
-            let small = self.small(2 + self.n_workers + self.n_recorders);
-            topics.push(TopicPlan::messages::<ViewPose>(
-                topic::view_pose(index),
-                self.delivery,
-                small,
-            ));
-            topics.push(TopicPlan::messages::<ViewQuality>(
-                topic::view_quality(index),
-                self.delivery,
-                small,
-            ));
-        }
-        for worker in 0..self.n_workers {
-            // Fusion of all views at once sends a message for every view but one at a time.
-            let small = self.small(1 + self.n_recorders);
-            let buffer = small.buffer.max(self.views.len());
-            topics.push(TopicPlan::messages::<PairPose>(
-                topic::pair_pose(worker),
-                self.delivery,
-                Limits { buffer, ..small },
-            ));
-        }
-        topics.push(TopicPlan::messages::<Pose3d>(
-            topic::pose3d(),
-            self.delivery,
-            self.small(self.n_recorders),
-        ));
-        topics.extend(self.processes.iter().flat_map(|name| process_topics(name)));
-        topics
-    }
-
-    fn small(&self, subscribers: usize) -> Limits {
-        let buffer = match self.delivery {
-            Delivery::Realtime => SMALL_BUFFER_REALTIME,
-            Delivery::Lossless => SMALL_BUFFER_LOSSLESS,
-        };
-        Limits::new(subscribers + SPARE, buffer, 2)
     }
 }
 
@@ -234,70 +134,40 @@ fn check_room(topics: &[TopicPlan], free_bytes: u64) -> Result<(), PreflightErro
 
 #[cfg(test)]
 mod tests {
-    use super::{DeploymentPlan, PreflightError, ViewPlan, check_descriptors, check_room};
-    use crate::{Delivery, Fault as _};
+    use messages::EvidenceHeader;
 
-    fn plan() -> DeploymentPlan {
-        DeploymentPlan {
-            delivery: Delivery::Realtime,
-            views: vec![
-                ViewPlan {
-                    frame_bytes: 272 * 480 * 3,
-                    evidence_values: 10_000_000,
-                    n_workers: 2,
-                };
-                4
-            ],
-            n_workers: 2,
-            n_recorders: 1,
-            held: 2,
-            held_frames: 2,
-            processes: (0..12).map(|index| format!("process-{index}")).collect(),
-        }
+    use super::*;
+
+    /// Response maps of 40 MB that two processes read, and borrow two of.
+    fn evidence(view: usize, delivery: Delivery) -> TopicPlan {
+        let limits = Limits::new(2, 1, 2);
+        let name = topic::evidence(view);
+        TopicPlan::slices::<f32, EvidenceHeader>(name, delivery, limits, 10_000_000)
+            .with_few_chunks(3)
+    }
+
+    fn topics() -> Vec<TopicPlan> {
+        let evidence = (0..4).map(|view| evidence(view, Delivery::Realtime));
+        let processes = (0..12).flat_map(|it| process_topics(&format!("process-{it}")));
+        evidence.chain(processes).collect()
     }
 
     #[test]
     fn chunks_are_subscribers_times_queued_and_borrowed_plus_one_loan() {
-        let topics = plan().topics();
-        let evidence = topics
-            .iter()
-            .find(|it| it.topic() == "evidence/v3/0")
-            .unwrap();
         // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
         let chunk = 40_000_000 + 1152;
-        assert_eq!(evidence.pool_bytes(), 7 * chunk);
+        assert_eq!(evidence(0, Delivery::Realtime).pool_bytes(), 7 * chunk);
     }
 
     #[test]
     fn with_lossless_delivery_evidence_takes_one_chunk_more_than_borrowed() {
-        let plan = DeploymentPlan {
-            delivery: Delivery::Lossless,
-            ..plan()
-        };
-        let topics = plan.topics();
-        let mut evidence = topics
-            .iter()
-            .filter(|it| it.topic().starts_with("evidence/"));
-        assert!(evidence.all(|it| it.pool_bytes() == 3 * (40_000_000 + 1152)));
-    }
-
-    #[test]
-    fn every_topic_has_its_own_name() {
-        let mut names: Vec<_> = plan()
-            .topics()
-            .iter()
-            .map(|it| it.topic().to_owned())
-            .collect();
-        let n = names.len();
-        assert_eq!(n, 4 * 4 + 2 + 1 + 2 * 12);
-        names.sort();
-        names.dedup();
-        assert_eq!(names.len(), n);
+        let bytes = evidence(0, Delivery::Lossless).pool_bytes();
+        assert_eq!(bytes, 3 * (40_000_000 + 1152));
     }
 
     #[test]
     fn a_deployment_that_does_not_fit_is_refused_with_the_numbers() {
-        let topics = plan().topics();
+        let topics = topics();
         let error = check_room(&topics, 64 << 20).unwrap_err();
         let PreflightError::TooLarge {
             needed_bytes,
@@ -326,7 +196,7 @@ mod tests {
 
     #[test]
     fn exactly_enough_memory_is_accepted() {
-        let topics = plan().topics();
+        let topics = topics();
         let PreflightError::TooLarge { needed_bytes, .. } = check_room(&topics, 0).unwrap_err()
         else {
             panic!("must not fit into nothing");
