@@ -1,27 +1,28 @@
-//! Whether a run was as fast as it was asked to be.
+//! The latency budget of a run: a limit on the 99th percentile of the time from capture to result.
 
 use core::fmt::Write as _;
 
 use runfiles::{LatencyReport, Percentiles};
 use serde_json::{Value, json};
 
-/// The longest time from capture to result that 99 of 100 frames may take, and what they took.
+/// A latency budget and the measured latency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// What was asked for, milliseconds.
+    /// The budget, milliseconds.
     limit_ms: f64,
-    /// Frames that were measured.
+    /// Number of measured frames.
     n_frames: u64,
-    /// What they took, milliseconds; none where nothing was measured.
+    /// The measured 99th percentile, milliseconds; none if no frame was measured.
     p99_ms: Option<f64>,
-    /// Percentiles of all stages, as text.
+    /// The latency table of all stages, as text; empty if nothing was measured.
     table: String,
 }
 
 impl Budget {
-    /// Judges a run.
+    /// Compares the latency of a run with its budget.
     ///
-    /// * `latency`: where the time went; none if that is not known.
+    /// * `limit_ms`: the budget, milliseconds.
+    /// * `latency`: the latency report of the run; none if there is none.
     pub fn new(limit_ms: f64, latency: Option<&LatencyReport>) -> Self {
         let measured = latency.map(|it| it.end_to_end);
         let measured = measured.filter(|it| it.count > 0);
@@ -33,17 +34,17 @@ impl Budget {
         }
     }
 
-    /// Whether frames were measured, and were fast enough.
+    /// Whether frames were measured and the budget was met.
     pub fn is_held(&self) -> bool {
         self.p99_ms.is_some_and(|it| it <= self.limit_ms)
     }
 
-    /// Whether frames were measured, and were too slow.
+    /// Whether frames were measured and the budget was exceeded.
     pub fn is_exceeded(&self) -> bool {
         self.p99_ms.is_some() && !self.is_held()
     }
 
-    /// In one line.
+    /// The verdict in one line.
     pub fn verdict(&self) -> String {
         let Self {
             limit_ms, n_frames, ..
@@ -59,8 +60,8 @@ impl Budget {
         }
     }
 
-    /// The same with where the time went, for a run that fails by it.
-    pub fn complaint(&self) -> String {
+    /// The verdict and the latency table, as the error message of a run that exceeds its budget.
+    pub fn error_text(&self) -> String {
         let text = format!("latency budget of {}", self.verdict());
         if self.table.is_empty() {
             text
@@ -69,7 +70,7 @@ impl Budget {
         }
     }
 
-    /// For programs.
+    /// The verdict as JSON.
     pub fn json(&self) -> Value {
         json!({
             "budget_ms": self.limit_ms,
@@ -80,22 +81,27 @@ impl Budget {
     }
 }
 
-/// Percentiles of every stage and of the whole, with a title; empty where nothing was measured.
+/// The latency table, milliseconds: a header, a row per stage and one end to end; empty if nothing was measured.
 pub fn table(latency: &LatencyReport) -> String {
     let mut text = String::new();
-    for (name, it) in rows(latency).filter(|(_, it)| it.count > 0) {
+    for (name, percentiles) in rows(latency).filter(|(_, it)| it.count > 0) {
         if text.is_empty() {
             let titles = ["p50", "p99", "p99.9", "max"];
             row(&mut text, "  latency, ms", titles.map(str::to_owned));
         }
-        let times = [it.p50_ms, it.p99_ms, it.p99_9_ms, it.max_ms];
+        let times = [
+            percentiles.p50_ms,
+            percentiles.p99_ms,
+            percentiles.p99_9_ms,
+            percentiles.max_ms,
+        ];
         let cells = times.map(|ms| format!("{ms:.1}"));
         row(&mut text, &format!("    {name}"), cells);
     }
     text
 }
 
-/// The stages that were measured, in the order of the data, and the whole.
+/// The latency percentiles of the measured stages, in pipeline order, then those end to end.
 pub fn rows(latency: &LatencyReport) -> impl Iterator<Item = (&'static str, Percentiles)> {
     let names = ["capture", "pose", "quality", "fuse", "triangulate"].into_iter();
     let stages = names.filter_map(|name| Some((name, *latency.stages.get(name)?)));
@@ -128,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_as_slow_as_it_may_be_holds_its_budget() {
+    fn a_latency_equal_to_the_budget_is_held() {
         let budget = Budget::new(50.0, Some(&latency(100)));
         assert!(budget.is_held() && !budget.is_exceeded());
         assert_eq!(
@@ -138,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slower_one_misses_it_and_says_where_the_time_went() {
+    fn an_exceeded_budget_is_reported_with_the_latency_table() {
         let budget = Budget::new(49.9, Some(&latency(100)));
         assert!(budget.is_exceeded());
         let expected = "\
@@ -146,16 +152,16 @@ latency budget of 49.9 ms missed: p99 end to end is 50.0 ms of 100 frames
   latency, ms         p50       p99     p99.9       max
     pose             20.0      50.0      60.0     123.0
     end to end       20.0      50.0      60.0     123.0";
-        assert_eq!(budget.complaint(), expected);
+        assert_eq!(budget.error_text(), expected);
         assert_eq!(budget.json()["held"], false);
     }
 
     #[test]
-    fn what_was_not_measured_is_neither_held_nor_exceeded() {
+    fn an_unmeasured_budget_is_neither_held_nor_exceeded() {
         for latency in [None, Some(LatencyReport::default()), Some(latency(0))] {
             let budget = Budget::new(1e9, latency.as_ref());
             assert!(!budget.is_held() && !budget.is_exceeded(), "{latency:?}");
-            assert!(budget.complaint().contains("could not be judged"));
+            assert!(budget.error_text().contains("could not be judged"));
             assert_eq!(budget.json()["p99_ms"], Value::Null);
         }
     }

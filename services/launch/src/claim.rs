@@ -1,4 +1,4 @@
-//! One writer at a time: an output folder belongs to whoever writes there.
+//! Exclusive access to an output folder.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, Write as _};
@@ -8,26 +8,26 @@ use runtime::{ExitKind, Failure};
 
 use runtime::in_file;
 
-/// The file in the folder that is locked. It stays: only its lock says that somebody writes, and that ends with the
-/// process, however it ends.
+/// The lock file in the folder. It is never removed: only the lock on it counts, and the system releases that when
+/// the process ends.
 const FILE: &str = ".parallax.lock";
 
-/// The right to write to a folder, as long as it lives.
+/// Exclusive write access to a folder; released when dropped.
 #[derive(Debug)]
 pub struct Claim {
-    /// None where the file system cannot lock, which is no reason not to run.
+    /// None if the file system does not support locks; the run goes on without one.
     _file: Option<File>,
 }
 
 impl Claim {
-    /// Claims a folder, which is made if it is not there.
+    /// Claims a folder; creates it if it does not exist.
     ///
-    /// * `what`: who claims it, for whoever comes second.
+    /// * `owner`: shown in the error message of another process that tries to claim the folder.
     ///
     /// # Errors
     ///
-    /// The folder cannot be made or written to, or somebody else writes there, who is named.
-    pub fn of(folder: &Path, what: &str) -> Result<Self, Failure> {
+    /// The folder cannot be created or written to, or another process has claimed it; the message names that process.
+    pub fn of(folder: &Path, owner: &str) -> Result<Self, Failure> {
         let in_folder = |error: &std::io::Error| in_file(folder, error);
         std::fs::create_dir_all(folder).map_err(|error| in_folder(&error))?;
         let path = folder.join(FILE);
@@ -41,22 +41,26 @@ impl Claim {
             Err(TryLockError::Error(_)) => return Ok(Self { _file: None }),
             Err(TryLockError::WouldBlock) => return Err(taken(folder, &mut file)),
         }
-        let told = file
+        let written = file
             .set_len(0)
             .and_then(|()| file.rewind())
-            .and_then(|()| writeln!(file, "process {}, {what}", std::process::id()));
-        told.map_err(|error| in_file(&path, &error))?;
+            .and_then(|()| writeln!(file, "process {}, {owner}", std::process::id()));
+        written.map_err(|error| in_file(&path, &error))?;
         Ok(Self { _file: Some(file) })
     }
 }
 
 fn taken(folder: &Path, file: &mut File) -> Failure {
-    let mut who = String::new();
-    // Who has only just claimed it has not said its name yet.
-    if file.read_to_string(&mut who).is_err() || who.trim().is_empty() {
-        "another process".clone_into(&mut who);
+    let mut owner = String::new();
+    // The owner may not have written its name yet.
+    if file.read_to_string(&mut owner).is_err() || owner.trim().is_empty() {
+        "another process".clone_into(&mut owner);
     }
-    let message = format!("{} is being written to by {}", folder.display(), who.trim());
+    let message = format!(
+        "{} is being written to by {}",
+        folder.display(),
+        owner.trim()
+    );
     Failure::new(ExitKind::Config, message)
         .with_hint("wait until it ends, or name another output folder")
 }
@@ -66,15 +70,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_has_one_writer_who_is_named_and_a_dead_one_does_not_count() {
+    fn a_second_claim_names_the_owner_and_a_released_folder_can_be_claimed() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("out");
         let first = Claim::of(&folder, "deployment room").unwrap();
         let refused = Claim::of(&folder, "deployment hall")
             .unwrap_err()
             .to_string();
-        let who = format!("process {}, deployment room", std::process::id());
-        assert!(refused.contains(&who), "{refused}");
+        let owner = format!("process {}, deployment room", std::process::id());
+        assert!(refused.contains(&owner), "{refused}");
         drop(first);
         Claim::of(&folder, "deployment hall").unwrap();
     }

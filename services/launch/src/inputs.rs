@@ -1,4 +1,4 @@
-//! The files that a deployment names: read before anything is started.
+//! The input files of a deployment, read before any process is started.
 
 mod advice;
 
@@ -27,16 +27,16 @@ use runtime::no_text;
 
 pub use runtime::{in_file, read_text as text};
 
-/// The named model, or the one that ships with Parallax.
+/// Reads the named model, or the shipped model if none is named.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is no model.
+/// The file cannot be read or is not a model.
 pub fn model_or_shipped(path: Option<&Path>) -> Result<Arc<Model>, Failure> {
     path.map_or_else(shipped_model, model)
 }
 
-/// The bytes of the named model file, or of the model that ships with Parallax.
+/// The bytes of the named model file, or of the shipped model if none is named.
 ///
 /// # Errors
 ///
@@ -53,11 +53,11 @@ fn shipped_model() -> Result<Arc<Model>, Failure> {
     Model::new(spec).map(Arc::new).or_fail(ExitKind::Input)
 }
 
-/// Reads the model, of whichever format.
+/// Reads a model of any supported format.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is no model.
+/// The file cannot be read or is not a model.
 pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
     if deployment::is_shipped(path) {
         return shipped_model();
@@ -67,13 +67,13 @@ pub fn model(path: &Path) -> Result<Arc<Model>, Failure> {
         .or_fail(ExitKind::Input)
 }
 
-/// Reads the calibration, of whichever format.
+/// Reads a calibration of any supported format.
 ///
-/// * `paths`: several if every camera has its own file.
+/// * `paths`: one file, or one file per camera.
 ///
 /// # Errors
 ///
-/// A file cannot be read, or is no calibration; a hint says what to try.
+/// A file cannot be read or is not a calibration; the hint says what to try.
 pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Failure> {
     let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
     geometry::files::read_many(&paths, options).map_err(|error| {
@@ -90,11 +90,11 @@ pub fn rig(paths: &[impl AsRef<Path>], options: &ReadOptions) -> Result<Rig, Fai
     })
 }
 
-/// Reads the calibration of a deployment, in its unit, and with its up.
+/// Reads the calibration of a deployment, and applies the deployment's `unit` and `up`.
 ///
 /// # Errors
 ///
-/// As of [`rig`]; or the deployment's `up` does not go with it.
+/// As for [`rig`]; or the rig is invalid with the deployment's `up`.
 pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
         unit: deployment.unit.map(Into::into),
@@ -103,24 +103,24 @@ pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let read = rig(&[&deployment.rig], &options)?;
     let up = deployment
         .up
-        .and_then(|it| UnitVector3::try_new(it.into(), 1e-9));
+        .and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
     let Some(up) = up else { return Ok(read) };
     let with_up = Rig::new(read.cameras().to_vec(), Some(up), read.source());
     with_up.or_fail(ExitKind::Calibration)
 }
 
-/// What is known of a camera's footage before it is read.
+/// Metadata of a camera's footage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Footage {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// Frames that will be used.
+    /// Number of frames to use.
     pub n_frames: u64,
-    /// Frames used per second of the scene, where known.
+    /// Used frames per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
 }
 
-/// What of a camera's footage is to be used.
+/// The footage of a camera, with the range of frames to use.
 pub fn source(
     camera: &deployment::capture::Camera,
     config: &deployment::capture::Config,
@@ -134,18 +134,18 @@ pub fn source(
     }
 }
 
-/// Looks at the footage of every camera.
+/// Reads the metadata of every camera's footage.
 pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> {
     deployment
         .cameras
         .iter()
         .map(|camera| {
-            let seen = Feed::look(&source(camera, &deployment.capture));
-            let info = seen.map_err(|error| {
+            let info = Feed::look(&source(camera, &deployment.capture));
+            let info = info.map_err(|error| {
                 let hint = advice::on_footage(&error, &camera.name);
                 Failure::new(ExitKind::Input, error).with_hint(hint)
             })?;
-            say_what_is_not_turned(&format!("camera {:?}", camera.name), info.turn);
+            warn_of_orientation_tag(&format!("camera {:?}", camera.name), info.turn);
             Ok(Footage {
                 size: [info.size.width as u32, info.size.height as u32],
                 n_frames: info.n_frames,
@@ -155,22 +155,26 @@ pub(crate) fn footage(deployment: &Deployment) -> Result<Vec<Footage>, Failure> 
         .collect()
 }
 
-/// Says that pictures of a calibrated camera are taken as they are stored, where a tag asks for more.
-pub fn say_what_is_not_turned(whose: &str, turn: Turn) {
+/// Warns if an image has an orientation tag: the pixels of a calibrated camera are used as they are stored.
+///
+/// * `source`: the camera or file, for the message.
+pub fn warn_of_orientation_tag(source: &str, turn: Turn) {
     if !turn.is_none() {
         output::message(format_args!(
-            "warning: {whose}: the orientation tag of its first picture asks for {turn}, which is not done: a \
+            "warning: {source}: the orientation tag of its first picture asks for {turn}, which is not done: a \
              calibration speaks of pixels as they are stored; if this one was made of pictures as they are seen, \
              store these so (`mogrify -auto-orient`)"
         ));
     }
 }
 
-/// Reads the part-type tables of a pair: `first wrt second` and `second wrt first`.
+/// Reads the part-type tables of a pair of views.
+///
+/// * `files`: the tables `first wrt second` and `second wrt first`.
 ///
 /// # Errors
 ///
-/// A file cannot be read, has other types than the model, or contradicts the other.
+/// A file cannot be read, its part types are not those of the model, or the two contradict each other.
 pub fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
     let n_types: Vec<usize> = (0..model.n_parts())
         .map(|part| model.n_types(part))
@@ -191,11 +195,11 @@ pub fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failu
     })
 }
 
-/// Reads what was learned about several views, if a file is named, and sees that it goes with the model.
+/// Reads the learned multi-view consistency, if a file is named, and checks that it matches the model.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or was learned with another model.
+/// The file cannot be read or was learned with another model.
 pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Failure> {
     let Some(file) = file else {
         return Ok(None);
@@ -208,11 +212,11 @@ pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Fa
     Ok(Some(learned))
 }
 
-/// The part-type tables of some cameras: those that are named, and of the other pairs what was learned.
+/// The part-type tables of all pairs of the given cameras: those named in the settings, else the learned ones.
 ///
 /// # Errors
 ///
-/// A table cannot be read, or the rig that `fuse.consistency_rig` names was not learned.
+/// A table cannot be read, or there are no learned tables for the rig that `fuse.consistency_rig` names.
 pub fn pair_tables(
     config: &deployment::fuse::Config,
     learned: Option<&Learned>,
@@ -256,31 +260,32 @@ pub fn pair_tables(
     })
 }
 
-/// Reads a table of expected errors.
+/// Reads a table of expected errors of a model with `n_parts` parts.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is no table of so many parts.
+/// The file cannot be read or is not a table for this number of parts.
 pub fn quality_table(file: &Path, n_parts: usize) -> Result<Table, Failure> {
     Table::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))
 }
 
-/// Reads a network that predicts errors.
+/// Reads a network that predicts the expected errors of a model with `n_parts` parts.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is no network of so many parts.
+/// The file cannot be read or is not a network for this number of parts.
 pub fn network(file: &Path, n_parts: usize) -> Result<Network, Failure> {
     let bytes = Shipped::Network.read(file)?.into_owned();
     Network::parse(bytes, n_parts).map_err(|error| refused(file, &error))
 }
 
-/// Reads the network of a deployment, if it has one.
+/// Reads the network of the `[quality]` section, if it names one.
 ///
 /// # Errors
 ///
-/// The file cannot be read or is no network of so many parts, or ONNX Runtime is asked for and not to be had.
-pub fn own_network(
+/// The file cannot be read or is not a network for this number of parts, or the requested ONNX Runtime cannot be
+/// loaded.
+pub fn quality_network(
     config: &deployment::quality::Config,
     n_parts: usize,
 ) -> Result<Option<Network>, Failure> {
@@ -325,33 +330,33 @@ fn by_onnx_runtime(
     Err(Failure::new(ExitKind::Config, message))
 }
 
-/// A network that is refused, with the library's own words.
+/// The failure for a network that cannot be used, with the cause that the library reports.
 fn refused(file: &Path, error: &NetworkError) -> Failure {
     let cause = std::error::Error::source(error).map(|it| format!(": {it}"));
     let message = format!("{}: {error}{}", file.display(), cause.unwrap_or_default());
     Failure::new(ExitKind::Input, message)
 }
 
-/// Reads thresholds of the expected errors.
+/// Reads the thresholds (tau) of a model with `n_parts` parts, pixels.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or does not hold a threshold for every part.
+/// The file cannot be read, or does not have one threshold per part.
 pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
     let tau = Tau::parse(&text(file)?, n_parts).map_err(|error| in_file(file, &error))?;
     Ok(tau.px().to_vec())
 }
 
-/// Makes a folder for results.
+/// Creates a folder for results.
 ///
 /// # Errors
 ///
-/// It cannot be made; a hint says what to try.
+/// The folder cannot be created; the hint says what to try.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
 
-/// A failure to read what a deployment names, with what its file says of where that comes from.
+/// Adds the origin of the data, if the deployment file gives one, to a failure to read an input.
 pub(crate) fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
     match &deployment.data {
         Some(data) if failure.kind() == ExitKind::Input => {

@@ -1,18 +1,18 @@
-//! A deployment made ready and run: read, resolved, checked, planned, supervised, and told what became of it.
+//! Prepares and runs a deployment: reads, resolves, checks and plans it, supervises the run, and reports on it.
 //!
 //! | step | where |
 //! |---|---|
-//! | the deployment file, checked against this machine | [`load`] |
-//! | the files and the footage that it names | [`inputs`], [`Shipped`] |
-//! | what every process is given | [`plan::resolve`], [`Resolved`] |
-//! | what the stages work with | [`Prepared`] |
-//! | processes and topics; the run itself | [`Planned`] |
-//! | one of its processes | [`process`] |
-//! | progress, and what became of the run | [`Watcher`], [`Report`] |
-//! | a run as seen from outside | [`live`] |
-//! | what a recording says of its run | [`recorded`] |
+//! | read the deployment file and check it against this machine | [`load`] |
+//! | read its input files and footage | [`inputs`], [`Shipped`] |
+//! | resolve it: the deployment with the metadata of its footage, the input of every process | [`plan::resolve`], [`Resolved`] |
+//! | prepare model, views and settings of the stages | [`Prepared`] |
+//! | plan processes and topics, and run them | [`Planned`] |
+//! | run one of its processes | [`process`] |
+//! | show progress, and report on the run | [`Watcher`], [`Report`] |
+//! | observe a running deployment from another process | [`live`] |
+//! | read the settings in a recording, and report its flaws | [`recorded`] |
 //!
-//! Data go to standard output and messages to standard error, both through [`output`].
+//! Data goes to standard output and messages to standard error, both through [`output`].
 #![forbid(unsafe_code)]
 
 mod claim;
@@ -31,7 +31,7 @@ pub mod budget;
 pub mod inputs;
 pub mod live;
 pub mod load;
-pub mod nothing;
+pub mod no_results;
 pub mod output;
 pub mod plan;
 pub mod process;

@@ -1,7 +1,7 @@
-//! A deployment that runs, as seen from outside: its processes, and where their time goes.
+//! A running deployment, observed from another process: its processes and their metrics.
 
-mod board;
 mod describe;
+mod snapshot;
 mod table;
 
 use core::time::Duration;
@@ -9,15 +9,15 @@ use std::time::Instant;
 
 use runtime::{Failure, Namespace, Observer, now_nanos};
 
-pub use board::{Board, Member, Standing};
 pub use describe::{describe, measured};
+pub use snapshot::{ProcessSnapshot, Snapshot, State};
 pub use table::table;
 
-/// How long the first words of all processes are waited for.
+/// How long to wait for the first metrics of all processes.
 const PATIENCE: Duration = Duration::from_secs(2);
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Looks at a deployment for as long as it runs.
+/// Observes a deployment while it runs.
 #[derive(Debug)]
 pub struct Live {
     name: String,
@@ -25,11 +25,11 @@ pub struct Live {
 }
 
 impl Live {
-    /// Begins to look.
+    /// Connects to a running deployment.
     ///
     /// # Errors
     ///
-    /// The deployment does not run, or cannot be looked into.
+    /// The deployment does not run, or its topics cannot be opened.
     pub fn open(namespace: &Namespace) -> Result<Self, Failure> {
         Ok(Self {
             name: namespace.name().to_owned(),
@@ -37,34 +37,39 @@ impl Live {
         })
     }
 
-    /// What is to be seen now.
+    /// The current state of all processes.
     ///
     /// # Errors
     ///
-    /// What it says cannot be received.
-    pub fn look(&mut self) -> Result<Board, Failure> {
+    /// The metrics cannot be received.
+    pub fn snapshot(&mut self) -> Result<Snapshot, Failure> {
         let supervisor = self.observer.supervisor();
-        let seen = self.observer.observe()?;
-        Ok(Board::new(&self.name, supervisor, &seen, now_nanos()))
+        let observed = self.observer.observe()?;
+        Ok(Snapshot::new(
+            &self.name,
+            supervisor,
+            &observed,
+            now_nanos(),
+        ))
     }
 
-    /// The same once everybody has said something, or two seconds are over.
+    /// As [`Self::snapshot`], but first waits until every live process has sent metrics, at most two seconds.
     ///
     /// # Errors
     ///
-    /// As of [`Self::look`].
-    pub fn first_look(&mut self) -> Result<Board, Failure> {
+    /// As for [`Self::snapshot`].
+    pub fn first_snapshot(&mut self) -> Result<Snapshot, Failure> {
         let begin = Instant::now();
         loop {
-            let board = self.look()?;
-            if board.is_complete() || begin.elapsed() > PATIENCE || self.is_over() {
-                return Ok(board);
+            let snapshot = self.snapshot()?;
+            if snapshot.is_complete() || begin.elapsed() > PATIENCE || self.is_over() {
+                return Ok(snapshot);
             }
             std::thread::sleep(PAUSE);
         }
     }
 
-    /// Whether the deployment ends, and this has to be dropped.
+    /// Whether the deployment is ending; the observer must then be dropped.
     pub fn is_over(&self) -> bool {
         self.observer.is_over()
     }

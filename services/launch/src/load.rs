@@ -1,4 +1,4 @@
-//! Deployment files from the disk, checked against this machine.
+//! Loads deployment files and checks them against this machine.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -9,7 +9,7 @@ use deployment::{ConfigError, Deployment, Loaded, Machine};
 use runtime::{ExitKind, Fault};
 use scene::Address;
 
-/// Why there is no deployment.
+/// Why a deployment could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file could not be read.
@@ -17,12 +17,12 @@ pub enum LoadError {
     Read {
         /// The file.
         file: PathBuf,
-        /// What it is instead, where the words of the system do not tell.
+        /// What kind of file it is instead; empty if the error of the system suffices.
         why: &'static str,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// What it holds is wrong.
+    /// The content of the file is invalid.
     #[error(transparent)]
     Config(#[from] ConfigError),
 }
@@ -36,13 +36,15 @@ impl Fault for LoadError {
     }
 }
 
-/// Reads a deployment file; `set` are `key=value` pairs that replace what it says.
+/// Reads a deployment file.
 ///
-/// Relative paths are relative to the file, whoever gives them.
+/// Relative paths, also those in `set`, are relative to the folder of the file.
+///
+/// * `set`: `key=value` pairs that replace values of the file.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or what it holds is wrong.
+/// The file cannot be read, or a value is invalid.
 pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     let text = fs::read_to_string(file).map_err(|source| LoadError::Read {
         file: file.to_owned(),
@@ -52,12 +54,15 @@ pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::parse(&text, file, set, &ThisMachine)?)
 }
 
-/// A deployment that was read before, with other values; see [`Loaded::again`].
+/// A loaded deployment with some values replaced; see [`Loaded::again`].
+///
+/// * `set`: `key=value` pairs that replace values.
+/// * `refused`: why a key may not be replaced; none if it may.
 ///
 /// # Errors
 ///
-/// A value is refused, or wrong.
-pub fn again(
+/// A key may not be replaced, or a value is invalid.
+pub fn with_overrides(
     deployment: &Deployment,
     set: &[String],
     refused: impl Fn(&str) -> Option<String>,
@@ -65,11 +70,13 @@ pub fn again(
     Ok(Loaded::again(deployment, set, refused, &ThisMachine)?)
 }
 
-/// The defaults alone.
+/// The default values, without a deployment file.
+///
+/// * `set`: `key=value` pairs that replace values.
 ///
 /// # Errors
 ///
-/// A value is wrong.
+/// A value is invalid.
 pub fn defaults(set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::defaults(set)?)
 }
@@ -105,7 +112,7 @@ impl Machine for ThisMachine {
     }
 }
 
-/// What the file is instead, where the words of the system do not tell.
+/// What kind of file it is instead; empty if the error of the system suffices.
 fn why_not(file: &Path, error: &std::io::Error) -> &'static str {
     if error.kind() == ErrorKind::InvalidData {
         ": it is no text (not UTF-8)"
@@ -129,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_precision_that_the_machine_lacks_is_refused_with_what_it_lacks() {
+    fn a_precision_that_the_machine_lacks_is_refused_with_the_reason() {
         let set = "pose.precision=bf16";
         match kernels::Amx::detect() {
             Ok(_) => {
@@ -147,19 +154,21 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_there_is_named() {
+    fn a_missing_file_is_named() {
         let error = read(Path::new("/nowhere/d.toml"), &[]).unwrap_err();
         assert!(error.to_string().contains("/nowhere/d.toml"));
     }
 
     #[test]
     fn paths_become_absolute() {
-        let it = parse("pose.threads=1").unwrap().deployment;
-        assert!(it.rig.is_absolute() && Path::new(&it.cameras[0].source).is_absolute());
+        let deployment = parse("pose.threads=1").unwrap().deployment;
+        assert!(
+            deployment.rig.is_absolute() && Path::new(&deployment.cameras[0].source).is_absolute()
+        );
     }
 
     #[test]
-    fn cores_are_numbered_as_the_system_numbers_them() {
+    fn the_maximal_number_of_cores_is_that_of_the_runtime() {
         assert_eq!(deployment::MAX_CORES, runtime::MAX_CORES);
     }
 }

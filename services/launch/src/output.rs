@@ -1,4 +1,4 @@
-//! Data to standard output, messages to standard error.
+//! Writes data to standard output and messages to standard error.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -7,16 +7,16 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde::Serialize;
 use tracing::Level;
 
-/// How much is said to people.
+/// How much a command prints and logs.
 #[derive(Debug, Clone, Copy)]
 pub struct Verbosity {
-    /// Nothing but what went wrong.
+    /// Print errors only.
     pub quiet: bool,
-    /// The least important events that are logged, here and by processes that are started.
+    /// The log level of this process and of the processes that it starts.
     pub level: Level,
 }
 
-/// Writes a line of data. A reader that went away (`| head`) is no failure.
+/// Writes a line of data. A closed pipe (`| head`) is not an error.
 ///
 /// # Errors
 ///
@@ -34,23 +34,23 @@ pub fn line(text: impl Display) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// Standard output cannot be written to, or the value has no form in JSON.
+/// Standard output cannot be written to, or the value cannot be represented in JSON.
 pub fn json(value: &impl Serialize) -> Result<(), Failure> {
     line(serde_json::to_string(value).or_fail(ExitKind::Run)?)
 }
 
-/// Writes a message for people; there is nobody left to tell if that fails.
+/// Writes a message to the user. An error of standard error is ignored.
 pub fn message(text: impl Display) {
     drop(writeln!(io::stderr().lock(), "{text}"));
 }
 
 /// Reports a failure that does not end the program.
 pub fn failure(failure: &Failure) {
-    // There is nobody left to tell if that fails.
+    // An error of standard error cannot be reported.
     drop(failure.report(&mut io::stderr().lock()));
 }
 
-/// Whether standard error may be redrawn.
-pub fn is_lively() -> bool {
+/// Whether standard error is a terminal, so that a progress bar can be drawn.
+pub fn is_terminal() -> bool {
     io::stderr().is_terminal()
 }

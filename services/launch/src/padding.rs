@@ -1,16 +1,14 @@
-//! How much of the frames is padding, because their size has another aspect than the camera's image.
+//! Warns about frames that are largely padding because their aspect ratio differs from that of the camera's image.
 
-/// Shares of padding below this are not worth a word.
-const WORTH_A_WORD: f64 = 0.1;
+/// The smallest share of padding that is reported.
+const MIN_SHARE: f64 = 0.1;
 
-/// A warning about the cameras of whose frames much is padding; none if there are none.
+/// A warning about the cameras whose frames are largely padding; none if there are none.
 ///
 /// * `frame`: width and height of the frames, pixels.
-/// * `cameras`: the name of each, and width and height of its image, pixels.
+/// * `cameras`: name, and width and height of the image in pixels, of every camera.
 pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option<String> {
-    let padded = cameras
-        .iter()
-        .filter(|it| share(it.1, frame) > WORTH_A_WORD);
+    let padded = cameras.iter().filter(|it| share(it.1, frame) > MIN_SHARE);
     let padded: Vec<(&str, [u32; 2])> = padded.copied().collect();
     let (_, image) = *padded.first()?;
     let names: Vec<&str> = padded
@@ -32,20 +30,20 @@ pub(crate) fn warning(frame: [usize; 2], cameras: &[(&str, [u32; 2])]) -> Option
     ))
 }
 
-/// How much larger an image becomes that just fits into a frame.
+/// The factor by which an image is scaled to fit into a frame.
 fn scale(image: [u32; 2], frame: [usize; 2]) -> f64 {
-    let side = |it: usize| frame[it] as f64 / f64::from(image[it].max(1));
-    side(0).min(side(1))
+    let of_axis = |axis: usize| frame[axis] as f64 / f64::from(image[axis].max(1));
+    of_axis(0).min(of_axis(1))
 }
 
-/// The share of a frame that an image in its own aspect does not fill.
+/// The share of a frame that remains empty when an image is scaled to fit into it.
 fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let scale = scale(image, frame);
     let area = f64::from(image[0]) * f64::from(image[1]) * scale * scale;
     1.0 - area / (frame[0] as f64 * frame[1] as f64)
 }
 
-/// The size of the image in the frame.
+/// The size of the image scaled to fit into the frame, pixels.
 fn fitting(image: [u32; 2], frame: [usize; 2]) -> [u32; 2] {
     let scale = scale(image, frame);
     image.map(|it| (f64::from(it) * scale).round().max(1.0) as u32)
@@ -64,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_aspect_needs_none_whatever_the_size() {
+    fn the_same_aspect_ratio_needs_no_padding() {
         for frame in [[640, 480], [320, 240], [1280, 960]] {
             assert!(share([640, 480], frame).abs() < 1e-9, "{frame:?}");
             assert_eq!(fitting([640, 480], frame), frame.map(|it| it as u32));

@@ -1,4 +1,4 @@
-//! From a deployment to the processes and topics that the supervisor runs.
+//! Plans the processes and topics of a deployment.
 
 use core::time::Duration;
 use std::ffi::OsString;
@@ -21,14 +21,16 @@ use crate::sanity;
 use crate::scheduling;
 use crate::vertical;
 
-/// How many times the work of any turn before it a turn may be, where turns are alike: frames, or levels of a pair.
-const EVEN: u32 = 3;
+/// Where the iterations of a main loop are comparable (a frame, or a level of a pair): how many times the processor time
+/// of the longest iteration so far an iteration may take.
+const MAX_WORK_FACTOR: u32 = 3;
 
-/// Looks at the footage of a deployment, and whether it can be that of its cameras; says what is doubtful.
+/// Resolves a deployment: reads the metadata of its footage, checks footage and calibration against each other, finds the
+/// vertical if it is not given, and logs warnings.
 ///
 /// # Errors
 ///
-/// Footage or calibration cannot be read, or cannot give joints in space.
+/// Footage or calibration cannot be read, or no joints can be located in space with them.
 pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     let footage = inputs::footage(deployment);
     let mut resolved = Resolved {
@@ -38,7 +40,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
         replay: None,
     };
     sanity::warn(&resolved)?;
-    // Of the processes none has to find it again, and a replay takes the same.
+    // Stored in the deployment, so that every process and a replay use the same vertical.
     if let Some(found) = vertical::find(deployment)? {
         tracing::warn!("{}", found.why);
         resolved.deployment.up = Some(found.up);
@@ -46,11 +48,11 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     Ok(resolved)
 }
 
-/// Reads everything that the deployment names, and says what it is.
+/// Reads all inputs of a deployment, and describes them in one line.
 ///
 /// # Errors
 ///
-/// Something that the deployment names cannot be read or used.
+/// An input cannot be read or used.
 pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     let resolved = resolve(deployment)?;
     let prepared = Prepared::new(&resolved)?;
@@ -59,18 +61,20 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
         tracing::warn!("{padding}");
     }
     let n_frames = resolved.n_frames();
-    let solved_in = match prepared.settings.views {
+    let pairs = match prepared.settings.views {
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
         pipeline::Views::All => "solved at once".to_owned(),
     };
     Ok(format!(
-        "{} views, {solved_in}, {n_frames} frames, a model of {} parts",
+        "{} views, {pairs}, {n_frames} frames, a model of {} parts",
         prepared.views.len(),
         prepared.model.n_parts()
     ))
 }
 
-/// The topics of a deployment.
+/// Plans the topics of a deployment.
+///
+/// * `names`: the names of its processes.
 pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String]) -> Vec<TopicPlan> {
     let sizes = prepared.views.iter().map(|it| ViewSize {
         frame_bytes: it
@@ -96,7 +100,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     between.chain(of_processes).collect()
 }
 
-/// A topic with that room.
+/// The plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
     let (topic, longest) = (room.topic, room.longest);
@@ -116,9 +120,9 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     }
 }
 
-/// The processes of a deployment, receivers before senders.
+/// Plans the processes of a deployment, receivers before senders.
 ///
-/// * `file`: the resolved deployment, as the user finds it.
+/// * `file`: path of the resolved deployment in the output folder.
 fn processes(resolved: &Resolved, file: &Path) -> Vec<ProcessSpec> {
     let topology = resolved.topology();
     let processes = topology.processes().iter();
@@ -152,13 +156,16 @@ fn process(it: &Process, topology: &Topology, resolved: &Resolved, file: &Path) 
             deployment::Role::Optional => Role::Optional,
         },
         senders: topology.senders_to(it).map(|it| it.name.clone()).collect(),
-        scheduling: scheduling::asked(&resolved.deployment.runtime, it.service, &it.name),
-        // Not known of what is written at the end; and where nothing may be lost nothing is hurried.
-        most_work: (is_hurried && is_even).then_some(EVEN),
+        scheduling: scheduling::requested(&resolved.deployment.runtime, it.service, &it.name),
+        // Not for stages that write files, whose work varies, and not with lossless delivery, which has no deadlines.
+        most_work: (is_hurried && is_even).then_some(MAX_WORK_FACTOR),
     }
 }
 
-/// What the supervisor is to run.
+/// Plans a run of the supervisor.
+///
+/// * `file`: path of the resolved deployment in the output folder.
+/// * `log`: the log level of the processes.
 pub(crate) fn plan(
     resolved: &Resolved,
     prepared: &Prepared,
@@ -187,7 +194,7 @@ pub(crate) fn plan(
     })
 }
 
-/// This program, which becomes any of the services.
+/// The path of this executable, which runs every service.
 fn executable() -> Result<PathBuf, Failure> {
     std::env::current_exe().or_fail(ExitKind::Run)
 }

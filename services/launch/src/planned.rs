@@ -1,4 +1,4 @@
-//! A deployment that can be started, and its run.
+//! A planned deployment, and its run.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,47 +16,49 @@ use crate::resolved::Resolved;
 use crate::scheduling;
 use crate::summary::{Report, Watcher};
 
-/// A deployment that can be started.
+/// A deployment with the plan of its run.
 #[derive(Debug)]
 pub struct Planned {
-    /// What every process is given.
+    /// The resolved deployment, the input of every process.
     resolved: Resolved,
     /// Its processes and topics.
     plan: Plan,
 }
 
 impl Planned {
-    /// Reads what the deployment names, and deals the work to processes.
+    /// Resolves a deployment and plans its processes and topics.
     ///
-    /// * `log`: the least important events that its processes log.
+    /// * `log`: the log level of its processes.
     ///
     /// # Errors
     ///
-    /// Something that it names cannot be read or used; see [`plan::resolve`] and [`Self::of`].
+    /// An input cannot be read or used; see [`plan::resolve`] and [`Self::of`].
     pub fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
         Self::of(plan::resolve(deployment)?, log)
     }
 
-    /// Deals the work of a deployment whose footage is known to processes.
+    /// Plans the processes and topics of a resolved deployment.
+    ///
+    /// * `log`: the log level of its processes.
     ///
     /// # Errors
     ///
-    /// Model, calibration or predictions cannot be read or used.
+    /// Model, calibration, network or table of expected errors cannot be read or used.
     pub fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
-        let file = file_of(&resolved.deployment);
+        let file = resolved_file(&resolved.deployment);
         if let Some(padding) = &prepared.padding {
             tracing::warn!("{padding}");
         }
         let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
-        for warning in scheduling::permit(&mut plan.processes, Scheduling::rehearse) {
+        for warning in scheduling::remove_denied(&mut plan.processes, Scheduling::rehearse) {
             tracing::warn!("{warning}");
         }
         Ok(Self { resolved, plan })
     }
 
-    /// What every process is given.
+    /// The resolved deployment, the input of every process.
     pub fn resolved(&self) -> &Resolved {
         &self.resolved
     }
@@ -66,51 +68,51 @@ impl Planned {
         &self.plan
     }
 
-    /// The run, which is the time of its planning too: `runtime::now_nanos`.
+    /// The session: the time of planning, `runtime::now_nanos`.
     pub fn session(&self) -> u64 {
         self.plan.session
     }
 
-    /// Its processes.
+    /// The names of its processes.
     pub fn processes(&self) -> impl Iterator<Item = &str> {
         self.plan.processes.iter().map(|it| it.name.as_str())
     }
 
-    /// Has a process compute for ever in its first life, once it has sent something of a later frame.
+    /// Makes a process enter an endless loop in epoch 0, once it has sent a message about a frame after `after_frame`.
     pub fn spin(&mut self, process: &str, after_frame: u64) {
         let spec = self.plan.processes.iter_mut().find(|it| it.name == process);
-        if let Some(it) = spec {
+        if let Some(spec) = spec {
             let args = ["--spin-after".to_owned(), after_frame.to_string()];
-            it.args.extend(args.map(Into::into));
+            spec.args.extend(args.map(Into::into));
         }
     }
 
-    /// Runs it, shows its progress, and says what became of it.
+    /// Runs the deployment, shows its progress, and reports on it.
     ///
-    /// * `quiet`: shows nothing, nor what the onlooker answers.
-    /// * `stop`: ends it before its footage does.
-    /// * `onlooker`: is told everything that happens; what it answers is shown.
+    /// * `quiet`: shows no progress and no messages of `on_event`.
+    /// * `stop`: ends the run early.
+    /// * `on_event`: called for every event of the run; a message that it returns is shown.
     ///
     /// # Errors
     ///
-    /// The folder of the results cannot be made or is another run's; the processes cannot be started or supervised.
-    pub fn carry_out(
+    /// The output folder cannot be created or another run uses it; the processes cannot be started or supervised.
+    pub fn run(
         &self,
         quiet: bool,
         stop: &Stop,
-        onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
+        on_event: &mut dyn FnMut(&Event<'_>) -> Option<String>,
     ) -> Result<Report, Failure> {
         let deployment = &self.resolved.deployment;
         let folder = &deployment.output;
         inputs::make_folder(folder)?;
-        let _mine = Claim::of(folder, &format!("deployment {}", deployment.name))?;
-        self.resolved.write(&file_of(deployment))?;
+        let _claim = Claim::of(folder, &format!("deployment {}", deployment.name))?;
+        self.resolved.write(&resolved_file(deployment))?;
         let begin = Instant::now();
         let mut watcher = Watcher::new(&self.resolved, quiet);
         let outcome = supervise::run(&self.plan, stop, &mut |event| {
-            watcher.note(&event);
-            if let Some(said) = onlooker(&event).filter(|_| !quiet) {
-                watcher.say(&said);
+            watcher.handle(&event);
+            if let Some(message) = on_event(&event).filter(|_| !quiet) {
+                watcher.print(&message);
             }
         });
         watcher.finish();
@@ -124,7 +126,7 @@ impl Planned {
     }
 }
 
-/// The resolved deployment, for the user; the processes are given the same in their standard input.
-fn file_of(deployment: &Deployment) -> PathBuf {
+/// The file of the resolved deployment, for the user; the processes get the same content in their standard input.
+fn resolved_file(deployment: &Deployment) -> PathBuf {
     deployment.output.join("deployment.json")
 }

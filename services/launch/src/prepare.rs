@@ -1,4 +1,4 @@
-//! From a deployment and its footage to what the stages work with.
+//! Prepares model, views and settings of a resolved deployment for its stages.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,44 +17,44 @@ use crate::inputs;
 use crate::padding;
 use crate::resolved::Resolved;
 
-/// One view, ready.
+/// A prepared view.
 #[derive(Debug, Clone)]
 pub struct View {
     /// The camera's name.
     pub name: String,
-    /// From its footage to the frames of the pipeline.
+    /// The mapping from its footage to the frames of the pipeline.
     pub framing: Framing,
-    /// Camera, pyramid and cells of those frames.
+    /// Camera, pyramid layout and cells of those frames.
     pub plan: Arc<ViewPlan>,
 }
 
-/// What the stages of a deployment work with.
+/// The model, views and settings of a deployment.
 #[derive(Debug)]
 pub struct Prepared {
     /// The model.
     pub model: Arc<Model>,
-    /// The views, as they are numbered.
+    /// The views, in the order of their numbers.
     pub views: Vec<View>,
-    /// The pairs of views that are fused, ascending; where all views are solved at once, every view but the
-    /// first with the one before it: as many as there are messages, and together all views.
+    /// The pairs of views that are fused, ascending. If all views are solved at once: every view but the first with
+    /// the view before it, so that there is one pair per message and every view is in a pair.
     pub pairs: Vec<[usize; 2]>,
-    /// Against gravity, where the rig knows.
+    /// The direction against gravity, if the rig gives it.
     pub up_in_world: Option<UnitVector3<f64>>,
-    /// The settings of all steps.
+    /// The settings of all stages.
     pub settings: EstimatorSettings,
-    /// What of the frames' size is worth a word.
+    /// The warning about padding, if the frames are largely padding.
     pub padding: Option<String>,
 }
 
 impl Prepared {
-    /// Reads model and rig, and prepares the views.
+    /// Reads the model and the rig, and prepares the views.
     ///
     /// # Errors
     ///
-    /// A file that the deployment names cannot be read, does not go with the others, or contradicts the deployment.
+    /// An input cannot be read, does not match the other inputs, or contradicts the deployment.
     pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
-        let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
-        Self::read(resolved).map_err(told)
+        let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
+        Self::read(resolved).map_err(with_origin)
     }
 
     fn read(resolved: &Resolved) -> Result<Self, Failure> {
@@ -87,11 +87,11 @@ impl Prepared {
         })
     }
 
-    /// What knows the expected errors of a view, if there is a table of them.
+    /// The predictor of the expected errors of a view from a table, if the deployment names one.
     ///
     /// # Errors
     ///
-    /// The table cannot be read, or does not speak of the view.
+    /// The table cannot be read, or does not contain the view.
     pub fn predictor(
         &self,
         resolved: &Resolved,
@@ -108,28 +108,29 @@ impl Prepared {
         Ok(Some(predictor))
     }
 
-    /// Sees that the network, if there is one, can be run; and that the table of expected errors, if there
-    /// is one, speaks of every view; warns where it speaks of none of the frames.
+    /// Checks that the network, if there is one, can be loaded, and that the table of expected errors, if there is
+    /// one, contains every view. Warns of views without a row for any frame.
     ///
     /// # Errors
     ///
-    /// Network or table cannot be read, or do not go with the model.
+    /// Network or table cannot be read, or do not match the model.
     pub fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
-        let told = |failure| inputs::of_deployment(failure, &resolved.deployment);
-        self.predict(resolved).map_err(told)
+        let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
+        self.check_quality(resolved).map_err(with_origin)
     }
 
-    fn predict(&self, resolved: &Resolved) -> Result<(), Failure> {
+    fn check_quality(&self, resolved: &Resolved) -> Result<(), Failure> {
         let deployment = &resolved.deployment;
-        let ships = |file: &Option<PathBuf>| file.as_deref().is_some_and(deployment::is_shipped);
-        let has_other_model = deployment.model.is_some() && !ships(&deployment.model);
-        if has_other_model && ships(&deployment.quality.network) {
+        let is_shipped =
+            |file: &Option<PathBuf>| file.as_deref().is_some_and(deployment::is_shipped);
+        let has_other_model = deployment.model.is_some() && !is_shipped(&deployment.model);
+        if has_other_model && is_shipped(&deployment.quality.network) {
             tracing::warn!(
                 "quality.network is the one that ships, which was trained on what the model that ships finds; \
                  of another model's poses it knows nothing"
             );
         }
-        inputs::own_network(&resolved.deployment.quality, self.model.n_parts())?;
+        inputs::quality_network(&resolved.deployment.quality, self.model.n_parts())?;
         let capture = &resolved.deployment.capture;
         for (view, footage) in resolved.footage.iter().enumerate() {
             let Some(predictor) = self.predictor(resolved, view)? else {
@@ -147,17 +148,19 @@ impl Prepared {
         Ok(())
     }
 
-    /// The prepared views, as the steps take them.
+    /// The plans of all views.
     pub fn plans(&self) -> Vec<Arc<ViewPlan>> {
         self.views.iter().map(|it| Arc::clone(&it.plan)).collect()
     }
 }
 
-/// From the footage of one camera to its frames.
+/// The mapping from the footage of a camera to its frames.
+///
+/// * `index`: the camera's place in the deployment.
 ///
 /// # Errors
 ///
-/// The calibration lacks the camera, or does not fit the footage.
+/// The calibration does not contain the camera, or does not match the size of the footage.
 pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Framing, Failure> {
     let deployment = &resolved.deployment;
     let entry = &deployment.cameras[index];
@@ -250,7 +253,7 @@ fn settings(
     })
 }
 
-/// Pixels of the frame per pixel of the footage.
+/// The scale of the frames: pixels of the frame per pixel of the footage.
 pub fn frame_scale(framing: &Framing) -> f64 {
     let [[a, b, _], [c, d, _]] = framing.source_from_output();
     1.0 / (a * d - b * c).abs().sqrt()

@@ -1,4 +1,4 @@
-//! One process of a deployment: from what it is given to the job of its service.
+//! Runs one process of a deployment: builds the job of its service from the resolved deployment.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -87,23 +87,23 @@ impl Name {
 /// What a process is told of itself; what it is told of the deployment stands in its standard input.
 #[derive(Debug, Clone)]
 pub struct Own {
-    /// The resolved deployment, where standard input does not hold it.
+    /// The file of the resolved deployment, which is read if standard input is empty.
     pub plan: PathBuf,
-    /// View or worker, from 0.
+    /// The number of its view or worker, from 0.
     pub index: usize,
-    /// What a recording stands in for.
+    /// The stage that a replay process stands in for.
     pub stage: Option<Stage>,
-    /// Compute for ever in the first life, once something of a later frame has been sent.
+    /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.
     pub spin_after: Option<u64>,
 }
 
-/// Becomes the process: works until its inputs end, or it is told to stop.
+/// Runs the process until its inputs end or a stop is requested.
 ///
 /// # Errors
 ///
-/// The deployment is not given or cannot be used, it has no such process, or the work of the process fails.
+/// The resolved deployment cannot be read or used, it has no such process, or the service fails.
 pub fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
-    let resolved = Resolved::given(&own.plan)?;
+    let resolved = Resolved::read(&own.plan)?;
     let n_views = resolved.deployment.cameras.len();
     let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
     if per_view && own.index >= n_views {
@@ -135,8 +135,8 @@ pub fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure
     }
 }
 
-/// Threads of a process. Where there are several the caller, who does the work, is one of them: from outside a pool
-/// levels are not spread over it.
+/// The thread pool of a process. If it has several threads, the calling thread is one of them: work that is started
+/// outside a pool would not be spread over its threads.
 fn pool(n_threads: usize) -> ThreadPoolBuilder {
     let pool = ThreadPoolBuilder::new().num_threads(n_threads);
     if n_threads > 1 {
@@ -183,7 +183,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
-    let network = inputs::own_network(&resolved.deployment.quality, prepared.model.n_parts())?;
+    let network = inputs::quality_network(&resolved.deployment.quality, prepared.model.n_parts())?;
     let source = match network {
         Some(network) => quality::Source::Network(Box::new(quality::NetworkSource {
             forecaster: Forecaster::new(network),
@@ -248,7 +248,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         n_workers: topology.n_workers(),
         n_consumers: topology.receivers_of(&topic::pose3d()),
         pairs: prepared.pairs,
-        // A pair that waits for a view takes this long itself.
+        // Twice the patience of a pair, which waits for late views itself.
         patience: 2 * resolved.patience(),
     };
     triangulate::run(service, &job, step)
@@ -309,7 +309,7 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
 
 fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {
     let recording = resolved.replay.as_ref().zip(own.stage);
-    let (it, stage) = recording
+    let (plan, stage) = recording
         .ok_or("there is no recording, or no --stage")
         .or_fail(ExitKind::Config)?;
     let topology = resolved.topology();
@@ -326,9 +326,9 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
         n_receivers: topology.receivers_of(topic),
     };
     let job = replay::Job {
-        file: it.file.clone(),
+        file: plan.file.clone(),
         outputs: replayed.outputs.iter().map(output).collect(),
-        pace: it.speed.map_or(replay::Pace::Max, replay::Pace::Times),
+        pace: plan.speed.map_or(replay::Pace::Max, replay::Pace::Times),
         frame_step: resolved.deployment.capture.frame_step.max(1),
         patience: resolved.patience(),
     };
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn who_may_use_several_threads_works_inside_their_pool() {
+    fn a_pool_of_several_threads_contains_the_calling_thread() {
         let threads_of = |n| {
             let inside = move || {
                 let _pool = pool(n).build();

@@ -1,4 +1,4 @@
-//! What a recording says about its run, and what is said about a recording.
+//! The settings of a run in its recording, and the description of a recording.
 
 use core::fmt::Write as _;
 use std::collections::BTreeMap;
@@ -16,23 +16,23 @@ use serde_json::{Value, json};
 use crate::resolved::Resolved;
 use crate::shipped::Shipped;
 
-/// So many damaged messages are named, and so many places.
-const MOST_NAMED: usize = 10;
+/// The maximal number of damaged messages, and of damaged places, that are listed as text.
+const MAX_LISTED: usize = 10;
 
-/// The settings of a run, as they stand in its recording.
+/// The settings of a run that its recording contains.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
-    /// What every process was given.
+    /// The resolved deployment, the input of every process.
     pub resolved: Resolved,
-    /// Fingerprints of the files that they read, by name.
+    /// Fingerprints (FNV-1a) of the input files, by path; shipped files by their name.
     pub files: BTreeMap<PathBuf, u64>,
 }
 
-/// What the recording of a run says about itself; the process that writes it adds the session.
+/// The metadata of a recording. The session is 0: the recording process sets it.
 ///
 /// # Errors
 ///
-/// A file that the deployment names cannot be read.
+/// An input file cannot be read.
 pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure> {
     let settings = Settings {
         files: fingerprints(&resolved.deployment)?,
@@ -54,7 +54,7 @@ pub fn about(resolved: &Resolved, plan: &RecordingPlan) -> Result<About, Failure
     })
 }
 
-/// Fingerprints of the files that a deployment names, but for its footage.
+/// Fingerprints (FNV-1a) of the input files of a deployment, without its footage.
 pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, u64>, Failure> {
     let mut files = BTreeMap::new();
     for file in [Some(&deployment.rig), deployment.quality.table.as_ref()]
@@ -70,7 +70,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         (Shipped::Consistency, &deployment.fuse.consistency),
     ] {
         let Some(file) = file else { continue };
-        // Files that ship may be several, and have one name.
+        // The deployment calls all shipped files "shipped".
         let name = if deployment::is_shipped(file) {
             kind.name()
         } else {
@@ -81,22 +81,22 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     Ok(files)
 }
 
-/// Finds all messages of a recording.
+/// Scans a recording for its messages.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or is no recording.
+/// The file cannot be read or is not a recording.
 pub fn open(file: &Path) -> Result<Recording, Failure> {
     let mut input = File::open(file).map_err(|error| runtime::in_file(file, &error))?;
     recording::scan(&mut input).map_err(|error| runtime::in_file(file, &error))
 }
 
-/// Whether everything that was sent is in the file, as far as the file can say.
+/// Whether the file is undamaged and contains every message that was sent, as far as the file tells.
 pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0
 }
 
-/// Whether everything that was written is still there, as far as it can be told without reading the messages.
+/// Whether the file is complete and undamaged, as far as a scan tells; the content of the messages is not checked.
 pub fn is_undamaged(recording: &Recording) -> bool {
     let extent = &recording.extent;
     extent.is_complete
@@ -105,7 +105,9 @@ pub fn is_undamaged(recording: &Recording) -> bool {
         && recording.n_missing() == 0
 }
 
-/// Reads what is replayed, and finds the messages that are not what was written.
+/// Reads the messages that a replay sends, and returns those whose checksums do not match.
+///
+/// * `from`: the first stage that the replay runs.
 ///
 /// # Errors
 ///
@@ -130,25 +132,25 @@ pub fn damaged(
         .map_err(|error| runtime::in_file(file, &error))
 }
 
-/// Names the messages that are not what was written, the first ones at length.
+/// Describes the damaged messages as text, and lists the first of them; none if there are none.
 pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
     let mut text = format!(
         "  {} damaged messages are left out: they are not what their checksums say",
         damaged.len()
     );
-    let named = damaged.iter().take(MOST_NAMED).map(|it| {
+    let named = damaged.iter().take(MAX_LISTED).map(|it| {
         let frame = it.frame.map_or(String::new(), |it| format!(", frame {it}"));
         format!("\n    {}{frame}, at byte {}", it.topic, it.offset)
     });
     text.extend(named);
-    if damaged.len() > MOST_NAMED {
-        let more = damaged.len() - MOST_NAMED;
+    if damaged.len() > MAX_LISTED {
+        let more = damaged.len() - MAX_LISTED;
         text.extend([format!("\n    and {more} more; --json names all")]);
     }
     (!damaged.is_empty()).then_some(text)
 }
 
-/// The same for programs.
+/// The damaged messages as JSON.
 pub fn damaged_json(damaged: &[Damaged]) -> Value {
     let damaged = damaged
         .iter()
@@ -156,7 +158,7 @@ pub fn damaged_json(damaged: &[Damaged]) -> Value {
     damaged.collect()
 }
 
-/// What a file holds, for people: a line, and another for each thing that is wrong with it.
+/// Describes a recording as text: one line on its content, and one per flaw.
 pub fn text(file: &Path, recording: &Recording) -> String {
     let extent = &recording.extent;
     let mut text = format!(
@@ -185,11 +187,11 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
             "\n  not complete: {why}; read up to byte {whole} of {all}"
         )?;
     }
-    for it in extent.damage.iter().take(MOST_NAMED) {
+    for it in extent.damage.iter().take(MAX_LISTED) {
         write!(text, "\n  damaged at byte {}: {}", it.offset, it.what)?;
     }
-    if extent.damage.len() > MOST_NAMED {
-        let more = extent.damage.len() - MOST_NAMED;
+    if extent.damage.len() > MAX_LISTED {
+        let more = extent.damage.len() - MAX_LISTED;
         write!(text, "\n  and at {more} more places")?;
     }
     for (topic, n) in &extent.missing {
@@ -217,7 +219,7 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
     Ok(())
 }
 
-/// The same for programs.
+/// Describes a recording as JSON.
 pub fn json(file: &Path, recording: &Recording) -> Value {
     let extent = &recording.extent;
     let topics = recording.tracks.iter().map(|(topic, it)| {

@@ -1,4 +1,4 @@
-//! A deployment whose footage is known: what every process is given.
+//! A resolved deployment: a deployment with the metadata of its footage, the input of every process.
 
 use core::time::Duration;
 use std::io::{IsTerminal as _, Read as _};
@@ -10,22 +10,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::inputs::Footage;
 
-/// A deployment with what was found out about its footage: what every process is given.
+/// A deployment with the metadata of its footage, the input of every process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Resolved {
-    /// The deployment, all paths absolute.
+    /// The deployment, with absolute paths.
     pub deployment: Deployment,
     /// The footage of every camera.
     pub footage: Vec<Footage>,
-    /// The file that every message goes to, if there is one.
+    /// The recording to write, if there is one.
     #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,
-    /// The recording that stands in for the first stages, if there is one.
+    /// The recording that replaces the first stages, if there is one.
     #[serde(default)]
     pub replay: Option<Replay>,
 }
 
-/// The services, in the order in which a frame passes them.
+/// The services, in pipeline order.
 pub const SERVICES: [&str; 6] = [
     "capture",
     "pose",
@@ -36,43 +36,43 @@ pub const SERVICES: [&str; 6] = [
 ];
 
 impl Resolved {
-    /// Frames that will be used.
+    /// Number of frames to use: that of the longest footage.
     pub fn n_frames(&self) -> u64 {
         self.footage.iter().map(|it| it.n_frames).max().unwrap_or(0)
     }
 
-    /// Frames of the footage per second, where any camera knows.
+    /// Frames per second of the footage, before `frame_step`, if it is known.
     pub fn frame_rate_hz(&self) -> Option<f64> {
         let capture = &self.deployment.capture;
         let step = capture.frame_step as f64;
         let known = self.footage.iter().filter_map(|it| it.frame_rate_hz);
         let all: Vec<f64> = known.map(|it| it * step).collect();
-        // Files that contradict each other are overruled by who knows better.
+        // If the files contradict each other, the setting of the deployment counts.
         let agree = all.iter().all(|it| (it / all[0] - 1.0).abs() < 1e-3);
         let given = capture.frame_rate_hz.filter(|_| !agree);
         given.or_else(|| all.first().copied())
     }
 
-    /// Writes it for the user to read.
+    /// Writes it to a file, for the user.
     pub(crate) fn write(&self, file: &Path) -> Result<(), Failure> {
         std::fs::write(file, self.to_text()?).map_err(|error| runtime::in_file(file, &error))
     }
 
-    /// What every process is given.
+    /// The text that every process gets as standard input.
     pub(crate) fn to_text(&self) -> Result<String, Failure> {
         serde_json::to_string_pretty(self).or_fail(ExitKind::Run)
     }
 
-    /// Reads what the supervisor has given to this process, in its standard input: the file in the output folder may
-    /// be gone or be another run's when a process is started again.
+    /// Reads the resolved deployment from standard input, where the supervisor writes it. The file in the output
+    /// folder could have been removed, or replaced by another run, before a restart.
     ///
-    /// * `file`: the file of the same content; it is read by a process that was started by hand, without anything in
-    ///   its input.
+    /// * `file`: a file with the same content, which is read if standard input is empty or a terminal, as for a
+    ///   process that is started by hand.
     ///
     /// # Errors
     ///
-    /// Neither input nor file hold it, or what they hold is something else.
-    pub fn given(file: &Path) -> Result<Self, Failure> {
+    /// Neither standard input nor the file can be read, or the text is not a resolved deployment.
+    pub fn read(file: &Path) -> Result<Self, Failure> {
         let wrong = |error: &dyn core::error::Error| runtime::in_file(file, error);
         let mut text = String::new();
         if !std::io::stdin().is_terminal() {
@@ -85,7 +85,7 @@ impl Resolved {
         serde_json::from_str(&text).map_err(|error| wrong(&error))
     }
 
-    /// What happens when a receiver is slower than its sender.
+    /// The delivery of messages to receivers that are slower than their senders.
     pub fn delivery(&self) -> Delivery {
         match self.deployment.capture.mode {
             deployment::capture::Mode::Lossless => Delivery::Lossless,
@@ -93,12 +93,12 @@ impl Resolved {
         }
     }
 
-    /// How long a stage waits for a view that is late.
+    /// How long a stage waits for a late view.
     pub fn patience(&self) -> Duration {
         Duration::from_millis(self.deployment.deadline_ms())
     }
 
-    /// The processes of the deployment, and who sends to whom.
+    /// The processes of the deployment and the topics between them.
     pub fn topology(&self) -> Topology {
         let (recording, replay) = (self.recording.as_ref(), self.replay.as_ref());
         Topology::new(&self.deployment, recording, replay)

@@ -1,4 +1,4 @@
-//! Whether footage and calibration of a deployment can belong together: asked before anything is started.
+//! Checks of footage and calibration of a deployment, before any process is started.
 
 use std::path::PathBuf;
 
@@ -13,34 +13,35 @@ use scene::Address;
 use crate::inputs;
 use crate::resolved::Resolved;
 
-/// Rates further apart than this factor cannot be paired frame by frame.
-const RATES: f64 = 1.02;
-/// Brightness, of 255, by which parts of a picture must differ for it to tell cameras apart.
-const LEAST_CONTRAST: f64 = 16.0;
-/// Pictures that differ by less, of 255, on average over a grid of so many cells either way, look the same.
-const LEAST_APART: f64 = 1.0;
+/// The largest ratio of two frame rates at which frames can be paired by number.
+const MAX_RATE_RATIO: f64 = 1.02;
+/// The least range of brightness, of 255, over the cells of an image at which it is compared with others.
+const MIN_CONTRAST: f64 = 16.0;
+/// Images whose mean difference of brightness over the cells is less than this, of 255, look the same.
+const MIN_DIFFERENCE: f64 = 1.0;
+/// Cells of the grid of brightness, in each direction.
 const CELLS: usize = 32;
 
-/// Says what is doubtful.
+/// Checks footage and calibration; returns warnings.
 ///
 /// # Errors
 ///
-/// What cannot give joints in space: one camera, cameras at one place, another unit, one footage for two cameras,
-/// rates that differ.
+/// No joints can be located in space: a single camera, cameras in one place, a wrong unit, one source for two
+/// cameras, or different frame rates.
 pub(crate) fn check(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
-    let mut doubts = deployment.doubts(n_cores());
-    several(deployment)?;
-    sources(deployment)?;
-    doubts.extend(cameras(deployment)?);
-    doubts.extend(rates(resolved)?);
-    doubts.extend(lengths(resolved));
-    doubts.extend(pictures(resolved)?);
-    Ok(doubts)
+    let mut warnings = deployment.doubts(n_cores());
+    check_number(deployment)?;
+    check_sources(deployment)?;
+    warnings.extend(check_cameras(deployment)?);
+    warnings.extend(check_rates(resolved)?);
+    warnings.extend(check_lengths(resolved));
+    warnings.extend(check_images(resolved)?);
+    Ok(warnings)
 }
 
 /// Refuses a single camera.
-fn several(deployment: &Deployment) -> Result<(), Failure> {
+fn check_number(deployment: &Deployment) -> Result<(), Failure> {
     let [camera] = &deployment.cameras[..] else {
         return Ok(());
     };
@@ -54,9 +55,9 @@ fn several(deployment: &Deployment) -> Result<(), Failure> {
     ))
 }
 
-/// Refuses two cameras of one source.
-fn sources(deployment: &Deployment) -> Result<(), Failure> {
-    let same = |source: &str| -> PathBuf {
+/// Refuses two cameras with the same source.
+fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
+    let canonical = |source: &str| -> PathBuf {
         let path = PathBuf::from(source);
         if Address::is_address(source) {
             return path;
@@ -66,7 +67,7 @@ fn sources(deployment: &Deployment) -> Result<(), Failure> {
     let all: Vec<PathBuf> = deployment
         .cameras
         .iter()
-        .map(|it| same(&it.source))
+        .map(|it| canonical(&it.source))
         .collect();
     for (nth, source) in all.iter().enumerate() {
         let Some(first) = all[..nth].iter().position(|it| it == source) else {
@@ -83,26 +84,26 @@ fn sources(deployment: &Deployment) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Asks of the cameras that are used what `parallax calib check` asks of a file.
-fn cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
+/// Applies the checks of `parallax calib check` to the cameras of the deployment.
+fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     let named = deployment
         .cameras
         .iter()
         .filter_map(|it| rig.camera(&it.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
-    // None of the cameras, or not all: said elsewhere, with the names.
+    // A camera that the rig does not contain is reported elsewhere, by name.
     let Ok(used) = used else {
         return Ok(Vec::new());
     };
     let findings = check_rig(&used);
-    let is_meant = |it: &Finding| {
+    let is_confirmed = |it: &Finding| {
         let is_distance = matches!(it, Finding::Distance { .. });
         is_distance && deployment.unit.is_some()
     };
     let (refused, rest): (Vec<&Finding>, Vec<&Finding>) = findings
         .iter()
-        .partition(|it| it.severity() == Severity::Error && !is_meant(it));
+        .partition(|it| it.severity() == Severity::Error && !is_confirmed(it));
     if let Some(first) = refused.first() {
         let more = match refused.len() - 1 {
             0 => String::new(),
@@ -112,15 +113,15 @@ fn cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
         let failure = Failure::new(ExitKind::Calibration, message);
         return Err(failure.with_hint(hint(first)));
     }
-    let doubtful = rest
+    let warnings = rest
         .into_iter()
         .filter(|it| it.severity() >= Severity::Warning);
-    Ok(doubtful
+    Ok(warnings
         .map(|it| format!("{}: {it}", deployment.rig.display()))
         .collect())
 }
 
-/// What to try.
+/// The hint for a finding.
 fn hint(finding: &Finding) -> String {
     match finding {
         Finding::Distance { metres, .. } => format!(
@@ -138,8 +139,8 @@ fn hint(finding: &Finding) -> String {
     }
 }
 
-/// Refuses footage of different rates, unless the rate is given; says by how much rates drift apart.
-fn rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
+/// Refuses footage with different frame rates, unless the rate is given. Warns of drift.
+fn check_rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     let deployment = &resolved.deployment;
     let step = deployment.capture.frame_step as f64;
     let views = deployment.cameras.iter().zip(&resolved.footage);
@@ -151,12 +152,12 @@ fn rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     let (Some((slow, low)), Some((fast, high))) = (slowest, fastest) else {
         return Ok(None);
     };
-    let numbers = format!("{slow} has {low:.6} frames per second, {fast} {high:.6}");
+    let rates = format!("{slow} has {low:.6} frames per second, {fast} {high:.6}");
     let drift = resolved.n_frames() as f64 * step * (high / low - 1.0);
     let text = format!(
-        "{numbers}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
+        "{rates}: frames are paired by their numbers, so that in the end they are {drift:.1} frames apart"
     );
-    if high / low <= RATES || deployment.capture.frame_rate_hz.is_some() {
+    if high / low <= MAX_RATE_RATIO || deployment.capture.frame_rate_hz.is_some() {
         return Ok((drift >= 0.5).then_some(text));
     }
     let failure = Failure::new(ExitKind::Input, text);
@@ -166,8 +167,8 @@ fn rates(resolved: &Resolved) -> Result<Option<String>, Failure> {
     ))
 }
 
-/// Says which footage is much shorter than another.
-fn lengths(resolved: &Resolved) -> Option<String> {
+/// Warns if the footage of one camera is much shorter than that of another.
+fn check_lengths(resolved: &Resolved) -> Option<String> {
     let names = resolved.deployment.cameras.iter().map(|it| &it.name);
     let all: Vec<_> = names
         .zip(resolved.footage.iter().map(|it| it.n_frames))
@@ -180,15 +181,15 @@ fn lengths(resolved: &Resolved) -> Option<String> {
     })
 }
 
-/// Refuses cameras whose first pictures are equal, bit for bit; names those whose pictures look the same.
-fn pictures(resolved: &Resolved) -> Result<Vec<String>, Failure> {
+/// Refuses cameras whose first images are identical. Warns of cameras whose first images look the same.
+fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let first = deployment
         .cameras
         .iter()
-        .map(|it| Pictures::of(it, &deployment.capture));
-    let first: Vec<Option<Pictures>> = first.collect();
-    let mut said = Vec::new();
+        .map(|it| FirstImages::of(it, &deployment.capture));
+    let first: Vec<Option<FirstImages>> = first.collect();
+    let mut warnings = Vec::new();
     for (nth, own) in first.iter().enumerate() {
         for (other, theirs) in first[..nth].iter().enumerate() {
             let (Some(own), Some(theirs)) = (own, theirs) else {
@@ -205,26 +206,26 @@ fn pictures(resolved: &Resolved) -> Result<Vec<String>, Failure> {
                     failure.with_hint("every [[camera]] needs the footage of its own camera")
                 );
             }
-            let apart = own.apart(theirs);
-            if apart < LEAST_APART {
-                said.push(format!(
-                    "the first pictures of {a} and {b} differ by {apart:.1} of 255 on average: is it one video, given for two cameras?"
+            let difference = own.difference(theirs);
+            if difference < MIN_DIFFERENCE {
+                warnings.push(format!(
+                    "the first pictures of {a} and {b} differ by {difference:.1} of 255 on average: is it one video, given for two cameras?"
                 ));
             }
         }
     }
-    Ok(said)
+    Ok(warnings)
 }
 
-/// The first pictures of a camera.
-struct Pictures {
+/// The first images of a camera.
+struct FirstImages {
     rgb: Vec<Vec<u8>>,
-    /// Brightness of the first, on a grid.
+    /// Mean brightness of the cells of the first image, row by row.
     grid: Vec<f64>,
 }
 
-impl Pictures {
-    /// Unless all pixels are alike, as of a camera without light. Scenes are not made for it.
+impl FirstImages {
+    /// None for a synthetic camera, for unreadable footage, and for a first image without contrast.
     fn of(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
@@ -238,7 +239,7 @@ impl Pictures {
             count: Some(2),
             ..SourceSpec::new(camera.source.clone())
         };
-        // What cannot be read is said by who reads it.
+        // Unreadable footage is reported where it is read.
         let mut feed = Feed::open(&spec).ok()?;
         let mut rgb = Vec::new();
         while let Ok(Some(frame)) = feed.next_frame() {
@@ -248,18 +249,20 @@ impl Pictures {
         let grid = grid(rgb.first()?, [size.width, size.height]);
         let most = grid.iter().copied().fold(f64::MIN, f64::max);
         let least = grid.iter().copied().fold(f64::MAX, f64::min);
-        (most - least >= LEAST_CONTRAST).then_some(Self { rgb, grid })
+        (most - least >= MIN_CONTRAST).then_some(Self { rgb, grid })
     }
 
-    /// Mean difference of brightness.
-    fn apart(&self, other: &Self) -> f64 {
+    /// Mean absolute difference of brightness over the cells.
+    fn difference(&self, other: &Self) -> f64 {
         let pairs = self.grid.iter().zip(&other.grid);
         let sum: f64 = pairs.map(|(a, b)| (a - b).abs()).sum();
         sum / self.grid.len() as f64
     }
 }
 
-/// Mean brightness in cells, whatever the size of the picture.
+/// Mean brightness of the cells of an image, row by row.
+///
+/// * `rgb`: the pixels, three bytes each.
 fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
     let mut cells = vec![[0.0, 0.0]; CELLS * CELLS];
     for (row, line) in rgb.chunks_exact(3 * width).enumerate() {
@@ -273,14 +276,19 @@ fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
     cells.into_iter().map(mean).collect()
 }
 
-/// The same, said as warnings.
+/// Runs the checks and logs the warnings.
+///
+/// # Errors
+///
+/// As for [`check`].
 pub(crate) fn warn(resolved: &Resolved) -> Result<(), Failure> {
-    for doubt in check(resolved)? {
-        tracing::warn!("{doubt}");
+    for warning in check(resolved)? {
+        tracing::warn!("{warning}");
     }
     Ok(())
 }
-/// Cores of this machine, where it tells.
+
+/// Number of cores that this process may use, if it is known.
 fn n_cores() -> Option<usize> {
     let known = std::thread::available_parallelism();
     known.ok().map(usize::from)

@@ -1,15 +1,15 @@
-//! What the processes of a deployment ask of the scheduler, and what the system does not grant: reported once, and then
-//! gone without.
+//! The scheduling that processes of a deployment request, without what the system denies.
 
 use deployment::{Policy, Runtime};
 use runtime::{Denied, RealTime, Scheduling};
 use supervise::ProcessSpec;
 
-/// Those that somebody waits for: a camera waits for its clock, and nobody for the recorder.
-const SPINNING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
+/// The services that may poll: they wait for messages, and other stages wait for their results. `capture` waits for its
+/// clock, and no stage waits for `results`.
+const POLLING: [&str; 4] = ["pose", "quality", "fuse", "triangulate"];
 
-/// What a process asks of the system's scheduler.
-pub(crate) fn asked(settings: &Runtime, service: &str, process: &str) -> Scheduling {
+/// The scheduling that a process requests. Settings of the process take precedence over those of its service.
+pub(crate) fn requested(settings: &Runtime, service: &str, process: &str) -> Scheduling {
     let policy = match settings.policy {
         Policy::Fifo => runtime::Policy::Fifo,
         Policy::RoundRobin => runtime::Policy::RoundRobin,
@@ -21,35 +21,34 @@ pub(crate) fn asked(settings: &Runtime, service: &str, process: &str) -> Schedul
         cores: cores.cloned().unwrap_or_default(),
         real_time: priority.map(|&priority| RealTime { policy, priority }),
         lock_memory: settings.lock_memory,
-        spin: settings.spin && SPINNING.contains(&service),
+        spin: settings.spin && POLLING.contains(&service),
     }
 }
 
-/// Takes from processes what the system would not grant them.
+/// Removes from the processes the requests that the system would deny. Returns a warning for each denial: the
+/// processes, the reason, and what to try.
 ///
-/// Returns a warning for every thing that is not granted: whom it concerns, why, and what to try.
-///
-/// * `rehearse`: what the system would not grant, [`Scheduling::rehearse`].
-pub(crate) fn permit(
+/// * `rehearse`: the requests that the system would deny, [`Scheduling::rehearse`].
+pub(crate) fn remove_denied(
     processes: &mut [ProcessSpec],
     rehearse: impl Fn(&Scheduling) -> Vec<Denied>,
 ) -> Vec<String> {
     let mut known: Vec<(Scheduling, Vec<Denied>)> = Vec::new();
-    let mut concerned: Vec<(Denied, Vec<String>)> = Vec::new();
+    let mut denials: Vec<(Denied, Vec<String>)> = Vec::new();
     for process in processes.iter_mut() {
-        let asked = process.scheduling.clone();
-        let denied = match known.iter().find(|it| it.0 == asked) {
+        let requested = process.scheduling.clone();
+        let denied = match known.iter().find(|it| it.0 == requested) {
             Some((_, denied)) => denied.clone(),
-            None => rehearse(&asked),
+            None => rehearse(&requested),
         };
-        for it in &denied {
-            match concerned.iter_mut().find(|other| other.0 == *it) {
+        for denial in &denied {
+            match denials.iter_mut().find(|it| it.0 == *denial) {
                 Some((_, names)) => names.push(process.name.clone()),
-                None => concerned.push((it.clone(), vec![process.name.clone()])),
+                None => denials.push((denial.clone(), vec![process.name.clone()])),
             }
         }
-        process.scheduling = asked.clone().without(&denied);
-        known.push((asked, denied));
+        process.scheduling = requested.clone().without(&denied);
+        known.push((requested, denied));
     }
     let warning = |(denied, names): &(Denied, Vec<String>)| {
         let reason = core::error::Error::source(denied).map(|it| format!(" ({it})"));
@@ -60,7 +59,7 @@ pub(crate) fn permit(
             denied.hint()
         )
     };
-    concerned.iter().map(warning).collect()
+    denials.iter().map(warning).collect()
 }
 
 #[cfg(test)]
@@ -83,16 +82,16 @@ mod tests {
         }
     }
 
-    /// A system with cores 0 and 1, where nobody has a real-time priority.
-    fn rehearse(asked: &Scheduling) -> Vec<Denied> {
+    /// A system with cores 0 and 1 that denies real-time priorities.
+    fn rehearse(requested: &Scheduling) -> Vec<Denied> {
         let allowed = vec![0, 1];
-        let too_many = asked.cores.iter().any(|it| !allowed.contains(it));
+        let too_many = requested.cores.iter().any(|it| !allowed.contains(it));
         let cores = too_many.then(|| Denied::Cores {
-            asked: asked.cores.clone(),
+            asked: requested.cores.clone(),
             allowed,
             source: None,
         });
-        let real_time = asked.real_time.map(|asked: RealTime| Denied::RealTime {
+        let real_time = requested.real_time.map(|asked: RealTime| Denied::RealTime {
             asked,
             source: ErrorKind::PermissionDenied.into(),
         });
@@ -100,15 +99,15 @@ mod tests {
     }
 
     #[test]
-    fn every_denial_is_said_once_and_names_whom_it_concerns() {
+    fn every_denial_is_reported_once_with_its_processes() {
         let mut processes = [
             spec("pose-0", "fifo=50 cores=1"),
             spec("pose-1", "fifo=50 cores=1,7 spin"),
             spec("results", ""),
         ];
-        let said = permit(&mut processes, rehearse);
-        let [priority, cores] = &said[..] else {
-            panic!("{said:#?}")
+        let warnings = remove_denied(&mut processes, rehearse);
+        let [priority, cores] = &warnings[..] else {
+            panic!("{warnings:#?}")
         };
         assert!(
             priority
@@ -126,41 +125,44 @@ mod tests {
     }
 
     #[test]
-    fn who_is_granted_everything_is_not_warned() {
+    fn without_denials_there_are_no_warnings() {
         let mut processes = [spec("pose-0", "cores=0,1 spin"), spec("fuse-0", "")];
-        assert_eq!(permit(&mut processes, rehearse), Vec::<String>::new());
+        assert_eq!(
+            remove_denied(&mut processes, rehearse),
+            Vec::<String>::new()
+        );
         assert_eq!(processes[0].scheduling.to_string(), "cores=0,1 spin");
     }
 
-    fn of(text: &str, process: &str) -> String {
-        let it: Runtime = toml::from_str(text).unwrap();
+    fn scheduling_of(text: &str, process: &str) -> String {
+        let settings: Runtime = toml::from_str(text).unwrap();
         let service = process.split('-').next().unwrap();
-        asked(&it, service, process).to_string()
+        requested(&settings, service, process).to_string()
     }
 
     #[test]
-    fn nothing_is_asked_for_by_default() {
+    fn nothing_is_requested_by_default() {
         for process in ["capture-0", "pose-1", "triangulate"] {
-            assert_eq!(of("", process), "");
+            assert_eq!(scheduling_of("", process), "");
         }
     }
 
     #[test]
-    fn what_is_said_of_a_process_wins_over_what_is_said_of_its_service() {
+    fn settings_of_a_process_take_precedence_over_those_of_its_service() {
         let text = "cores = { pose = [0, 1], pose-2 = [3] }\npriority = { pose-2 = 9, fuse = 4 }";
-        assert_eq!(of(text, "pose-0"), "cores=0,1");
-        assert_eq!(of(text, "pose-2"), "cores=3 fifo=9");
-        assert_eq!(of(text, "fuse-0"), "fifo=4");
-        assert_eq!(of(text, "results"), "");
+        assert_eq!(scheduling_of(text, "pose-0"), "cores=0,1");
+        assert_eq!(scheduling_of(text, "pose-2"), "cores=3 fifo=9");
+        assert_eq!(scheduling_of(text, "fuse-0"), "fifo=4");
+        assert_eq!(scheduling_of(text, "results"), "");
     }
 
     #[test]
-    fn who_waits_for_a_clock_and_who_nobody_waits_for_do_not_spin() {
+    fn capture_and_results_do_not_poll() {
         let text = "spin = true\npolicy = \"round-robin\"\npriority = { capture = 2 }";
         for process in ["pose-0", "quality-0", "fuse-1", "triangulate"] {
-            assert_eq!(of(text, process), "spin");
+            assert_eq!(scheduling_of(text, process), "spin");
         }
-        assert_eq!(of(text, "capture-0"), "round-robin=2");
-        assert_eq!(of(text, "results"), "");
+        assert_eq!(scheduling_of(text, "capture-0"), "round-robin=2");
+        assert_eq!(scheduling_of(text, "results"), "");
     }
 }

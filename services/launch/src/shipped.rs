@@ -1,4 +1,4 @@
-//! The files that ship with Parallax: they are built in, so that they are there wherever the executable is.
+//! The files that ship with Parallax, built into the executable.
 
 use std::borrow::Cow;
 use std::fs;
@@ -10,19 +10,19 @@ use runtime::{ExitKind, Failure};
 
 use runtime::in_file;
 
-/// A file that ships; their cards lie beside them in `configs/models`.
+/// A shipped file; its model card is beside it in `configs/models`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shipped {
     /// The person model.
     Model,
-    /// The network that predicts the errors of its parts.
+    /// The network that predicts the expected errors of its parts.
     Network,
-    /// What its views have in common.
+    /// The learned multi-view consistency of the model.
     Consistency,
 }
 
 impl Shipped {
-    /// What it holds.
+    /// The content of the file.
     pub fn bytes(self) -> &'static [u8] {
         match self {
             Self::Model => include_bytes!("../../../configs/models/person.fmp"),
@@ -31,7 +31,7 @@ impl Shipped {
         }
     }
 
-    /// What it is called where the word alone would not tell which.
+    /// A unique name, for example `shipped:model`; settings call every shipped file `shipped`.
     pub fn name(self) -> PathBuf {
         let kind = match self {
             Self::Model => "model",
@@ -41,17 +41,17 @@ impl Shipped {
         format!("{SHIPPED}:{kind}").into()
     }
 
-    /// The file of that name.
+    /// The file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
         let mut all = [Self::Model, Self::Network, Self::Consistency].into_iter();
         all.find(|it| it.name() == name)
     }
 
-    /// What a file of this kind holds: the one that is named, or the one that ships.
+    /// Reads a file of this kind; `shipped` stands for the shipped one.
     ///
     /// # Errors
     ///
-    /// The file is not there, cannot be read, or is empty.
+    /// The file does not exist, cannot be read, or is empty.
     pub fn read(self, file: &Path) -> Result<Cow<'static, [u8]>, Failure> {
         if is_shipped(file) {
             return Ok(Cow::Borrowed(self.bytes()));
@@ -72,7 +72,7 @@ impl Shipped {
         Ok(Cow::Owned(bytes))
     }
 
-    /// What to name in place of a file that is not there.
+    /// The hint for a missing file.
     fn hint(self) -> String {
         let [key, made_by] = match self {
             Self::Model => ["model", "train fmp"],
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_of_them_is_what_it_is_called() {
+    fn every_shipped_file_is_of_its_kind() {
         let model = fmp::files::own::decode(Shipped::Model.bytes()).unwrap();
         let n_parts = model.parts.len();
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();

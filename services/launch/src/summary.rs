@@ -1,4 +1,4 @@
-//! What a user sees of a run: its progress, and at the end what became of it.
+//! The progress of a run, and the report at its end.
 
 mod cameras;
 mod recorded;
@@ -18,17 +18,17 @@ use supervise::{Event, Outcome};
 
 use crate::budget::{self, Budget};
 use crate::live;
-use crate::nothing;
+use crate::no_results;
 use crate::output;
 use crate::resolved::Resolved;
 use crate::views::ViewReport;
 
 pub use recorded::Recorded;
 
-/// Pause between two lines where no bar can be drawn.
+/// Interval of progress messages if no bar can be drawn.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Shows progress: a bar on a terminal, else a line from time to time.
+/// Shows the progress of a run: a bar on a terminal, else a message every few seconds.
 #[derive(Debug)]
 pub struct Watcher {
     bar: ProgressBar,
@@ -37,15 +37,15 @@ pub struct Watcher {
     start_frame: u64,
     frame_step: u64,
     n_done: u64,
-    said_at: Instant,
+    printed_at: Instant,
     begin: Instant,
 }
 
 impl Watcher {
-    /// Begins.
+    /// Starts with no frame done.
     pub fn new(resolved: &Resolved, quiet: bool) -> Self {
         let n_frames = resolved.n_frames();
-        let bar = if quiet || !output::is_lively() {
+        let bar = if quiet || !output::is_terminal() {
             ProgressBar::hidden()
         } else {
             ProgressBar::new(n_frames)
@@ -62,39 +62,39 @@ impl Watcher {
             start_frame: resolved.deployment.capture.start_frame,
             frame_step: resolved.deployment.capture.frame_step.max(1),
             n_done: 0,
-            said_at: Instant::now(),
+            printed_at: Instant::now(),
             begin: Instant::now(),
         }
     }
 
-    /// Takes note of what the supervisor tells.
-    pub fn note(&mut self, event: &Event<'_>) {
+    /// Updates the progress, and prints the events that concern the user.
+    pub fn handle(&mut self, event: &Event<'_>) {
         match event {
             Event::Health { process, health } if *process == "triangulate" => {
-                // By frame, for a restarted process counts anew.
+                // By frame number: the counts of a process start at 0 after a restart.
                 if health.n_sent > 0 {
                     let nth = health.last_frame.saturating_sub(self.start_frame) / self.frame_step;
                     self.n_done = self.n_done.max(nth + 1);
                 }
                 self.bar.set_position(self.n_done);
-                self.say_now_and_then();
+                self.print_progress();
             }
-            Event::Line { text, .. } => self.say(text),
-            Event::Died { process, death } => self.say(&format!("{process} {death}")),
+            Event::Line { text, .. } => self.print(text),
+            Event::Died { process, death } => self.print(&format!("{process} {death}")),
             Event::Restarting { process, pause } if pause.is_zero() => {
-                self.say(&format!("{process} starts again"));
+                self.print(&format!("{process} starts again"));
             }
             Event::Restarting { process, pause } => {
-                self.say(&format!(
+                self.print(&format!(
                     "{process} starts again in {} ms",
                     pause.as_millis()
                 ));
             }
             Event::GivenUp { process, restarts } => {
-                self.say(&format!("{process} is given up after {restarts} restarts"));
+                self.print(&format!("{process} is given up after {restarts} restarts"));
             }
             Event::Dismissed { process } => {
-                self.say(&format!(
+                self.print(&format!(
                     "{process} is stopped: nothing is left that sends to it"
                 ));
             }
@@ -102,21 +102,21 @@ impl Watcher {
         }
     }
 
-    /// Ends the bar.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
 
-    /// Shows a line above the bar.
-    pub fn say(&self, text: &str) {
+    /// Prints a line above the bar.
+    pub fn print(&self, text: &str) {
         self.bar.suspend(|| output::message(text));
     }
 
-    fn say_now_and_then(&mut self) {
-        if self.quiet || output::is_lively() || self.said_at.elapsed() < PERIOD {
+    fn print_progress(&mut self) {
+        if self.quiet || output::is_terminal() || self.printed_at.elapsed() < PERIOD {
             return;
         }
-        self.said_at = Instant::now();
+        self.printed_at = Instant::now();
         let rate = self.n_done as f64 / self.begin.elapsed().as_secs_f64();
         output::message(format_args!(
             "{} of {} frames, {rate:.2} a second",
@@ -125,7 +125,7 @@ impl Watcher {
     }
 }
 
-/// What became of a run.
+/// The report on a run.
 #[derive(Debug)]
 pub struct Report {
     name: String,
@@ -135,24 +135,25 @@ pub struct Report {
     interrupted: bool,
     given_up: Vec<String>,
     restarts: Vec<(String, u32)>,
-    /// Most memory that every process has held, shared memory included, bytes.
+    /// Peak memory of every process, including shared memory, bytes.
     peaks: Vec<(String, u64)>,
     n_dropped: u64,
-    /// Messages that every process refused, by cause.
+    /// Messages that each process refused, by cause.
     refused: Vec<(String, [u64; Refusal::N])>,
     is_lossless: bool,
     views: Vec<ViewReport>,
     budget: Option<Budget>,
-    /// What every process has said last of its times and counts.
+    /// The last metrics of every process.
     measured: BTreeMap<String, Value>,
-    /// `summary.json`.
+    /// The summary of the process `results`: `summary.json`.
     recorded: Recorded,
 }
 
 impl Report {
-    /// Puts together what the supervisor and the recorder know.
+    /// Combines the outcome of the supervisor with the summary of the process `results`.
     ///
-    /// * `session`: the run; what an earlier one left in the folder says nothing about this.
+    /// * `session`: the session of the run; the summary of another session is ignored.
+    /// * `elapsed`: the duration of the run.
     pub fn new(resolved: &Resolved, session: u64, outcome: &Outcome, elapsed: Duration) -> Self {
         let folder = &resolved.deployment.output;
         let cameras = resolved.deployment.cameras.iter();
@@ -193,31 +194,31 @@ impl Report {
         }
     }
 
-    /// What became of the frames of every view.
+    /// The frame counts of every view.
     pub fn views(&self) -> &[ViewReport] {
         &self.views
     }
 
-    /// Processes that ended without being asked to more often than they were struck on purpose, or were given up.
+    /// The processes that were restarted more often than faults were injected into them, or were given up; sorted.
     ///
-    /// * `struck`: how often a process was.
-    pub fn failed_by_themselves(&self, struck: impl Fn(&str) -> u32) -> Vec<String> {
+    /// * `n_faults`: the number of faults injected into a process.
+    pub fn unexpected_failures(&self, n_faults: impl Fn(&str) -> u32) -> Vec<String> {
         let restarted = self.restarts.iter();
-        let by_themselves = restarted
-            .filter(|(name, n)| *n > struck(name))
+        let unexpected = restarted
+            .filter(|(name, n)| *n > n_faults(name))
             .map(|it| &it.0);
-        let mut failed: Vec<String> = by_themselves.chain(&self.given_up).cloned().collect();
+        let mut failed: Vec<String> = unexpected.chain(&self.given_up).cloned().collect();
         failed.sort();
         failed.dedup();
         failed
     }
 
-    /// Whether the run was fast enough, if it was asked to be.
+    /// The verdict on the latency budget, if the deployment has one.
     pub fn budget(&self) -> Option<&Budget> {
         self.budget.as_ref()
     }
 
-    /// Cameras that do not stand where the calibration says.
+    /// The cameras whose calibration is suspected to be wrong.
     pub fn misplaced(&self) -> Vec<String> {
         let suspected = self.suspected();
         suspected.map(|(camera, _)| camera.clone()).collect()
@@ -229,16 +230,16 @@ impl Report {
         fits.filter(|(_, fit)| fit.suspected)
     }
 
-    /// What the process `results` wrote about the run.
+    /// The summary that the process `results` wrote.
     pub fn recorded(&self) -> &Recorded {
         &self.recorded
     }
 
-    /// How the run ended, if not well.
+    /// The exit status of the run, if it did not succeed.
     pub fn kind(&self) -> Option<ExitKind> {
         let budget = self.budget.as_ref();
         if budget.is_some_and(Budget::is_exceeded) {
-            // Live cameras run until they are stopped: that is no excuse.
+            // Also if it was interrupted: live cameras always run until they are stopped.
             Some(ExitKind::Limit)
         } else if self.interrupted {
             Some(ExitKind::Interrupted)
@@ -249,34 +250,33 @@ impl Report {
         }
     }
 
-    /// Whether views, frames or processes were lost on the way, or it is not known. Of an interrupted run nothing is
-    /// said.
+    /// Whether views, frames or processes were lost, or the losses are unknown. False for an interrupted run.
     fn is_degraded(&self) -> bool {
         !self.interrupted
-            && (self.why_nothing().is_some()
+            && (self.no_results_reason().is_some()
                 || !self.given_up.is_empty()
                 || !self.restarts.is_empty()
                 || self.recorded.summary().is_none_or(|it| self.is_lossy(it))
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
     }
 
-    /// Whether frames were lost, or the cameras contradict each other.
-    fn is_lossy(&self, it: &Summary) -> bool {
-        let is_incomplete = it.frames_missed > 0 || it.frames < self.n_frames;
-        it.exchanged.is_some()
-            || it.contradicted.is_some()
+    /// Whether frames were lost or the cameras contradict each other.
+    fn is_lossy(&self, summary: &Summary) -> bool {
+        let is_incomplete = summary.frames_missed > 0 || summary.frames < self.n_frames;
+        summary.exchanged.is_some()
+            || summary.contradicted.is_some()
             || (self.is_lossless && is_incomplete)
-            || it.frames_not_recorded > 0
-            || it.writes_failed > 0
+            || summary.frames_not_recorded > 0
+            || summary.writes_failed > 0
     }
 
-    /// Why there is no result in space; nothing is said of an interrupted run.
-    fn why_nothing(&self) -> Option<String> {
+    /// Why the run has no joints in space; none for an interrupted run.
+    fn no_results_reason(&self) -> Option<String> {
         let summary = self.recorded.summary().filter(|_| !self.interrupted)?;
-        nothing::why(summary, &self.views)
+        no_results::reason(summary, &self.views)
     }
 
-    /// For programs.
+    /// The report as JSON.
     pub fn json(&self) -> Value {
         json!({
             "schema_version": 1,
@@ -286,7 +286,7 @@ impl Report {
             "seconds": self.seconds,
             "interrupted": self.interrupted,
             "degraded": self.is_degraded(),
-            "no_results": self.why_nothing(),
+            "no_results": self.no_results_reason(),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
@@ -299,7 +299,7 @@ impl Report {
         })
     }
 
-    /// For people.
+    /// The report as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -308,7 +308,7 @@ impl Report {
     }
 
     fn write(&self, text: &mut String) -> core::fmt::Result {
-        let how = match self.kind() {
+        let status = match self.kind() {
             Some(ExitKind::Interrupted) => ", stopped",
             Some(ExitKind::Limit) => ", over its latency budget",
             Some(_) => ", degraded",
@@ -316,7 +316,7 @@ impl Report {
         };
         writeln!(
             text,
-            "{}: {} frames in {:.1} s{how}",
+            "{}: {} frames in {:.1} s{status}",
             self.name, self.n_frames, self.seconds
         )?;
         writeln!(text, "  results       {}", self.folder)?;
@@ -371,7 +371,7 @@ impl Report {
     }
 
     fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {
-        if let Some(why) = self.why_nothing() {
+        if let Some(why) = self.no_results_reason() {
             writeln!(text, "  no results    {why}")?;
         }
         let used = summary.views_used.iter();
@@ -402,7 +402,7 @@ impl Report {
         Ok(())
     }
 
-    /// Nothing where nothing was refused, as in every run without a broken sender.
+    /// Writes the refused messages by process and cause; nothing if none were refused.
     fn write_refused(&self, text: &mut String) -> core::fmt::Result {
         for (process, counts) in &self.refused {
             let causes = by_cause(counts);
@@ -415,13 +415,13 @@ impl Report {
         Ok(())
     }
 
-    /// The largest process of every service.
+    /// Writes the peak memory of the largest process of every service.
     fn write_memory(&self, text: &mut String) -> core::fmt::Result {
         let mut peaks = BTreeMap::new();
         for (process, bytes) in &self.peaks {
             let service = process.split('-').next().unwrap_or_default();
-            let most = peaks.entry(service).or_insert(0);
-            *most = bytes.div_ceil(1_000_000).max(*most);
+            let peak = peaks.entry(service).or_insert(0);
+            *peak = bytes.div_ceil(1_000_000).max(*peak);
         }
         let peaks: Vec<String> = peaks
             .iter()
@@ -449,20 +449,20 @@ fn write_latency(text: &mut String, latency: &LatencyReport) -> core::fmt::Resul
     Ok(())
 }
 
-/// What every process has said last of its times and counts; null where that cannot be read.
+/// The last metrics of every process as JSON; null if they are invalid.
 fn measured(outcome: &Outcome) -> BTreeMap<String, Value> {
-    let said = outcome.processes.iter().filter_map(|it| {
+    let measured = outcome.processes.iter().filter_map(|it| {
         let reading = Reading::from_message(it.measured.as_ref()?);
         let reading = reading.inspect_err(|error| {
             tracing::warn!(process = it.name, %error, "unreadable times and counts");
         });
-        let told = reading.map_or(Value::Null, |it| live::measured(&it));
-        Some((it.name.clone(), told))
+        let value = reading.map_or(Value::Null, |it| live::measured(&it));
+        Some((it.name.clone(), value))
     });
-    said.collect()
+    measured.collect()
 }
 
-/// The causes for which something was refused, and how often.
+/// The counts of refused messages by the name of the cause, without zeros.
 fn by_cause(counts: &[u64; Refusal::N]) -> BTreeMap<&'static str, u64> {
     let all = Refusal::ALL.iter().zip(counts);
     let some = all.filter(|it| *it.1 > 0);

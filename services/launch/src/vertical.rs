@@ -1,4 +1,5 @@
-//! Which way is up, where neither calibration nor deployment says it: from how cameras are held, and from people.
+//! Finds the vertical if neither calibration nor deployment gives it: from the roll of the cameras, and from the scores of
+//! the people in their first images.
 
 use capture::Feed;
 use deployment::Deployment;
@@ -11,42 +12,43 @@ use runtime::Failure;
 
 use crate::inputs;
 
-/// Pictures of a camera that are searched, and the frames between them.
+/// Number of images per camera that are searched.
 const N_PICTURES: u64 = 2;
+/// Frames from one of these images to the next.
 const STEP: u64 = 20;
-/// Most cameras whose pictures are searched.
-const MOST_VIEWS: usize = 4;
-/// The longer side of a picture that is searched, at most.
-const LONGEST_PX: f64 = 480.0;
-/// Turns of a picture that differ by less are one, degrees.
-const SAME_TURN: f64 = 12.0;
-/// An axis of the world so near, degrees, is what is meant.
+/// The maximal number of cameras whose images are searched.
+const MAX_VIEWS: usize = 4;
+/// The maximal length of the longer side of a searched image, pixels.
+const MAX_SIDE_PX: f64 = 480.0;
+/// Rolls that differ by less than this are searched once, degrees.
+const SAME_ROLL: f64 = 12.0;
+/// A direction within this angle of a world axis is snapped to the axis, degrees.
 const NEAR_AXIS: f64 = 6.0;
-/// Directions nearer to each other are not tried both, degrees.
-const SAME_WAY: f64 = 10.0;
-/// By so much, and by such a share, the score must be higher for another direction than that of cameras held level.
-const LEAST_GAIN: f64 = 0.1;
-const LEAST_SHARE: f64 = 0.2;
+/// Directions within this angle of each other are tried once, degrees.
+const SAME_DIRECTION: f64 = 10.0;
+/// The score of another direction must exceed that of level cameras by `MIN_GAIN + MIN_GAIN_SHARE * |score|`.
+const MIN_GAIN: f64 = 0.1;
+const MIN_GAIN_SHARE: f64 = 0.2;
 
-/// A direction against gravity, and why.
+/// The direction against gravity that was found, and why it was chosen.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Found {
-    /// The direction.
+pub(crate) struct Vertical {
+    /// The unit vector against gravity, in the world.
     pub up: [f64; 3],
-    /// For people.
+    /// The reason, for the user.
     pub why: String,
 }
 
-/// A direction that is tried, and how well people are found with it.
+/// A direction that was tried, and the score of the people found with it.
 #[derive(Debug, Clone, Copy)]
-struct Tried {
+struct Hypothesis {
     up: UnitVector3<f64>,
-    /// Mean over views and pictures of the best pose's score; none where nothing was found.
+    /// Mean score of the best pose over views and images; none if nobody was found.
     score: Option<f64>,
 }
 
-/// Finds the vertical of a deployment that does not say it; none where it does, or where frames are not turned.
-pub(crate) fn find(deployment: &Deployment) -> Result<Option<Found>, Failure> {
+/// Finds the vertical of a deployment. None if the rig or the deployment gives it, or if frames are not turned upright.
+pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     if rig.up_in_world().is_some() || !deployment.capture.upright {
         return Ok(None);
@@ -56,45 +58,45 @@ pub(crate) fn find(deployment: &Deployment) -> Result<Option<Found>, Failure> {
         .iter()
         .filter_map(|it| rig.camera(&it.name));
     let cameras: Vec<Camera> = named.cloned().collect();
-    let ways = ways(&cameras);
-    let Some(level) = ways.first().copied() else {
+    let directions = directions(&cameras);
+    let Some(level) = directions.first().copied() else {
         return Ok(None);
     };
-    let mut pictures = Pictures::new(deployment, &cameras)?;
-    let tried: Vec<Tried> = ways
+    let mut images = Images::new(deployment, &cameras)?;
+    let tried: Vec<Hypothesis> = directions
         .iter()
-        .map(|up| Tried {
+        .map(|up| Hypothesis {
             up: *up,
-            score: pictures.score(*up),
+            score: images.score(*up),
         })
         .collect();
-    let best = choose(&tried).unwrap_or(Tried {
+    let best = choose(&tried).unwrap_or(Hypothesis {
         up: level,
         score: None,
     });
-    Ok(Some(Found {
+    Ok(Some(Vertical {
         up: best.up.into_inner().into(),
-        why: why(&best, &tried, &cameras),
+        why: reason(&best, &tried, &cameras),
     }))
 }
 
-/// The direction with which people are found best; that of cameras held level if no other is clearly better.
-fn choose(tried: &[Tried]) -> Option<Tried> {
+/// The hypothesis with the highest score; the first, that of level cameras, unless another is clearly better.
+fn choose(tried: &[Hypothesis]) -> Option<Hypothesis> {
     let level = tried.first()?;
-    let score = |it: &Tried| it.score.unwrap_or(f64::NEG_INFINITY);
+    let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
     let best = tried.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    let gain = LEAST_GAIN + LEAST_SHARE * level.score.unwrap_or(0.0).abs();
+    let gain = MIN_GAIN + MIN_GAIN_SHARE * level.score.unwrap_or(0.0).abs();
     let is_clear = score(best) > score(level) + gain;
     Some(if is_clear { *best } else { *level })
 }
 
-fn why(best: &Tried, tried: &[Tried], cameras: &[Camera]) -> String {
+fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String {
     let text = |up: &UnitVector3<f64>| format!("[{:.3}, {:.3}, {:.3}]", up.x, up.y, up.z);
     let off = cameras.iter().map(|it| roll_degrees(it, &best.up).abs());
     let off = off.fold(0.0, f64::max);
     let others = tried.iter().filter(|it| it.up != best.up);
     let next = others.max_by(|a, b| {
-        let score = |it: &Tried| it.score.unwrap_or(f64::NEG_INFINITY);
+        let score = |it: &Hypothesis| it.score.unwrap_or(f64::NEG_INFINITY);
         score(a).total_cmp(&score(b))
     });
     let people = match (best.score, next.and_then(|it| Some((it.up, it.score?)))) {
@@ -112,17 +114,17 @@ fn why(best: &Tried, tried: &[Tried], cameras: &[Camera]) -> String {
     )
 }
 
-/// Directions that may be up, the most likely first: that of cameras held level, the axes of the world, that of
-/// cameras held upright, and the opposite ones.
-fn ways(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
+/// The directions to try, in this order: that of level cameras, those of cameras rolled by 90 degrees either way, the world
+/// axes, and the opposite of the first.
+fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let axis =
         |camera: &Camera, axis: Vector3<f64>| camera.camera_from_world.rotation.inverse() * axis;
     let all = |along: Vector3<f64>| -> Vec<Vector3<f64>> {
         cameras.iter().map(|it| axis(it, along)).collect()
     };
     let (right, down) = (all(Vector3::x()), all(Vector3::y()));
-    let level = across(&right, -down.iter().sum::<Vector3<f64>>());
-    let upright = across(&down, right.iter().sum());
+    let level = common_normal(&right, -down.iter().sum::<Vector3<f64>>());
+    let upright = common_normal(&down, right.iter().sum());
     let world = [
         Vector3::z_axis(),
         -Vector3::z_axis(),
@@ -144,20 +146,22 @@ fn ways(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
         .chain(upright)
         .chain(upright.map(|it| -it));
     let opposite = level.map(|it| -it);
-    let mut ways: Vec<UnitVector3<f64>> = Vec::new();
+    let mut directions: Vec<UnitVector3<f64>> = Vec::new();
     for it in likely.chain(world).chain(opposite) {
-        if ways
+        if directions
             .iter()
-            .all(|other| other.angle(&it).to_degrees() > SAME_WAY)
+            .all(|other| other.angle(&it).to_degrees() > SAME_DIRECTION)
         {
-            ways.push(it);
+            directions.push(it);
         }
     }
-    ways
+    directions
 }
 
-/// The direction across to all of some, on the side of another: least squares, with less weight for those that are off.
-fn across(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> {
+/// The direction perpendicular to all given vectors, by least squares with less weight for outliers.
+///
+/// * `side`: the result is on this side. It is the result itself if the vectors do not determine a plane.
+fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> {
     let mean = UnitVector3::try_new(side, 1e-6);
     let mut weights = vec![1.0; all.len()];
     let mut found = None;
@@ -170,7 +174,7 @@ fn across(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> 
         let order = eigen.eigenvalues.iter().enumerate();
         let mut order: Vec<(usize, f64)> = order.map(|(nth, it)| (nth, *it)).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1));
-        // Of cameras that all look the same way, or at each other, any direction across to that will do.
+        // The vectors are parallel, as for cameras that all look the same way or at each other.
         if order[1].1 < 0.02 * order[2].1 {
             return mean;
         }
@@ -189,15 +193,15 @@ fn across(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> 
     found
 }
 
-/// The turn that makes a camera's picture upright, degrees; 0 where it looks along the vertical.
+/// The roll that turns a camera's image upright, degrees; 0 if the camera looks along the vertical.
 fn roll_degrees(camera: &Camera, up: &UnitVector3<f64>) -> f64 {
     let rig = Rig::new(vec![camera.clone()], Some(*up), "");
     let roll = rig.ok().and_then(|it| upright_roll(camera, &it));
     roll.unwrap_or(0.0).to_degrees()
 }
 
-/// The first pictures of some cameras, searched for people at one turn after the other.
-struct Pictures<'a> {
+/// The first images of some cameras, which are searched for people at several rolls.
+struct Images<'a> {
     search: Search,
     views: Vec<View<'a>>,
 }
@@ -207,14 +211,14 @@ struct View<'a> {
     size: Size,
     offset: Option<[u32; 2]>,
     rgb: Vec<Vec<u8>>,
-    /// What was tried: the turn, degrees, and the mean score.
+    /// The rolls that were searched, degrees, and their mean scores.
     tried: Vec<(f64, Option<f64>)>,
 }
 
-impl<'a> Pictures<'a> {
+impl<'a> Images<'a> {
     fn new(deployment: &Deployment, cameras: &'a [Camera]) -> Result<Self, Failure> {
         let model = inputs::model_or_shipped(deployment.model.as_deref())?;
-        let views = deployment.cameras.iter().take(MOST_VIEWS);
+        let views = deployment.cameras.iter().take(MAX_VIEWS);
         let views = views.filter_map(|entry| {
             let camera = cameras.iter().find(|it| it.name == entry.name)?;
             View::new(entry, camera, &deployment.capture)
@@ -225,7 +229,7 @@ impl<'a> Pictures<'a> {
         })
     }
 
-    /// How well people are found with a direction as up.
+    /// The mean score of the people found with a direction as up; none if nobody was found.
     fn score(&mut self, up: UnitVector3<f64>) -> Option<f64> {
         let search = &self.search;
         let scores = self.views.iter_mut().filter_map(|it| it.score(search, up));
@@ -236,7 +240,7 @@ impl<'a> Pictures<'a> {
 }
 
 impl<'a> View<'a> {
-    /// What cannot be read is said by who reads it later.
+    /// None if the footage cannot be read; that is reported where it is read later.
     fn new(
         entry: &deployment::capture::Camera,
         camera: &'a Camera,
@@ -264,8 +268,8 @@ impl<'a> View<'a> {
 
     fn score(&mut self, search: &Search, up: UnitVector3<f64>) -> Option<f64> {
         let degrees = roll_degrees(self.camera, &up);
-        let apart = |other: f64| ((degrees - other + 540.0).rem_euclid(360.0) - 180.0).abs();
-        if let Some((_, score)) = self.tried.iter().find(|it| apart(it.0) < SAME_TURN) {
+        let difference = |other: f64| ((degrees - other + 540.0).rem_euclid(360.0) - 180.0).abs();
+        if let Some((_, score)) = self.tried.iter().find(|it| difference(it.0) < SAME_ROLL) {
             return *score;
         }
         let scores: Vec<f64> = self
@@ -279,11 +283,11 @@ impl<'a> View<'a> {
         score
     }
 
-    /// The best score in a picture that is turned.
+    /// The best score in an image turned by an angle.
     fn search_at(&self, search: &Search, rgb: &[u8], degrees: f64) -> Option<f64> {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
-        // As large a frame as either way of holding the camera needs.
-        let scale = (LONGEST_PX / width.max(height)).min(1.0);
+        // A square, which fits the image at every roll.
+        let scale = (MAX_SIDE_PX / width.max(height)).min(1.0);
         let side = (scale * width.max(height)).round() as u32;
         let source = [self.size.width, self.size.height].map(|it| it as u32);
         let roll = degrees.to_radians();
@@ -310,7 +314,7 @@ impl<'a> View<'a> {
 mod tests {
     use super::*;
 
-    /// Cameras of a ring, held with a turn about their axes, degrees, in a world whose up is `up`.
+    /// Cameras of a ring, rolled about their axes by some degrees, in a world whose up is `up`.
     fn ring(rolls: &[f64], up: UnitVector3<f64>) -> Vec<Camera> {
         let rig = scene::RigChoice::parse(&format!("ring:{}", rolls.len()));
         let rig = rig.unwrap().rig().unwrap();
@@ -327,11 +331,11 @@ mod tests {
     }
 
     fn off_degrees(cameras: &[Camera], up: UnitVector3<f64>, nth: usize) -> f64 {
-        ways(cameras)[nth].angle(&up).to_degrees()
+        directions(cameras)[nth].angle(&up).to_degrees()
     }
 
     #[test]
-    fn cameras_held_level_say_which_way_is_up_even_if_one_is_not() {
+    fn level_cameras_determine_the_vertical_even_if_one_is_rolled() {
         let odd = UnitVector3::new_normalize(Vector3::new(0.5, -0.7, 0.4));
         for up in [Vector3::z_axis(), -Vector3::y_axis(), odd] {
             for (rolls, most) in [
@@ -346,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_that_stand_on_their_sides_are_tried_next() {
+    fn cameras_on_their_sides_are_tried_next() {
         let up = UnitVector3::new_normalize(Vector3::new(0.2, 0.9, -0.3));
         for roll in [90.0, -90.0] {
             let cameras = ring(&[roll; 4], up);
@@ -356,8 +360,8 @@ mod tests {
     }
 
     #[test]
-    fn people_overrule_cameras_only_if_they_are_found_clearly_better() {
-        let tried = |score: Option<f64>, up| Tried { up, score };
+    fn another_direction_needs_a_clearly_better_score() {
+        let tried = |score: Option<f64>, up| Hypothesis { up, score };
         let [z, y] = [Vector3::z_axis(), Vector3::y_axis()];
         let up = |level, other| choose(&[tried(level, z), tried(other, y)]).unwrap().up;
         assert_eq!(up(Some(0.5), Some(0.55)), z);

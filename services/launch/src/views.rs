@@ -1,4 +1,4 @@
-//! What became of the frames of every view.
+//! The frame counts of every view of a run.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -10,36 +10,36 @@ use supervise::{Counts, Outcome};
 
 use crate::resolved::Resolved;
 
-/// What became of the frames of one view: all counts but the first add up to it.
+/// The frame counts of one view. `frames` is the sum of the counts from `used` to `unanswered`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ViewReport {
     /// The camera.
     pub name: String,
     /// Frames of the footage.
     pub frames: u64,
-    /// Frames that have a part in a result.
+    /// Frames that were used in a result.
     pub used: u64,
-    /// Frames in which nobody was found, or that could not be read.
+    /// Frames in which nobody was found, or that the camera could not deliver.
     pub empty: u64,
-    /// Frames that were answered, but too late for a result.
+    /// Frames whose pose came too late for a result.
     pub late: u64,
-    /// Frames that were passed over because there was no time for them.
+    /// Frames that were dropped for lack of time.
     pub dropped: u64,
-    /// Frames that came while a process was not there, or that it held when it died.
+    /// Frames that were lost because a process was dead, or died while it held them.
     pub lost: u64,
-    /// All others: what was not reached before the run was stopped.
+    /// All other frames: those that were not reached before the run was stopped.
     pub unanswered: u64,
-    /// What was wrong with the camera, by cause, and in how many results; a part of `empty`.
+    /// Number of results with a camera fault, by cause; included in `empty`.
     pub faults: BTreeMap<String, u64>,
-    /// Results without this view, by reason.
+    /// Number of results without this view, by reason.
     #[serde(skip)]
     pub missing: Vec<(Missing, u64)>,
 }
 
 impl ViewReport {
-    /// Puts together what the supervisor and the process `results` know.
+    /// Combines the counts of the supervisor with the summary of the process `results`.
     ///
-    /// * `summary`: of `results`, if there is one.
+    /// * `summary`: the summary, if there is one.
     pub fn all(resolved: &Resolved, outcome: &Outcome, summary: Option<&Summary>) -> Vec<Self> {
         let counts = |process: String| {
             let found = outcome.processes.iter().find(|it| it.name == process);
@@ -53,25 +53,29 @@ impl ViewReport {
         views.collect()
     }
 
-    /// * `counts`: of its camera and of its pose process.
+    /// * `frames`: frames of the footage.
+    /// * the counts of its capture and its pose process.
     fn new(
         name: &str,
         frames: u64,
         [camera, pose]: [Counts; 2],
         summary: Option<&Summary>,
     ) -> Self {
-        // Where there is no summary, no frame is known to be used.
+        // Without a summary no frame is known to be used.
         let reasons = summary.and_then(|it| it.views_missing.get(name));
         let missing: Vec<(Missing, u64)> = reasons.cloned().into_iter().flatten().collect();
         let used = summary.and_then(|it| it.views_present.get(name));
         let used = used.copied().unwrap_or(0);
         let empty = missing.iter().filter(|it| it.0.is_answer());
         let empty: u64 = empty.map(|it| it.1).sum();
-        // The last count of a process that was killed may be missing.
+        // The last count of a killed process may be missing.
         let answered = pose.n_sent.max(used + empty);
-        let passed = (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
+        let not_processed =
+            (camera.n_dropped + pose.n_dropped).min(frames.saturating_sub(answered));
         let of = |reason: &str| missing.iter().find(|it| it.0.text() == reason);
-        let lost = of(Missing::PROCESS_LOST).map_or(0, |it| it.1).min(passed);
+        let lost = of(Missing::PROCESS_LOST)
+            .map_or(0, |it| it.1)
+            .min(not_processed);
         let faults = Status::CAMERA_FAULTS.iter();
         let faults = faults.filter_map(|it| Some((it.reason().to_owned(), of(it.reason())?.1)));
         Self {
@@ -80,23 +84,23 @@ impl ViewReport {
             used,
             empty,
             late: answered - used - empty,
-            dropped: passed - lost,
+            dropped: not_processed - lost,
             lost,
-            unanswered: frames.saturating_sub(answered + passed),
+            unanswered: frames.saturating_sub(answered + not_processed),
             faults: faults.collect(),
             missing,
         }
     }
 
-    /// Whether it is missing for a reason that nobody asked for.
+    /// Whether the view is missing from a result for a reason that is not expected with this delivery.
     pub fn is_lost(&self, is_lossless: bool) -> bool {
-        let is_asked_for = |reason: &Missing| match reason {
+        let is_expected = |reason: &Missing| match reason {
             Missing::Late | Missing::Dropped => !is_lossless,
             other => other.text() == Status::NO_DETECTION.reason(),
         };
         self.missing
             .iter()
-            .any(|(reason, n)| *n > 0 && !is_asked_for(reason))
+            .any(|(reason, n)| *n > 0 && !is_expected(reason))
     }
 }
 
@@ -160,26 +164,26 @@ mod tests {
         ];
         assert_eq!(all, [9, 2, 1, 4, 3, 1]);
         assert_eq!(all.iter().sum::<u64>(), got.frames);
-        let said = "a: 9 of 20 frames, 2 empty, 1 late, 4 dropped, 3 lost, 1 not answered";
-        assert_eq!(got.to_string(), said);
+        let expected = "a: 9 of 20 frames, 2 empty, 1 late, 4 dropped, 3 lost, 1 not answered";
+        assert_eq!(got.to_string(), expected);
     }
 
     #[test]
-    fn what_was_wrong_with_a_camera_is_told_by_cause() {
+    fn camera_faults_are_shown_by_cause() {
         let got =
             view(&json!({ "no detection": 1, "frozen picture": 1, "camera gone": 1, "late": 1 }));
         let faults = json!({ "camera gone": 1, "frozen picture": 1 });
         assert_eq!(serde_json::to_value(&got.faults).unwrap(), faults);
         assert_eq!(got.empty, 3);
-        let said = got.to_string();
+        let text = got.to_string();
         assert!(
-            said.ends_with("; camera: 1 camera gone, 1 frozen picture"),
-            "{said}"
+            text.ends_with("; camera: 1 camera gone, 1 frozen picture"),
+            "{text}"
         );
     }
 
     #[test]
-    fn what_latest_wins_means_is_no_loss_but_for_those_who_want_every_frame() {
+    fn late_and_dropped_frames_are_losses_with_lossless_delivery_only() {
         for (reason, expected) in [
             ("no detection", [false, false]),
             ("late", [false, true]),

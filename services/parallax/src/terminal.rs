@@ -28,7 +28,7 @@ impl Terminal {
     ///
     /// * `template`: how it looks, in the words of `indicatif`.
     pub(crate) fn with_bar(quiet: bool, json: bool, template: &str) -> Self {
-        let bar = if quiet || !output::is_lively() {
+        let bar = if quiet || !output::is_terminal() {
             ProgressBar::hidden()
         } else {
             ProgressBar::new(0)
@@ -70,7 +70,7 @@ impl Console for Terminal {
     }
 
     fn shows_bar(&self) -> bool {
-        output::is_lively()
+        output::is_terminal()
     }
 
     fn begin(&self, label: &str, details: &str) {

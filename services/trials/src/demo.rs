@@ -100,7 +100,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
         Strike::new(Blow::Kill, &format!("capture-{VICTIM}"), at_frame).of_camera(camera)
     });
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let ran = planned.carry_out(verbosity.quiet, &stop, &mut |event| {
+    let ran = planned.run(verbosity.quiet, &stop, &mut |event| {
         strike
             .as_mut()
             .and_then(|it| it.note(event, now_nanos(), Blow::deal))

@@ -1,4 +1,4 @@
-//! What to try when a file cannot be used.
+//! Hints for input files that cannot be used.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -9,7 +9,9 @@ use footage::FootageError;
 use geometry::files::RigFileError;
 use runtime::{ExitKind, Failure};
 
-/// * `camera`: whose footage it is.
+/// The hint for footage that cannot be used.
+///
+/// * `camera`: the camera of the footage.
 pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
     let camera = format!("camera {camera:?}");
     match error {
@@ -48,7 +50,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
     }
 }
 
-/// None where the message says it all.
+/// The hint for a calibration that cannot be used; none if the error message suffices.
 pub(super) fn on_rig(error: &RigFileError) -> Option<String> {
     let path = match error {
         RigFileError::Read { path, source } if source.kind() == ErrorKind::PermissionDenied => {
@@ -82,7 +84,7 @@ pub(super) fn on_rig(error: &RigFileError) -> Option<String> {
     None
 }
 
-/// A folder for results that cannot be made.
+/// The failure to create a folder for results.
 pub(super) fn on_folder(folder: &Path, error: &io::Error) -> Failure {
     let in_the_way = folder
         .ancestors()

@@ -1,92 +1,92 @@
-//! Times and counts for programs.
+//! A snapshot of a deployment as JSON.
 
 use messages::Cause;
 use metrics::{Reading, Timed};
 use serde_json::{Map, Value, json};
 
-use super::board::{Board, Member};
+use super::snapshot::{ProcessSnapshot, Snapshot};
 
-/// A deployment and all of its processes.
-pub fn describe(board: &Board) -> Value {
-    let members: Vec<Value> = board.members.iter().map(member).collect();
+/// A deployment and all its processes as JSON.
+pub fn describe(snapshot: &Snapshot) -> Value {
+    let processes: Vec<Value> = snapshot.processes.iter().map(process).collect();
     json!({
-        "name": board.name,
-        "supervisor": board.supervisor,
-        "processes": members,
+        "name": snapshot.name,
+        "supervisor": snapshot.supervisor,
+        "processes": processes,
     })
 }
 
-fn member(it: &Member) -> Value {
-    let mut told = json!({
-        "process": it.process,
-        "pid": it.pid,
-        "state": it.standing.name(),
-        "age_ms": it.reading.as_ref().map(|_| it.age_nanos / 1_000_000),
-        "problem": it.problem.map(|it| it.to_string()),
-        "measured": it.reading.as_ref().map(measured),
+fn process(process: &ProcessSnapshot) -> Value {
+    let mut value = json!({
+        "process": process.name,
+        "pid": process.pid,
+        "state": process.state.name(),
+        "age_ms": process.reading.as_ref().map(|_| process.age_nanos / 1_000_000),
+        "problem": process.problem.map(|it| it.to_string()),
+        "measured": process.reading.as_ref().map(measured),
     });
-    if it.problem.is_none()
-        && let Some(told) = told.as_object_mut()
+    if process.problem.is_none()
+        && let Some(fields) = value.as_object_mut()
     {
-        told.remove("problem");
+        fields.remove("problem");
     }
-    told
+    value
 }
 
-/// What one life of a process has said of itself.
-pub fn measured(it: &Reading) -> Value {
+/// The metrics of a process since its last start, as JSON.
+pub fn measured(reading: &Reading) -> Value {
     let dropped: Map<String, Value> = Cause::ALL
         .into_iter()
-        .map(|cause| (key(cause.name()), it.n_dropped_by(cause).into()))
+        .map(|cause| (key(cause.name()), reading.n_dropped_by(cause).into()))
         .collect();
-    let times: Vec<Value> = it.times.iter().map(timed).collect();
+    let times: Vec<Value> = reading.times.iter().map(timed).collect();
     json!({
-        "restarts": it.restarts,
-        "seconds": (it.at_nanos - it.began_at_nanos) as f64 / 1e9,
-        "view": it.view.as_ref().map(|it| json!({ "index": it.index, "name": it.name })),
-        "finished": it.is_finished,
-        "received": it.n_received,
-        "sent": it.n_sent,
-        "sent_per_second": it.sent_millihertz as f64 / 1e3,
+        "restarts": reading.restarts,
+        "seconds": (reading.at_nanos - reading.began_at_nanos) as f64 / 1e9,
+        "view": reading.view.as_ref().map(|it| json!({ "index": it.index, "name": it.name })),
+        "finished": reading.is_finished,
+        "received": reading.n_received,
+        "sent": reading.n_sent,
+        "sent_per_second": reading.sent_millihertz as f64 / 1e3,
         "dropped": dropped,
-        "queue": it.queue.map(|it| it[0]),
-        "longest_queue": it.queue.map(|it| it[1]),
-        "memory_bytes": it.memory_bytes,
-        "peak_memory_bytes": it.peak_memory_bytes,
-        "evidence_bytes": it.evidence_bytes,
+        "queue": reading.queue.map(|it| it[0]),
+        "longest_queue": reading.queue.map(|it| it[1]),
+        "memory_bytes": reading.memory_bytes,
+        "peak_memory_bytes": reading.peak_memory_bytes,
+        "evidence_bytes": reading.evidence_bytes,
         "times": times,
     })
 }
 
-fn timed(it: &Timed) -> Value {
+fn timed(timed: &Timed) -> Value {
     let ms = |nanos: u64| nanos as f64 / 1e6;
     json!({
-        "stage": key(it.span.name()),
-        "view": it.view,
-        "count": it.count,
-        "per_second": it.millihertz as f64 / 1e3,
-        "p50_ms": ms(it.p50_nanos),
-        "p99_ms": ms(it.p99_nanos),
-        "p99_9_ms": ms(it.p99_9_nanos),
-        "max_ms": ms(it.max_nanos),
+        "stage": key(timed.span.name()),
+        "view": timed.view,
+        "count": timed.count,
+        "per_second": timed.millihertz as f64 / 1e3,
+        "p50_ms": ms(timed.p50_nanos),
+        "p99_ms": ms(timed.p99_nanos),
+        "p99_9_ms": ms(timed.p99_9_nanos),
+        "max_ms": ms(timed.max_nanos),
     })
 }
 
-/// A name as a key: `end_to_end`.
+/// A name as a JSON key: `end_to_end`.
 fn key(name: &str) -> String {
     name.replace(' ', "_")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::board::tests::board;
+    use super::super::snapshot::tests::snapshot;
     use super::*;
 
     #[test]
-    fn every_process_is_there_with_what_it_said() {
-        let told = describe(&board());
-        assert_eq!(told["name"], "walk");
-        let processes = told["processes"].as_array().unwrap();
+    fn every_process_is_listed_with_its_metrics() {
+        let value = describe(&snapshot());
+        assert_eq!(value["name"], "walk");
+        let processes = value["processes"].as_array().unwrap();
         let states: Vec<&str> = processes
             .iter()
             .map(|it| it["state"].as_str().unwrap())

@@ -1,38 +1,48 @@
-//! Times and counts for people: two tables, of processes and of what their time went into.
+//! A snapshot of a deployment as text: a table of the processes, and one of their times.
 
 use core::fmt::Write as _;
 
 use messages::Cause;
 use metrics::{Reading, Timed};
 
-use super::board::{Board, Member, Standing};
+use super::snapshot::{ProcessSnapshot, Snapshot, State};
 
-/// What is not known.
+/// The cell of an unknown value.
 const NONE: &str = "-";
 
-/// A deployment as lines of text. Every cell stands under its title, whose unit it is in.
-pub fn table(board: &Board) -> String {
-    let alive = board.members.iter().filter(|it| it.pid.is_some()).count();
+/// A deployment as two tables. The titles contain the units.
+pub fn table(snapshot: &Snapshot) -> String {
+    let alive = snapshot
+        .processes
+        .iter()
+        .filter(|it| it.pid.is_some())
+        .count();
     let mut text = format!(
         "{}: run by process {}, {alive} of {} processes live\n\n",
-        board.name,
-        board.supervisor,
-        board.members.len()
+        snapshot.name,
+        snapshot.supervisor,
+        snapshot.processes.len()
     );
-    let rows = board.members.iter().map(|it| process(board, it));
-    push(&mut text, &PROCESSES, &rows.collect::<Vec<_>>());
-    let problems = board.members.iter().filter_map(|it| {
-        let problem = it.problem?;
-        Some(format!("{} cannot be read: {problem}\n", it.process))
+    let rows = snapshot
+        .processes
+        .iter()
+        .map(|process| process_row(snapshot, process));
+    push_table(&mut text, &PROCESSES, &rows.collect::<Vec<_>>());
+    let problems = snapshot.processes.iter().filter_map(|process| {
+        let problem = process.problem?;
+        Some(format!("{} cannot be read: {problem}\n", process.name))
     });
     text.extend(problems);
     text.push('\n');
-    let rows = board.members.iter().flat_map(|it| times(board, it));
-    push(&mut text, &TIMES, &rows.collect::<Vec<_>>());
+    let rows = snapshot
+        .processes
+        .iter()
+        .flat_map(|process| time_rows(snapshot, process));
+    push_table(&mut text, &TIMES, &rows.collect::<Vec<_>>());
     text
 }
 
-/// Titles; those that begin with `<` stand to the left of their columns.
+/// Column titles; `<` marks a left-aligned column.
 const PROCESSES: [&str; 11] = [
     "<PROCESS",
     "<VIEW",
@@ -47,46 +57,53 @@ const PROCESSES: [&str; 11] = [
     "<DROPPED",
 ];
 
-fn process(board: &Board, it: &Member) -> Vec<String> {
-    let said = it.reading.as_ref();
+fn process_row(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<String> {
+    let reading = process.reading.as_ref();
     let or_none = |value: Option<String>| value.unwrap_or_else(|| NONE.to_owned());
-    let lives = matches!(it.standing, Standing::Runs | Standing::Done);
+    let is_active = matches!(process.state, State::Running | State::Done);
     let megabytes = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
-    let up = |it: &Reading| format!("{:.0}", (it.at_nanos - it.began_at_nanos) as f64 / 1e9);
+    let uptime = |it: &Reading| format!("{:.0}", (it.at_nanos - it.began_at_nanos) as f64 / 1e9);
     vec![
-        it.process.clone(),
+        process.name.clone(),
         or_none(
-            said.and_then(|it| it.view.as_ref())
-                .map(|it| view(board, it.index)),
+            reading
+                .and_then(|it| it.view.as_ref())
+                .map(|it| view(snapshot, it.index)),
         ),
-        it.standing.name().to_owned(),
-        or_none(said.filter(|_| lives).map(up)),
-        or_none(said.map(|it| it.n_sent.to_string())),
-        or_none(said.filter(|_| lives).map(|it| rate(it.sent_millihertz))),
-        or_none(said.map(|it| it.restarts.to_string())),
+        process.state.name().to_owned(),
+        or_none(reading.filter(|_| is_active).map(uptime)),
+        or_none(reading.map(|it| it.n_sent.to_string())),
         or_none(
-            said.and_then(|it| it.queue)
+            reading
+                .filter(|_| is_active)
+                .map(|it| rate(it.sent_millihertz)),
+        ),
+        or_none(reading.map(|it| it.restarts.to_string())),
+        or_none(
+            reading
+                .and_then(|it| it.queue)
                 .map(|it| format!("{} of {}", it[0], it[1])),
         ),
         or_none(
-            said.filter(|it| it.memory_bytes > 0)
+            reading
+                .filter(|it| it.memory_bytes > 0)
                 .map(|it| megabytes(it.memory_bytes)),
         ),
         or_none(
-            said.filter(|it| it.evidence_bytes > 0)
+            reading
+                .filter(|it| it.evidence_bytes > 0)
                 .map(|it| megabytes(it.evidence_bytes)),
         ),
-        or_none(said.map(dropped)),
+        or_none(reading.map(dropped)),
     ]
 }
 
-/// `none`, or how many for every cause that there was.
-fn dropped(it: &Reading) -> String {
-    let there_was = Cause::ALL
+/// The counts of dropped messages by cause, without zeros; `none` if nothing was dropped.
+fn dropped(reading: &Reading) -> String {
+    let causes: Vec<String> = Cause::ALL
         .into_iter()
-        .filter(|cause| it.n_dropped_by(*cause) > 0);
-    let causes: Vec<String> = there_was
-        .map(|cause| format!("{} {}", it.n_dropped_by(cause), cause.name()))
+        .filter(|cause| reading.n_dropped_by(*cause) > 0)
+        .map(|cause| format!("{} {}", reading.n_dropped_by(cause), cause.name()))
         .collect();
     if causes.is_empty() {
         "none".to_owned()
@@ -99,14 +116,14 @@ const TIMES: [&str; 9] = [
     "<PROCESS", "<STAGE", "<VIEW", "COUNT", "PER s", "p50 ms", "p99 ms", "p99.9 ms", "max ms",
 ];
 
-/// One row for every stage and view; the name of the process stands in the first.
-fn times(board: &Board, it: &Member) -> Vec<Vec<String>> {
-    let Some(said) = &it.reading else {
+/// One row per kind of time and view; the name of the process is in the first row only.
+fn time_rows(snapshot: &Snapshot, process: &ProcessSnapshot) -> Vec<Vec<String>> {
+    let Some(reading) = &process.reading else {
         return Vec::new();
     };
-    let mut sorted: Vec<&Timed> = said.times.iter().collect();
+    let mut sorted: Vec<&Timed> = reading.times.iter().collect();
     sorted.sort_by_key(|it| (it.span, it.view));
-    let own = said.view.as_ref().map(|it| it.index);
+    let own_view = reading.view.as_ref().map(|it| it.index);
     let rows = sorted.into_iter().enumerate().map(|(nth, timed)| {
         let ms = [
             timed.p50_nanos,
@@ -114,12 +131,12 @@ fn times(board: &Board, it: &Member) -> Vec<Vec<String>> {
             timed.p99_9_nanos,
             timed.max_nanos,
         ];
-        let name = if nth == 0 { it.process.as_str() } else { "" };
-        let of = timed.view.or(own);
+        let name = if nth == 0 { process.name.as_str() } else { "" };
+        let index = timed.view.or(own_view);
         let mut row = vec![
             name.to_owned(),
             timed.span.name().to_owned(),
-            of.map_or_else(|| "all".to_owned(), |it| view(board, it)),
+            index.map_or_else(|| "all".to_owned(), |index| view(snapshot, index)),
             timed.count.to_string(),
             rate(timed.millihertz),
         ];
@@ -129,13 +146,13 @@ fn times(board: &Board, it: &Member) -> Vec<Vec<String>> {
     rows.collect()
 }
 
-/// A view by name, or by number from 0 where nobody has said its name.
-fn view(board: &Board, index: usize) -> String {
-    let name = board.views().get(&index).map(|it| (*it).to_owned());
+/// The name of a view, or its number if the name is unknown.
+fn view(snapshot: &Snapshot, index: usize) -> String {
+    let name = snapshot.views().get(&index).map(|it| (*it).to_owned());
     name.unwrap_or_else(|| format!("view {index}"))
 }
 
-/// Two digits after the point of what is rare, one of what is not.
+/// A rate in hertz: two decimals below 10, else one.
 fn rate(millihertz: u64) -> String {
     let hertz = millihertz as f64 / 1e3;
     if hertz < 10.0 {
@@ -145,7 +162,7 @@ fn rate(millihertz: u64) -> String {
     }
 }
 
-/// Three digits after the point of what is short, one of what is long.
+/// A time in milliseconds: three decimals below 10, else one.
 fn milliseconds(nanos: u64) -> String {
     let ms = nanos as f64 / 1e6;
     if ms < 10.0 {
@@ -155,8 +172,8 @@ fn milliseconds(nanos: u64) -> String {
     }
 }
 
-/// Appends a table whose columns are as wide as they need to be.
-fn push<const N: usize>(text: &mut String, titles: &[&str; N], rows: &[Vec<String>]) {
+/// Appends a table; every column is as wide as its widest cell.
+fn push_table<const N: usize>(text: &mut String, titles: &[&str; N], rows: &[Vec<String>]) {
     let width_of = |cell: &str| cell.chars().count();
     let widths: [usize; N] = core::array::from_fn(|column| {
         let title = width_of(titles[column].trim_start_matches('<'));
@@ -183,11 +200,11 @@ fn push<const N: usize>(text: &mut String, titles: &[&str; N], rows: &[Vec<Strin
 
 #[cfg(test)]
 mod tests {
-    use super::super::board::tests::board;
+    use super::super::snapshot::tests::snapshot;
     use super::*;
 
     #[test]
-    fn a_deployment_reads_as_two_tables() {
+    fn a_deployment_is_shown_as_two_tables() {
         let expected = "\
 walk: run by process 3, 3 of 4 processes live
 
@@ -203,18 +220,13 @@ pose-0   waiting     left      100   20.0   0.060   0.060     0.060   0.060
          computing   left      100   20.0    50.1    99.1     100.1   100.1
          publishing  left      100   20.0   0.003   0.003     0.003   0.003
 results  waiting     all       100   20.0  ";
-        let text = table(&board());
-        let same = text
-            .chars()
-            .zip(expected.chars())
-            .take_while(|it| it.0 == it.1);
-        let same = same.count();
-        assert_eq!(same, expected.chars().count(), "{text}");
+        let text = table(&snapshot());
+        assert!(text.starts_with(expected), "{text}");
     }
 
     #[test]
-    fn every_cell_stands_under_its_title() {
-        let text = table(&board());
+    fn columns_are_aligned_with_their_titles() {
+        let text = table(&snapshot());
         let lines: Vec<&str> = text.lines().collect();
         let title = lines[2].find("DROPPED").unwrap();
         for line in &lines[3..7] {
@@ -225,9 +237,9 @@ results  waiting     all       100   20.0  ";
     }
 
     #[test]
-    fn what_was_lost_is_told_by_cause() {
-        let mut board = board();
-        let reading = board.members[2].reading.as_mut().unwrap();
+    fn dropped_messages_are_shown_by_cause() {
+        let mut snapshot = snapshot();
+        let reading = snapshot.processes[2].reading.as_mut().unwrap();
         reading.n_dropped = [1, 0, 0, 0, 2];
         assert_eq!(dropped(reading), "1 behind clock, 2 malformed");
         reading.n_dropped = [0; 5];
@@ -242,16 +254,16 @@ results  waiting     all       100   20.0  ";
     }
 
     #[test]
-    fn rare_things_have_a_rate_too() {
+    fn small_rates_have_two_decimals() {
         assert_eq!([50, 9_990, 19_960].map(rate), ["0.05", "9.99", "20.0"]);
     }
 
     #[test]
-    fn what_cannot_be_read_is_told_with_the_reason() {
-        let mut board = board();
-        board.members[2].reading = None;
-        board.members[2].problem = Some(metrics::ReadingError::Name);
-        let text = table(&board);
+    fn invalid_metrics_are_shown_with_the_reason() {
+        let mut snapshot = snapshot();
+        snapshot.processes[2].reading = None;
+        snapshot.processes[2].problem = Some(metrics::ReadingError::Name);
+        let text = table(&snapshot);
         assert!(text.contains("pose-0 cannot be read: the name"), "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! `summary.json` of a run, read again.
+//! Reads `summary.json` of a run.
 
 use std::fs;
 use std::io;
@@ -7,22 +7,22 @@ use std::path::Path;
 use runfiles::{LatencyReport, RunSummary, Summary};
 use serde_json::{Value, json};
 
-/// What the process `results` wrote about the run.
+/// The summary that the process `results` wrote.
 #[derive(Debug)]
 pub enum Recorded {
-    /// Nothing about this run.
+    /// There is no summary of this run.
     Nothing,
-    /// A file that cannot be read, and why.
+    /// The file cannot be read; the reason.
     Unreadable(String),
-    /// All of it.
+    /// The summary.
     Written(Box<RunSummary>),
 }
 
 impl Recorded {
-    /// Reads the summary in the folder of a run.
+    /// Reads the summary in the output folder of a run.
     ///
-    /// * `session`: the run; what an earlier one left in the folder is nothing.
-    /// * `cameras`: of the deployment; the summary counts for each of them.
+    /// * `session`: the session of the run; the summary of another session counts as none.
+    /// * `cameras`: the cameras of the deployment; the summary must have counts for each of them.
     pub(super) fn read(folder: &Path, session: u64, cameras: &[&str]) -> Self {
         let file = folder.join(RunSummary::FILE);
         let read = match fs::read_to_string(&file) {
@@ -33,17 +33,17 @@ impl Recorded {
         read.unwrap_or_else(|why| Self::Unreadable(format!("{}: {why}", file.display())))
     }
 
-    /// What was seen and what was missed, if that is known.
+    /// The counts of the run, if there is a summary.
     pub fn summary(&self) -> Option<&Summary> {
         self.written().map(|it| &it.summary)
     }
 
-    /// Where the time went, if that is known.
+    /// The latency report of the run, if there is a summary.
     pub fn latency(&self) -> Option<&LatencyReport> {
         self.written().map(|it| &it.latency)
     }
 
-    /// Why there is no summary, if there is none.
+    /// Why there is no summary; none if there is one.
     pub(super) fn problem(&self) -> Option<String> {
         match self {
             Self::Nothing => Some("nothing: the process `results` wrote no summary".to_owned()),
@@ -52,7 +52,7 @@ impl Recorded {
         }
     }
 
-    /// For programs; null if there is none.
+    /// The summary as JSON; null if there is none.
     pub(super) fn json(&self) -> Value {
         json!(self.written())
     }
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summary_of_this_run_is_read_and_one_of_another_run_is_nothing() {
+    fn the_summary_of_another_session_counts_as_none() {
         let text = run().to_text().unwrap();
         assert_eq!(read(&text, &["c1"]).written(), Some(&run()));
         let earlier = text.replace("\"session\": 7", "\"session\": 6");
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_is_missing_or_wrong_is_named_and_is_not_nought() {
+    fn a_missing_or_invalid_count_is_an_error_that_names_it() {
         let text = run().to_text().unwrap();
         let cases = [
             (

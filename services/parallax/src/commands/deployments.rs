@@ -68,11 +68,11 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
 /// Shows the processes of one deployment that runs.
 fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
     let namespace = top::namespace(Some(named))?;
-    let board = Live::open(&namespace)?.first_look()?;
+    let snapshot = Live::open(&namespace)?.first_snapshot()?;
     if json {
-        output::json(&json!({ "schema_version": 1, "deployment": live::describe(&board) }))?;
+        output::json(&json!({ "schema_version": 1, "deployment": live::describe(&snapshot) }))?;
     } else {
-        output::line(live::table(&board).trim_end())?;
+        output::line(live::table(&snapshot).trim_end())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -15,7 +15,7 @@ use deployment::fuse::Config;
 use deployment::fuse_numbers;
 use experiment::{FilmSettings, Version};
 use fmp::Model;
-use launch::{Claim, Shipped, inputs, nothing};
+use launch::{Claim, Shipped, inputs, no_results};
 use offline::eval::{Done, Fusion, Job};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence};
@@ -262,7 +262,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
             let is_judged = done.sequences.iter().any(|it| !it.1.is_empty());
-            nothing::unless(
+            no_results::require(
                 is_judged,
                 "no frame was judged: there is none, or --only and --every leave none",
             )

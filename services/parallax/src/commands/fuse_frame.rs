@@ -165,7 +165,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         report.print()?;
     }
     let is_found = estimate.skeleton.joints.iter().any(Result::is_ok);
-    launch::nothing::unless(is_found, "no joint has a place in space")
+    launch::no_results::require(is_found, "no joint has a place in space")
 }
 
 /// The cameras that were given an image, in the rig's order, with their images framed.
@@ -198,7 +198,7 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
     }
     let mut source = Source::open(&SourceSpec::new(file)).or_fail(ExitKind::Input)?;
     let size = source.info().size;
-    inputs::say_what_is_not_turned(file, source.info().turn);
+    inputs::warn_of_orientation_tag(file, source.info().turn);
     let roll = if arguments.no_upright {
         0.0
     } else {

@@ -95,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let mut growth = Growth::new(&file, &forecast);
-    let report = planned.carry_out(globals.quiet, &stop, &mut |_| growth.note())?;
+    let report = planned.run(globals.quiet, &stop, &mut |_| growth.note())?;
     let recording = recorded::open(&file)?;
     let later = (1..MOST_LIVES).map(|it| record::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();

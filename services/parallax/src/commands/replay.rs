@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let settings = settings(&file, &recording)?;
     let from = arguments.from;
     let refused = |key: &str| refused(key, from);
-    let mut loaded = load::again(&settings.resolved.deployment, &arguments.set, refused)?;
+    let mut loaded = load::with_overrides(&settings.resolved.deployment, &arguments.set, refused)?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let out = arguments.out.clone();
     let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let planned = Planned::of(resolved, globals.level())?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let report = planned.carry_out(globals.quiet, &stop, &mut |_| None)?;
+    let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
     if arguments.json {
         let mut value = report.json();
         value["recording"] = recorded::json(&file, &recording);

@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return show(planned.plan());
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let report = planned.carry_out(globals.quiet, &stop, &mut |_| None)?;
+    let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
     if arguments.json {
         output::json(&report.json())?;
     } else if !globals.quiet {
@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     match (report.kind(), report.budget()) {
         (Some(ExitKind::Limit), Some(budget)) => {
-            Err(Failure::new(ExitKind::Limit, budget.complaint()))
+            Err(Failure::new(ExitKind::Limit, budget.error_text()))
         }
         (kind, _) => Ok(ExitCode::from(kind.map_or(0, ExitKind::status))),
     }

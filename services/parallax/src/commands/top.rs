@@ -42,9 +42,9 @@ pub(crate) struct Arguments {
 /// Shows a deployment until it ends, or the user has seen enough.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut live = Live::open(&namespace(arguments.deployment.as_deref())?)?;
-    let board = live.first_look()?;
+    let snapshot = live.first_snapshot()?;
     if arguments.once || !io::stdout().is_terminal() {
-        output::line(live::table(&board).trim_end())?;
+        output::line(live::table(&snapshot).trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;

@@ -245,7 +245,7 @@ impl Course {
         let victim = format!("capture-{}", case.n_views - 1);
         let mut strike = case.has_dead.then(|| Strike::new(Blow::Kill, &victim, 0.0));
         let before = cpu_seconds_of_children()?;
-        let report = planned.carry_out(self.verbosity.quiet, stop, &mut |event| {
+        let report = planned.run(self.verbosity.quiet, stop, &mut |event| {
             strike
                 .as_mut()
                 .and_then(|it| it.note(event, now_nanos(), Blow::deal))

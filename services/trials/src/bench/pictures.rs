@@ -26,7 +26,7 @@ pub(super) fn draw(
     if !quiet {
         output::message(format_args!("making {n_pictures} pictures ..."));
     }
-    let bar = if quiet || !output::is_lively() {
+    let bar = if quiet || !output::is_terminal() {
         ProgressBar::hidden()
     } else {
         ProgressBar::new(n_pictures)

@@ -139,13 +139,13 @@ impl Ground {
 
     /// Runs it to its end, whatever that is.
     ///
-    /// * `onlooker`: as that of [`Planned::carry_out`].
+    /// * `onlooker`: as that of [`Planned::run`].
     pub(super) fn watch(
         &self,
         planned: &Planned,
         onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
     ) -> Ran {
-        let report = planned.carry_out(self.verbosity.quiet, &self.stop, onlooker);
+        let report = planned.run(self.verbosity.quiet, &self.stop, onlooker);
         let deployment = &planned.resolved().deployment;
         let names = deployment.cameras.iter().map(|it| it.name.clone());
         let names: Vec<String> = names.collect();
@@ -183,7 +183,7 @@ impl Ran {
             failure: self.report.as_ref().err().map(ToString::to_string),
             n_results: self.moments.len(),
             unanswered: report.map_or(0, |it| it.views().iter().map(|it| it.unanswered).sum()),
-            failed: report.map_or_else(Vec::new, |it| it.failed_by_themselves(struck)),
+            failed: report.map_or_else(Vec::new, |it| it.unexpected_failures(struck)),
             left: self.left.clone(),
             accused: report.map_or_else(Vec::new, Report::misplaced),
         }

@@ -61,7 +61,7 @@ impl Report {
             views: run.ran.views(),
             failed: &run
                 .ran
-                .failed_by_themselves(|it| u32::from(was_killed && it == killed)),
+                .unexpected_failures(|it| u32::from(was_killed && it == killed)),
             n_unwritten: summary.map(|it| it.writes_failed + it.frames_not_recorded),
         };
         let limits = limits::judge(asked, &measured);

@@ -39,14 +39,14 @@ pub(super) fn show(live: &mut Live, stop: &Stop, pause: Duration) -> Result<bool
         terminal: ratatui::try_init().or_fail(ExitKind::Run)?,
     };
     let mut first = 0;
-    let mut text = live::table(&live.look()?);
+    let mut text = live::table(&live.snapshot()?);
     let mut looked_at = Instant::now();
     while !stop.is_requested() {
         if live.is_over() {
             return Ok(true);
         }
         if looked_at.elapsed() >= pause {
-            text = live::table(&live.look()?);
+            text = live::table(&live.snapshot()?);
             looked_at = Instant::now();
         }
         let mut room = 1;

@@ -1,4 +1,4 @@
-//! Runs that gave nothing: why, in words.
+//! Runs without results: the exit status and the reason.
 
 use std::process::ExitCode;
 
@@ -7,20 +7,23 @@ use runtime::{ExitKind, Failure};
 
 use crate::views::ViewReport;
 
-/// Ends a command that found nothing as degraded.
+/// The exit status of a command: success if it found something.
+///
+/// * `message`: the error message if it found nothing.
 ///
 /// # Errors
 ///
-/// Nothing was found: `ExitKind::Degraded`, with the words.
-pub fn unless(is_found: bool, what: &str) -> Result<ExitCode, Failure> {
-    let failure = || Failure::new(ExitKind::Degraded, what);
+/// Nothing was found: `ExitKind::Degraded` with the message.
+pub fn require(is_found: bool, message: &str) -> Result<ExitCode, Failure> {
+    let failure = || Failure::new(ExitKind::Degraded, message);
     is_found.then_some(ExitCode::SUCCESS).ok_or_else(failure)
 }
 
-/// Why a run has no result in space, if that is for a reason other than that nobody was to be seen.
+/// Why a run has no joints in space. None if it has some, or if no person was detected.
 ///
-/// * `summary`: of the process `results`.
-pub fn why(summary: &Summary, views: &[ViewReport]) -> Option<String> {
+/// * `summary`: the summary that the process `results` wrote.
+/// * `views`: the reports of all views.
+pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     if views.iter().all(|it| it.frames == 0) {
         return Some("the footage has no frame".to_owned());
     }
@@ -64,30 +67,30 @@ mod tests {
         }
     }
 
-    fn why_of(frames: u64, with_pose: u64, views: &[ViewReport]) -> String {
+    fn reason_of(frames: u64, with_pose: u64, views: &[ViewReport]) -> String {
         let summary = Summary {
             frames,
             frames_with_pose: with_pose,
             ..Summary::default()
         };
-        why(&summary, views).unwrap_or_default()
+        reason(&summary, views).unwrap_or_default()
     }
 
     #[test]
-    fn a_run_without_any_result_says_why() {
-        let dropped = why_of(0, 0, &[view(30, 0), view(30, 0)]);
+    fn a_run_without_any_result_has_a_reason() {
+        let dropped = reason_of(0, 0, &[view(30, 0), view(30, 0)]);
         assert!(dropped.contains("no frame got a result"), "{dropped}");
         assert!(dropped.contains("a: 0 of 30 frames"), "{dropped}");
-        let none = why_of(0, 0, &[view(0, 0)]);
+        let none = reason_of(0, 0, &[view(0, 0)]);
         assert!(none.contains("no frame"), "{none}");
-        let flat = why_of(3, 0, &[view(3, 3), view(3, 3)]);
+        let flat = reason_of(3, 0, &[view(3, 3), view(3, 3)]);
         assert!(flat.contains("none of 3 results"), "{flat}");
     }
 
     #[test]
     fn a_room_without_people_and_a_single_view_are_no_failure() {
-        assert_eq!(why_of(3, 0, &[view(3, 0), view(3, 0)]), "");
-        assert_eq!(why_of(3, 0, &[view(3, 3)]), "");
-        assert_eq!(why_of(3, 1, &[view(3, 3), view(3, 3)]), "");
+        assert_eq!(reason_of(3, 0, &[view(3, 0), view(3, 0)]), "");
+        assert_eq!(reason_of(3, 0, &[view(3, 3)]), "");
+        assert_eq!(reason_of(3, 1, &[view(3, 3), view(3, 3)]), "");
     }
 }

@@ -1,0 +1,280 @@
+//! The state of all processes of a deployment at one time, and their last metrics.
+
+use std::collections::BTreeMap;
+
+use metrics::{Reading, ReadingError};
+use runtime::ObservedProcess;
+
+use crate::resolved::SERVICES;
+
+/// A live process without metrics for this long counts as silent. Metrics are due every second.
+const SILENT_NANOS: u64 = 5_000_000_000;
+
+/// The state of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// It is alive and sends metrics.
+    Running,
+    /// It has received the end of stream and sent it on.
+    Done,
+    /// It is alive and has not sent metrics since its last start.
+    Starting,
+    /// It is alive, but has not sent metrics for several seconds.
+    Silent,
+    /// It is not running; the supervisor may restart it.
+    Dead,
+}
+
+impl State {
+    /// The name that is shown to users.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Running => "runs",
+            Self::Done => "done",
+            Self::Starting => "begins",
+            Self::Silent => "silent",
+            Self::Dead => "dead",
+        }
+    }
+}
+
+/// One process at the time of the snapshot.
+#[derive(Debug, Clone)]
+pub struct ProcessSnapshot {
+    /// Its name in the deployment.
+    pub name: String,
+    /// Its process id, while it is alive.
+    pub pid: Option<u32>,
+    /// Its state.
+    pub state: State,
+    /// Its last metrics, if they are valid; kept after its death.
+    pub reading: Option<Reading>,
+    /// Why its last metrics are invalid.
+    pub problem: Option<ReadingError>,
+    /// Age of its last metrics, nanoseconds.
+    pub age_nanos: u64,
+}
+
+/// All processes of a deployment at one time.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// The name of the deployment.
+    pub name: String,
+    /// The process id of its supervisor.
+    pub supervisor: u32,
+    /// Its processes, in pipeline order.
+    pub processes: Vec<ProcessSnapshot>,
+}
+
+impl Snapshot {
+    pub(super) fn new(
+        name: &str,
+        supervisor: u32,
+        observed: &[ObservedProcess<'_>],
+        now: u64,
+    ) -> Self {
+        let mut processes: Vec<ProcessSnapshot> = observed
+            .iter()
+            .map(|it| ProcessSnapshot::new(it, now))
+            .collect();
+        processes.sort_by_key(|it| sort_key(&it.name));
+        Self {
+            name: name.to_owned(),
+            supervisor,
+            processes,
+        }
+    }
+
+    /// The names of the views, as far as the metrics contain them.
+    pub fn views(&self) -> BTreeMap<usize, &str> {
+        let readings = self.processes.iter().filter_map(|it| it.reading.as_ref());
+        readings
+            .filter_map(|it| it.view.as_ref())
+            .filter(|it| !it.name.is_empty())
+            .map(|it| (it.index, it.name.as_str()))
+            .collect()
+    }
+
+    /// Whether every live process has sent metrics.
+    pub(super) fn is_complete(&self) -> bool {
+        let is_starting = |it: &ProcessSnapshot| it.state == State::Starting;
+        !self.processes.iter().any(is_starting)
+    }
+}
+
+impl ProcessSnapshot {
+    fn new(observed: &ObservedProcess<'_>, now: u64) -> Self {
+        let read = observed.metrics.map(Reading::from_message);
+        let age_nanos = observed
+            .metrics
+            .map_or(0, |it| now.saturating_sub(it.at_nanos));
+        let (reading, problem) = match read {
+            None => (None, None),
+            Some(Ok(reading)) => (Some(reading), None),
+            Some(Err(problem)) => (None, Some(problem)),
+        };
+        let current = reading.as_ref().filter(|it| observed.pid == Some(it.pid));
+        let state = match (observed.pid, current) {
+            (None, _) => State::Dead,
+            (Some(_), None) if problem.is_none() => State::Starting,
+            _ if age_nanos > SILENT_NANOS => State::Silent,
+            (_, Some(reading)) if reading.is_finished => State::Done,
+            _ => State::Running,
+        };
+        Self {
+            name: observed.process.to_owned(),
+            pid: observed.pid,
+            state,
+            reading,
+            problem,
+            age_nanos,
+        }
+    }
+}
+
+/// The sort key of a process: position of its service in the pipeline, index, name.
+fn sort_key(process: &str) -> (usize, usize, String) {
+    let (service, index) = process.split_once('-').unwrap_or((process, "0"));
+    let nth = SERVICES.iter().position(|it| *it == service);
+    let index = index.parse().unwrap_or(usize::MAX);
+    (nth.unwrap_or(SERVICES.len()), index, process.to_owned())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use messages::{Cause, Span};
+    use metrics::{Meter, Passage};
+
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    /// Metrics sent at 10 s by a process that was started at 4 s.
+    pub(crate) fn metrics_of(pid: u32, view: Option<usize>) -> messages::Metrics {
+        let mut meter = Meter::default();
+        if let Some(view) = view {
+            meter.belongs_to(view, ["left", "right"][view]);
+        }
+        for nth in 1..=100 {
+            meter.passed(&Passage {
+                waiting: Some(60_000),
+                computing: nth * 1_000_000,
+                publishing: 2_500,
+                since_capture: None,
+            });
+        }
+        meter.spent(Span::WAITING, Some(1), 3 * SECOND);
+        meter.dropped(Cause::Late, 3);
+        meter.queued(2);
+        let mut sent = messages::Metrics {
+            pid,
+            epoch: 1,
+            n_sent: 100,
+            sent_millihertz: 19_960,
+            at_nanos: 10 * SECOND,
+            began_at_nanos: 4 * SECOND,
+            memory_bytes: 48_200_000,
+            peak_memory_bytes: 50_000_000,
+            evidence_bytes: 7_350_000,
+            ..meter.head()
+        };
+        for index in 0..meter.n_rows() {
+            sent.rows[index] = meter.row(index).unwrap();
+            sent.rows[index].millihertz = 19_960;
+        }
+        sent.n_rows = meter.n_rows() as u32;
+        sent
+    }
+
+    /// A snapshot at 11 s: two processes run, one is dead, one is starting.
+    pub(crate) fn snapshot() -> Snapshot {
+        let (pose, record) = (metrics_of(17, Some(0)), metrics_of(18, None));
+        let observed_process = |process, pid, metrics| ObservedProcess {
+            process,
+            pid,
+            metrics,
+        };
+        let observed = [
+            observed_process("capture-10", None, None),
+            observed_process("capture-9", Some(4), None),
+            observed_process("pose-0", Some(17), Some(&pose)),
+            observed_process("results", Some(18), Some(&record)),
+        ];
+        Snapshot::new("walk", 3, &observed, 11 * SECOND)
+    }
+
+    fn state(pid: Option<u32>, metrics: Option<&messages::Metrics>, now: u64) -> State {
+        let process = "pose-0";
+        ProcessSnapshot::new(
+            &ObservedProcess {
+                process,
+                pid,
+                metrics,
+            },
+            now,
+        )
+        .state
+    }
+
+    #[test]
+    fn processes_are_in_pipeline_order_and_by_index() {
+        let names: Vec<String> = snapshot().processes.into_iter().map(|it| it.name).collect();
+        assert_eq!(names, ["capture-9", "capture-10", "pose-0", "results"]);
+    }
+
+    #[test]
+    fn a_live_process_with_metrics_runs_until_it_is_done() {
+        let mut metrics = metrics_of(17, None);
+        let now = 11 * SECOND;
+        assert_eq!(state(Some(17), Some(&metrics), now), State::Running);
+        metrics.finished = 1;
+        assert_eq!(state(Some(17), Some(&metrics), now), State::Done);
+    }
+
+    #[test]
+    fn a_process_that_is_not_alive_is_dead_whatever_its_metrics() {
+        let metrics = metrics_of(17, None);
+        assert_eq!(state(None, Some(&metrics), 11 * SECOND), State::Dead);
+        assert_eq!(state(None, None, 11 * SECOND), State::Dead);
+    }
+
+    #[test]
+    fn metrics_from_before_a_restart_do_not_count() {
+        let metrics = metrics_of(16, None);
+        assert_eq!(
+            state(Some(17), Some(&metrics), 11 * SECOND),
+            State::Starting
+        );
+        assert_eq!(state(Some(17), None, 11 * SECOND), State::Starting);
+    }
+
+    #[test]
+    fn a_process_without_metrics_for_five_seconds_is_silent() {
+        let metrics = metrics_of(17, None);
+        assert_eq!(state(Some(17), Some(&metrics), 15 * SECOND), State::Running);
+        assert_eq!(state(Some(17), Some(&metrics), 16 * SECOND), State::Silent);
+    }
+
+    #[test]
+    fn invalid_metrics_are_reported() {
+        let mut metrics = metrics_of(17, None);
+        metrics.n_rows = 1000;
+        let process = "pose-0";
+        let observed_process = ObservedProcess {
+            process,
+            pid: Some(17),
+            metrics: Some(&metrics),
+        };
+        let process = ProcessSnapshot::new(&observed_process, 11 * SECOND);
+        assert_eq!(
+            process.problem,
+            Some(ReadingError::TooManyRows { rows: 1000 })
+        );
+        assert!(process.reading.is_none());
+    }
+
+    #[test]
+    fn the_names_of_views_are_those_in_the_metrics() {
+        assert_eq!(snapshot().views(), [(0, "left")].into());
+    }
+}
