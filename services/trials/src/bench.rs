@@ -1,14 +1,14 @@
-//! How fast messages travel between processes, and how fast whole deployments are.
+//! Benchmarks of the transport between processes, and of whole deployments under load.
 
-mod course;
 mod hop;
 mod load;
-mod occasion;
 mod options;
 mod pictures;
+mod provenance;
 mod receiver;
 mod report;
 mod transport;
+mod workload;
 
 pub use load::{Kind, load};
 pub use options::Options;

@@ -1,19 +1,19 @@
-//! A deployment with a fault made on purpose, once for every fault, and what held.
+//! Fault injection: runs a deployment once per fault, and checks limits on its behaviour.
 
-mod aim;
-mod barrage;
 mod camera;
-mod census;
 mod fault;
-mod ground;
 mod judge;
 mod moved;
 mod options;
 mod orphans;
 mod random;
+mod random_kills;
+mod resources;
 mod scenario;
 mod series;
 mod stall;
+mod target;
+mod testbed;
 mod verdict;
 
 use fastrand::Rng;
@@ -23,59 +23,59 @@ use runtime::{Delivery, ExitKind, Failure, now_nanos};
 use serde_json::{Value, json};
 
 use crate::trial::cost::Cost;
-use crate::trial::strike::Strike;
-use aim::{STRIKE_AFTER, frame_at, trace_of};
-use ground::Ground;
-use judge::Orphaned;
+use crate::trial::injection::Injector;
+use judge::SupervisorKillOutcome;
 use scenario::service_of;
+use target::{INJECT_AFTER, epoch_source_of, frame_at};
+use testbed::Testbed;
 use verdict::Verdict;
 
-pub use crate::trial::strike::Blow;
+pub use crate::trial::injection::ProcessFault;
 pub use fault::CameraFault;
 pub use options::{Limits, Options};
 pub use scenario::Scenario;
 
-/// How long the main loop of a process may stand still where one computes for ever and nothing may be lost: a sign of
-/// work is due each second, and three may be missed. Where the latest wins its work alone is to tell.
+/// The hang limit of the `spin-...` scenarios with lossless delivery: a main loop reports progress every second, and three
+/// reports may be missing. With realtime delivery the processor time of an iteration tells.
 const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
-/// What held.
+/// The outcome of the scenarios.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Whether no limit was missed.
+    /// Whether all limits held.
     pub is_held: bool,
-    /// For programs; `chaos.json`.
+    /// The report as JSON; the content of `chaos.json`.
     pub json: Value,
-    /// For people: a table of the scenarios, and below each what did not hold.
+    /// The report as text: a table of the scenarios, with the missed limits of each.
     pub table: String,
 }
 
-/// Tries everything that is asked for, judges it, and writes `chaos.json`. `None` if it was stopped: then nothing is
-/// judged or written.
+/// Runs the scenarios, checks their limits, and writes `chaos.json`. `None` if it was interrupted; then nothing is
+/// written.
 ///
 /// # Errors
 ///
-/// The deployment cannot be read or used, or has no process for a scenario that was asked for; the report cannot be
-/// written. A run that fails is no error but a limit that is missed.
+/// The deployment cannot be read or used, or lacks the process of a requested scenario; the report cannot be written.
+/// A run that fails is not an error but a missed limit.
 pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, Failure> {
-    let ground = Ground::new(options, verbosity)?;
-    let processes = ground.plan("", &[])?;
+    let testbed = Testbed::new(options, verbosity)?;
+    let processes = testbed.plan("", &[])?;
     let processes: Vec<String> = processes.processes().map(str::to_owned).collect();
     let mut verdicts = Vec::new();
     for scenario in chosen(&options.scenarios, &processes)? {
         if !verbosity.quiet {
-            let (name, says) = (scenario.name(), scenario.says());
-            output::message(format_args!("{name}: {says}"));
+            let (name, summary) = (scenario.name(), scenario.summary());
+            output::message(format_args!("{name}: {summary}"));
         }
-        verdicts.push(attempt(&ground, options, scenario)?);
-        if ground.stop.is_requested() {
+        verdicts.push(attempt(&testbed, options, scenario)?);
+        if testbed.stop.is_requested() {
             return Ok(None);
         }
     }
     let is_held = verdicts.iter().all(Verdict::is_held);
     let scenarios: Vec<Value> = verdicts.iter().map(Verdict::json).collect();
     let json = json!({ "schema_version": 1, "held": is_held, "scenarios": scenarios });
-    let file = ground.folder.join("chaos.json");
+    let file = testbed.folder.join("chaos.json");
     std::fs::write(&file, format!("{json:#}\n"))
         .map_err(|error| runtime::in_file(&file, &error))?;
     Ok(Some(Outcome {
@@ -85,15 +85,15 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     }))
 }
 
-/// What was asked for, or all that the deployment has processes for.
-fn chosen(asked: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
-    if asked.is_empty() {
+/// The requested scenarios; if none are requested, all that are possible with the processes of the deployment.
+fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
+    if requested.is_empty() {
         let mut all = Scenario::all();
         all.retain(|it| it.is_possible(processes));
         return Ok(all);
     }
-    match asked.iter().find(|it| !it.is_possible(processes)) {
-        None => Ok(asked.to_vec()),
+    match requested.iter().find(|it| !it.is_possible(processes)) {
+        None => Ok(requested.to_vec()),
         Some(it) => {
             let message = format!("{}: the deployment has no such process", it.name());
             Err(Failure::new(ExitKind::Usage, message))
@@ -101,91 +101,96 @@ fn chosen(asked: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Fai
     }
 }
 
-fn attempt(ground: &Ground, options: &Options, it: Scenario) -> Result<Verdict, Failure> {
-    match it {
-        Scenario::Once(blow, service) => once(ground, options, blow, service),
-        Scenario::Random => random::attempt(ground, options),
-        Scenario::Supervisor => supervisor(ground, options),
-        Scenario::Camera(fault) => camera::attempt(ground, options, fault),
-        Scenario::Moved => moved::attempt(ground, options),
-        Scenario::Stall => stall::attempt(ground, options),
+fn attempt(testbed: &Testbed, options: &Options, scenario: Scenario) -> Result<Verdict, Failure> {
+    match scenario {
+        Scenario::Once(fault, service) => once(testbed, options, fault, service),
+        Scenario::Random => random::attempt(testbed, options),
+        Scenario::Supervisor => supervisor(testbed, options),
+        Scenario::Camera(fault) => camera::attempt(testbed, options, fault),
+        Scenario::Moved => moved::attempt(testbed, options),
+        Scenario::Stall => stall::attempt(testbed, options),
     }
 }
 
 fn once(
-    ground: &Ground,
+    testbed: &Testbed,
     options: &Options,
-    blow: Blow,
+    fault: ProcessFault,
     service: &'static str,
 ) -> Result<Verdict, Failure> {
-    let scenario = Scenario::Once(blow, service).name();
-    let planned = ground.plan(&scenario, &[])?;
-    let victims: Vec<&str> = planned.processes().collect();
-    let victims = victims.into_iter().filter(|it| service_of(it) == service);
-    let process = Rng::with_seed(options.seed).choice(victims.collect::<Vec<_>>());
+    let scenario = Scenario::Once(fault, service).name();
+    let planned = testbed.plan(&scenario, &[])?;
+    let processes: Vec<&str> = planned.processes().collect();
+    let candidates = processes.into_iter().filter(|it| service_of(it) == service);
+    let process = Rng::with_seed(options.seed).choice(candidates.collect::<Vec<_>>());
     let process = process.unwrap_or(service).to_owned();
-    let at_frame = frame_at(&planned, STRIKE_AFTER);
-    let planned = match blow {
-        Blow::Kill | Blow::Stop => planned,
-        Blow::Spin => spinning(ground, &scenario, &process, at_frame as u64)?,
+    let at_frame = frame_at(&planned, INJECT_AFTER);
+    let planned = match fault {
+        ProcessFault::Kill | ProcessFault::Stop => planned,
+        ProcessFault::Spin => spinning(testbed, &scenario, &process, at_frame as u64)?,
     };
-    let mut strike = Strike::new(blow, &process, at_frame);
-    let ran = ground.watch(&planned, &mut |event| {
-        strike.note(event, now_nanos(), Blow::deal)
+    let mut injector = Injector::new(fault, &process, at_frame);
+    let run = testbed.run(&planned, &mut |event| {
+        injector.handle(event, now_nanos(), ProcessFault::inject)
     });
-    let times = strike.times();
-    let cost = Cost::new(trace_of(&process), times, planned.session(), &ran.moments);
-    let struck = |it: &str| u32::from(it == process && times.killed.is_some());
-    let after = ran.aftermath(struck);
+    let times = injector.times();
+    let cost = Cost::new(
+        epoch_source_of(&process),
+        times,
+        planned.session(),
+        &run.results,
+    );
+    let n_faults = |it: &str| u32::from(it == process && times.injected.is_some());
+    let outcome = run.outcome(n_faults);
     let policy = planned.plan().policy;
-    let hang = match blow {
-        Blow::Spin if planned.plan().delivery == Delivery::Lossless => policy.hang_limit,
-        Blow::Kill | Blow::Stop | Blow::Spin => policy.stopped_limit,
+    let hang = match fault {
+        ProcessFault::Spin if planned.plan().delivery == Delivery::Lossless => policy.hang_limit,
+        ProcessFault::Kill | ProcessFault::Stop | ProcessFault::Spin => policy.stopped_limit,
     };
     let hang_ms = hang.as_millis() as f64;
     Ok(Verdict {
         scenario,
-        measured: verdict::of_cost(&process, &cost, after.n_results),
-        more: Vec::new(),
+        measured: verdict::of_cost(&process, &cost, outcome.n_results),
+        details: Vec::new(),
         numbers: json!({ "process": process, "cost": cost }),
-        limits: judge::once(&options.limits, blow, &process, hang_ms, (&cost, &after)),
-        run: ran.json(),
+        limits: judge::once(&options.limits, fault, &process, hang_ms, (&cost, &outcome)),
+        run: run.json(),
     })
 }
 
-fn supervisor(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
+fn supervisor(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> {
     let scenario = Scenario::Supervisor.name();
-    let killed = orphans::kill(ground, &scenario, &ground.plan(&scenario, &[])?);
-    let (mut it, failure) = match killed {
-        Ok(it) => (it, None),
-        Err(failure) => (Orphaned::default(), Some(failure.to_string())),
+    let killed = orphans::kill(testbed, &scenario, &testbed.plan(&scenario, &[])?);
+    let (mut killed, failure) = match killed {
+        Ok(killed) => (killed, None),
+        Err(failure) => (SupervisorKillOutcome::default(), Some(failure.to_string())),
     };
-    let planned = ground.plan(&scenario, &[])?;
-    let ran = ground.watch(&planned, &mut |_| None);
-    let sent = ran.moments.iter().map(|it| it.sent_ms);
-    it.result_ms = sent.reduce(f64::min);
-    let mut after = ran.aftermath(|_| 0);
-    after.failure = failure.or(after.failure);
+    let planned = testbed.plan(&scenario, &[])?;
+    let run = testbed.run(&planned, &mut |_| None);
+    let sent = run.results.iter().map(|it| it.sent_ms);
+    killed.result_ms = sent.reduce(f64::min);
+    let mut outcome = run.outcome(|_| 0);
+    outcome.failure = failure.or(outcome.failure);
     Ok(Verdict {
         scenario,
-        measured: verdict::of_orphans(&it, after.n_results),
-        more: Vec::new(),
-        numbers: json!({ "children_ended_ms": it.ended_ms, "files_left": it.files, "next_result_ms": it.result_ms }),
-        limits: judge::supervisor(&options.limits, &it, &after),
-        run: ran.json(),
+        measured: verdict::of_orphans(&killed, outcome.n_results),
+        details: Vec::new(),
+        numbers: json!({ "children_ended_ms": killed.ended_ms, "files_left": killed.files, "next_result_ms": killed.result_ms }),
+        limits: judge::supervisor(&options.limits, &killed, &outcome),
+        run: run.json(),
     })
 }
 
-/// Plans a run one process of which never finishes what it does after it has sent something of a later frame.
+/// Plans a run in which a process enters an endless loop, once it has sent a message about a frame after `after_frame`.
 fn spinning(
-    ground: &Ground,
+    testbed: &Testbed,
     scenario: &str,
     process: &str,
     after_frame: u64,
 ) -> Result<Planned, Failure> {
-    let mut planned = ground.plan(scenario, &[])?;
+    let mut planned = testbed.plan(scenario, &[])?;
     if planned.plan().delivery == Delivery::Lossless {
-        planned = ground.plan(scenario, &[SPIN_LIMIT])?;
+        planned = testbed.plan(scenario, &[SPIN_LIMIT])?;
     }
     planned.spin(process, after_frame);
     Ok(planned)
@@ -196,11 +201,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_tried_is_refused_if_it_was_asked_for_and_else_left_out() {
+    fn an_impossible_scenario_is_refused_if_requested_and_else_left_out() {
         let processes = ["capture-0", "pose-0", "triangulate", "results"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
         assert_eq!(all.len(), 20);
-        let quality = Scenario::Once(Blow::Kill, "quality");
+        let quality = Scenario::Once(ProcessFault::Kill, "quality");
         assert!(!all.contains(&quality));
         let refused = chosen(&[all[0], quality], &processes).unwrap_err();
         assert!(refused.to_string().contains("kill-quality"), "{refused}");

@@ -1,13 +1,13 @@
-//! Runs that try a deployment: with a fault made on purpose, under load, or for show; and what held.
+//! Trials of whole deployments: fault injection, benchmarks and the demo, with limits that are checked.
 //!
-//! | trial | what is done | what is judged |
+//! | trial | what is run | what is checked |
 //! |---|---|---|
-//! | [`chaos`] | a process is killed, stopped or sent spinning, a camera fails or was moved | who noticed, who came back, what was lost |
-//! | [`mod@bench`] | messages are sent, deployments are run as fast as they go | how long it took |
-//! | [`demo`] | cameras that do not exist see a person who does not, and one of them is killed | results against the truth, and all of the above |
+//! | [`chaos`] | a process is killed, stopped or made to loop endlessly; a camera fails or was moved | detection, recovery and losses |
+//! | [`mod@bench`] | messages between two processes; deployments under load | latency and throughput |
+//! | [`demo`] | synthetic cameras, one of whose processes is killed | accuracy of the results, recovery and losses |
 //!
-//! Every run is one of real processes, started as `parallax run` starts them. What a command line says becomes the
-//! options of a trial; what it prints at the end is in what a trial returns. Progress is shown meanwhile.
+//! Every run uses real processes, started as `parallax run` starts them. The command line provides the options of a trial
+//! and prints what it returns; progress is shown during the run.
 #![forbid(unsafe_code)]
 
 mod spread;

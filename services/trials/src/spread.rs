@@ -1,4 +1,4 @@
-//! How a quantity spreads: percentiles.
+//! Percentiles of measured values.
 
 use serde::{Deserialize, Serialize};
 use statistics::Sorted;
@@ -6,20 +6,20 @@ use statistics::Sorted;
 /// Percentiles of measured values, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Spread {
-    /// How many were measured.
+    /// Number of values.
     pub n: usize,
-    /// Half are at most this.
+    /// The median.
     pub p50: f64,
-    /// 99 of 100 are.
+    /// The 99th percentile.
     pub p99: f64,
-    /// 999 of 1000 are; the largest where fewer were measured.
+    /// The 99.9th percentile; the maximum if there are fewer than 1000 values.
     pub p99_9: f64,
-    /// All are.
+    /// The maximum.
     pub max: f64,
 }
 
 impl Spread {
-    /// Of some values, by nearest rank; none of nothing.
+    /// The percentiles of some values, by nearest rank; none if there are no values.
     pub(crate) fn of(values: Vec<f64>) -> Option<Self> {
         let sorted = Sorted::new(values);
         Some(Self {
@@ -31,12 +31,12 @@ impl Spread {
         })
     }
 
-    /// Its four numbers for a table.
+    /// The four percentiles as cells of a table; `-` if there are none.
     pub(crate) fn cells(spread: Option<Self>, digits: usize) -> [String; 4] {
-        let Some(it) = spread else {
+        let Some(spread) = spread else {
             return ["-"; 4].map(str::to_owned);
         };
-        [it.p50, it.p99, it.p99_9, it.max].map(|it| format!("{it:.digits$}"))
+        [spread.p50, spread.p99, spread.p99_9, spread.max].map(|it| format!("{it:.digits$}"))
     }
 }
 
@@ -58,14 +58,14 @@ mod tests {
     }
 
     #[test]
-    fn of_few_values_the_high_percentiles_are_the_largest() {
+    fn the_high_percentiles_of_few_values_are_the_maximum() {
         let got = Spread::of(vec![3.0, 1.0, 2.0]).unwrap();
         assert_eq!([got.p50, got.p99, got.p99_9, got.max], [2.0, 3.0, 3.0, 3.0]);
         assert_eq!(Spread::of(vec![7.0]).unwrap().p50, 7.0);
     }
 
     #[test]
-    fn of_nothing_there_is_none() {
+    fn without_values_there_are_no_percentiles() {
         assert_eq!(Spread::of(Vec::new()), None);
         assert_eq!(Spread::cells(None, 1), ["-"; 4]);
     }

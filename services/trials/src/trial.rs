@@ -1,10 +1,8 @@
-//! A run in which processes are killed on purpose: its cameras, the blow, and what it cost.
-//!
-//! What `parallax demo` and `parallax chaos` share.
+//! What the trials share: synthetic deployments, the injection of process faults, results, and limits.
 
-pub(crate) mod stage;
+pub(crate) mod synthetic;
 
-pub(crate) mod strike;
+pub(crate) mod injection;
 
 pub(crate) mod results;
 
@@ -12,5 +10,5 @@ pub(crate) mod cost;
 
 pub(crate) mod limit;
 
-/// A place in space, metres in the world.
+/// A point in the world, metres.
 pub(crate) type Point = [f64; 3];

@@ -120,7 +120,7 @@ impl Arguments {
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.list {
         for it in Scenario::all() {
-            output::line(format_args!("{:<17} {}", it.name(), it.says()))?;
+            output::line(format_args!("{:<17} {}", it.name(), it.summary()))?;
         }
         return Ok(ExitCode::SUCCESS);
     }

@@ -1,4 +1,4 @@
-//! One series of messages from this process to another.
+//! Sends a series of messages from this process to a receiving process.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -11,47 +11,47 @@ use runtime::{
 };
 use tracing::Level;
 
-use super::receiver::{Heard, N_PLACED, Spot, WARM_UP, write};
+use super::receiver::{N_PLACED, ReceiverReport, Spot, WARM_UP, write};
 
-/// Name of the other process.
+/// Name of the receiving process.
 const RECEIVER: &str = "receiver";
-/// How long it may take to begin, and to say what it heard.
+/// How long to wait for the receiver to start, and for its report.
 const PATIENCE: Duration = Duration::from_secs(30);
-const PAUSE: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// What is sent, and how it is heard.
+/// The settings of a series.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
     /// Name of the deployment.
     pub name: String,
-    /// Bytes of a message, at least 16.
+    /// Size of a message, bytes; at least 16.
     pub bytes: usize,
-    /// Messages that are measured.
+    /// Number of measured messages.
     pub n_messages: u64,
-    /// From one message to the next.
+    /// Interval between messages.
     pub interval: Duration,
-    /// What the receiver asks of the system's scheduler, and whether it polls.
+    /// The scheduling of the receiver, and whether it polls.
     pub receiver: Scheduling,
-    /// The least important events that it logs.
+    /// The log level of the receiver.
     pub log: Level,
 }
 
-/// What became of a series.
+/// The measurements of a series.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measured {
-    /// Messages that were sent of those that are measured.
+    /// Number of measured messages that were sent.
     pub sent: u64,
-    /// What the receiver says.
-    pub heard: Heard,
-    /// Of how many messages both processes said where they lie.
+    /// The report of the receiver.
+    pub receiver: ReceiverReport,
+    /// Number of messages whose location both processes know.
     pub n_compared: usize,
-    /// How many of these lay in the same place for both.
+    /// Number of these with the same location in both processes.
     pub n_same_place: usize,
-    /// Bytes that the ports of both processes copied.
+    /// Bytes copied by the ports of both processes.
     pub copied_bytes: u64,
 }
 
-/// Sends a series. `None` if it was stopped.
+/// Sends a series. `None` if it was interrupted.
 pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, Failure> {
     let namespace = Namespace::new(&series.name)?;
     let limits = Limits::new(1, 1, 1);
@@ -63,7 +63,7 @@ pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, 
     );
     let [health, metrics] = process_topics(RECEIVER);
     let topics = [pixels, health, metrics];
-    // Dropped in reverse: ports, topics, bus, and the lock last, which removes every file.
+    // Dropped in reverse order: ports, topics, bus, and last the lock, which removes all files.
     let lock = namespace.acquire()?;
     preflight(&topics)?;
     let bus = Bus::open(lock.namespace(), "sender", stop)?;
@@ -71,19 +71,19 @@ pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, 
     let publisher = bus.slice_publisher::<u8, FrameHeader>(&topic::frame(0))?;
     let mut child = start(series, lock.namespace())?;
     if publisher.wait_for_subscribers(1, PATIENCE) == 0 && !stop.is_requested() {
-        return Err(silent(&mut child));
+        return Err(no_report(&mut child));
     }
     let Some(spots) = send(series, &publisher, stop)? else {
         return Ok(None);
     };
-    let Some(heard) = ask(&mut child, &publisher, stop)? else {
+    let Some(receiver) = request_report(&mut child, &publisher, stop)? else {
         return Ok(None);
     };
-    let (n_compared, n_same_place) = compare(&spots, &heard.spots);
-    let copied_bytes = bus.copies().bytes() + heard.copied_bytes;
+    let (n_compared, n_same_place) = compare(&spots, &receiver.spots);
+    let copied_bytes = bus.copies().bytes() + receiver.copied_bytes;
     Ok(Some(Measured {
         sent: series.n_messages,
-        heard,
+        receiver,
         n_compared,
         n_same_place,
         copied_bytes,
@@ -107,7 +107,7 @@ fn start(series: &Series, namespace: &Namespace) -> Result<Child, Failure> {
     Child::start(&executable, &args).or_fail(ExitKind::Run)
 }
 
-/// Sends all messages; where the first lay, or `None` if it was stopped.
+/// Sends all messages; returns the locations of the first ones, or `None` if it was interrupted.
 fn send(
     series: &Series,
     publisher: &SlicePublisher<u8, FrameHeader>,
@@ -145,12 +145,12 @@ fn header(message: u64, status: Status) -> FrameHeader {
     }
 }
 
-/// Tells the receiver that this was all, until it says what it heard.
-fn ask(
+/// Sends the end of the series to the receiver until it reports.
+fn request_report(
     child: &mut Child,
     publisher: &SlicePublisher<u8, FrameHeader>,
     stop: &Stop,
-) -> Result<Option<Heard>, Failure> {
+) -> Result<Option<ReceiverReport>, Failure> {
     let begin = Instant::now();
     while begin.elapsed() < PATIENCE {
         if stop.is_requested() {
@@ -159,11 +159,11 @@ fn ask(
         let mut loan = publisher.loan(1)?;
         *loan.header_mut() = header(0, Status::END);
         loan.send()?;
-        sleep(PAUSE);
+        sleep(POLL_INTERVAL);
         let ended = child.try_wait().or_fail(ExitKind::Run)?;
         for line in child.read_lines().or_fail(ExitKind::Run)? {
             match serde_json::from_str(&line) {
-                Ok(heard) => return Ok(Some(heard)),
+                Ok(receiver) => return Ok(Some(receiver)),
                 Err(_) => output::message(line),
             }
         }
@@ -171,17 +171,17 @@ fn ask(
             break;
         }
     }
-    Err(silent(child))
+    Err(no_report(child))
 }
 
-fn silent(child: &mut Child) -> Failure {
+fn no_report(child: &mut Child) -> Failure {
     for line in child.read_lines().unwrap_or_default() {
         output::message(line);
     }
     Failure::new(ExitKind::Run, "the receiving process says nothing")
 }
 
-/// Of how many messages both say where they lie, and of how many the same.
+/// The number of messages whose location both processes know, and of those with the same location.
 fn compare(sent: &[Spot], received: &[Spot]) -> (usize, usize) {
     let of = |message: u64| sent.iter().find(move |it| it.message == message);
     let pairs = received.iter().filter_map(|it| Some((it, of(it.message)?)));
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_copy_lies_elsewhere() {
+    fn a_copied_message_has_another_location() {
         let spot = |message, offset| Spot {
             message,
             inode: 7,

@@ -1,25 +1,25 @@
-//! Whole deployments under load.
+//! Benchmarks of whole deployments under load.
 
 use launch::output::{self, Verbosity};
 use report::run::Limit;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
-use super::course::{Case, Course, Measured};
-use super::occasion::Occasion;
 use super::options::Options;
+use super::provenance::Provenance;
 use super::report::Report;
+use super::workload::{Case, Measured, Workload};
 use crate::spread::Spread;
 use crate::trial::limit;
 
-/// Which runs.
+/// The kind of load benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// All cameras at the pace of the clock; one dead.
+    /// All cameras in real time; then the same with one killed.
     Latency,
-    /// All cameras, every frame.
+    /// All cameras, every frame, as fast as possible.
     Throughput,
-    /// One camera more from run to run; one dead.
+    /// One camera, two, and so on, in real time; then all with one killed.
     Scale,
 }
 
@@ -40,7 +40,7 @@ impl Kind {
         }
     }
 
-    /// The runs with so many cameras.
+    /// The runs of a benchmark with at most `n_views` cameras.
     fn cases(self, n_views: usize) -> Vec<Case> {
         let case = |n_views| Case {
             n_views,
@@ -61,22 +61,22 @@ impl Kind {
     }
 }
 
-/// Measures a deployment under load. `None` if it was stopped.
+/// Measures a deployment under load. `None` if it was interrupted.
 ///
 /// # Errors
 ///
-/// The deployment cannot be read or used, has fewer cameras than were asked for, or a run of it fails.
+/// The deployment cannot be read or used, has fewer cameras than requested, or a run fails.
 pub fn load(
     kind: Kind,
     options: &Options,
     verbosity: Verbosity,
 ) -> Result<Option<Report>, Failure> {
-    let occasion = Occasion::now();
+    let provenance = Provenance::now();
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let Some(course) = Course::new(options, verbosity, &stop)? else {
+    let Some(workload) = Workload::new(options, verbosity, &stop)? else {
         return Ok(None);
     };
-    let cases = kind.cases(course.n_views());
+    let cases = kind.cases(workload.n_views());
     let mut all = Vec::new();
     for (index, case) in cases.iter().enumerate() {
         if !verbosity.quiet {
@@ -85,7 +85,7 @@ pub fn load(
                 "run {nth} of {of}: {case}, {seconds} s of footage"
             ));
         }
-        match course.measure(*case, &stop)? {
+        match workload.measure(*case, &stop)? {
             Some(measured) => all.push(measured),
             None => return Ok(None),
         }
@@ -93,8 +93,8 @@ pub fn load(
     Ok(Some(Report {
         bench: kind.name(),
         title: kind.title().to_owned(),
-        occasion,
-        settings: options.settings(course.n_views()),
+        provenance,
+        settings: options.settings(workload.n_views()),
         table: table(&all),
         notes: Vec::new(),
         limits: options.limits(&all),
@@ -120,7 +120,7 @@ impl Options {
         })
     }
 
-    /// What was asked of the run with all cameras, none of them dead.
+    /// The requested limits, checked on the run with all cameras.
     fn limits(&self, all: &[Measured]) -> Vec<Limit> {
         let whole = all.iter().rfind(|it| !it.case.has_dead);
         let end_to_end = whole.and_then(|it| it.end_to_end);
@@ -137,7 +137,7 @@ impl Options {
     }
 }
 
-/// A row for every run, and below it one for every stage.
+/// The table: a header, and per run a row and one row per stage.
 fn table(all: &[Measured]) -> Vec<Vec<String>> {
     let heads = [
         "run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_dies_after_all_runs_in_which_none_does() {
+    fn the_run_with_a_killed_camera_is_the_last() {
         assert_eq!(
             names(Kind::Scale, 3),
             ["1 view", "2 views", "3 views", "3 views, one dead"]
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn the_only_camera_does_not_die() {
+    fn a_single_camera_is_not_killed() {
         assert_eq!(names(Kind::Latency, 1), ["1 view"]);
     }
 }

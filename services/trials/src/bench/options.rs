@@ -1,34 +1,34 @@
-//! What is to be measured of a deployment under load, and what must hold.
+//! Options and limits of the load benchmarks.
 
 use std::path::PathBuf;
 
-/// What to measure.
+/// Options of a load benchmark.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The deployment file; cameras that do not exist if there is none.
+    /// The deployment file; synthetic cameras if there is none.
     pub deployment: Option<PathBuf>,
-    /// Cameras; of a deployment file the first so many, all if there is no number. 4 of those that do not exist.
+    /// Number of cameras: the first ones of the deployment file, all by default; 4 synthetic cameras by default.
     pub views: Option<usize>,
-    /// Footage of every run, seconds.
+    /// Length of the footage of every run, seconds.
     pub seconds: u32,
-    /// Frames a second of cameras that do not exist.
+    /// Frames per second of synthetic cameras.
     pub rate_hz: f64,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Whether camera processes make their pictures while they run.
+    /// Whether the capture processes render their pictures during the run.
     pub live: bool,
-    /// Whether stages look for messages without pause.
+    /// Whether stages poll for messages.
     pub spin: bool,
-    /// Values of the deployment that are replaced: `key=value`.
+    /// `key=value` pairs that replace values of the deployment.
     pub set: Vec<String>,
-    /// Folder for pictures and results.
+    /// The folder for pictures and results.
     pub out: PathBuf,
-    /// Name of the deployment: two that run at once need two.
+    /// The name of the deployment, unique among those that run at the same time.
     pub name: String,
-    /// Largest median end to end, milliseconds, of the run with all cameras.
+    /// The largest median latency end to end of the run with all cameras, milliseconds.
     pub max_p50_ms: Option<f64>,
-    /// Largest 99th percentile, likewise.
+    /// The largest 99th percentile of the same, milliseconds.
     pub max_p99_ms: Option<f64>,
-    /// Least results a second, likewise.
+    /// The least rate of results of the same run, per second.
     pub min_rate_hz: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Pictures of cameras that do not exist, made before they are needed.
+//! Renders the pictures of synthetic cameras in advance.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use scene::{Scene, Settings, View};
 
-/// Writes the first pictures of every camera into a folder of its name; false if it was stopped.
+/// Writes the first pictures of every camera into a subfolder with its name; false if it was interrupted.
 ///
 /// * `quiet`: shows no progress.
 pub(super) fn draw(
@@ -47,9 +47,9 @@ pub(super) fn draw(
     Ok(!stop.is_requested())
 }
 
-/// Makes the folder anew: those of another bench must not be among them.
+/// Writes the pictures of a camera; removes pictures of an earlier benchmark.
 ///
-/// * `is_enough`: asked after every picture.
+/// * `is_enough`: called after every picture; true ends the rendering.
 fn draw_view(
     view: &mut View,
     n_frames: u64,

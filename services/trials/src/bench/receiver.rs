@@ -1,4 +1,4 @@
-//! The receiving process of a series of messages: takes in what is sent, and says how long it was on its way.
+//! The receiving process of the transport benchmark: receives messages, and measures their latency.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -11,24 +11,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::spread::Spread;
 
-/// Messages before those that are measured: the first few of them are looked at closely.
+/// Number of messages before the measured ones.
 pub(super) const WARM_UP: u64 = 64;
-/// Of these, how many are asked where they lie.
+/// Number of messages, from the first, whose location is recorded.
 pub(super) const N_PLACED: u64 = 32;
 
-/// Where the bytes of a message lie: file and place in it. The same numbers in two processes are the same bytes.
+/// The location of a message: file and offset. The same location in two processes means the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Spot {
-    /// Which message.
+    /// The number of the message.
     pub message: u64,
-    /// Number of the file.
+    /// The inode of the file.
     pub inode: u64,
-    /// Bytes from its begin.
+    /// The offset in the file, bytes.
     pub offset: u64,
 }
 
 impl Spot {
-    /// Of a message, if it lies in shared memory.
+    /// The location of a message; none if it is not in shared memory.
     pub(super) fn of(message: u64, payload: &[u8]) -> Option<Self> {
         let Mapped { inode, offset, .. } = mapped_at(payload).ok()??;
         Some(Self {
@@ -39,51 +39,51 @@ impl Spot {
     }
 }
 
-/// What a receiver has to say in the end.
+/// The report of the receiver at the end of a series.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(super) struct Heard {
-    /// Messages that were received of those that are measured.
+pub(super) struct ReceiverReport {
+    /// Number of measured messages that were received.
     pub received: u64,
-    /// Of these, with another content than was sent.
+    /// Number of messages with a wrong content.
     pub broken: u64,
-    /// From just before sending to just after receiving, microseconds.
+    /// Time from just before sending to just after receiving, microseconds.
     pub hop_us: Option<Spread>,
-    /// Where the first messages lay.
+    /// The locations of the first messages.
     pub spots: Vec<Spot>,
-    /// Bytes that the receiver's ports copied.
+    /// Bytes copied by the receiver's ports.
     pub copied_bytes: u64,
 }
 
-/// Becomes the receiving process of [`transport()`](super::transport()).
+/// Runs the receiving process of [`transport()`](super::transport()).
 ///
-/// * `arguments`: what that process says about the deployment.
+/// * `arguments`: the launch arguments from the sending process.
 ///
 /// # Errors
 ///
-/// The arguments are not those of a process.
+/// The arguments are invalid.
 pub fn receive(arguments: &[OsString]) -> Result<ExitCode, Failure> {
     let (launch, _) = Launch::from_args(arguments.iter().cloned())?;
-    Ok(run_service(launch, hear))
+    Ok(run_service(launch, receive_all))
 }
 
-fn hear(service: &Service) -> Result<(), Failure> {
+fn receive_all(service: &Service) -> Result<(), Failure> {
     let bus = service.bus();
     let mut waiter = bus.waiter();
     let port = bus.slice_subscriber::<u8, FrameHeader>(&topic::frame(0), &mut waiter)?;
-    let mut heard = Heard::default();
+    let mut report = ReceiverReport::default();
     let mut hops = Vec::new();
     while waiter.wait(Duration::from_millis(100))? != Woken::Stop {
         while let Some(sample) = port.receive()? {
             let received_at = now_nanos();
             let header = sample.header();
             if header.status == Status::END {
-                heard.hop_us = Spread::of(hops);
-                heard.copied_bytes = bus.copies().bytes();
-                return output::json(&heard);
+                report.hop_us = Spread::of(hops);
+                report.copied_bytes = bus.copies().bytes();
+                return output::json(&report);
             }
-            heard.look_closely(&sample);
+            report.inspect(&sample);
             if header.stamp.frame >= WARM_UP {
-                heard.received += 1;
+                report.received += 1;
                 let nanos = received_at.saturating_sub(header.timing.sent_at_nanos);
                 hops.push(nanos as f64 / 1e3);
             }
@@ -92,8 +92,8 @@ fn hear(service: &Service) -> Result<(), Failure> {
     Ok(())
 }
 
-impl Heard {
-    fn look_closely(&mut self, sample: &Sample<u8, FrameHeader>) {
+impl ReceiverReport {
+    fn inspect(&mut self, sample: &Sample<u8, FrameHeader>) {
         let (message, payload) = (sample.header().stamp.frame, sample.payload());
         if message < N_PLACED {
             self.spots.extend(Spot::of(message, payload));
@@ -102,7 +102,7 @@ impl Heard {
     }
 }
 
-/// Writes a message where it will be read: its number at both ends, and a byte of it between.
+/// Writes the content of a message: its number at both ends, and the low byte of it in between.
 pub(super) fn write(message: u64, payload: &mut [u8]) {
     payload.fill(message as u8);
     let number = message.to_le_bytes();
@@ -114,7 +114,7 @@ pub(super) fn write(message: u64, payload: &mut [u8]) {
     }
 }
 
-/// Whether a payload is what was written of a message, as far as a look at its ends and its middle tells.
+/// Whether a payload is that of a message; checks both ends and one byte in the middle.
 fn is_of(message: u64, payload: &[u8]) -> bool {
     let number = message.to_le_bytes();
     let is_whole = payload.len() < 24 || payload[payload.len() / 2] == message as u8;
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_is_known_by_its_content() {
+    fn a_wrong_or_torn_message_is_detected() {
         for len in [16, 24, 64, 1000] {
             let mut payload = vec![0; len];
             write(0x0102_0304, &mut payload);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_in_no_shared_memory_has_no_spot() {
+    fn memory_that_is_not_shared_has_no_location() {
         assert_eq!(Spot::of(3, &[0; 5000]), None);
     }
 }

@@ -1,4 +1,4 @@
-//! What was measured: a table for people, JSON for programs, a record for later.
+//! The report of a benchmark, as text, as JSON, and as a record in a Markdown file.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -8,62 +8,61 @@ use report::run::Limit;
 use runtime::Failure;
 use serde_json::{Value, json};
 
-use super::occasion::Occasion;
+use super::provenance::Provenance;
 
-/// What was measured.
+/// The report of a benchmark.
 #[derive(Debug)]
 pub struct Report {
-    /// Which bench: a word.
+    /// The name of the benchmark.
     pub(super) bench: &'static str,
-    /// What the table shows, in a line.
+    /// The title of the table.
     pub(super) title: String,
-    /// When, where and of what; as it began.
-    pub(super) occasion: Occasion,
-    /// What was set, by name.
+    /// The provenance of the measurements.
+    pub(super) provenance: Provenance,
+    /// The settings, by name.
     pub(super) settings: Value,
-    /// The table: heads, then rows.
+    /// The table: a header, then rows.
     pub(super) table: Vec<Vec<String>>,
-    /// Lines below it.
+    /// Lines below the table.
     pub(super) notes: Vec<String>,
-    /// What had to hold.
+    /// The limits, with what was measured.
     pub(super) limits: Vec<Limit>,
-    /// The numbers, for programs.
+    /// The measurements as JSON.
     pub(super) numbers: Value,
 }
 
 impl Report {
-    /// Whether no limit was missed.
+    /// Whether all limits held.
     pub fn is_held(&self) -> bool {
         self.limits.iter().all(|it| it.held)
     }
 
-    /// Appends it to a record, as Markdown with date, machine, commit and settings. The file and its folder are made if
-    /// they are not there.
+    /// Appends the report to a Markdown file. Creates the file and its folder if they do not exist.
     ///
     /// # Errors
     ///
     /// The file cannot be written to.
     pub fn append(&self, file: &Path) -> Result<(), Failure> {
-        let added = self.add(file);
-        added.map_err(|error| runtime::in_file(file, &error))
+        let written = self.write_record(file);
+        written.map_err(|error| runtime::in_file(file, &error))
     }
 
-    fn add(&self, file: &Path) -> std::io::Result<()> {
+    fn write_record(&self, file: &Path) -> std::io::Result<()> {
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder)?;
         }
         let text = format!(
             "\n## {}: {}\n\n```\n{}\n```\n",
-            self.occasion.date,
+            self.provenance.date,
             self.bench,
             self.text()
         );
         let mut record = OpenOptions::new().create(true).append(true).open(file)?;
-        // In one piece: two that end at once do not mix.
+        // In one write, so that records of concurrent benchmarks do not mix.
         record.write_all(text.as_bytes())
     }
 
-    /// For programs.
+    /// The report as JSON.
     pub fn json(&self) -> Value {
         let limits = self.limits.iter().map(
             |it| json!({ "what": it.what, "asked": it.asked, "got": it.got, "held": it.held }),
@@ -71,7 +70,7 @@ impl Report {
         json!({
             "schema_version": 1,
             "bench": self.bench,
-            "occasion": self.occasion,
+            "occasion": self.provenance,
             "settings": self.settings,
             "numbers": self.numbers,
             "limits": limits.collect::<Vec<_>>(),
@@ -79,10 +78,10 @@ impl Report {
         })
     }
 
-    /// For people.
+    /// The report as text.
     pub fn text(&self) -> String {
         let mut lines = vec![self.title.clone()];
-        lines.extend(self.occasion.text().lines().map(str::to_owned));
+        lines.extend(self.provenance.text().lines().map(str::to_owned));
         lines.push(settings(&self.settings));
         lines.push(String::new());
         lines.extend(aligned(&self.table));
@@ -98,18 +97,18 @@ impl Report {
     }
 }
 
-/// `name value, name value`.
+/// The settings as one line: `name value, name value`.
 fn settings(value: &Value) -> String {
     let entries = value.as_object().into_iter().flatten();
-    let said = entries.map(|(name, value)| match value {
+    let texts = entries.map(|(name, value)| match value {
         Value::String(text) if text.is_empty() => format!("{name} none"),
         Value::String(text) => format!("{name} {text}"),
         other => format!("{name} {other}"),
     });
-    said.collect::<Vec<_>>().join(", ")
+    texts.collect::<Vec<_>>().join(", ")
 }
 
-/// Rows as lines: the first column begins, the others end below their heads.
+/// The rows as lines: the first column left-aligned, the others right-aligned.
 fn aligned(table: &[Vec<String>]) -> Vec<String> {
     let n_columns = table.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| {
@@ -142,7 +141,7 @@ mod tests {
         Report {
             bench: "transport",
             title: "one hop".to_owned(),
-            occasion: Occasion::now(),
+            provenance: Provenance::now(),
             settings: json!({ "messages": 7, "cores": "" }),
             table: vec![
                 row(["who", "p50", "max"]),
@@ -155,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_stand_below_their_heads() {
+    fn columns_are_aligned_with_their_headers() {
         let text = report(1.5).text();
         assert!(text.contains("\nwho       p50    max\n"), "{text}");
         assert!(text.contains("\nsomebody  1.5  10.25\na note\n"), "{text}");
@@ -163,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_that_was_missed_is_named_and_decides_the_exit_code() {
+    fn a_missed_limit_is_shown_and_the_report_is_not_held() {
         for (got, held, word) in [(1.5, true, "held  "), (2.5, false, "MISSED")] {
             let report = report(got);
             assert_eq!(report.is_held(), held);
@@ -173,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn records_follow_one_another_in_the_file() {
+    fn records_are_appended() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("new/record.md");
         for _ in 0..2 {

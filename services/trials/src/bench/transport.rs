@@ -1,4 +1,4 @@
-//! One hop between two processes, woken by an event and polling.
+//! Measures one hop between two processes, with a receiver that is woken by an event or polls.
 
 use std::time::Duration;
 
@@ -8,49 +8,49 @@ use runtime::{ExitKind, Failure, OrFail as _, Policy, RealTime, Scheduling, Stop
 use serde_json::{Value, json};
 
 use super::hop::{self, Measured, Series};
-use super::occasion::Occasion;
+use super::provenance::Provenance;
 use super::report::Report;
 use crate::spread::Spread;
 use crate::trial::limit;
 
-/// What to measure.
+/// Options of the transport benchmark.
 #[derive(Debug, Clone)]
 pub struct Transport {
-    /// Messages of every series.
+    /// Messages per series.
     pub messages: u64,
-    /// From one message to the next, microseconds.
+    /// Interval between messages, microseconds.
     pub interval_us: u64,
-    /// Bytes of the messages, a series for each; 16 at least.
+    /// Sizes of messages, bytes, at least 16; one series each.
     pub bytes: Vec<usize>,
-    /// Whether only the receiver that polls is measured.
+    /// Whether only the polling receiver is measured.
     pub spin: bool,
-    /// Cores for the sender and the receiver; any if empty.
+    /// Cores of the sender and the receiver; any if empty.
     pub cores: Vec<usize>,
     /// Real-time priority of both, 1 to 99.
     pub priority: Option<u8>,
-    /// Largest median of a hop when woken, microseconds.
+    /// The largest median of a hop with a receiver that is woken by an event, microseconds.
     pub max_event_us: Option<f64>,
-    /// Largest median of a hop when polling, microseconds.
+    /// The largest median of a hop with a polling receiver, microseconds.
     pub max_polled_us: Option<f64>,
-    /// Name of the deployment: two that run at once need two.
+    /// The name of the deployment, unique among those that run at the same time.
     pub name: String,
 }
 
-/// One row of the table.
+/// A row of the table.
 struct Row {
     spins: bool,
     bytes: usize,
     measured: Measured,
 }
 
-/// Measures all series. `None` if it was stopped.
+/// Measures all series. `None` if it was interrupted.
 ///
 /// # Errors
 ///
-/// There are cores for one of the two only; the receiving process cannot be started, or says nothing.
+/// The number of cores is not 0 or 2; the receiving process cannot be started, or does not report.
 pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Report>, Failure> {
     let [sender, receiver] = options.scheduling()?;
-    let occasion = Occasion::now();
+    let provenance = Provenance::now();
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     for denied in sender.apply() {
         tracing::warn!("{denied}; going on without. Try: {}", denied.hint());
@@ -73,8 +73,8 @@ pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Rep
                 log: verbosity.level,
             };
             if !verbosity.quiet {
-                let (how, n) = (how(spins), options.messages);
-                output::message(format_args!("{n} messages of {bytes} bytes, {how} ..."));
+                let (mode, n) = (mode(spins), options.messages);
+                output::message(format_args!("{n} messages of {bytes} bytes, {mode} ..."));
             }
             let Some(measured) = hop::measure(&series, &stop)? else {
                 return Ok(None);
@@ -86,10 +86,10 @@ pub fn transport(options: &Transport, verbosity: Verbosity) -> Result<Option<Rep
             });
         }
     }
-    Ok(Some(options.report(occasion, &rows)))
+    Ok(Some(options.report(provenance, &rows)))
 }
 
-fn how(spins: bool) -> &'static str {
+fn mode(spins: bool) -> &'static str {
     if spins {
         "polling"
     } else {
@@ -98,7 +98,7 @@ fn how(spins: bool) -> &'static str {
 }
 
 impl Transport {
-    /// Of the sender and the receiver.
+    /// The scheduling of the sender and the receiver.
     fn scheduling(&self) -> Result<[Scheduling; 2], Failure> {
         if ![0, 2].contains(&self.cores.len()) {
             let message = "--cores takes two: the sender's and the receiver's";
@@ -115,7 +115,7 @@ impl Transport {
         Ok([of(0), of(1)])
     }
 
-    fn report(&self, occasion: Occasion, rows: &[Row]) -> Report {
+    fn report(&self, provenance: Provenance, rows: &[Row]) -> Report {
         let heads = ["receiver", "bytes", "p50", "p99", "p99.9", "max", "lost"];
         let table = [heads.map(str::to_owned).to_vec()].into_iter();
         let [sender, receiver] = [0, 1].map(|it| {
@@ -125,7 +125,7 @@ impl Transport {
         Report {
             bench: "transport",
             title: "one hop between two processes, microseconds".to_owned(),
-            occasion,
+            provenance,
             settings: json!({
                 "messages": self.messages,
                 "interval_us": self.interval_us,
@@ -140,14 +140,14 @@ impl Transport {
         }
     }
 
-    /// What was asked for, and what must always hold.
+    /// The requested limits, and those that always apply.
     fn limits(&self, rows: &[Row]) -> Vec<Limit> {
         let mut limits = Vec::new();
         for (spins, most) in [(false, self.max_event_us), (true, self.max_polled_us)] {
             let Some(most) = most else { continue };
             for row in rows.iter().filter(|it| it.spins == spins) {
-                let what = format!("p50 of {} bytes {}, us", row.bytes, how(spins));
-                let got = row.measured.heard.hop_us.map(|it| it.p50);
+                let what = format!("p50 of {} bytes {}, us", row.bytes, mode(spins));
+                let got = row.measured.receiver.hop_us.map(|it| it.p50);
                 limits.push(limit::at_most(&what, most, got));
             }
         }
@@ -164,7 +164,7 @@ impl Transport {
             limit::at_most(
                 "messages with another content",
                 0.0,
-                Some(sum(|it| it.heard.broken) as f64),
+                Some(sum(|it| it.receiver.broken) as f64),
             ),
         ]);
         limits
@@ -175,12 +175,12 @@ impl Row {
     fn lost(&self) -> u64 {
         self.measured
             .sent
-            .saturating_sub(self.measured.heard.received)
+            .saturating_sub(self.measured.receiver.received)
     }
 
     fn cells(&self) -> Vec<String> {
-        let mut cells = vec![how(self.spins).to_owned(), self.bytes.to_string()];
-        cells.extend(Spread::cells(self.measured.heard.hop_us, 2));
+        let mut cells = vec![mode(self.spins).to_owned(), self.bytes.to_string()];
+        cells.extend(Spread::cells(self.measured.receiver.hop_us, 2));
         cells.push(self.lost().to_string());
         cells
     }
@@ -191,10 +191,10 @@ impl Row {
             "receiver": if self.spins { "poll" } else { "event" },
             "bytes": self.bytes,
             "sent": it.sent,
-            "received": it.heard.received,
+            "received": it.receiver.received,
             "lost": self.lost(),
-            "broken": it.heard.broken,
-            "hop_us": it.heard.hop_us,
+            "broken": it.receiver.broken,
+            "hop_us": it.receiver.hop_us,
             "places": { "compared": it.n_compared, "same": it.n_same_place },
             "copied_bytes": it.copied_bytes,
         })

@@ -1,4 +1,4 @@
-//! A camera that fails while the run goes on: what is said of its frames, and when it is back.
+//! The `camera-...` scenarios: a camera fails for a while.
 
 use fastrand::Rng;
 use report::run::Limit;
@@ -6,48 +6,51 @@ use runtime::Failure;
 use serde::Serialize;
 use serde_json::json;
 
-use super::aim::{STRIKE_AFTER, frame_at};
 use super::fault::CameraFault;
-use super::ground::Ground;
-use super::judge::Aftermath;
+use super::judge::RunOutcome;
 use super::options::{Limits, Options};
+use super::target::{INJECT_AFTER, frame_at};
+use super::testbed::Testbed;
 use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
-use crate::trial::results::Moment;
+use crate::trial::results::FrameResult;
 
-/// For so long a camera fails, as a share of the footage.
+/// The duration of the fault, as a share of the footage.
 const SHARE: f64 = 0.2;
-/// Repetitions from which on a picture is called frozen, so that a short run shows it.
+/// The number of repetitions after which a picture counts as frozen: small, so that a short run shows it.
 const FROZEN_AFTER: &str = "capture.frozen_after=2";
 
-/// What became of a run in which a camera failed. Times are milliseconds.
+/// What a run with a camera fault showed. Times are in milliseconds.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(super) struct Failed {
+pub(super) struct CameraFailure {
     /// The camera.
     pub camera: String,
-    /// First frame of the fault, and one beyond the last.
+    /// The first frame of the fault, and the one after the last.
     pub span: [u64; 2],
-    /// Results of those frames that say why the camera has no part in them, by cause.
+    /// The number of results of these frames that give each cause of the fault as the reason why the view is missing.
     pub flagged: Vec<(String, usize)>,
-    /// Results of those frames in which others have a part.
+    /// The number of results of these frames that other views were used in.
     pub results_without_it: usize,
-    /// Longest time between two of them.
+    /// The longest time between two of these results.
     pub longest_pause_ms: Option<f64>,
-    /// From the last result of those frames to the first in which the camera has a part again.
+    /// The time from the last result of these frames to the first result that the camera is used in again.
     pub back_ms: Option<f64>,
 }
 
-impl Failed {
-    /// * `view`: of the camera.
+impl CameraFailure {
+    /// Evaluates the results of a run.
+    ///
+    /// * `view`: the number of the camera's view.
+    /// * `span`: the first frame of the fault, and the one after the last.
     pub(super) fn new(
         fault: CameraFault,
         camera: &str,
         view: usize,
         span: [u64; 2],
-        moments: &[Moment],
+        results: &[FrameResult],
     ) -> Self {
-        let reason = |it: &Moment| it.views.get(view).and_then(|it| it.missing.clone());
-        let during: Vec<&Moment> = moments
+        let reason = |it: &FrameResult| it.views.get(view).and_then(|it| it.missing.clone());
+        let during: Vec<&FrameResult> = results
             .iter()
             .filter(|it| (span[0]..span[1]).contains(&it.frame))
             .collect();
@@ -59,10 +62,10 @@ impl Failed {
                 .count();
             (cause.to_owned(), n)
         });
-        let has_others = |it: &&&Moment| it.views.iter().any(|it| it.missing.is_none());
+        let has_others = |it: &&&FrameResult| it.views.iter().any(|it| it.missing.is_none());
         let pauses = during.windows(2).map(|it| it[1].sent_ms - it[0].sent_ms);
         let last = during.last().map(|it| it.sent_ms);
-        let mut after = moments.iter().filter(|it| it.frame >= span[1]);
+        let mut after = results.iter().filter(|it| it.frame >= span[1]);
         let back = after.find(|it| reason(it).is_none()).map(|it| it.sent_ms);
         Self {
             camera: camera.to_owned(),
@@ -74,13 +77,13 @@ impl Failed {
         }
     }
 
-    /// What must hold.
-    pub(super) fn judge(&self, asked: &Limits, after: &Aftermath) -> Vec<Limit> {
+    /// Checks the limits of the scenario.
+    pub(super) fn judge(&self, limits: &Limits, outcome: &RunOutcome) -> Vec<Limit> {
         let flagged = self.flagged.iter();
         let flagged = flagged
             .map(|(cause, n)| at_least(&format!("frames called {cause}"), 1.0, Some(*n as f64)));
-        let mut limits: Vec<Limit> = flagged.collect();
-        limits.extend([
+        let mut checked: Vec<Limit> = flagged.collect();
+        checked.extend([
             at_least(
                 "results of others meanwhile",
                 1.0,
@@ -88,16 +91,16 @@ impl Failed {
             ),
             at_most(
                 "longest pause of results meanwhile, ms",
-                asked.max_pause_ms,
+                limits.max_pause_ms,
                 self.longest_pause_ms,
             ),
-            at_most("back after, ms", asked.max_return_ms, self.back_ms),
+            at_most("back after, ms", limits.max_return_ms, self.back_ms),
         ]);
-        limits.extend(after.judge(0));
-        limits
+        checked.extend(outcome.judge(0));
+        checked
     }
 
-    /// For people.
+    /// The measurements as text.
     fn measured(&self, n_results: usize) -> String {
         let flagged = self.flagged.iter().map(|(cause, n)| format!("{n} {cause}"));
         format!(
@@ -112,78 +115,78 @@ impl Failed {
     }
 }
 
-/// Lets a camera chosen at random fail.
+/// Runs the deployment with a fault of a randomly chosen camera.
 pub(super) fn attempt(
-    ground: &Ground,
+    testbed: &Testbed,
     options: &Options,
     fault: CameraFault,
 ) -> Result<Verdict, Failure> {
-    let [scenario, _] = fault.words();
-    let plain = ground.plan(scenario, &[])?;
+    let [scenario, _] = fault.name_and_summary();
+    let plain = testbed.plan(scenario, &[])?;
     let cameras = &plain.resolved().deployment.cameras;
     let view = Rng::with_seed(options.seed).usize(..cameras.len());
     let camera = cameras[view].name.clone();
     let [from, to] =
-        [STRIKE_AFTER, STRIKE_AFTER + SHARE].map(|share| frame_at(&plain, share) as u64);
+        [INJECT_AFTER, INJECT_AFTER + SHARE].map(|share| frame_at(&plain, share) as u64);
     let span = [from, to.max(from + 3)];
     let setting = fault.setting(span);
-    let planned = ground.plan_with(scenario, &[FROZEN_AFTER], &|deployment| {
+    let planned = testbed.plan_with(scenario, &[FROZEN_AFTER], &|deployment| {
         if let (Some(camera), Ok(fault)) = (deployment.cameras.get_mut(view), setting.parse()) {
             camera.fault = fault;
         }
     })?;
-    let ran = ground.watch(&planned, &mut |_| None);
-    let after = ran.aftermath(|_| 0);
-    let it = Failed::new(fault, &camera, view, span, &ran.moments);
+    let run = testbed.run(&planned, &mut |_| None);
+    let outcome = run.outcome(|_| 0);
+    let failure = CameraFailure::new(fault, &camera, view, span, &run.results);
     Ok(Verdict {
         scenario: scenario.to_owned(),
-        measured: it.measured(after.n_results),
-        more: Vec::new(),
-        numbers: json!(it),
-        limits: it.judge(&options.limits, &after),
-        run: ran.json(),
+        measured: failure.measured(outcome.n_results),
+        details: Vec::new(),
+        numbers: json!(failure),
+        limits: failure.judge(&options.limits, &outcome),
+        run: run.json(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trial::results::Seen;
+    use crate::trial::results::ViewResult;
 
-    /// A result of two views, the second of which is missing for a reason.
-    fn moment(frame: u64, sent_ms: f64, missing: Option<&str>) -> Moment {
-        let second = Seen {
+    /// A result of two views; the second is missing if there is a reason.
+    fn moment(frame: u64, sent_ms: f64, missing: Option<&str>) -> FrameResult {
+        let second = ViewResult {
             missing: missing.map(str::to_owned),
-            ..Seen::default()
+            ..ViewResult::default()
         };
-        Moment {
+        FrameResult {
             frame,
             epoch: 0,
             sent_ms,
             joints: Vec::new(),
-            views: vec![Seen::default(), second],
+            views: vec![ViewResult::default(), second],
         }
     }
 
-    fn failed(moments: &[Moment]) -> Failed {
-        Failed::new(CameraFault::Unplug, "b", 1, [2, 5], moments)
+    fn failed(results: &[FrameResult]) -> CameraFailure {
+        CameraFailure::new(CameraFault::Unplug, "b", 1, [2, 5], results)
     }
 
-    fn missed(it: &Failed) -> Vec<String> {
-        let asked = Limits {
+    fn missed(failure: &CameraFailure) -> Vec<String> {
+        let limits = Limits {
             max_return_ms: 500.0,
             max_pause_ms: 200.0,
         };
-        let after = Aftermath {
+        let outcome = RunOutcome {
             n_results: 6,
-            ..Aftermath::default()
+            ..RunOutcome::default()
         };
-        let limits = it.judge(&asked, &after).into_iter();
-        limits.filter(|it| !it.held).map(|it| it.what).collect()
+        let checked = failure.judge(&limits, &outcome).into_iter();
+        checked.filter(|it| !it.held).map(|it| it.what).collect()
     }
 
     #[test]
-    fn a_camera_that_leaves_and_comes_back_is_told_by_its_results() {
+    fn the_results_show_the_absence_and_the_return_of_a_camera() {
         let gone = Some("camera gone");
         let it = failed(&[
             moment(1, 100.0, None),
@@ -193,7 +196,7 @@ mod tests {
             moment(5, 500.0, gone),
             moment(6, 600.0, None),
         ]);
-        let expected = Failed {
+        let expected = CameraFailure {
             camera: "b".to_owned(),
             span: [2, 5],
             flagged: vec![("camera gone".to_owned(), 2)],
@@ -206,13 +209,13 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_that_nobody_notices_and_a_camera_that_stays_away_are_misses() {
-        let unnoticed: Vec<Moment> = (0..8)
+    fn an_undetected_fault_and_a_camera_that_never_returns_miss_limits() {
+        let unnoticed: Vec<FrameResult> = (0..8)
             .map(|it| moment(it, 100.0 * it as f64, None))
             .collect();
         assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
         let gone = Some("camera gone");
-        let for_ever: Vec<Moment> = (0..8)
+        let for_ever: Vec<FrameResult> = (0..8)
             .map(|it| moment(it, 100.0 * it as f64, gone.filter(|_| it > 1)))
             .collect();
         assert_eq!(missed(&failed(&for_ever)), ["back after, ms"]);

@@ -1,19 +1,19 @@
-//! How a camera fails, and what is to be said of its frames.
+//! Camera faults, and the status that their frames must have.
 
 use messages::Status;
 
-/// How a camera fails.
+/// A fault of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraFault {
-    /// It is gone.
+    /// It is disconnected.
     Unplug,
-    /// Its picture stays as it is.
+    /// It repeats the same picture.
     Freeze,
-    /// Its clock jumps, goes back and stands still.
+    /// Its clock jumps, goes back and stops.
     Clock,
-    /// Its pictures have another size.
+    /// Its pictures have a wrong size.
     Size,
-    /// It leaves out every second frame.
+    /// It skips every second frame.
     Slow,
     /// Its pictures cannot be decoded.
     Damage,
@@ -30,8 +30,8 @@ impl CameraFault {
         Self::Damage,
     ];
 
-    /// Its name, and what happens, for people.
-    pub(super) fn words(self) -> [&'static str; 2] {
+    /// The name of the scenario, and its description.
+    pub(super) fn name_and_summary(self) -> [&'static str; 2] {
         match self {
             Self::Unplug => [
                 "camera-unplug",
@@ -54,7 +54,7 @@ impl CameraFault {
         }
     }
 
-    /// Faults of the source that make it up, which share the time, and what is to be said of each.
+    /// The faults of the source that it consists of, one after the other, and the status of the frames of each.
     pub(super) fn parts(self) -> &'static [(&'static str, Status)] {
         match self {
             Self::Unplug => &[("unplug", Status::UNPLUGGED)],
@@ -70,9 +70,9 @@ impl CameraFault {
         }
     }
 
-    /// As a setting of a camera.
+    /// The setting `fault` of a camera.
     ///
-    /// * `span`: first frame, and one beyond the last.
+    /// * `span`: the first frame, and the one after the last.
     pub(super) fn setting(self, [from, to]: [u64; 2]) -> String {
         let parts = self.parts();
         let each = ((to - from) / parts.len() as u64).max(1);
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_is_one_that_a_camera_can_have() {
+    fn every_fault_is_a_valid_setting() {
         for it in CameraFault::ALL {
             let faults: deployment::capture::Faults = it.setting([40, 60]).parse().unwrap();
             assert!(faults.at(39).is_none() && faults.at(40).is_some(), "{it:?}");

@@ -1,48 +1,48 @@
-//! What must hold when a process is struck: numbers in, verdicts out.
+//! Checks the measurements of a scenario against its limits.
 
 use report::run::Limit;
 
-use super::census::Sample;
 use super::options::Limits;
+use super::resources::ResourceUse;
 use super::scenario::service_of;
 use crate::spread::Spread;
 use crate::trial::cost::Cost;
+use crate::trial::injection::ProcessFault;
 use crate::trial::limit::{at_least, at_most, none_of};
-use crate::trial::strike::Blow;
 
-/// A death must be noticed within, milliseconds.
+/// The longest time until a death is noticed, milliseconds.
 const NOTICE_MS: f64 = 1000.0;
-/// How much later than its limit a hang may be noticed, milliseconds.
+/// The longest time from the hang limit until a hang is noticed, milliseconds.
 const LATE_MS: f64 = 1000.0;
-/// Frames that every kill may cost without anybody knowing: what the process held, and what its last report may not
-/// have counted.
-const HELD: u64 = 2;
-/// What may be more at the end than at first: share of it, and so much on top.
+/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// not count.
+const MAX_UNACCOUNTED: u64 = 2;
+/// Growth allowed for a resource: by this factor, plus the following amounts.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
 
-/// What is left of a run that is over.
+/// The outcome of a run, as far as it is the same for all scenarios.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Aftermath {
-    /// Why it did not end by itself, if it did not.
+pub(super) struct RunOutcome {
+    /// Why the run failed, if it did.
     pub failure: Option<String>,
-    /// Results that were written.
+    /// Number of results that were written.
     pub n_results: usize,
-    /// Frames of all views whose end is not known.
+    /// Number of frames, over all views, that are unaccounted for.
     pub unanswered: u64,
-    /// Processes that ended more often than they were struck, or were given up.
+    /// Processes that were restarted more often than faults were injected into them, or were given up.
     pub failed: Vec<String>,
-    /// What is left in shared memory.
-    pub left: Vec<String>,
-    /// Cameras that are said not to stand where the calibration says, but for one that does not.
-    pub accused: Vec<String>,
+    /// Names of the files left in shared memory.
+    pub leftovers: Vec<String>,
+    /// Cameras whose calibration is suspected to be wrong although it is right.
+    pub suspected: Vec<String>,
 }
 
-impl Aftermath {
-    /// What must hold however a run went.
+impl RunOutcome {
+    /// Checks the limits that are the same for all scenarios.
     ///
-    /// * `n_kills`: processes that were struck.
+    /// * `n_kills`: the number of processes that were killed or made to hang.
     pub(super) fn judge(&self, n_kills: u64) -> Vec<Limit> {
         let failure: Vec<String> = self.failure.iter().cloned().collect();
         let unanswered = self.failure.is_none().then_some(self.unanswered as f64);
@@ -51,38 +51,38 @@ impl Aftermath {
             at_least("results", 1.0, Some(self.n_results as f64)),
             at_most(
                 "frames whose end is not known",
-                (HELD * n_kills) as f64,
+                (MAX_UNACCOUNTED * n_kills) as f64,
                 unanswered,
             ),
             none_of("processes that failed by themselves", &self.failed),
-            none_of("left in shared memory", &self.left),
+            none_of("left in shared memory", &self.leftovers),
             none_of(
                 "cameras accused that stand where they should",
-                &self.accused,
+                &self.suspected,
             ),
         ]
     }
 }
 
-/// Judges a run one process of which was struck once.
+/// Checks a run with one fault of a process.
 ///
-/// * `hang_ms`: how long a stopped process may give no sign of life, or a spinning one of work, before the supervisor
-///   ends it.
+/// * `hang_ms`: how long a stopped process may send no heartbeat, or a spinning one report no progress, before the
+///   supervisor kills it.
 pub(super) fn once(
-    asked: &Limits,
-    blow: Blow,
+    requested: &Limits,
+    fault: ProcessFault,
     process: &str,
     hang_ms: f64,
-    (cost, after): (&Cost, &Aftermath),
+    (cost, outcome): (&Cost, &RunOutcome),
 ) -> Vec<Limit> {
-    let (notice, patience) = match blow {
-        Blow::Kill => (NOTICE_MS, 0.0),
-        Blow::Stop | Blow::Spin => (hang_ms + LATE_MS, hang_ms),
+    let (notice, patience) = match fault {
+        ProcessFault::Kill => (NOTICE_MS, 0.0),
+        ProcessFault::Stop | ProcessFault::Spin => (hang_ms + LATE_MS, hang_ms),
     };
-    let back = asked.max_return_ms + patience;
+    let back = requested.max_return_ms + patience;
     let pause = match service_of(process) {
-        "capture" | "pose" | "quality" => asked.max_pause_ms,
-        // Without these there is no result, or none of some pairs, or none that is written.
+        "capture" | "pose" | "quality" => requested.max_pause_ms,
+        // Without the others some or all results are missing.
         _ => back,
     };
     let mut limits = vec![
@@ -94,39 +94,43 @@ pub(super) fn once(
             cost.longest_pause_ms,
         ),
     ];
-    limits.extend(after.judge(1));
+    limits.extend(outcome.judge(1));
     limits
 }
 
-/// What became of a run in which one process after the other was killed.
+/// The measurements of a run with random kills.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Barraged {
-    /// Kills.
+pub(super) struct RandomKillsOutcome {
+    /// Number of kills.
     pub n_kills: usize,
-    /// How long those were away who came back, milliseconds; none if nobody did.
-    pub away_ms: Option<Spread>,
-    /// What all held at first and at last, if the run was long enough to say.
-    pub held: Option<[Sample; 2]>,
+    /// Downtimes of the processes that came back, milliseconds; none if none came back.
+    pub downtime_ms: Option<Spread>,
+    /// The resources in use at the start and at the end; none if the run was too short.
+    pub resources: Option<[ResourceUse; 2]>,
 }
 
-/// Judges a run in which one process after the other was killed.
-pub(super) fn random(asked: &Limits, it: &Barraged, after: &Aftermath) -> Vec<Limit> {
+/// Checks a run with random kills.
+pub(super) fn random(
+    requested: &Limits,
+    kills: &RandomKillsOutcome,
+    outcome: &RunOutcome,
+) -> Vec<Limit> {
     let mut limits = vec![
-        at_least("kills", 1.0, Some(it.n_kills as f64)),
+        at_least("kills", 1.0, Some(kills.n_kills as f64)),
         at_least(
             "came back",
-            it.n_kills as f64,
-            Some(it.away_ms.map_or(0, |it| it.n) as f64),
+            kills.n_kills as f64,
+            Some(kills.downtime_ms.map_or(0, |it| it.n) as f64),
         ),
         at_most(
             "back after (p99), ms",
-            asked.max_return_ms,
-            it.away_ms.map(|it| it.p99),
+            requested.max_return_ms,
+            kills.downtime_ms.map(|it| it.p99),
         ),
     ];
-    limits.extend(after.judge(it.n_kills as u64));
-    if let Some([first, last]) = &it.held {
-        let grown = |what: &str, number: fn(&Sample) -> u64, more: f64, unit: f64| {
+    limits.extend(outcome.judge(kills.n_kills as u64));
+    if let Some([first, last]) = &kills.resources {
+        let grown = |what: &str, number: fn(&ResourceUse) -> u64, more: f64, unit: f64| {
             let most = (GROWTH * number(first) as f64 + more) / unit;
             at_most(what, most.round(), Some(number(last) as f64 / unit))
         };
@@ -151,30 +155,34 @@ pub(super) fn random(asked: &Limits, it: &Barraged, after: &Aftermath) -> Vec<Li
     limits
 }
 
-/// What became of a run whose supervisor was killed, and of the next one.
+/// The measurements of a run whose supervisor was killed, and of the next run.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Orphaned {
-    /// When the last of its processes was gone, milliseconds after the kill.
+pub(super) struct SupervisorKillOutcome {
+    /// Time from the kill until the last of its processes had ended, milliseconds; none if some did not end.
     pub ended_ms: Option<f64>,
-    /// Files that were left for the next one.
+    /// Number of files that were left for the next run to remove.
     pub files: u64,
-    /// When the next one had its first result, milliseconds after it was planned.
+    /// Time from the planning of the next run to its first result, milliseconds.
     pub result_ms: Option<f64>,
 }
 
-/// Judges a run whose supervisor was killed, and the next one.
+/// Checks a run whose supervisor was killed, and the next run.
 ///
-/// * `after`: of the next one.
-pub(super) fn supervisor(asked: &Limits, it: &Orphaned, after: &Aftermath) -> Vec<Limit> {
+/// * `outcome`: the outcome of the next run.
+pub(super) fn supervisor(
+    requested: &Limits,
+    killed: &SupervisorKillOutcome,
+    outcome: &RunOutcome,
+) -> Vec<Limit> {
     let mut limits = vec![
-        at_most("its processes ended after, ms", NOTICE_MS, it.ended_ms),
+        at_most("its processes ended after, ms", NOTICE_MS, killed.ended_ms),
         at_most(
             "first result of the next run after, ms",
-            asked.max_return_ms,
-            it.result_ms,
+            requested.max_return_ms,
+            killed.result_ms,
         ),
     ];
-    limits.extend(after.judge(0));
+    limits.extend(outcome.judge(0));
     limits
 }
 
@@ -187,19 +195,19 @@ mod tests {
         max_pause_ms: 2000.0,
     };
 
-    fn good() -> (Cost, Aftermath) {
+    fn good() -> (Cost, RunOutcome) {
         let cost = Cost {
             noticed_ms: Some(3.0),
             back_ms: Some(900.0),
             longest_pause_ms: Some(400.0),
             ..Cost::default()
         };
-        let after = Aftermath {
+        let outcome = RunOutcome {
             n_results: 20,
             unanswered: 2,
-            ..Aftermath::default()
+            ..RunOutcome::default()
         };
-        (cost, after)
+        (cost, outcome)
     }
 
     fn missed(limits: Vec<Limit>) -> Vec<String> {
@@ -207,20 +215,20 @@ mod tests {
         missed.map(|it| it.what).collect()
     }
 
-    /// What a run misses that was good but for a change.
+    /// The limits that a good run misses after a change.
     fn missed_once(
-        blow: Blow,
+        fault: ProcessFault,
         process: &str,
-        change: impl FnOnce(&mut Cost, &mut Aftermath),
+        change: impl FnOnce(&mut Cost, &mut RunOutcome),
     ) -> Vec<String> {
-        let (mut cost, mut after) = good();
-        change(&mut cost, &mut after);
-        missed(once(&ASKED, blow, process, 3000.0, (&cost, &after)))
+        let (mut cost, mut outcome) = good();
+        change(&mut cost, &mut outcome);
+        missed(once(&ASKED, fault, process, 3000.0, (&cost, &outcome)))
     }
 
     #[test]
-    fn every_limit_of_a_struck_process_can_be_missed_alone() {
-        type Change = fn(&mut Cost, &mut Aftermath);
+    fn every_limit_of_a_process_fault_can_be_missed_alone() {
+        type Change = fn(&mut Cost, &mut RunOutcome);
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 11] = [
             (|_, _| (), nothing),
@@ -241,11 +249,11 @@ mod tests {
                 &["processes that failed by themselves"],
             ),
             (
-                |_, it| it.left = vec!["px".to_owned()],
+                |_, it| it.leftovers = vec!["px".to_owned()],
                 &["left in shared memory"],
             ),
             (
-                |_, it| it.accused = vec!["c1".to_owned()],
+                |_, it| it.suspected = vec!["c1".to_owned()],
                 &["cameras accused that stand where they should"],
             ),
             (
@@ -254,36 +262,41 @@ mod tests {
             ),
         ];
         for (change, expected) in changes {
-            assert_eq!(missed_once(Blow::Kill, "pose-1", change), expected);
+            assert_eq!(missed_once(ProcessFault::Kill, "pose-1", change), expected);
         }
     }
 
     #[test]
-    fn a_process_that_was_never_struck_has_held_nothing() {
-        let got = missed_once(Blow::Kill, "pose-1", |it, _| *it = Cost::default());
+    fn without_an_injected_fault_the_limits_are_missed() {
+        let got = missed_once(ProcessFault::Kill, "pose-1", |it, _| *it = Cost::default());
         assert_eq!(got.len(), 3, "{got:?}");
     }
 
     #[test]
-    fn a_hang_may_be_noticed_late_but_the_others_go_on() {
-        let late = |it: &mut Cost, _: &mut Aftermath| {
+    fn the_hang_limit_extends_the_limits_of_a_stopped_process_only() {
+        let late = |it: &mut Cost, _: &mut RunOutcome| {
             (it.noticed_ms, it.back_ms) = (Some(3100.0), Some(10_900.0));
         };
-        assert_eq!(missed_once(Blow::Stop, "pose-1", late), [""; 0]);
-        let got = missed_once(Blow::Kill, "pose-1", late);
+        assert_eq!(missed_once(ProcessFault::Stop, "pose-1", late), [""; 0]);
+        let got = missed_once(ProcessFault::Kill, "pose-1", late);
         assert_eq!(got, ["noticed after, ms", "back after, ms"]);
     }
 
     #[test]
-    fn who_makes_all_results_may_be_missed_for_as_long_as_it_is_away() {
-        let pause = |it: &mut Cost, _: &mut Aftermath| it.longest_pause_ms = Some(2500.0);
-        assert_eq!(missed_once(Blow::Kill, "triangulate", pause), [""; 0]);
-        assert_eq!(missed_once(Blow::Kill, "capture-1", pause).len(), 1);
+    fn the_pause_may_last_as_long_as_triangulate_is_away() {
+        let pause = |it: &mut Cost, _: &mut RunOutcome| it.longest_pause_ms = Some(2500.0);
+        assert_eq!(
+            missed_once(ProcessFault::Kill, "triangulate", pause),
+            [""; 0]
+        );
+        assert_eq!(missed_once(ProcessFault::Kill, "capture-1", pause).len(), 1);
     }
 
-    /// What a barrage misses that was good but for a change.
-    fn missed_random(change: impl FnOnce(&mut Barraged, &mut Sample)) -> Vec<String> {
-        let first = Sample {
+    /// The limits that a good run with random kills misses after a change.
+    fn missed_random(
+        change: impl FnOnce(&mut RandomKillsOutcome, &mut ResourceUse),
+    ) -> Vec<String> {
+        let first = ResourceUse {
             memory_bytes: 100_000_000,
             supervisor_memory_bytes: 10_000_000,
             descriptors: 100,
@@ -291,25 +304,25 @@ mod tests {
             shared_bytes: 5_000_000,
         };
         let mut last = first;
-        let mut it = Barraged {
+        let mut it = RandomKillsOutcome {
             n_kills: 3,
-            away_ms: Spread::of(vec![500.0, 700.0, 900.0]),
-            held: None,
+            downtime_ms: Spread::of(vec![500.0, 700.0, 900.0]),
+            resources: None,
         };
         change(&mut it, &mut last);
-        it.held = Some([first, last]);
+        it.resources = Some([first, last]);
         missed(random(&ASKED, &it, &good().1))
     }
 
     #[test]
-    fn every_limit_of_a_barrage_can_be_missed_alone() {
-        type Change = fn(&mut Barraged, &mut Sample);
+    fn every_limit_of_random_kills_can_be_missed_alone() {
+        type Change = fn(&mut RandomKillsOutcome, &mut ResourceUse);
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
             (|it, _| it.n_kills = 4, &["came back"]),
             (
-                |it, _| it.away_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
+                |it, _| it.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
                 &["back after (p99), ms"],
             ),
             (
@@ -330,7 +343,7 @@ mod tests {
         for (change, expected) in changes {
             assert_eq!(missed_random(change), expected);
         }
-        let none = random(&ASKED, &Barraged::default(), &good().1);
+        let none = random(&ASKED, &RandomKillsOutcome::default(), &good().1);
         let expected = [
             "kills",
             "back after (p99), ms",
@@ -340,24 +353,24 @@ mod tests {
     }
 
     #[test]
-    fn orphans_must_end_and_the_next_run_must_work() {
-        let good_one = Orphaned {
+    fn orphaned_processes_must_end_and_the_next_run_must_work() {
+        let good_one = SupervisorKillOutcome {
             ended_ms: Some(40.0),
             files: 90,
             result_ms: Some(900.0),
         };
-        let after = Aftermath {
+        let outcome = RunOutcome {
             unanswered: 0,
             ..good().1
         };
-        let judge = |it: &Orphaned| missed(supervisor(&ASKED, it, &after));
+        let judge = |it: &SupervisorKillOutcome| missed(supervisor(&ASKED, it, &outcome));
         assert_eq!(judge(&good_one), [""; 0]);
-        let orphans = Orphaned {
+        let orphans = SupervisorKillOutcome {
             ended_ms: None,
             ..good_one.clone()
         };
         assert_eq!(judge(&orphans), ["its processes ended after, ms"]);
-        let broken = Orphaned {
+        let broken = SupervisorKillOutcome {
             result_ms: None,
             ..good_one
         };

@@ -1,4 +1,4 @@
-//! A camera that was moved after the calibration: whether it is named.
+//! The scenario `camera-moved`: a camera was moved after the calibration, and must be identified.
 
 use std::path::PathBuf;
 
@@ -10,16 +10,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
-use super::ground::Ground;
 use super::options::Options;
 use super::scenario::MOVED;
+use super::testbed::Testbed;
 use super::verdict::Verdict;
 use crate::trial::limit::at_least;
 
-/// By so much it is turned.
+/// The rotation of the camera, degrees.
 const DEGREES: f64 = 2.0;
 
-/// Turns a camera of a rig a little, up, down or to a side.
+/// Rotates a camera of a rig by `DEGREES` about a random axis perpendicular to its optical axis.
 fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
     let bearing = core::f64::consts::TAU * random.f64();
     let axis = Vector3::new(bearing.cos(), bearing.sin(), 0.0);
@@ -35,26 +35,26 @@ fn moved(rig: &Rig, camera: &str, random: &mut Rng) -> Result<Rig, Failure> {
     Rig::new(cameras.collect(), rig.up_in_world(), rig.source()).or_fail(ExitKind::Calibration)
 }
 
-/// Runs the deployment with the calibration of one camera wrong.
-pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
-    let plain = ground.plan(MOVED, &[])?;
+/// Runs the deployment with a wrong calibration of a randomly chosen camera.
+pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> {
+    let plain = testbed.plan(MOVED, &[])?;
     let deployment = &plain.resolved().deployment;
     let mut random = Rng::with_seed(options.seed);
     let cameras = &deployment.cameras;
     let camera = cameras[random.usize(..cameras.len())].name.clone();
     let rig = inputs::rig_of(deployment)?;
     let rig = moved(&rig, &camera, &mut random)?;
-    let file: PathBuf = ground.folder.join("moved-rig.toml");
+    let file: PathBuf = testbed.folder.join("moved-rig.toml");
     geometry::files::write(&file, Format::Own, &rig).or_fail(ExitKind::Input)?;
-    let planned = ground.plan_with(MOVED, &[], &|it| {
-        it.rig.clone_from(&file);
-        it.unit = None;
+    let planned = testbed.plan_with(MOVED, &[], &|deployment| {
+        deployment.rig.clone_from(&file);
+        deployment.unit = None;
     })?;
-    let ran = ground.watch(&planned, &mut |_| None);
-    let mut after = ran.aftermath(|_| 0);
-    let is_named = after.accused.contains(&camera);
-    after.accused.retain(|it| *it != camera);
-    let summary = ran
+    let run = testbed.run(&planned, &mut |_| None);
+    let mut outcome = run.outcome(|_| 0);
+    let is_named = outcome.suspected.contains(&camera);
+    outcome.suspected.retain(|it| *it != camera);
+    let summary = run
         .report
         .as_ref()
         .ok()
@@ -68,17 +68,17 @@ pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Fai
         if is_named { "named" } else { "not named" },
         px(fit.residual_px),
         px(fit.without_px),
-        after.n_results,
+        outcome.n_results,
     );
     let named = at_least("it is named", 1.0, Some(f64::from(u8::from(is_named))));
-    let limits = [named].into_iter().chain(after.judge(0)).collect();
+    let limits = [named].into_iter().chain(outcome.judge(0)).collect();
     Ok(Verdict {
         scenario: MOVED.to_owned(),
         measured,
-        more: Vec::new(),
+        details: Vec::new(),
         numbers: json!({ "camera": camera, "fits": fits }),
         limits,
-        run: ran.json(),
+        run: run.json(),
     })
 }
 
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_camera_is_turned_where_it_stands_and_the_others_stay() {
+    fn one_camera_is_rotated_in_place_and_the_others_are_unchanged() {
         let rig = scene::RigChoice::parse("ring:4").unwrap().rig().unwrap();
         let name = rig.cameras()[2].name.clone();
         let wrong = moved(&rig, &name, &mut Rng::with_seed(3)).unwrap();

@@ -1,36 +1,36 @@
-//! What is to be tried, and what must hold.
+//! Options and limits of the scenarios.
 
 use std::path::PathBuf;
 
 use super::scenario::Scenario;
 
-/// What to try.
+/// Options of a fault-injection trial.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The deployment file; four cameras that do not exist if there is none.
+    /// The deployment file; four synthetic cameras if there is none.
     pub deployment: Option<PathBuf>,
-    /// What is to happen; everything that the deployment has processes for if empty.
+    /// The scenarios; if empty, all that are possible with the processes of the deployment.
     pub scenarios: Vec<Scenario>,
-    /// Chooses the victims, and the performance of the person who does not exist.
+    /// Seed of the choice of processes and cameras, and of the synthetic scene.
     pub seed: u64,
-    /// Footage of every run, seconds.
+    /// Length of the footage of every run, seconds.
     pub seconds: u32,
-    /// Seconds of a run in which one process after the other is killed that are reported together.
+    /// Length of the parts in which a run with random kills is reported, seconds.
     pub part_seconds: u32,
-    /// Folder for the report and the results.
+    /// The folder for the report and the results.
     pub out: PathBuf,
-    /// Name of the deployment while it is tried; its own and `-chaos` if there is none.
+    /// The name of the deployment during the trial; its own name with `-chaos` appended if there is none.
     pub name: Option<String>,
-    /// Limits that can be asked for.
+    /// Configurable limits.
     pub limits: Limits,
 }
 
-/// Limits that can be asked for.
+/// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Longest time from the kill until the process has a part in a result again (or, of those that no result names,
-    /// until it has done something), milliseconds.
+    /// The longest time from the fault until the process contributes to a result again, milliseconds. For processes that
+    /// results do not name: until it reports that it has worked.
     pub max_return_ms: f64,
-    /// Longest time without a result while a process is away without which others can go on, milliseconds.
+    /// The longest pause between results while a process is away that the others do not depend on, milliseconds.
     pub max_pause_ms: f64,
 }

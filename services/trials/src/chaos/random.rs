@@ -1,64 +1,65 @@
-//! One process after the other killed, chosen at random.
+//! The scenario `kill-random`: randomly chosen processes are killed, one after the other.
 
 use runtime::{Failure, now_nanos};
 use serde_json::json;
 
-use super::aim::{frame_at, trace_of};
-use super::barrage::{Barrage, Kill};
-use super::census::{self, Census};
-use super::ground::Ground;
-use super::judge::{self, Barraged};
+use super::judge::{self, RandomKillsOutcome};
 use super::options::Options;
+use super::random_kills::{Kill, RandomKills};
+use super::resources::{self, ResourceMonitor};
 use super::scenario::Scenario;
 use super::series;
+use super::target::{epoch_source_of, frame_at};
+use super::testbed::Testbed;
 use super::verdict::{self, Verdict};
 use crate::spread::Spread;
 
-/// Nobody is killed after this share of the frames.
+/// No process is killed after this share of the frames.
 const UNTIL: f64 = 0.8;
-/// Nanoseconds between two kills.
+/// Time between two kills, nanoseconds.
 const PERIOD: u64 = 2_000_000_000;
 
-/// Kills one process after the other, chosen at random, and judges what became of the run.
-pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
+/// Runs the deployment, kills processes, and checks the limits.
+pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> {
     let scenario = Scenario::Random.name();
-    let planned = ground.plan(&scenario, &[])?;
+    let planned = testbed.plan(&scenario, &[])?;
     let until = frame_at(&planned, UNTIL) as u64;
-    let mut barrage = Barrage::new(options.seed, PERIOD, until);
-    let mut census = Census::default();
+    let mut random_kills = RandomKills::new(options.seed, PERIOD, until);
+    let mut monitor = ResourceMonitor::default();
     let namespace = &planned.plan().namespace;
-    let ran = ground.watch(&planned, &mut |event| {
+    let run = testbed.run(&planned, &mut |event| {
         let now = now_nanos();
-        census.note(event, now, |pids| census::look(namespace, pids));
-        barrage.note(event, now, runtime::kill)
+        monitor.handle(event, now, |pids| resources::measure(namespace, pids));
+        random_kills.handle(event, now, runtime::kill)
     });
-    let kills = barrage.kills();
-    let struck = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
-    let after = ran.aftermath(struck);
+    let kills = random_kills.kills();
+    let n_faults = |name: &str| kills.iter().filter(|it| it.process == name).count() as u32;
+    let outcome = run.outcome(n_faults);
     let session = planned.session();
-    let away_ms = |it: &Kill| it.away_ms(trace_of(&it.process), session, &ran.moments);
+    let downtime_ms =
+        |it: &Kill| it.downtime_ms(epoch_source_of(&it.process), session, &run.results);
     let each = kills
         .iter()
-        .map(|it| json!({ "process": it.process, "back_ms": away_ms(it) }));
+        .map(|it| json!({ "process": it.process, "back_ms": downtime_ms(it) }));
     let each: Vec<_> = each.collect();
-    let it = Barraged {
+    let measured = RandomKillsOutcome {
         n_kills: kills.len(),
-        away_ms: Spread::of(kills.iter().filter_map(away_ms).collect()),
-        held: census.ends(),
+        downtime_ms: Spread::of(kills.iter().filter_map(downtime_ms).collect()),
+        resources: monitor.ends(),
     };
     let length = u64::from(options.part_seconds) * 1_000_000_000;
-    let parts = series::parts(length, session, kills, &census, &ran.moments);
+    let parts = series::parts(length, session, kills, &monitor, &run.results);
     Ok(Verdict {
         scenario,
-        measured: verdict::of_barrage(&it, after.n_results),
+        measured: verdict::of_random_kills(&measured, outcome.n_results),
         numbers: json!({
             "kills": each,
-            "back_ms": it.away_ms,
-            "first_and_last": it.held,
+            "back_ms": measured.downtime_ms,
+            "first_and_last": measured.resources,
             "parts": parts,
         }),
-        more: series::table(&parts),
-        limits: judge::random(&options.limits, &it, &after),
-        run: ran.json(),
+        details: series::table(&parts),
+        limits: judge::random(&options.limits, &measured, &outcome),
+        run: run.json(),
     })
 }

@@ -1,53 +1,53 @@
-//! The faults that can be asked for, by name.
+//! The scenarios, by name.
 
 use launch::SERVICES;
 
 use super::fault::CameraFault;
-use crate::trial::strike::Blow;
+use crate::trial::injection::ProcessFault;
 
-/// The name of the scenario in which a camera was moved.
+/// The name of the scenario with a camera that was moved after the calibration.
 pub(super) const MOVED: &str = "camera-moved";
-/// The name of the scenario in which the recorder stops reading.
+/// The name of the scenario in which the process `results` is stopped for a while.
 pub(super) const STALL: &str = "stall-results";
 
-/// A fault.
+/// A fault to inject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scenario {
-    /// One process of a service is struck once.
-    Once(Blow, &'static str),
-    /// Processes chosen at random are killed, one after the other.
+    /// A fault is injected once into one process of a service.
+    Once(ProcessFault, &'static str),
+    /// Randomly chosen processes are killed, one after the other.
     Random,
     /// `parallax run` itself is killed.
     Supervisor,
-    /// A camera fails for some time.
+    /// A camera fails for a while.
     Camera(CameraFault),
     /// A camera was moved after the calibration.
     Moved,
-    /// The recorder stops reading for some time.
+    /// The process `results` is stopped for a while.
     Stall,
 }
 
 impl Scenario {
-    /// All of them.
+    /// All scenarios.
     pub fn all() -> Vec<Self> {
-        let once = |blow| SERVICES.map(|it| Self::Once(blow, it));
-        let mut all = Vec::from(once(Blow::Kill));
+        let once = |fault| SERVICES.map(|it| Self::Once(fault, it));
+        let mut all = Vec::from(once(ProcessFault::Kill));
         all.push(Self::Random);
-        all.extend(once(Blow::Stop));
-        // The recorder works for nobody, and is as slow as its disk.
+        all.extend(once(ProcessFault::Stop));
+        // Not `results`: no stage waits for it, and its work depends on the disk.
         let spinning = SERVICES.into_iter().filter(|it| *it != "results");
-        all.extend(spinning.map(|it| Self::Once(Blow::Spin, it)));
+        all.extend(spinning.map(|it| Self::Once(ProcessFault::Spin, it)));
         all.push(Self::Supervisor);
         all.extend(CameraFault::ALL.map(Self::Camera));
         all.extend([Self::Moved, Self::Stall]);
         all
     }
 
-    /// The one of a name, for the command line.
+    /// The scenario with the given name, for the command line.
     ///
     /// # Errors
     ///
-    /// There is none of that name: in words, for people.
+    /// There is no scenario of that name; the message is for the user.
     pub fn by_name(name: &str) -> Result<Self, String> {
         let found = Self::all().into_iter().find(|it| it.name() == name);
         found.ok_or_else(|| "there is none of this name; --list names them all".to_owned())
@@ -56,25 +56,27 @@ impl Scenario {
     /// Its name.
     pub fn name(self) -> String {
         match self {
-            Self::Once(Blow::Kill, service) => format!("kill-{service}"),
-            Self::Once(Blow::Stop, service) => format!("hang-{service}"),
-            Self::Once(Blow::Spin, service) => format!("spin-{service}"),
+            Self::Once(ProcessFault::Kill, service) => format!("kill-{service}"),
+            Self::Once(ProcessFault::Stop, service) => format!("hang-{service}"),
+            Self::Once(ProcessFault::Spin, service) => format!("spin-{service}"),
             Self::Random => "kill-random".to_owned(),
             Self::Supervisor => "kill-supervisor".to_owned(),
-            Self::Camera(it) => it.words()[0].to_owned(),
+            Self::Camera(it) => it.name_and_summary()[0].to_owned(),
             Self::Moved => MOVED.to_owned(),
             Self::Stall => STALL.to_owned(),
         }
     }
 
-    /// What happens, for people.
-    pub fn says(self) -> String {
+    /// What happens in it, for the user.
+    pub fn summary(self) -> String {
         match self {
-            Self::Once(Blow::Kill, service) => format!("a {service} process is killed (SIGKILL)"),
-            Self::Once(Blow::Stop, service) => {
+            Self::Once(ProcessFault::Kill, service) => {
+                format!("a {service} process is killed (SIGKILL)")
+            }
+            Self::Once(ProcessFault::Stop, service) => {
                 format!("a {service} process is stopped (SIGSTOP), as if it hung")
             }
-            Self::Once(Blow::Spin, service) => {
+            Self::Once(ProcessFault::Spin, service) => {
                 format!(
                     "a {service} process computes for ever, with signs of life but without work"
                 )
@@ -83,7 +85,7 @@ impl Scenario {
             Self::Supervisor => {
                 "`parallax run` itself is killed, and the same deployment started again".to_owned()
             }
-            Self::Camera(it) => it.words()[1].to_owned(),
+            Self::Camera(it) => it.name_and_summary()[1].to_owned(),
             Self::Moved => "a camera was turned by two degrees after the calibration".to_owned(),
             Self::Stall => {
                 "the results process stands still for three seconds, and goes on".to_owned()
@@ -91,12 +93,14 @@ impl Scenario {
         }
     }
 
-    /// Whether a deployment has the processes for it.
+    /// Whether it is possible with the processes of a deployment.
+    ///
+    /// * `processes`: their names.
     pub fn is_possible(self, processes: &[String]) -> bool {
         match self {
             Self::Once(_, service) => processes.iter().any(|it| service_of(it) == service),
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
-            // Of fewer than four cameras nobody can tell which it is.
+            // With fewer than four cameras the moved one cannot be identified.
             Self::Moved => {
                 processes
                     .iter()
@@ -118,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_scenario_is_found_by_its_name_and_no_two_share_one() {
+    fn every_scenario_has_a_unique_name() {
         let all = Scenario::all();
         assert_eq!(all.len(), 27);
         for it in all {
@@ -128,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_there_cannot_be_struck() {
+    fn a_scenario_is_possible_only_with_its_process() {
         let processes = ["pose-0", "pose-1", "results"].map(str::to_owned);
         let names: Vec<String> = Scenario::all()
             .into_iter()

@@ -1,61 +1,62 @@
-//! A long run, part by part: how late its results were, and what it held.
+//! Reports a long run in parts: latency, kills and resources of each.
 
 use core::fmt::Write as _;
 use core::ops::Range;
 
 use serde::Serialize;
 
-use super::barrage::Kill;
-use super::census::{Census, Sample};
+use super::random_kills::Kill;
+use super::resources::{ResourceMonitor, ResourceUse};
 use crate::spread::Spread;
-use crate::trial::results::Moment;
+use crate::trial::results::FrameResult;
 
-/// A part of a run.
+/// The numbers of a part of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Part {
-    /// When it began, seconds since the run was planned.
+    /// Its start, seconds since the planning of the run.
     pub from_s: f64,
-    /// Processes that were killed.
+    /// Number of kills.
     pub kills: usize,
-    /// Results that were sent.
+    /// Number of results.
     pub results: usize,
-    /// From the capture of the first picture to the sending of the result, milliseconds.
+    /// Time from the capture of the first picture to the result, milliseconds.
     pub end_to_end_ms: Option<Spread>,
-    /// What was held: the median; none if there was no second in which all processes worked.
-    pub held: Option<Sample>,
+    /// The median resources; none if there was no second in which all processes worked.
+    #[serde(rename = "held")]
+    pub resources: Option<ResourceUse>,
 }
 
-/// Divides a run into parts of a length.
+/// Divides a run into parts.
 ///
-/// * `length`: of a part, nanoseconds; the last one may be shorter.
-/// * `session`: when the run was planned, `runtime::now_nanos`.
+/// * `length`: the length of a part, nanoseconds; the last one may be shorter.
+/// * `session`: the session: the time of planning, `runtime::now_nanos`.
 pub(super) fn parts(
     length: u64,
     session: u64,
     kills: &[Kill],
-    census: &Census,
-    moments: &[Moment],
+    monitor: &ResourceMonitor,
+    results: &[FrameResult],
 ) -> Vec<Part> {
-    let sent = |it: &Moment| session + (it.sent_ms * 1e6) as u64;
-    let end = moments.iter().map(sent).max().unwrap_or(session);
+    let sent = |it: &FrameResult| session + (it.sent_ms * 1e6) as u64;
+    let end = results.iter().map(sent).max().unwrap_or(session);
     let begins = (session..=end).step_by(length.max(1) as usize);
     let part = |from: u64| {
         let span: Range<u64> = from..from + length.max(1);
-        let killed = kills.iter().filter_map(|it| it.times.killed);
-        let of_part = moments.iter().filter(|it| span.contains(&sent(it)));
-        let late = |it: &Moment| Some(it.sent_ms - it.captured_ms()?);
+        let killed = kills.iter().filter_map(|it| it.times.injected);
+        let of_part = results.iter().filter(|it| span.contains(&sent(it)));
+        let latency = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
         Part {
             from_s: (from - session) as f64 / 1e9,
             kills: killed.filter(|it| span.contains(it)).count(),
             results: of_part.clone().count(),
-            end_to_end_ms: Spread::of(of_part.filter_map(late).collect()),
-            held: census.within(&span),
+            end_to_end_ms: Spread::of(of_part.filter_map(latency).collect()),
+            resources: monitor.within(&span),
         }
     };
     begins.map(part).collect()
 }
 
-/// A table of the parts, a line each; nothing of a single one.
+/// The parts as a table: a header and one line per part; empty for a single part.
 pub(super) fn table(parts: &[Part]) -> Vec<String> {
     if parts.len() < 2 {
         return Vec::new();
@@ -63,20 +64,24 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
     let head = "  from s  kills  results   p50 ms   p99 ms  p99.9 ms   max ms  memory MB  shared MB  descriptors  files";
     let lines = parts.iter().map(|it| {
         let mut line = format!("{:>8.0}{:>7}{:>9}", it.from_s, it.kills, it.results);
-        let late = Spread::cells(it.end_to_end_ms, 0);
-        let held = it.held.map(|held| {
+        let latency = Spread::cells(it.end_to_end_ms, 0);
+        let resources = it.resources.map(|used| {
             let mb = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
-            let memory = held.memory_bytes + held.supervisor_memory_bytes;
-            let [memory, shared] = [memory, held.shared_bytes].map(mb);
+            let memory = used.memory_bytes + used.supervisor_memory_bytes;
+            let [memory, shared] = [memory, used.shared_bytes].map(mb);
             [
                 memory,
                 shared,
-                held.descriptors.to_string(),
-                held.files.to_string(),
+                used.descriptors.to_string(),
+                used.files.to_string(),
             ]
         });
-        let held = held.unwrap_or_else(|| ["-"; 4].map(str::to_owned));
-        for (cell, width) in late.iter().chain(&held).zip([9, 9, 10, 9, 11, 11, 13, 7]) {
+        let resources = resources.unwrap_or_else(|| ["-"; 4].map(str::to_owned));
+        for (cell, width) in latency
+            .iter()
+            .chain(&resources)
+            .zip([9, 9, 10, 9, 11, 11, 13, 7])
+        {
             // Writing to a string cannot fail.
             let _infallible = write!(line, "{cell:>width$}");
         }
@@ -91,24 +96,24 @@ mod tests {
     use supervise::Event;
 
     use super::*;
-    use crate::trial::results::Seen;
-    use crate::trial::strike::Times;
+    use crate::trial::injection::FaultTimes;
+    use crate::trial::results::ViewResult;
 
     const SECOND: u64 = 1_000_000_000;
     const SESSION: u64 = 50 * SECOND;
 
-    fn moment(captured_s: f64, sent_s: f64) -> Moment {
+    fn moment(captured_s: f64, sent_s: f64) -> FrameResult {
         let [captured_ms, sent_ms] = [captured_s, sent_s].map(|it| it * 1000.0);
         let shot = CameraTimes {
             epoch: 0,
             captured_ms,
             sent_ms: captured_ms,
         };
-        let seen = Seen {
-            shot: Some(shot),
-            ..Seen::default()
+        let seen = ViewResult {
+            camera: Some(shot),
+            ..ViewResult::default()
         };
-        Moment {
+        FrameResult {
             frame: 0,
             epoch: 0,
             sent_ms,
@@ -118,26 +123,26 @@ mod tests {
     }
 
     fn kill(at_s: u64) -> Kill {
-        let times = Times {
-            killed: Some(SESSION + at_s * SECOND),
-            ..Times::default()
+        let times = FaultTimes {
+            injected: Some(SESSION + at_s * SECOND),
+            ..FaultTimes::default()
         };
         Kill {
             process: "pose-1".to_owned(),
             times,
-            life: 1,
+            epoch: 1,
         }
     }
 
-    /// One process, of which a sample is taken at some seconds.
-    fn census(at_s: &[u64]) -> Census {
-        let mut census = Census::default();
+    /// A monitor of one process with samples at the given seconds.
+    fn monitor(at_s: &[u64]) -> ResourceMonitor {
+        let mut monitor = ResourceMonitor::default();
         let event = Event::Started {
             process: "pose-1",
             pid: 7,
             epoch: 0,
         };
-        census.note(&event, SESSION, |_| Sample::default());
+        monitor.handle(&event, SESSION, |_| ResourceUse::default());
         let health = messages::Health {
             n_sent: 1,
             ..messages::Health::default()
@@ -147,22 +152,29 @@ mod tests {
                 process: "pose-1",
                 health: &health,
             };
-            census.note(&event, SESSION + seconds * SECOND, |_| Sample {
+            monitor.handle(&event, SESSION + seconds * SECOND, |_| ResourceUse {
                 files: *seconds,
-                ..Sample::default()
+                ..ResourceUse::default()
             });
         }
-        census
+        monitor
     }
 
     #[test]
-    fn everything_counts_in_the_part_in_which_it_happened() {
-        let moments = [moment(1.0, 1.2), moment(9.9, 10.4), moment(24.0, 24.3)];
+    fn results_kills_and_samples_count_in_their_part() {
+        let results = [moment(1.0, 1.2), moment(9.9, 10.4), moment(24.0, 24.3)];
         let kills = [kill(3), kill(12), kill(14)];
-        let parts = parts(10 * SECOND, SESSION, &kills, &census(&[2, 13]), &moments);
+        let parts = parts(10 * SECOND, SESSION, &kills, &monitor(&[2, 13]), &results);
         let got: Vec<_> = parts
             .iter()
-            .map(|it| (it.from_s, it.kills, it.results, it.held.map(|it| it.files)))
+            .map(|it| {
+                (
+                    it.from_s,
+                    it.kills,
+                    it.results,
+                    it.resources.map(|it| it.files),
+                )
+            })
             .collect();
         let expected = [
             (0.0, 1, 1, Some(2)),
@@ -175,10 +187,10 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_one_part_needs_no_table_and_others_have_a_line_for_each() {
-        let moments = [moment(1.0, 1.2), moment(24.0, 24.3)];
-        let census = census(&[2]);
-        let of = |seconds: u64| parts(seconds * SECOND, SESSION, &[], &census, &moments);
+    fn a_run_of_one_part_has_no_table_and_others_have_a_line_per_part() {
+        let results = [moment(1.0, 1.2), moment(24.0, 24.3)];
+        let monitor = monitor(&[2]);
+        let of = |seconds: u64| parts(seconds * SECOND, SESSION, &[], &monitor, &results);
         assert_eq!(table(&of(60)), [""; 0]);
         let lines = table(&of(20));
         assert_eq!(lines.len(), 3, "{lines:?}");

@@ -1,4 +1,4 @@
-//! A recorder that stops reading for some seconds and then goes on: what the others do meanwhile.
+//! The scenario `stall-results`: the process `results` is stopped for some seconds and then resumed.
 
 use std::io;
 
@@ -8,44 +8,45 @@ use serde::Serialize;
 use serde_json::json;
 use supervise::Event;
 
-use super::aim::{STRIKE_AFTER, frame_at};
-use super::ground::Ground;
-use super::judge::Aftermath;
+use super::judge::RunOutcome;
 use super::options::{Limits, Options};
 use super::scenario::STALL;
+use super::target::{INJECT_AFTER, frame_at};
+use super::testbed::Testbed;
 use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
 
-/// How long it stands still, nanoseconds.
+/// How long the process is stopped, nanoseconds.
 const STALL_NANOS: u64 = 3_000_000_000;
-/// Nobody takes it for hung.
-const PATIENT: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
-/// Where the latest frame wins, results go on at no less than this share of the rate before.
+/// Settings with which the supervisor does not take it for hung.
+const NO_HANG_DETECTION: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
+/// With realtime delivery: the least rate of results during the stall, as a share of the rate before.
 const SHARE: f64 = 0.5;
 
-/// A recorder that is to stand still, or has.
+/// Stops and resumes the process `results`, and measures the rate of results.
 #[derive(Debug, Default)]
-pub(super) struct Stall {
-    /// Once there is a result of this frame.
+pub(super) struct StallInjector {
+    /// The process is stopped once there is a result of this frame.
     at_frame: u64,
     pid: Option<u32>,
-    /// When the first result was told, and how many there were.
+    /// Time, nanoseconds, and number of results at the first health message with a result.
     first: Option<[u64; 2]>,
-    /// When it was stopped and when it was let go, and how many results there were.
+    /// The same when the process was stopped.
     stopped: Option<[u64; 2]>,
-    freed: Option<[u64; 2]>,
+    /// The same when the process was resumed.
+    resumed: Option<[u64; 2]>,
 }
 
-/// What was measured.
+/// The measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Stalled {
-    /// For how long, milliseconds.
+pub(super) struct StallMeasurement {
+    /// Duration of the stall, milliseconds.
     pub stall_ms: f64,
-    /// Results a second that were made before and meanwhile.
+    /// Results per second before and during the stall.
     pub rates_hz: [f64; 2],
 }
 
-impl Stall {
+impl StallInjector {
     pub(super) fn new(at_frame: u64) -> Self {
         Self {
             at_frame,
@@ -53,11 +54,11 @@ impl Stall {
         }
     }
 
-    /// Takes note of what the supervisor tells, stops the recorder and lets it go when it is time, and says so.
+    /// Handles an event of the supervisor, and stops or resumes the process if it is time. Returns a message about it.
     ///
     /// * `now`: `runtime::now_nanos`.
-    /// * `signal`: stops (true) the process of a number, or lets it go on.
-    pub(super) fn note(
+    /// * `signal`: stops (true) or resumes (false) the process with this id.
+    pub(super) fn handle(
         &mut self,
         event: &Event<'_>,
         now: u64,
@@ -77,14 +78,14 @@ impl Stall {
                 process: "triangulate",
                 health,
             } if health.n_sent > 0 => {
-                return self.turn([now, health.n_sent], health.last_frame, signal);
+                return self.stop_or_resume([now, health.n_sent], health.last_frame, signal);
             }
             _ => {}
         }
         None
     }
 
-    fn turn(
+    fn stop_or_resume(
         &mut self,
         state: [u64; 2],
         frame: u64,
@@ -92,7 +93,7 @@ impl Stall {
     ) -> Option<String> {
         self.first.get_or_insert(state);
         let pid = self.pid?;
-        let (stops, said) = match (self.stopped, self.freed) {
+        let (stops, message) = match (self.stopped, self.resumed) {
             (None, _) if frame >= self.at_frame => (true, "stopping results on purpose"),
             (Some([at, _]), None) if state[0] - at >= STALL_NANOS => {
                 (false, "letting results go on")
@@ -102,34 +103,36 @@ impl Stall {
         let done = if stops {
             &mut self.stopped
         } else {
-            &mut self.freed
+            &mut self.resumed
         };
         *done = Some(state);
         Some(match signal(stops, pid) {
-            Ok(()) => format!("{said}, process {pid}"),
-            Err(error) => format!("{said} failed: {error}"),
+            Ok(()) => format!("{message}, process {pid}"),
+            Err(error) => format!("{message} failed: {error}"),
         })
     }
 
-    /// What was measured, if it stood still and went on.
-    pub(super) fn stalled(&self) -> Option<Stalled> {
-        let [first, stopped, freed] = [self.first?, self.stopped?, self.freed?];
+    /// The measurements; none if the process was not stopped and resumed.
+    pub(super) fn measurement(&self) -> Option<StallMeasurement> {
+        let [first, stopped, resumed] = [self.first?, self.stopped?, self.resumed?];
         let rate = |from: [u64; 2], to: [u64; 2]| {
             (to[1] - from[1].min(to[1])) as f64 * 1e9 / (to[0] - from[0]).max(1) as f64
         };
-        Some(Stalled {
-            stall_ms: (freed[0] - stopped[0]) as f64 / 1e6,
-            rates_hz: [rate(first, stopped), rate(stopped, freed)],
+        Some(StallMeasurement {
+            stall_ms: (resumed[0] - stopped[0]) as f64 / 1e6,
+            rates_hz: [rate(first, stopped), rate(stopped, resumed)],
         })
     }
 }
 
-/// What must hold: in realtime the others go on; where nothing may be lost, nothing is.
+/// Checks the limits: with realtime delivery the other processes go on; with lossless delivery nothing is lost.
+///
+/// * `every_frame`: the number of frames, with lossless delivery.
 fn judge(
     asked: &Limits,
-    it: Option<&Stalled>,
+    it: Option<&StallMeasurement>,
     every_frame: Option<u64>,
-    after: &Aftermath,
+    outcome: &RunOutcome,
 ) -> Vec<Limit> {
     let most_ms = STALL_NANOS as f64 / 1e6 + asked.max_pause_ms;
     let mut limits = vec![at_most(
@@ -138,22 +141,22 @@ fn judge(
         it.map(|it| it.stall_ms),
     )];
     limits.push(if let Some(n) = every_frame {
-        at_least("results written", n as f64, Some(after.n_results as f64))
+        at_least("results written", n as f64, Some(outcome.n_results as f64))
     } else {
         let [before, meanwhile] = it.map_or([f64::NAN; 2], |it| it.rates_hz);
         let meanwhile = Some(meanwhile).filter(|it| it.is_finite());
         at_least("results a second meanwhile", SHARE * before, meanwhile)
     });
-    limits.extend(after.judge(0));
+    limits.extend(outcome.judge(0));
     limits
 }
 
-/// Stops the recorder for some seconds.
-pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Failure> {
-    let planned = ground.plan(STALL, &PATIENT)?;
-    let mut stall = Stall::new(frame_at(&planned, STRIKE_AFTER) as u64);
-    let ran = ground.watch(&planned, &mut |event| {
-        stall.note(event, runtime::now_nanos(), |stops, pid| {
+/// Runs the deployment, and stops the process `results` for some seconds.
+pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, Failure> {
+    let planned = testbed.plan(STALL, &NO_HANG_DETECTION)?;
+    let mut stall = StallInjector::new(frame_at(&planned, INJECT_AFTER) as u64);
+    let run = testbed.run(&planned, &mut |event| {
+        stall.handle(event, runtime::now_nanos(), |stops, pid| {
             if stops {
                 runtime::freeze(pid)
             } else {
@@ -161,8 +164,8 @@ pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Fai
             }
         })
     });
-    let after = ran.aftermath(|_| 0);
-    let it = stall.stalled();
+    let outcome = run.outcome(|_| 0);
+    let it = stall.measurement();
     let is_lossless = planned.resolved().delivery() == runtime::Delivery::Lossless;
     let every_frame = is_lossless.then(|| planned.resolved().n_frames());
     let [before, meanwhile] = it.map_or([0.0; 2], |it| it.rates_hz);
@@ -171,12 +174,12 @@ pub(super) fn attempt(ground: &Ground, options: &Options) -> Result<Verdict, Fai
         measured: format!(
             "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
             ms(it.map(|it| it.stall_ms)),
-            after.n_results
+            outcome.n_results
         ),
-        more: Vec::new(),
+        details: Vec::new(),
         numbers: json!(it),
-        limits: judge(&options.limits, it.as_ref(), every_frame, &after),
-        run: ran.json(),
+        limits: judge(&options.limits, it.as_ref(), every_frame, &outcome),
+        run: run.json(),
     })
 }
 
@@ -188,8 +191,8 @@ mod tests {
 
     const SECOND: u64 = 1_000_000_000;
 
-    /// Tells of so many results at a time; what is done to the recorder.
-    fn tell(stall: &mut Stall, n_sent: u64, at: u64) -> Option<bool> {
+    /// Passes a health message with a number of results at a time; returns whether the process was stopped or resumed.
+    fn health_at(stall: &mut StallInjector, n_sent: u64, at: u64) -> Option<bool> {
         let health = Health {
             n_sent,
             last_frame: n_sent,
@@ -200,7 +203,7 @@ mod tests {
             health: &health,
         };
         let mut done = None;
-        stall.note(&event, at, |stops, pid| {
+        stall.handle(&event, at, |stops, pid| {
             assert_eq!(pid, 7);
             done = Some(stops);
             Ok(())
@@ -209,43 +212,43 @@ mod tests {
     }
 
     #[test]
-    fn it_is_stopped_once_and_let_go_once_and_rates_are_told_apart() {
-        let mut stall = Stall::new(10);
+    fn the_process_is_stopped_and_resumed_once_and_both_rates_are_measured() {
+        let mut stall = StallInjector::new(10);
         let started = Event::Started {
             process: "results",
             pid: 7,
             epoch: 0,
         };
-        assert_eq!(stall.note(&started, 0, |_, _| Ok(())), None);
-        let told = [(2, 1), (10, 3), (12, 4), (16, 6), (17, 7)];
-        let done = told.map(|(n, at)| tell(&mut stall, n, at * SECOND));
+        assert_eq!(stall.handle(&started, 0, |_, _| Ok(())), None);
+        let events = [(2, 1), (10, 3), (12, 4), (16, 6), (17, 7)];
+        let done = events.map(|(n, at)| health_at(&mut stall, n, at * SECOND));
         assert_eq!(done, [None, Some(true), None, Some(false), None]);
-        let expected = Stalled {
+        let expected = StallMeasurement {
             stall_ms: 3000.0,
             rates_hz: [4.0, 2.0],
         };
-        assert_eq!(stall.stalled(), Some(expected));
+        assert_eq!(stall.measurement(), Some(expected));
     }
 
     #[test]
-    fn who_is_held_up_has_missed_and_who_loses_nothing_may_be() {
+    fn with_lossless_delivery_only_the_number_of_results_counts() {
         let asked = Limits {
             max_return_ms: 1000.0,
             max_pause_ms: 1000.0,
         };
-        let after = Aftermath {
+        let outcome = RunOutcome {
             n_results: 20,
-            ..Aftermath::default()
+            ..RunOutcome::default()
         };
-        let missed = |it: Option<Stalled>, every_frame| {
-            let limits = judge(&asked, it.as_ref(), every_frame, &after).into_iter();
+        let missed = |it: Option<StallMeasurement>, every_frame| {
+            let limits = judge(&asked, it.as_ref(), every_frame, &outcome).into_iter();
             limits
                 .filter(|it| !it.held)
                 .map(|it| it.what)
                 .collect::<Vec<_>>()
         };
         let with = |rate| {
-            Some(Stalled {
+            Some(StallMeasurement {
                 stall_ms: 3010.0,
                 rates_hz: [4.0, rate],
             })

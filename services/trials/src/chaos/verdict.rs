@@ -1,37 +1,37 @@
-//! What held in one scenario, as text and as JSON.
+//! The verdict on a scenario, as text and as JSON.
 
 use core::fmt::Write as _;
 
 use report::run::Limit;
 use serde_json::{Value, json};
 
-use super::judge::{Barraged, Orphaned};
+use super::judge::{RandomKillsOutcome, SupervisorKillOutcome};
 use crate::trial::cost::Cost;
 
-/// What held in one scenario.
+/// The verdict on a scenario.
 #[derive(Debug)]
 pub(super) struct Verdict {
-    /// Its name.
+    /// The name of the scenario.
     pub scenario: String,
-    /// What was measured, for people.
+    /// The measurements as text.
     pub measured: String,
-    /// What else is to be read below it, line by line.
-    pub more: Vec<String>,
-    /// The same for programs.
+    /// Further lines of text.
+    pub details: Vec<String>,
+    /// The measurements as JSON.
     pub numbers: Value,
-    /// The verdicts.
+    /// The limits, with what was measured.
     pub limits: Vec<Limit>,
-    /// What became of the run, for programs.
+    /// The report on the run as JSON.
     pub run: Value,
 }
 
 impl Verdict {
-    /// Whether no limit was missed.
+    /// Whether all limits held.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|it| it.held)
     }
 
-    /// For programs.
+    /// The verdict as JSON.
     pub(super) fn json(&self) -> Value {
         let limit = |it: &Limit| json!({ "what": it.what, "asked": it.asked, "measured": it.got, "held": it.held });
         json!({
@@ -44,7 +44,7 @@ impl Verdict {
     }
 }
 
-/// A table of scenarios, and below each what did not hold.
+/// The verdicts as a table, with the missed limits of each.
 pub(super) fn table(verdicts: &[Verdict]) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -63,7 +63,7 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
             } = limit;
             writeln!(text, "{:<8}{:<17}   {what}: {got} (asked: {asked})", "", "")?;
         }
-        for line in &it.more {
+        for line in &it.details {
             writeln!(text, "{:<8}{line}", "")?;
         }
     }
@@ -71,7 +71,7 @@ fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
     writeln!(text, "{n_held} of {} scenarios held", verdicts.len())
 }
 
-/// What a process cost that was struck once.
+/// Text on a fault of a process.
 pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
     format!(
         "{process}: noticed {}, restarted {}, back {}; longest pause {} (before {}); {n_results} results",
@@ -83,15 +83,15 @@ pub(super) fn of_cost(process: &str, cost: &Cost, n_results: usize) -> String {
     )
 }
 
-/// What a barrage cost.
-pub(super) fn of_barrage(it: &Barraged, n_results: usize) -> String {
+/// Text on random kills.
+pub(super) fn of_random_kills(measured: &RandomKillsOutcome, n_results: usize) -> String {
     let mut text = format!(
         "{} kills; back p50 {}, p99 {}; {n_results} results",
-        it.n_kills,
-        ms(it.away_ms.map(|it| it.p50)),
-        ms(it.away_ms.map(|it| it.p99)),
+        measured.n_kills,
+        ms(measured.downtime_ms.map(|it| it.p50)),
+        ms(measured.downtime_ms.map(|it| it.p99)),
     );
-    if let Some([first, last]) = &it.held {
+    if let Some([first, last]) = &measured.resources {
         let mb = |bytes: u64| bytes as f64 / 1e6;
         // Writing to a string cannot fail.
         let _infallible = write!(
@@ -108,19 +108,19 @@ pub(super) fn of_barrage(it: &Barraged, n_results: usize) -> String {
     text
 }
 
-/// What the death of a supervisor cost.
-pub(super) fn of_orphans(it: &Orphaned, n_results: usize) -> String {
+/// Text on a killed supervisor.
+pub(super) fn of_orphans(killed: &SupervisorKillOutcome, n_results: usize) -> String {
     format!(
         "its processes ended {}; {} files left for the next start, whose first result came {}; {n_results} results",
-        ms(it.ended_ms),
-        it.files,
-        ms(it.result_ms),
+        ms(killed.ended_ms),
+        killed.files,
+        ms(killed.result_ms),
     )
 }
 
-/// Milliseconds in words.
-pub(super) fn ms(it: Option<f64>) -> String {
-    it.map_or_else(|| "never".to_owned(), |it| format!("{it:.0} ms"))
+/// A time in milliseconds, or `never`.
+pub(super) fn ms(time: Option<f64>) -> String {
+    time.map_or_else(|| "never".to_owned(), |ms| format!("{ms:.0} ms"))
 }
 
 #[cfg(test)]
@@ -129,11 +129,11 @@ mod tests {
     use crate::trial::limit::at_most;
 
     #[test]
-    fn what_did_not_hold_is_named_below_its_scenario() {
+    fn missed_limits_are_listed_below_their_scenario() {
         let verdict = |scenario: &str, got| Verdict {
             scenario: scenario.to_owned(),
             measured: "pose-1: noticed 3 ms".to_owned(),
-            more: vec!["from s".to_owned()],
+            details: vec!["from s".to_owned()],
             numbers: Value::Null,
             limits: vec![
                 at_most("back after, ms", 8000.0, got),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_happened_is_called_so() {
+    fn a_missing_time_is_shown_as_never() {
         let cost = Cost {
             noticed_ms: Some(3.4),
             ..Cost::default()

@@ -1,4 +1,4 @@
-//! The limits by which the demo judges itself.
+//! Checks the limits of the demo.
 
 use launch::ViewReport;
 use report::run::Limit;
@@ -8,84 +8,100 @@ use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// What a process that is killed may hold, and what its last report may not have counted: frames.
-const HELD: u64 = 2;
+/// Frames that may be unaccounted for per kill: the one that the process held, and one that its last health message did
+/// not count.
+const MAX_UNACCOUNTED: u64 = 2;
 
-/// What is judged.
+/// The measurements of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
-    /// Frames that the cameras were to take.
+    /// Frames that the cameras should capture.
     pub n_frames: u64,
-    /// Results, and those of them with a skeleton.
+    /// Number of results, and of those with a skeleton.
     pub n_results: [usize; 2],
-    /// Against the truth.
+    /// The accuracy of the results.
     pub score: &'a Score,
-    /// Of the killed camera, if one was to be killed.
+    /// The cost of the kill, if a kill was planned.
     pub cost: Option<&'a Cost>,
-    /// How long a stage waits for a view that is late.
+    /// How long a stage waits for a late view, milliseconds.
     pub deadline_ms: f64,
-    /// How many times as long everything takes here as on a machine that keeps up with 5 frames a second.
+    /// Computing time relative to a machine that keeps up with 5 frames per second, at least 1.
     pub slowness: f64,
-    /// How many times as far apart frames are as there.
+    /// Interval of frames relative to 5 frames per second, at least 1.
     pub spread: f64,
-    /// The frames of every view.
+    /// The frame counts of every view.
     pub views: &'a [ViewReport],
-    /// Processes that ended without being asked to, other than the one that was killed.
+    /// Processes that ended unexpectedly, other than the one that was killed.
     pub failed: &'a [String],
-    /// Results that were not written, if that is known.
+    /// Number of results that were not written, if it is known.
     pub n_unwritten: Option<u64>,
 }
 
-/// Judges a run.
-pub(super) fn judge(asked: &Limits, it: &Measured<'_>) -> Vec<Limit> {
-    let [results, skeletons] = it.n_results;
+/// Checks a run.
+pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
+    let [results, skeletons] = measured.n_results;
     let mut limits = vec![
         at_least(
             "frames with a result, %",
-            asked.min_results,
-            share(results, it.n_frames as usize),
+            requested.min_results,
+            share(results, measured.n_frames as usize),
         ),
         at_least(
             "of these with a skeleton, %",
-            asked.min_skeletons,
+            requested.min_skeletons,
             share(skeletons, results),
         ),
-        at_least("PCP3D at 0.5, %", asked.min_pcp3d, it.score.pcp3d_percent),
+        at_least(
+            "PCP3D at 0.5, %",
+            requested.min_pcp3d,
+            measured.score.pcp3d_percent,
+        ),
     ];
-    if let Some(cost) = it.cost {
+    if let Some(cost) = measured.cost {
         let results = cost.killed_at_ms.map(|_| cost.results_without_it as f64);
-        let least = f64::from(u8::from(must_be_seen(cost, it.deadline_ms)));
+        let least = f64::from(u8::from(needs_results_meanwhile(
+            cost,
+            measured.deadline_ms,
+        )));
         limits.extend([
             at_most(
                 "killed camera back after, ms",
-                (it.spread * asked.max_return_ms).round(),
+                (measured.spread * requested.max_return_ms).round(),
                 cost.back_ms,
             ),
             at_least("results of the others meanwhile", least, results),
             at_most(
                 "longest pause of results meanwhile, ms",
-                (it.slowness * asked.max_pause_ms).round(),
+                (measured.slowness * requested.max_pause_ms).round(),
                 cost.longest_pause_ms,
             ),
         ]);
     }
-    let unanswered: u64 = it.views.iter().map(|it| it.unanswered).sum();
-    let may_be_lost = if it.cost.is_some() { HELD } else { 0 };
+    let unanswered: u64 = measured.views.iter().map(|it| it.unanswered).sum();
+    let may_be_lost = if measured.cost.is_some() {
+        MAX_UNACCOUNTED
+    } else {
+        0
+    };
     limits.extend([
         at_most(
             "frames whose end is not known",
             may_be_lost as f64,
             Some(unanswered as f64),
         ),
-        none_of("processes that failed by themselves", it.failed),
-        at_most("results not written", 0.0, it.n_unwritten.map(|n| n as f64)),
+        none_of("processes that failed by themselves", measured.failed),
+        at_most(
+            "results not written",
+            0.0,
+            measured.n_unwritten.map(|n| n as f64),
+        ),
     ]);
     limits
 }
 
-/// Whether it was away for so long that the others must have given results meanwhile: longer than results
-/// are apart anyway, and than a stage waits for a view.
-fn must_be_seen(cost: &Cost, deadline_ms: f64) -> bool {
+/// Whether the camera was away for so long that there must be results of the other views meanwhile: longer than the
+/// usual pauses between results and the deadline of a late view.
+fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms
 }
@@ -142,7 +158,7 @@ mod tests {
         }
     }
 
-    /// What a good run leaves.
+    /// The measurements of a good run.
     struct Run {
         n_results: [usize; 2],
         score: Score,
@@ -191,7 +207,7 @@ mod tests {
         }
     }
 
-    /// The limits that a changed run misses, by what they measure.
+    /// The limits that a good run misses after a change.
     fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
         let limits = Run::changed(change).limits().into_iter();
         limits.filter(|it| !it.held).map(|it| it.what).collect()
@@ -244,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slower_machine_has_longer_by_the_clock_and_nothing_else() {
+    fn on_a_slower_machine_only_limits_on_times_are_larger() {
         let slow = |it: &mut Run| (it.slowness, it.spread) = (3.0, 2.0);
         for (back_ms, pause_ms, expected) in [
             (16_000.0, 6000.0, &[][..]),
@@ -271,13 +287,13 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_was_to_be_killed_and_was_not_is_a_miss() {
+    fn a_planned_kill_that_did_not_happen_misses_limits() {
         let got = missed(|it| it.cost = Some(Cost::default()));
         assert_eq!(got.len(), 3, "{got:?}");
     }
 
     #[test]
-    fn who_was_back_at_once_was_not_missed() {
+    fn no_results_are_needed_meanwhile_if_the_camera_is_back_at_once() {
         let back = |ms: f64| {
             move |it: &mut Run| {
                 if let Some(cost) = &mut it.cost {
@@ -290,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nobody_is_killed_no_frame_may_be_lost() {
+    fn without_a_kill_no_frame_may_be_unaccounted_for() {
         let got = missed(|it| it.cost = None);
         assert_eq!(got, ["frames whose end is not known"]);
     }

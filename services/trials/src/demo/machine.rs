@@ -1,5 +1,4 @@
-//! What this machine can do now: frames are made and solved in this process before the cameras begin, and again
-//! when they are through.
+//! Measures the speed of this machine before and after the run: renders and processes frames in this process.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -14,22 +13,22 @@ use scene::{Scene, View};
 use serde_json::{Value, json};
 use statistics::Sorted;
 
-use crate::trial::stage::Stage;
+use crate::trial::synthetic::SyntheticDeployment;
 
-/// Frames a second on a machine that is fast enough.
+/// Frames per second on a machine that is fast enough.
 pub(super) const FULL_RATE_HZ: f64 = 5.0;
 
-/// The slowest that the cameras become, frames a second.
-const LEAST_RATE_HZ: f64 = 0.25;
+/// The least frame rate, frames per second.
+const MIN_RATE_HZ: f64 = 0.25;
 
-/// The part of a frame's time that its computing may take: the rest is for what processes cost besides, and for a
-/// load that is not always the same.
+/// The share of the interval between two frames that computing may take. The rest is for the overhead of processes and
+/// for changes of the load.
 const SHARE: f64 = 0.5;
 
-/// How long is measured: two frames at least.
+/// The duration of a measurement, which takes at least two frames.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// Makes and solves frames of all cameras, as the processes will.
+/// Renders and processes frames of all cameras, as the processes of the run do.
 pub(super) struct Gauge {
     views: Vec<View>,
     pictures: Vec<Vec<u8>>,
@@ -37,10 +36,13 @@ pub(super) struct Gauge {
 }
 
 impl Gauge {
-    /// Puts the scene together.
-    pub(super) fn new(stage: &Stage, resolved: &Resolved) -> Result<Self, Failure> {
-        let scene = Arc::new(Scene::new(&stage.settings).or_fail(ExitKind::Run)?);
-        let views: Result<Vec<View>, _> = (0..stage.rig.cameras().len())
+    /// Prepares the scene and the estimator.
+    pub(super) fn new(
+        synthetic: &SyntheticDeployment,
+        resolved: &Resolved,
+    ) -> Result<Self, Failure> {
+        let scene = Arc::new(Scene::new(&synthetic.settings).or_fail(ExitKind::Run)?);
+        let views: Result<Vec<View>, _> = (0..synthetic.rig.cameras().len())
             .map(|camera| View::new(&scene, camera))
             .collect();
         let views = views.or_fail(ExitKind::Run)?;
@@ -59,12 +61,12 @@ impl Gauge {
         })
     }
 
-    /// Measures, for about two seconds.
+    /// Measures for about two seconds.
     pub(super) fn measure(&mut self) -> Result<Machine, Failure> {
         let load = load();
         let begin = Instant::now();
         let mut spans = Vec::new();
-        // The first only makes room.
+        // The first frame is a warm-up.
         while spans.len() < 2 || begin.elapsed() < SPAN {
             let nth = Instant::now();
             self.frame(spans.len() as u64)?;
@@ -96,37 +98,37 @@ impl Gauge {
     }
 }
 
-/// What a measurement says.
+/// The measured speed of this machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Machine {
-    /// Processes that wanted to run, on average over the last minute, before anything was measured.
+    /// The load average of the last minute, before the measurement.
     load: Option<f64>,
     n_cores: usize,
     n_cameras: usize,
-    /// How long a frame of all cameras takes on all cores: the median.
+    /// Median time for one frame of all cameras on all cores, seconds.
     frame_s: f64,
 }
 
 impl Machine {
-    /// Frames a second that the cameras take: those of a fast machine, or as many as leave half of the time.
+    /// The frame rate of the cameras: at most `FULL_RATE_HZ`, and such that computing takes at most `SHARE` of the time.
     pub(super) fn rate_hz(&self) -> f64 {
         let most = SHARE / self.frame_s;
-        // Two decimals are enough to be read.
+        // Rounded to two decimals, for display.
         let rounded = (100.0 * most).floor() / 100.0;
-        rounded.clamp(LEAST_RATE_HZ, FULL_RATE_HZ)
+        rounded.clamp(MIN_RATE_HZ, FULL_RATE_HZ)
     }
 
-    /// How many times as long as on a machine that is fast enough everything takes here; 1 at least.
+    /// Computing time relative to a machine that is fast enough; at least 1.
     pub(super) fn slowness(&self) -> f64 {
         (FULL_RATE_HZ * self.frame_s / SHARE).max(1.0)
     }
 
-    /// How many times as far apart frames are as on a machine that is fast enough; 20 at most.
+    /// Interval of frames relative to a machine that is fast enough; 1 to 20.
     pub(super) fn spread(&self) -> f64 {
         FULL_RATE_HZ / self.rate_hz()
     }
 
-    /// The slower one of two.
+    /// The slower of two measurements.
     pub(super) fn slower(self, other: Self) -> Self {
         if other.frame_s > self.frame_s {
             other
@@ -135,7 +137,7 @@ impl Machine {
         }
     }
 
-    /// For people.
+    /// The measurement and its consequences as text.
     pub(super) fn text(&self) -> String {
         let Self {
             n_cores, n_cameras, ..
@@ -162,7 +164,7 @@ impl Machine {
         )
     }
 
-    /// For programs.
+    /// The measurement as JSON.
     pub(super) fn json(&self) -> Value {
         json!({
             "load": self.load,
@@ -175,7 +177,7 @@ impl Machine {
     }
 }
 
-/// Processes that want to run, on average over the last minute.
+/// The load average of the last minute.
 fn load() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/loadavg").ok()?;
     text.split_whitespace().next()?.parse().ok()
@@ -195,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn half_of_the_time_is_left_and_the_clock_is_judged_by_as_much_more() {
+    fn the_frame_rate_leaves_half_of_the_time() {
         for (frame_s, rate_hz, slowness) in [
             (0.02, 5.0, 1.0),
             (0.1, 5.0, 1.0),
@@ -211,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_busy_machine_is_called_so_with_its_numbers() {
+    fn a_busy_machine_is_reported_with_its_numbers() {
         let text = machine(9.25, 1.0).text();
         for words in [
             "busy (load 9.2 on 2 cores)",

@@ -1,50 +1,49 @@
-//! What is to be shown, and what must hold.
+//! Options and limits of the demo.
 
 use std::path::PathBuf;
 
 use scene::Action;
 
-/// What to show.
+/// Options of the demo.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Folder for the report and all that it is made of.
+    /// The folder for the report and the run.
     pub out: PathBuf,
-    /// Frames of every camera; those of `seconds`, or of twenty seconds but at least 30, if there is no number.
+    /// Frames per camera; by default those of `seconds`, or else of twenty seconds, at least 30.
     pub frames: Option<u64>,
-    /// How long the cameras run, seconds; `frames` goes before it.
+    /// Duration of the run, seconds; ignored if `frames` is given.
     pub seconds: Option<u32>,
-    /// Frames a second; what this machine is found to be able to, at most 5, if there is no number.
+    /// Frames per second; by default as many as this machine can process, at most 5.
     pub rate_hz: Option<f64>,
-    /// What the person does.
+    /// The action of the person.
     pub action: Action,
-    /// Number of the person: shape, clothes, manners.
+    /// The number of the person, which determines shape and clothes.
     pub subject: u64,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// How long a stage waits for a view that is late, milliseconds; 500, or what this machine needs, if there is no
-    /// number.
+    /// How long a stage waits for a late view, milliseconds; by default 500, or more on a slow machine.
     pub deadline_ms: Option<u64>,
-    /// Whether the process of a camera is killed.
+    /// Whether a camera's process is killed.
     pub kills: bool,
-    /// Limits that can be asked for.
+    /// Configurable limits.
     pub limits: Limits,
-    /// Name of the deployment: two that run at once need two.
+    /// The name of the deployment, unique among those that run at the same time.
     pub name: String,
 }
 
-/// Limits that can be asked for.
+/// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Least share of the frames with a result, percent; slow machines pass frames over, which is counted.
+    /// The least share of frames with a result, percent.
     pub min_results: f64,
-    /// Least share of the results with a skeleton, percent.
+    /// The least share of results with a skeleton, percent.
     pub min_skeletons: f64,
-    /// Least PCP3D at gamma 0.5 over all results, percent.
+    /// The least PCP3D at gamma 0.5 over all results, percent.
     pub min_pcp3d: f64,
-    /// Longest time until the killed camera has a frame in a result again, milliseconds on a machine that keeps up
-    /// with 5 frames a second.
+    /// The longest time until a frame of the killed camera is used in a result again, milliseconds, on a machine that
+    /// keeps up with 5 frames per second.
     pub max_return_ms: f64,
-    /// Longest time without a result while the killed camera is away, milliseconds on a machine that keeps up with
-    /// 5 frames a second.
+    /// The longest pause between results while the killed camera is away, milliseconds, on a machine that keeps up with
+    /// 5 frames per second.
     pub max_pause_ms: f64,
 }

@@ -1,4 +1,4 @@
-//! The page of the demo: what of its numbers stands where, and which pictures are shown.
+//! The content of the demo's HTML page: tables, space view and pictures.
 
 use std::path::Path;
 
@@ -11,17 +11,22 @@ use super::report::Report;
 use super::run::{Run, VICTIM};
 use crate::trial::Point;
 use crate::trial::cost::Cost;
-use crate::trial::results::Moment;
-use crate::trial::stage::Stage;
+use crate::trial::results::FrameResult;
+use crate::trial::synthetic::SyntheticDeployment;
 
 const JPEG_QUALITY: u8 = 88;
 
-/// Puts the page together.
+/// Builds the page.
 ///
-/// * `folder`: results of the run, with the pictures.
-pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path) -> Page {
+/// * `folder`: the output folder of the run, with the overlays.
+pub(super) fn page(
+    run: &Run<'_>,
+    report: &Report,
+    synthetic: &SyntheticDeployment,
+    folder: &Path,
+) -> Page {
     let clock = Clock::new(run);
-    let posed = || run.moments.iter().filter(|it| it.is_posed());
+    let posed = || run.results.iter().filter(|it| it.is_posed());
     let mut tables = Vec::new();
     if let Some(cost) = &report.cost {
         tables.push(of_cost(cost, &run.cameras[VICTIM]));
@@ -36,7 +41,7 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
             run.n_frames,
             run.rate_hz,
             run.processes.len(),
-            plural(run.moments.len(), "result"),
+            plural(run.results.len(), "result"),
             posed().count(),
             posed()
                 .filter(|it| it.views.iter().all(|it| it.missing.is_none()))
@@ -44,7 +49,7 @@ pub(super) fn page(run: &Run<'_>, report: &Report, stage: &Stage, folder: &Path)
             run.cameras.len(),
         ),
         limits: report.limits.clone(),
-        space: space(run, stage),
+        space: space(run, synthetic),
         marks: marks(report.cost.as_ref(), &clock),
         tables,
         legend: "Thick: the pose that all views agreed on, right orange, left blue; thin and grey: what the view found \
@@ -58,15 +63,16 @@ fn plural(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-/// From the clock of the run to seconds since the first frame.
+/// Converts times of the run to seconds since the first frame.
 struct Clock {
     first_ms: f64,
 }
 
 impl Clock {
     fn new(run: &Run<'_>) -> Self {
-        let begin = |it: &Moment| Some(it.captured_ms()? - 1000.0 * it.frame as f64 / run.rate_hz);
-        let first = run.moments.iter().filter_map(begin).reduce(f64::min);
+        let begin =
+            |it: &FrameResult| Some(it.captured_ms()? - 1000.0 * it.frame as f64 / run.rate_hz);
+        let first = run.results.iter().filter_map(begin).reduce(f64::min);
         Self {
             first_ms: first.unwrap_or(0.0),
         }
@@ -90,19 +96,19 @@ fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
     [mark(killed, "killed")].into_iter().chain(back).collect()
 }
 
-fn space(run: &Run<'_>, stage: &Stage) -> Space {
-    let moment = |(it, truth): (&Moment, &Vec<Point>)| report::run::Moment {
-        frame: it.frame,
-        seconds: it.frame as f64 / run.rate_hz,
-        found: it.joints.clone(),
+fn space(run: &Run<'_>, synthetic: &SyntheticDeployment) -> Space {
+    let moment = |(result, truth): (&FrameResult, &Vec<Point>)| report::run::Moment {
+        frame: result.frame,
+        seconds: result.frame as f64 / run.rate_hz,
+        found: result.joints.clone(),
         truth: truth.clone(),
-        views: it.views.iter().map(|it| it.missing.clone()).collect(),
+        views: result.views.iter().map(|it| it.missing.clone()).collect(),
     };
-    let up = stage.rig.up_in_world();
+    let up = synthetic.rig.up_in_world();
     Space {
         joints: PARSE14.joints.iter().map(|it| it.name.to_owned()).collect(),
         limbs: PARSE14.limbs.to_vec(),
-        eyes: stage
+        eyes: synthetic
             .rig
             .cameras()
             .iter()
@@ -113,7 +119,7 @@ fn space(run: &Run<'_>, stage: &Stage) -> Space {
             })
             .collect(),
         up: up.map_or([0.0, 0.0, 1.0], |it| it.into_inner().into()),
-        moments: run.moments.iter().zip(run.truth).map(moment).collect(),
+        moments: run.results.iter().zip(run.truth).map(moment).collect(),
     }
 }
 
@@ -209,7 +215,7 @@ fn latency(run: &Run<'_>) -> Table {
     let note = "Milliseconds of computing, by stage; end to end is from the capture of a frame to its skeleton in \
                 space, waiting for busy processes included. The cameras draw their pictures, which real ones do not.";
     let mut table = table("Latency", note, ["stage", "frames", "p50", "p99", "max"]);
-    let latency = run.ran.recorded().latency();
+    let latency = run.report.recorded().latency();
     let rows = latency.into_iter().flat_map(budget::rows);
     table.rows = rows
         .map(|(name, it)| {
@@ -235,7 +241,7 @@ fn accounts(run: &Run<'_>) -> Table {
     ];
     let mut table = table("Frames accounted for", note, columns);
     table.rows = run
-        .ran
+        .report
         .views()
         .iter()
         .map(|it| {
@@ -258,7 +264,7 @@ fn accounts(run: &Run<'_>) -> Table {
     table
 }
 
-/// Some frames in all views: the first that was drawn, one before the kill, one without the camera, the last.
+/// Strips of overlays of some frames in all views; see [`chosen`].
 fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     let file = |camera: &String, frame: u64| {
         folder
@@ -266,21 +272,21 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
             .join(camera)
             .join(format!("{frame:06}.png"))
     };
-    let is_drawn = |it: &&Moment| {
+    let is_drawn = |it: &&FrameResult| {
         run.cameras
             .iter()
             .any(|camera| file(camera, it.frame).exists())
     };
-    let drawn: Vec<&Moment> = run.moments.iter().filter(is_drawn).collect();
+    let drawn: Vec<&FrameResult> = run.results.iter().filter(is_drawn).collect();
     let shown = chosen(&drawn, cost.and_then(|it| it.last_frame));
-    let picture = |moment: &Moment, view: usize| Picture {
+    let picture = |moment: &FrameResult, view: usize| Picture {
         caption: run.cameras[view].clone(),
         jpeg: jpeg(&file(&run.cameras[view], moment.frame)).map_err(|_none| {
             let why = moment.views[view].missing.as_deref();
             why.unwrap_or("no picture").to_owned()
         }),
     };
-    let strip = |it: &&Moment| Strip {
+    let strip = |it: &&FrameResult| Strip {
         caption: format!("frame {}, {:.1} s", it.frame, it.frame as f64 / run.rate_hz),
         pictures: (0..run.cameras.len())
             .map(|view| picture(it, view))
@@ -289,26 +295,30 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     shown.iter().map(strip).collect()
 }
 
-/// * `killed_at`: the last frame of the killed camera.
-fn chosen<'a>(drawn: &[&'a Moment], killed_at: Option<u64>) -> Vec<&'a Moment> {
+/// The frames to show: the first complete one, the last complete one before the kill, the first without the camera, and the
+/// last complete one.
+///
+/// * `drawn`: the frames with overlays.
+/// * `killed_at`: the last frame of the killed camera before the kill.
+fn chosen<'a>(drawn: &[&'a FrameResult], killed_at: Option<u64>) -> Vec<&'a FrameResult> {
     let middle = drawn.get(drawn.len() / 2).map_or(0, |it| it.frame);
     let killed_at = killed_at.unwrap_or(middle);
-    let whole = |it: &&&Moment| it.views.iter().all(|it| it.missing.is_none());
-    let (before, after): (Vec<&Moment>, Vec<&Moment>) =
+    let is_complete = |it: &&&FrameResult| it.views.iter().all(|it| it.missing.is_none());
+    let (before, after): (Vec<&FrameResult>, Vec<&FrameResult>) =
         drawn.iter().partition(|it| it.frame <= killed_at);
     let without = after.iter().find(|it| it.views[VICTIM].missing.is_some());
     let four = [
-        before.iter().find(whole),
-        before.iter().rev().find(whole),
+        before.iter().find(is_complete),
+        before.iter().rev().find(is_complete),
         without,
-        after.iter().rev().find(whole),
+        after.iter().rev().find(is_complete),
     ];
-    let mut shown: Vec<&Moment> = four.into_iter().flatten().copied().collect();
+    let mut shown: Vec<&FrameResult> = four.into_iter().flatten().copied().collect();
     shown.dedup_by_key(|it| it.frame);
     shown
 }
 
-/// A picture of the recorder, smaller.
+/// An overlay as JPEG.
 fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
     let picture = image::open(file)?.into_rgb8();
     let mut bytes = Vec::new();
@@ -319,13 +329,13 @@ fn jpeg(file: &Path) -> Result<Vec<u8>, image::ImageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trial::results::Seen;
+    use crate::trial::results::ViewResult;
 
-    /// A frame that was drawn, with all four cameras or without the killed one.
-    fn drawn(frame: u64, is_whole: bool) -> Moment {
-        let mut views = vec![Seen::default(); 4];
-        views[VICTIM].missing = (!is_whole).then(|| "process lost".to_owned());
-        Moment {
+    /// A frame with overlays, with all four cameras or without the killed one.
+    fn drawn(frame: u64, is_complete: bool) -> FrameResult {
+        let mut views = vec![ViewResult::default(); 4];
+        views[VICTIM].missing = (!is_complete).then(|| "process lost".to_owned());
+        FrameResult {
             frame,
             epoch: 0,
             sent_ms: 0.0,
@@ -335,13 +345,13 @@ mod tests {
     }
 
     fn frames(of: &[(u64, bool)], killed_at: Option<u64>) -> Vec<u64> {
-        let moments: Vec<Moment> = of.iter().map(|it| drawn(it.0, it.1)).collect();
-        let all: Vec<&Moment> = moments.iter().collect();
+        let results: Vec<FrameResult> = of.iter().map(|it| drawn(it.0, it.1)).collect();
+        let all: Vec<&FrameResult> = results.iter().collect();
         chosen(&all, killed_at).iter().map(|it| it.frame).collect()
     }
 
     #[test]
-    fn pictures_are_of_before_the_kill_of_the_absence_and_of_afterwards() {
+    fn frames_before_during_and_after_the_absence_are_shown() {
         let run = [
             (0, true),
             (4, true),
@@ -356,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn where_little_was_drawn_little_is_shown_and_nothing_twice() {
+    fn few_overlays_give_few_strips_without_repetitions() {
         assert_eq!(frames(&[], Some(40)), [0; 0]);
         assert_eq!(frames(&[(4, true)], Some(40)), [4]);
         assert_eq!(frames(&[(0, true), (4, true), (8, true)], None), [0, 4, 8]);

@@ -1,4 +1,4 @@
-//! What the demo found out: numbers, verdicts, and both as text and as JSON.
+//! The report on the demo: accuracy, cost of the kill, and limits, as text and as JSON.
 
 use core::fmt::Write as _;
 use std::path::Path;
@@ -10,27 +10,27 @@ use super::limits::{self, Measured};
 use super::options::Limits;
 use super::run::{Run, VICTIM};
 use super::score::{GAMMA, Score, score};
-use crate::trial::cost::{Cost, Trace};
-use crate::trial::results::Moment;
+use crate::trial::cost::{Cost, EpochSource};
+use crate::trial::results::FrameResult;
 
-/// What the demo found out.
+/// The report on the demo.
 #[derive(Debug)]
 pub(super) struct Report {
-    /// Against the truth: all results, those with every view, those without the killed one.
+    /// Accuracy of all results, of those with every view, and of those without the killed camera's view.
     pub scores: [(&'static str, Score); 3],
-    /// What the killed camera cost, if one was to be killed.
+    /// The cost of the kill, if a kill was planned.
     pub cost: Option<Cost>,
-    /// The verdicts.
+    /// The limits, with what was measured.
     pub limits: Vec<Limit>,
 }
 
 impl Report {
-    /// Judges a run.
-    pub(super) fn new(run: &Run<'_>, asked: &Limits) -> Self {
-        let of = |wanted: &dyn Fn(&Moment) -> bool| {
-            let pairs = run.moments.iter().zip(run.truth);
-            let those = pairs.filter(|it| wanted(it.0));
-            score(those.map(|it| (&it.0.joints[..], &it.1[..])))
+    /// Evaluates a run.
+    pub(super) fn new(run: &Run<'_>, requested: &Limits) -> Self {
+        let of = |wanted: &dyn Fn(&FrameResult) -> bool| {
+            let pairs = run.results.iter().zip(run.truth);
+            let selected = pairs.filter(|it| wanted(it.0));
+            score(selected.map(|it| (&it.0.joints[..], &it.1[..])))
         };
         let scores = [
             ("all results", of(&|_| true)),
@@ -45,26 +45,26 @@ impl Report {
         ];
         let cost = run
             .killed
-            .map(|it| Cost::new(Trace::Camera(VICTIM), it, run.session, run.moments));
-        let posed = run.moments.iter().filter(|it| it.is_posed()).count();
-        let summary = run.ran.recorded().summary();
+            .map(|it| Cost::new(EpochSource::Camera(VICTIM), it, run.session, run.results));
+        let posed = run.results.iter().filter(|it| it.is_posed()).count();
+        let summary = run.report.recorded().summary();
         let was_killed = cost.as_ref().is_some_and(|it| it.killed_at_ms.is_some());
         let killed = format!("capture-{VICTIM}");
         let measured = Measured {
             n_frames: run.n_frames,
-            n_results: [run.moments.len(), posed],
+            n_results: [run.results.len(), posed],
             score: &scores[0].1,
             cost: cost.as_ref(),
             deadline_ms: run.deadline_ms,
             slowness: run.machine.map_or(1.0, |it| it.slowness()),
             spread: run.machine.map_or(1.0, |it| it.spread()),
-            views: run.ran.views(),
+            views: run.report.views(),
             failed: &run
-                .ran
+                .report
                 .unexpected_failures(|it| u32::from(was_killed && it == killed)),
             n_unwritten: summary.map(|it| it.writes_failed + it.frames_not_recorded),
         };
-        let limits = limits::judge(asked, &measured);
+        let limits = limits::judge(requested, &measured);
         Self {
             scores,
             cost,
@@ -72,12 +72,12 @@ impl Report {
         }
     }
 
-    /// Whether no limit was missed.
+    /// Whether all limits held.
     pub(super) fn is_held(&self) -> bool {
         self.limits.iter().all(|it| it.held)
     }
 
-    /// For programs; `report.json`.
+    /// The report as JSON; the content of `report.json`.
     pub(super) fn json(&self, run: &Run<'_>) -> Value {
         let limit = |it: &Limit| json!({ "what": it.what, "asked": it.asked, "measured": it.got, "held": it.held });
         let [all, complete, without] = &self.scores;
@@ -86,8 +86,8 @@ impl Report {
             "held": self.is_held(),
             "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
             "frames": run.n_frames,
-            "frames_with_result": run.moments.len(),
-            "frames_with_skeleton": run.moments.iter().filter(|it| it.is_posed()).count(),
+            "frames_with_result": run.results.len(),
+            "frames_with_skeleton": run.results.iter().filter(|it| it.is_posed()).count(),
             "frame_rate_hz": run.rate_hz,
             "machine": run.machine.map(|it| it.json()),
             "processes": run.processes,
@@ -95,11 +95,11 @@ impl Report {
             "accuracy": { "all": all.1, "every_camera": complete.1, "without_killed": without.1 },
             "killed_camera": self.cost.as_ref().map(|_| &run.cameras[VICTIM]),
             "killed": self.cost,
-            "run": run.ran.json(),
+            "run": run.report.json(),
         })
     }
 
-    /// For people.
+    /// The report as text.
     pub(super) fn text(&self, folder: &Path) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.

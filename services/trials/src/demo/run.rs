@@ -1,38 +1,38 @@
-//! What is known of a run of the demo that is over.
+//! A completed run of the demo.
 
 use launch::Report;
 
 use super::machine::Machine;
 use crate::trial::Point;
-use crate::trial::results::Moment;
-use crate::trial::strike::Times;
+use crate::trial::injection::FaultTimes;
+use crate::trial::results::FrameResult;
 
-/// The camera that is killed, from 0.
+/// The number of the view whose camera is killed.
 pub(super) const VICTIM: usize = 2;
 
-/// A run that is over, and all that is known of it.
+/// A completed run of the demo.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run<'a> {
-    /// Names, in the order of the rig.
+    /// The names of the cameras, in the order of the rig.
     pub cameras: &'a [String],
-    /// Frames of every camera.
+    /// Frames per camera.
     pub n_frames: u64,
-    /// And how many a second.
+    /// Frames per second.
     pub rate_hz: f64,
-    /// How long a stage waits for a view that is late, milliseconds.
+    /// How long a stage waits for a late view, milliseconds.
     pub deadline_ms: f64,
-    /// What was measured of the machine, before the run or after it, whichever is slower.
+    /// The measured speed of this machine: before or after the run, whichever is slower.
     pub machine: Option<Machine>,
-    /// Names of all processes but the supervisor.
+    /// The names of all processes except the supervisor.
     pub processes: &'a [String],
-    /// What `run` says of it.
-    pub ran: &'a Report,
+    /// The report of `launch` on it.
+    pub report: &'a Report,
     /// The results.
-    pub moments: &'a [Moment],
-    /// Where the joints were, for each of them.
+    pub results: &'a [FrameResult],
+    /// The true joints of each result, metres in the world.
     pub truth: &'a [Vec<Point>],
-    /// What became of the camera that was to be killed, if one was.
-    pub killed: Option<Times>,
-    /// When the run was planned, `runtime::now_nanos`.
+    /// The times of the kill, if a kill was planned.
+    pub killed: Option<FaultTimes>,
+    /// The session: the time of planning, `runtime::now_nanos`.
     pub session: u64,
 }

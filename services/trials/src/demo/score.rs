@@ -1,4 +1,4 @@
-//! How far what was found is from the truth: PCP3D and MPJPE of some results.
+//! The accuracy of results: PCP3D and MPJPE.
 
 use evaluation::{joint_errors, segment_errors, segments};
 use serde::Serialize;
@@ -6,31 +6,31 @@ use skeleton::PARSE14;
 
 use crate::trial::Point;
 
-/// The threshold of PCP3D, by convention.
+/// The conventional threshold of PCP3D.
 pub(super) const GAMMA: f64 = 0.5;
 
-/// Errors over some results.
+/// The accuracy of some results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Score {
-    /// Results that were judged.
+    /// Number of results.
     pub frames: usize,
-    /// Percentage of segments whose mean end error is at most half their length; a segment that was not found
-    /// is wrong. None without results.
+    /// PCP3D: percentage of segments whose mean end error is at most half their length. A segment that was not found
+    /// counts as wrong. None without results.
     pub pcp3d_percent: Option<f64>,
-    /// Mean distance of the joints that were found, millimetres.
+    /// MPJPE: mean distance of the found joints from the truth, millimetres.
     pub mpjpe_mm: Option<f64>,
-    /// Joints that were not found, percent.
+    /// Share of joints that were not found, percent.
     pub lost_percent: Option<f64>,
-    /// PCP3D of every segment.
+    /// PCP3D of every segment, percent.
     pub segments: Vec<(&'static str, Option<f64>)>,
 }
 
 /// Compares results with the truth.
 ///
-/// * `pairs`: the joints of `skeleton::PARSE14` that were found, and where they are, metres.
+/// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, metres.
 pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
     let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
-    // By segment: right ones, and all.
+    // By segment: the number of right ones, and of all.
     let mut right = vec![[0_usize; 2]; segments.len()];
     let (mut distances, mut n_joints, mut frames) = (Vec::new(), 0_usize, 0);
     for (found, truth) in pairs {
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_itself_is_right_and_a_long_way_off_is_wrong() {
+    fn the_truth_is_right_and_distant_joints_are_wrong() {
         let truth = truth();
         let found: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
         let far: Vec<Option<Point>> = truth.iter().map(|it| Some([it[0], 9.0, 0.0])).collect();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_found_is_wrong_but_has_no_distance() {
+    fn a_missing_joint_is_wrong_but_has_no_distance() {
         let (truth, nothing) = (truth(), vec![None; 14]);
         let got = score([(&nothing[..], &truth[..])].into_iter());
         assert_eq!((got.pcp3d_percent, got.mpjpe_mm), (Some(0.0), None));

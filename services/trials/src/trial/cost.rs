@@ -1,147 +1,160 @@
-//! What a killed process cost: how long it was away, what the others did meanwhile.
+//! The cost of a process fault: the downtime, and the results of the other processes meanwhile.
 
 use serde::Serialize;
 
-use super::results::Moment;
-use super::strike::Times;
+use super::injection::FaultTimes;
+use super::results::FrameResult;
 
-/// What a killed process cost. Times are milliseconds after it was killed.
+/// The cost of a process fault. Times are in milliseconds after the fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct Cost {
-    /// When it was killed, milliseconds since the run was planned; none if it never was.
+    /// When the fault was injected, milliseconds since the planning of the run; none if it was not.
     pub killed_at_ms: Option<f64>,
-    /// When the supervisor noticed.
+    /// When the supervisor noticed it.
     pub noticed_ms: Option<f64>,
-    /// When the process was started again.
+    /// When the process was restarted.
     pub restarted_ms: Option<f64>,
-    /// When it sent the first frame of its new life that has a result.
+    /// When the process sent its first message after the fault that contributed to a result.
     pub back_ms: Option<f64>,
-    /// The last frame of its old life that has a result, and the first of its new one.
+    /// Its last frame with a result before the fault.
     pub last_frame: Option<u64>,
-    /// The first frame of its new life that has a result.
+    /// Its first frame with a result after the fault.
     pub first_frame: Option<u64>,
-    /// Its frames in between.
+    /// Number of frames in between.
     pub frames_lost: Option<u64>,
-    /// Results that the other views gave of the frames in between.
+    /// Number of results of these frames, from the other views.
     pub results_without_it: usize,
-    /// Longest time between two results while it was away.
+    /// The longest time between two results while the process was away.
     pub longest_pause_ms: Option<f64>,
-    /// Longest time between two results before it was killed.
+    /// The longest time between two results before the fault.
     pub usual_pause_ms: Option<f64>,
 }
 
-/// Where the results say which life of a process they owe to.
+/// Where results record the epoch of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Trace {
-    /// It is the camera of a view.
+pub(crate) enum EpochSource {
+    /// The process is the camera of this view.
     Camera(usize),
-    /// It answers for a view.
+    /// The process is the pose stage of this view.
     Pose(usize),
-    /// It makes the results.
+    /// The process makes the results.
     Result,
-    /// Nowhere: only its signs of life tell.
-    Nowhere,
+    /// Nowhere; only its health messages tell.
+    Unrecorded,
 }
 
-impl Trace {
-    /// The life that a result owes to, and when that life sent what it owes.
-    fn life(self, it: &Moment) -> Option<(u32, f64)> {
+impl EpochSource {
+    /// The epoch of the process in a result, and when the process sent its message, milliseconds since the planning of
+    /// the run.
+    fn epoch(self, result: &FrameResult) -> Option<(u32, f64)> {
         match self {
-            Self::Camera(view) => it.views[view].shot.map(|it| (it.epoch, it.sent_ms)),
-            Self::Pose(view) => it.views[view].answer.map(|it| (it.epoch, it.sent_ms)),
-            Self::Result => Some((it.epoch, it.sent_ms)),
-            Self::Nowhere => None,
+            Self::Camera(view) => result.views[view].camera.map(|it| (it.epoch, it.sent_ms)),
+            Self::Pose(view) => result.views[view].pose.map(|it| (it.epoch, it.sent_ms)),
+            Self::Result => Some((result.epoch, result.sent_ms)),
+            Self::Unrecorded => None,
         }
     }
 
-    /// When a life sent the first of what a result owes to, milliseconds since the run was planned; none of
-    /// processes that results do not name.
-    pub(crate) fn began_ms(self, life: u32, moments: &[Moment]) -> Option<f64> {
-        let mut sent = moments.iter().filter_map(|it| self.life(it));
-        sent.find(|it| it.0 == life).map(|it| it.1)
+    /// When the process sent its first message of an epoch that contributed to a result, milliseconds since the
+    /// planning of the run; none if there is no such result.
+    pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
+        let mut sent = results.iter().filter_map(|it| self.epoch(it));
+        sent.find(|it| it.0 == epoch).map(|it| it.1)
     }
 }
 
 impl Cost {
-    /// Puts together what the kill and the results say.
+    /// Computes the cost from the times of the fault and the results of the run.
     ///
-    /// * `trace`: of the process.
-    /// * `times`: of the kill, as it was ordered.
-    /// * `session`: when the run was planned, by the same clock.
-    pub(crate) fn new(trace: Trace, times: Times, session: u64, moments: &[Moment]) -> Self {
-        let Some(killed) = times.killed else {
+    /// * `source`: where results record the epoch of the process.
+    /// * `times`: the times of the fault.
+    /// * `session`: the session: the time of planning, by the same clock.
+    pub(crate) fn new(
+        source: EpochSource,
+        times: FaultTimes,
+        session: u64,
+        results: &[FrameResult],
+    ) -> Self {
+        let Some(injected) = times.injected else {
             return Self::default();
         };
         let ms = |nanos: u64| nanos as f64 / 1e6;
-        let killed_at = ms(killed.saturating_sub(session));
-        let after = |it: u64| ms(it.saturating_sub(killed));
-        let lives = moments.iter().filter_map(|it| Some((it, trace.life(it)?)));
-        let (old, new): (Vec<_>, Vec<_>) = lives.partition(|it| it.1.0 == 0);
+        let injected_at = ms(injected.saturating_sub(session));
+        let after = |it: u64| ms(it.saturating_sub(injected));
+        let epochs = results
+            .iter()
+            .filter_map(|it| Some((it, source.epoch(it)?)));
+        let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|it| it.1.0 == 0);
         let (last, first) = (old.last(), new.first());
-        let heard = times.heard.filter(|_| trace == Trace::Nowhere).map(after);
-        // What came first with the new life, or at least after it, ends the pause, if it was one.
-        let after_heard = |it: &&Moment| heard.is_some_and(|ms| it.sent_ms >= killed_at + ms);
+        let recovered = times
+            .recovered
+            .filter(|_| source == EpochSource::Unrecorded)
+            .map(after);
+        // The pause ends with the first result of the new epoch, or else with the first result after the recovery.
+        let is_after_recovery =
+            |it: &&FrameResult| recovered.is_some_and(|ms| it.sent_ms >= injected_at + ms);
         let end = first
             .map(|it| it.0)
-            .or_else(|| moments.iter().find(after_heard))
+            .or_else(|| results.iter().find(is_after_recovery))
             .map(|it| it.sent_ms);
         let end = end.unwrap_or(f64::INFINITY);
-        let is_between = |it: &&Moment| match trace {
-            Trace::Nowhere => it.sent_ms > killed_at && it.sent_ms < end,
-            // By frames, for what was taken meanwhile may have its result a little later.
+        let is_between = |it: &&FrameResult| match source {
+            EpochSource::Unrecorded => it.sent_ms > injected_at && it.sent_ms < end,
+            // By frame number: the result of a frame captured in the meantime may be sent later.
             _ => {
                 last.is_none_or(|last| it.frame > last.0.frame)
                     && first.is_none_or(|first| it.frame < first.0.frame)
             }
         };
-        let away = moments.iter().filter(is_between);
+        let away = results.iter().filter(is_between);
         Self {
-            killed_at_ms: Some(killed_at),
+            killed_at_ms: Some(injected_at),
             noticed_ms: times.noticed.map(after),
-            restarted_ms: times.started.map(after),
-            back_ms: first.map(|it| it.1.1 - killed_at).or(heard),
+            restarted_ms: times.restarted.map(after),
+            back_ms: first.map(|it| it.1.1 - injected_at).or(recovered),
             last_frame: last.map(|it| it.0.frame),
             first_frame: first.map(|it| it.0.frame),
             frames_lost: last
                 .zip(first)
                 .map(|(last, first)| first.0.frame.saturating_sub(last.0.frame + 1)),
             results_without_it: away.filter(|it| it.is_posed()).count(),
-            longest_pause_ms: longest_pause(moments, killed_at, end),
-            usual_pause_ms: longest_pause(moments, f64::NEG_INFINITY, killed_at),
+            longest_pause_ms: longest_pause(results, injected_at, end),
+            usual_pause_ms: longest_pause(results, f64::NEG_INFINITY, injected_at),
         }
     }
 }
 
-/// Longest time between two results of which the later was sent in a span of time, both ends included.
-fn longest_pause(moments: &[Moment], from: f64, to: f64) -> Option<f64> {
-    let pairs = moments.windows(2).map(|it| [it[0].sent_ms, it[1].sent_ms]);
-    let those = pairs.filter(|it| it[1] >= from && it[1] <= to);
-    those.map(|it| it[1] - it[0]).reduce(f64::max)
+/// The longest time between two consecutive results of which the later was sent in the given span, milliseconds, both
+/// ends included.
+fn longest_pause(results: &[FrameResult], from: f64, to: f64) -> Option<f64> {
+    let pairs = results.windows(2).map(|it| [it[0].sent_ms, it[1].sent_ms]);
+    let inside = pairs.filter(|it| it[1] >= from && it[1] <= to);
+    inside.map(|it| it[1] - it[0]).reduce(f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use runfiles::{CameraTimes, PoseTimes};
 
-    use super::super::results::Seen;
+    use super::super::results::ViewResult;
     use super::*;
 
-    /// A result sent at a time; the camera's frame by the life that sent it.
-    fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> Moment {
-        let shot = epoch.map(|epoch| CameraTimes {
+    /// A result sent at a time, with the epoch of all its processes; without an epoch, the view is missing.
+    fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> FrameResult {
+        let camera = epoch.map(|epoch| CameraTimes {
             epoch,
             captured_ms: sent_ms - 20.0,
             sent_ms: sent_ms - 10.0,
         });
-        Moment {
+        FrameResult {
             frame,
             epoch: epoch.unwrap_or(0),
             sent_ms,
             joints: vec![Some([0.0; 3]); 14],
-            views: vec![Seen {
-                missing: shot.is_none().then(|| "process lost".to_owned()),
-                shot,
-                answer: epoch.map(|epoch| PoseTimes {
+            views: vec![ViewResult {
+                missing: camera.is_none().then(|| "process lost".to_owned()),
+                camera,
+                pose: epoch.map(|epoch| PoseTimes {
                     epoch,
                     sent_ms: sent_ms - 5.0,
                 }),
@@ -149,17 +162,17 @@ mod tests {
         }
     }
 
-    fn killed(at_ms: u64) -> Times {
-        Times {
-            killed: Some(1_000_000 * at_ms),
+    fn fault_at(at_ms: u64) -> FaultTimes {
+        FaultTimes {
+            injected: Some(1_000_000 * at_ms),
             noticed: Some(1_000_000 * (at_ms + 3)),
-            ..Times::default()
+            ..FaultTimes::default()
         }
     }
 
     #[test]
-    fn what_happened_between_two_lives_is_counted() {
-        let moments = [
+    fn frames_and_results_between_two_epochs_are_counted() {
+        let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 200.0, Some(0)),
             moment(2, 300.0, Some(0)),
@@ -168,7 +181,7 @@ mod tests {
             moment(6, 900.0, Some(1)),
             moment(7, 1900.0, Some(1)),
         ];
-        let got = Cost::new(Trace::Camera(0), killed(310), 0, &moments);
+        let got = Cost::new(EpochSource::Camera(0), fault_at(310), 0, &results);
         let expected = Cost {
             killed_at_ms: Some(310.0),
             noticed_ms: Some(3.0),
@@ -185,49 +198,53 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_for_the_dead_gives_nothing_without_it() {
-        let moments = [
+    fn there_are_no_results_meanwhile_if_the_others_wait() {
+        let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 200.0, Some(0)),
             moment(2, 5000.0, Some(1)),
         ];
-        let got = Cost::new(Trace::Camera(0), killed(210), 0, &moments);
+        let got = Cost::new(EpochSource::Camera(0), fault_at(210), 0, &results);
         assert_eq!(got.results_without_it, 0);
         assert_eq!(got.longest_pause_ms, Some(4800.0));
     }
 
     #[test]
-    fn every_stage_is_back_with_what_it_sent_itself() {
-        let moments = [
+    fn every_process_is_back_with_its_own_message() {
+        let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 300.0, Some(0)),
             moment(2, 900.0, Some(1)),
         ];
-        let back = |trace| Cost::new(trace, killed(310), 0, &moments).back_ms;
-        assert_eq!(back(Trace::Camera(0)), Some(580.0));
-        assert_eq!(back(Trace::Pose(0)), Some(585.0));
-        assert_eq!(back(Trace::Result), Some(590.0));
-        assert_eq!(back(Trace::Nowhere), None, "it was not heard of");
-        let began = |trace: Trace, life| trace.began_ms(life, &moments);
-        assert_eq!(began(Trace::Camera(0), 1), Some(890.0));
-        assert_eq!(began(Trace::Pose(0), 0), Some(95.0));
-        assert_eq!(began(Trace::Result, 2), None);
-        assert_eq!(began(Trace::Nowhere, 1), None);
+        let back = |source| Cost::new(source, fault_at(310), 0, &results).back_ms;
+        assert_eq!(back(EpochSource::Camera(0)), Some(580.0));
+        assert_eq!(back(EpochSource::Pose(0)), Some(585.0));
+        assert_eq!(back(EpochSource::Result), Some(590.0));
+        assert_eq!(
+            back(EpochSource::Unrecorded),
+            None,
+            "there was no health message"
+        );
+        let began = |source: EpochSource, epoch| source.began_ms(epoch, &results);
+        assert_eq!(began(EpochSource::Camera(0), 1), Some(890.0));
+        assert_eq!(began(EpochSource::Pose(0), 0), Some(95.0));
+        assert_eq!(began(EpochSource::Result, 2), None);
+        assert_eq!(began(EpochSource::Unrecorded, 1), None);
     }
 
     #[test]
-    fn of_whom_the_results_say_nothing_the_signs_of_life_tell() {
-        let moments = [
+    fn health_messages_tell_about_processes_that_results_do_not_record() {
+        let results = [
             moment(0, 100.0, None),
             moment(1, 300.0, None),
             moment(2, 500.0, None),
             moment(3, 1900.0, None),
         ];
-        let times = Times {
-            heard: Some(1_000_000 * 810),
-            ..killed(310)
+        let times = FaultTimes {
+            recovered: Some(1_000_000 * 810),
+            ..fault_at(310)
         };
-        let got = Cost::new(Trace::Nowhere, times, 0, &moments);
+        let got = Cost::new(EpochSource::Unrecorded, times, 0, &results);
         assert_eq!(got.back_ms, Some(500.0));
         assert_eq!(
             (got.results_without_it, got.longest_pause_ms),
@@ -237,20 +254,20 @@ mod tests {
     }
 
     #[test]
-    fn who_never_comes_back_is_away_to_the_end() {
-        let moments = [
+    fn a_process_that_does_not_come_back_is_away_to_the_end() {
+        let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 400.0, None),
             moment(2, 500.0, None),
         ];
-        let got = Cost::new(Trace::Camera(0), killed(110), 0, &moments);
+        let got = Cost::new(EpochSource::Camera(0), fault_at(110), 0, &results);
         assert_eq!((got.back_ms, got.frames_lost), (None, None));
         assert_eq!(
             (got.results_without_it, got.longest_pause_ms),
             (2, Some(300.0))
         );
         assert_eq!(
-            Cost::new(Trace::Camera(0), Times::default(), 0, &moments),
+            Cost::new(EpochSource::Camera(0), FaultTimes::default(), 0, &results),
             Cost::default()
         );
     }

@@ -1,8 +1,8 @@
-//! A measured number against the limit that was asked for.
+//! Compares measured numbers with limits.
 
 use report::run::Limit;
 
-/// Holds if the number is at least what was asked for.
+/// A limit that holds if the number is at least the given one.
 pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -12,7 +12,7 @@ pub(crate) fn at_least(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// Holds if the number is at most what was asked for.
+/// A limit that holds if the number is at most the given one.
 pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     limit(
         what,
@@ -22,7 +22,7 @@ pub(crate) fn at_most(what: &str, asked: f64, got: Option<f64>) -> Limit {
     )
 }
 
-/// Holds if there is nothing of it.
+/// A limit that holds if the list is empty.
 pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     Limit {
         what: what.to_owned(),
@@ -36,7 +36,7 @@ pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     }
 }
 
-/// What was not measured has not held.
+/// * `got`: the measured number; a limit on an unmeasured number is missed.
 fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
     let digits = |it: f64| usize::from(it.fract() != 0.0);
     Limit {
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_asked_for_itself_holds_and_what_was_not_measured_does_not() {
+    fn the_limit_itself_holds_and_an_unmeasured_number_does_not() {
         for (got, least, most) in [
             (Some(2.0), true, true),
             (Some(2.5), true, false),
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_should_not_be_there_is_named() {
+    fn a_list_that_should_be_empty_is_shown() {
         assert!(none_of("x", &[]).held);
         let got = none_of("x", &["a".to_owned(), "b".to_owned()]);
         assert_eq!((got.held, got.got.as_str()), (false, "a, b"));

@@ -1,4 +1,4 @@
-//! What a run left in its folder about every frame, read again.
+//! Reads the results of a run, frame by frame, from its output folder.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,54 +9,59 @@ use skeleton::PARSE14;
 
 use super::Point;
 
-/// One result.
+/// The result of one frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Moment {
+pub(crate) struct FrameResult {
     pub frame: u64,
-    /// How often the process that made it had been restarted.
+    /// The epoch of the process that made it.
     pub epoch: u32,
-    /// When it was sent, milliseconds since the run was planned.
+    /// When it was sent, milliseconds since the planning of the run.
     pub sent_ms: f64,
-    /// The joints of `skeleton::PARSE14` that were found, metres in the world.
+    /// The joints of `skeleton::PARSE14`, metres in the world; none for those not found.
     pub joints: Vec<Option<Point>>,
     /// The views, in the order of the rig.
-    pub views: Vec<Seen>,
+    pub views: Vec<ViewResult>,
 }
 
-/// What is known of one view of a result.
+/// One view of a result.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Seen {
-    /// Why it has no part in the result, if it has none.
+pub(crate) struct ViewResult {
+    /// Why it was not used in the result, if it was not.
     pub missing: Option<String>,
-    /// The frame that its camera sent.
-    pub shot: Option<CameraTimes>,
-    /// The answer of its pose process.
-    pub answer: Option<PoseTimes>,
+    /// The times of its camera.
+    pub camera: Option<CameraTimes>,
+    /// The times of its pose process.
+    pub pose: Option<PoseTimes>,
 }
 
-impl Moment {
-    /// Whether anything was found.
+impl FrameResult {
+    /// Whether any joint was found.
     pub(crate) fn is_posed(&self) -> bool {
         self.joints.iter().any(Option::is_some)
     }
 
-    /// When the first of its pictures was taken.
+    /// When the first of its pictures was captured, milliseconds since the planning of the run.
     pub(crate) fn captured_ms(&self) -> Option<f64> {
-        let shots = self.views.iter().filter_map(|it| it.shot);
+        let shots = self.views.iter().filter_map(|it| it.camera);
         shots.map(|it| it.captured_ms).reduce(f64::min)
     }
 }
 
-/// Reads the results of a run, in the order in which they came.
+/// Reads the results of a run, in the order of the file.
 ///
-/// * `cameras`: names, in the order of the rig.
-pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
+/// * `folder`: the output folder of the run.
+/// * `cameras`: their names, in the order of the rig.
+///
+/// # Errors
+///
+/// A file cannot be read, or a line of it is invalid.
+pub(crate) fn read(folder: &Path, cameras: &[String]) -> Result<Vec<FrameResult>, Failure> {
     let frames: Vec<FrameLine> = lines(folder)?;
     let times: Vec<TimesLine> = lines(folder)?;
     Ok(join(&frames, times, cameras))
 }
 
-/// Reads a file of lines.
+/// Reads a JSON-lines file of the output folder.
 fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     let file = folder.join(L::FILE);
     let text = runtime::read_text(&file)?;
@@ -64,8 +69,8 @@ fn lines<L: Line>(folder: &Path) -> Result<Vec<L>, Failure> {
     lines.map_err(|error| runtime::in_file(&file, &error))
 }
 
-/// Results that stand in one of the two files only are left out: they were not written.
-fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<Moment> {
+/// Joins the lines of both files by frame; a frame that is in one of them only has no result.
+fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<FrameResult> {
     let times = times.into_iter().map(|it| (it.frame, it));
     let times: BTreeMap<u64, TimesLine> = times.collect();
     let both = frames
@@ -73,12 +78,12 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
         .filter_map(|it| Some((it, times.get(&it.frame)?)));
     both.map(|(line, time)| {
         let joint = |name: &str| Some(line.joints.get(name)?.placed()?.position_m);
-        let view = |name: &String| Seen {
+        let view = |name: &String| ViewResult {
             missing: line.views_missing.get(name).map(ToString::to_string),
-            shot: time.views.get(name).and_then(|it| it.camera),
-            answer: time.views.get(name).and_then(|it| it.pose),
+            camera: time.views.get(name).and_then(|it| it.camera),
+            pose: time.views.get(name).and_then(|it| it.pose),
         };
-        Moment {
+        FrameResult {
             frame: line.frame,
             epoch: time.epoch,
             sent_ms: time.sent_ms,
@@ -99,7 +104,7 @@ mod tests {
     const TIMES: &str = r#"{"frame":4,"sent_ms":50.5,"epoch":3,"views":{"c1":{"camera":{"epoch":1,"captured_ms":10.0,"sent_ms":12.0},"pose":{"epoch":2,"sent_ms":20.0}},"c2":{"camera":null,"pose":null}}}
 "#;
 
-    fn parse(poses: &str, times: &str, cameras: &[String]) -> Result<Vec<Moment>, Failure> {
+    fn parse(poses: &str, times: &str, cameras: &[String]) -> Result<Vec<FrameResult>, Failure> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("pose3d.jsonl"), poses).unwrap();
         std::fs::write(folder.path().join("times.jsonl"), times).unwrap();
@@ -107,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn both_files_say_what_is_known_of_a_frame() {
+    fn both_files_are_joined_by_frame() {
         let cameras = ["c1", "c2"].map(str::to_owned);
         let got = parse(POSES, TIMES, &cameras).unwrap();
         let [moment] = &got[..] else {
@@ -116,21 +121,21 @@ mod tests {
         assert_eq!((moment.frame, moment.sent_ms), (4, 50.5));
         assert_eq!(moment.joints[13], Some([1.0, 2.0, 3.0]));
         assert_eq!(moment.joints.iter().flatten().count(), 1);
-        assert_eq!(moment.views[0].shot.unwrap().epoch, 1);
-        assert_eq!(moment.views[0].answer.unwrap().epoch, 2);
+        assert_eq!(moment.views[0].camera.unwrap().epoch, 1);
+        assert_eq!(moment.views[0].pose.unwrap().epoch, 2);
         assert_eq!(moment.epoch, 3);
         assert_eq!(moment.captured_ms(), Some(10.0));
         assert_eq!(moment.views[1].missing.as_deref(), Some("late"));
     }
 
     #[test]
-    fn a_line_that_is_none_is_an_error() {
+    fn an_invalid_line_is_an_error() {
         parse("{\"frame\":1", TIMES, &[]).unwrap_err();
         parse(POSES, "x\n", &[]).unwrap_err();
         let wrong = TIMES.replace("\"epoch\":3", "\"epoch\":-3");
         let error = parse(POSES, &wrong, &[]).unwrap_err().to_string();
-        for told in ["times.jsonl", "line 1", "`epoch`", "-3"] {
-            assert!(error.contains(told), "{error}");
+        for expected in ["times.jsonl", "line 1", "`epoch`", "-3"] {
+            assert!(error.contains(expected), "{error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What the processes of a run hold, second by second: memory, descriptors, files; and whether it grows.
+//! Measures the resources of a run every second: memory, descriptors and files.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -10,48 +10,48 @@ use runtime::Namespace;
 use serde::Serialize;
 use supervise::Event;
 
-use crate::trial::strike::is_at_work;
+use crate::trial::injection::has_worked;
 
-/// Nanoseconds between two samples.
+/// Time between two samples, nanoseconds.
 const PERIOD: u64 = 1_000_000_000;
-/// Fewer samples say nothing.
-const LEAST: usize = 9;
+/// The least number of samples at which growth is judged.
+const MIN_SAMPLES: usize = 9;
 
-/// What a run holds at a moment.
+/// The resources in use at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub(super) struct Sample {
-    /// Physical memory of all processes but the supervisor that is theirs alone: without files and shared memory, bytes.
+pub(super) struct ResourceUse {
+    /// Anonymous resident memory (`RssAnon`) of all processes except the supervisor, bytes.
     pub memory_bytes: u64,
-    /// That of the supervisor, which is never restarted, bytes.
+    /// Anonymous resident memory of the supervisor, bytes.
     pub supervisor_memory_bytes: u64,
-    /// Open files of all processes, those of the supervisor included.
+    /// Open file descriptors of all processes, including the supervisor.
     pub descriptors: u64,
-    /// Files of the deployment, those in shared memory included.
+    /// Files of the deployment, including those in shared memory.
     pub files: u64,
-    /// What its files in shared memory take of it, bytes.
+    /// Allocated size of its files in shared memory, bytes.
     pub shared_bytes: u64,
 }
 
-/// Takes samples whenever all processes are at work.
+/// Takes a sample every second in which all processes work.
 #[derive(Debug, Default)]
-pub(super) struct Census {
-    /// By name: number, how often it had been restarted, whether it is at work.
+pub(super) struct ResourceMonitor {
+    /// Process id, epoch, and whether it has worked in this epoch; by name.
     processes: BTreeMap<String, (u32, u32, bool)>,
     taken_at: u64,
-    /// And when they were taken.
-    samples: Vec<(u64, Sample)>,
+    /// The samples and their times, `runtime::now_nanos`.
+    samples: Vec<(u64, ResourceUse)>,
 }
 
-impl Census {
-    /// Takes note of what the supervisor tells.
+impl ResourceMonitor {
+    /// Handles an event of the supervisor, and takes a sample if it is time.
     ///
     /// * `now`: `runtime::now_nanos`.
-    /// * `look`: takes a sample of processes.
-    pub(super) fn note(
+    /// * `measure`: measures the processes with these ids.
+    pub(super) fn handle(
         &mut self,
         event: &Event<'_>,
         now: u64,
-        look: impl FnOnce(&[u32]) -> Sample,
+        measure: impl FnOnce(&[u32]) -> ResourceUse,
     ) {
         match *event {
             Event::Started {
@@ -69,7 +69,7 @@ impl Census {
             }
             Event::Health { process, health } => {
                 if let Some(it) = self.processes.get_mut(process) {
-                    it.2 |= is_at_work(process, health, it.1);
+                    it.2 |= has_worked(process, health, it.1);
                 }
             }
             _ => {}
@@ -78,37 +78,40 @@ impl Census {
         if is_due && !self.processes.is_empty() && self.processes.values().all(|it| it.2) {
             self.taken_at = now;
             let pids: Vec<u32> = self.processes.values().map(|it| it.0).collect();
-            self.samples.push((now, look(&pids)));
+            self.samples.push((now, measure(&pids)));
         }
     }
 
-    /// What was held at first and at last, each the median of a third of the samples; none if they are too few.
-    pub(super) fn ends(&self) -> Option<[Sample; 2]> {
+    /// The resources at the start and at the end: the medians of the first and of the last third of the samples. None if
+    /// there are too few samples.
+    pub(super) fn ends(&self) -> Option<[ResourceUse; 2]> {
         let third = self.samples.len() / 3;
-        if self.samples.len() < LEAST {
+        if self.samples.len() < MIN_SAMPLES {
             return None;
         }
         let last = self.samples.len() - third;
-        let of = |samples: &[(u64, Sample)]| median(samples.iter().map(|it| it.1));
+        let of = |samples: &[(u64, ResourceUse)]| median(samples.iter().map(|it| it.1));
         Some([of(&self.samples[..third])?, of(&self.samples[last..])?])
     }
 
-    /// What was held in a span of time, `runtime::now_nanos`: the median; none if there is no sample of it.
-    pub(super) fn within(&self, span: &Range<u64>) -> Option<Sample> {
+    /// The median of the samples in a span of time; none if there are none.
+    ///
+    /// * `span`: `runtime::now_nanos`.
+    pub(super) fn within(&self, span: &Range<u64>) -> Option<ResourceUse> {
         let within = self.samples.iter().filter(|it| span.contains(&it.0));
         median(within.map(|it| it.1))
     }
 }
 
-/// Of every number by itself; none of nothing.
-fn median(samples: impl Iterator<Item = Sample>) -> Option<Sample> {
-    let samples: Vec<Sample> = samples.collect();
-    let of = |number: fn(&Sample) -> u64| {
+/// The median of every field; none if there are no samples.
+fn median(samples: impl Iterator<Item = ResourceUse>) -> Option<ResourceUse> {
+    let samples: Vec<ResourceUse> = samples.collect();
+    let of = |number: fn(&ResourceUse) -> u64| {
         let mut all: Vec<u64> = samples.iter().map(number).collect();
         all.sort_unstable();
         all.get(all.len() / 2).copied().unwrap_or(0)
     };
-    (!samples.is_empty()).then(|| Sample {
+    (!samples.is_empty()).then(|| ResourceUse {
         memory_bytes: of(|it| it.memory_bytes),
         supervisor_memory_bytes: of(|it| it.supervisor_memory_bytes),
         descriptors: of(|it| it.descriptors),
@@ -117,32 +120,34 @@ fn median(samples: impl Iterator<Item = Sample>) -> Option<Sample> {
     })
 }
 
-/// What processes of a deployment hold now, this one being their supervisor.
-pub(super) fn look(namespace: &Namespace, pids: &[u32]) -> Sample {
+/// Measures the resources of a deployment whose supervisor is this process.
+///
+/// * `pids`: the ids of its other processes.
+pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> ResourceUse {
     let own = std::process::id();
     let descriptors = pids.iter().copied().chain([own]).map(descriptors);
-    Sample {
+    ResourceUse {
         memory_bytes: pids.iter().copied().map(memory).sum(),
         supervisor_memory_bytes: memory(own),
         descriptors: descriptors.sum(),
         files: n_files(namespace),
-        shared_bytes: left(namespace).iter().map(|it| shared(it)).sum(),
+        shared_bytes: shared_files(namespace).iter().map(|it| shared(it)).sum(),
     }
 }
 
-/// What a file takes of shared memory, which is less than its size where nobody has written.
+/// Allocated size of a file in shared memory, bytes: less than its length if pages were never written.
 fn shared(name: &str) -> u64 {
     let found = fs::metadata(Path::new("/dev/shm").join(name));
     found.map_or(0, |it| it.blocks() * 512)
 }
 
-/// Files of a deployment, those in shared memory included.
+/// Number of files of a deployment, including those in shared memory.
 pub(super) fn n_files(namespace: &Namespace) -> u64 {
-    left(namespace).len() as u64 + files(namespace.root())
+    shared_files(namespace).len() as u64 + files(namespace.root())
 }
 
-/// What lies in shared memory of a deployment.
-pub(super) fn left(namespace: &Namespace) -> Vec<String> {
+/// The names of a deployment's files in shared memory.
+pub(super) fn shared_files(namespace: &Namespace) -> Vec<String> {
     let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let names = entries.filter_map(|it| it.file_name().into_string().ok());
     names
@@ -150,7 +155,7 @@ pub(super) fn left(namespace: &Namespace) -> Vec<String> {
         .collect()
 }
 
-/// 0 for a process that has just ended.
+/// Anonymous resident memory of a process, bytes; 0 if it has ended.
 fn memory(pid: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let line = status.lines().find_map(|it| it.strip_prefix("RssAnon:"));
@@ -178,7 +183,7 @@ mod tests {
 
     use super::*;
 
-    fn say(census: &mut Census, process: &str, epoch: u32, seconds: u64) {
+    fn health_at(monitor: &mut ResourceMonitor, process: &str, epoch: u32, seconds: u64) {
         let health = Health {
             epoch,
             n_sent: 1,
@@ -188,68 +193,68 @@ mod tests {
             process,
             health: &health,
         };
-        census.note(&event, seconds * PERIOD, |pids| Sample {
+        monitor.handle(&event, seconds * PERIOD, |pids| ResourceUse {
             files: seconds,
             descriptors: pids.len() as u64,
-            ..Sample::default()
+            ..ResourceUse::default()
         });
     }
 
-    fn start(census: &mut Census, process: &str, epoch: u32) {
+    fn start(monitor: &mut ResourceMonitor, process: &str, epoch: u32) {
         let event = Event::Started {
             process,
             pid: 7,
             epoch,
         };
-        census.note(&event, 0, |_| Sample::default());
+        monitor.handle(&event, 0, |_| ResourceUse::default());
     }
 
     #[test]
-    fn a_sample_is_taken_every_second_in_which_all_are_at_work() {
-        let mut census = Census::default();
-        start(&mut census, "a", 0);
-        start(&mut census, "b", 0);
-        say(&mut census, "a", 0, 1);
-        assert_eq!(census.samples, [], "b has done nothing yet");
-        say(&mut census, "b", 0, 2);
-        say(&mut census, "a", 0, 2);
+    fn a_sample_is_taken_every_second_in_which_all_processes_work() {
+        let mut monitor = ResourceMonitor::default();
+        start(&mut monitor, "a", 0);
+        start(&mut monitor, "b", 0);
+        health_at(&mut monitor, "a", 0, 1);
+        assert_eq!(monitor.samples, [], "b has not worked yet");
+        health_at(&mut monitor, "b", 0, 2);
+        health_at(&mut monitor, "a", 0, 2);
         let died = Event::Died {
             process: "a",
             death: Death::Signal { number: 9 },
         };
-        census.note(&died, 0, |_| Sample::default());
-        say(&mut census, "b", 0, 3);
-        start(&mut census, "a", 1);
-        say(&mut census, "a", 0, 4);
-        say(&mut census, "a", 1, 5);
-        let taken: Vec<_> = census
+        monitor.handle(&died, 0, |_| ResourceUse::default());
+        health_at(&mut monitor, "b", 0, 3);
+        start(&mut monitor, "a", 1);
+        health_at(&mut monitor, "a", 0, 4);
+        health_at(&mut monitor, "a", 1, 5);
+        let taken: Vec<_> = monitor
             .samples
             .iter()
             .map(|it| (it.1.files, it.1.descriptors))
             .collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
-        let within = |span: Range<u64>| census.within(&(span.start * PERIOD..span.end * PERIOD));
+        let within = |span: Range<u64>| monitor.within(&(span.start * PERIOD..span.end * PERIOD));
         assert_eq!(within(3..6).map(|it| it.files), Some(5));
         assert_eq!(within(3..5), None);
     }
 
     #[test]
-    fn first_and_last_are_medians_that_no_single_sample_moves() {
-        let mut census = Census::default();
-        start(&mut census, "a", 0);
+    fn a_single_sample_does_not_change_start_and_end() {
+        let mut monitor = ResourceMonitor::default();
+        start(&mut monitor, "a", 0);
         for seconds in [1, 2, 3, 4, 5, 6, 7, 8] {
-            say(&mut census, "a", 0, seconds);
+            health_at(&mut monitor, "a", 0, seconds);
         }
-        assert_eq!(census.ends(), None, "too few");
-        say(&mut census, "a", 0, 900);
-        let files = census.ends().unwrap().map(|it| it.files);
+        assert_eq!(monitor.ends(), None, "too few");
+        health_at(&mut monitor, "a", 0, 900);
+        let files = monitor.ends().unwrap().map(|it| it.files);
         assert_eq!(files, [2, 8]);
     }
 
     #[test]
-    fn this_process_holds_something() {
+    fn this_process_uses_resources() {
         let namespace = Namespace::below("nobody", &std::env::temp_dir().join("px-none")).unwrap();
-        let sample = look(&namespace, &[std::process::id()]);
+        let sample = measure(&namespace, &[std::process::id()]);
         assert!(sample.memory_bytes > 100_000, "{sample:?}");
         assert!(sample.descriptors >= 2 * 3, "{sample:?}");
         assert_eq!(sample.files, 0);

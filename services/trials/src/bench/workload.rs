@@ -1,4 +1,4 @@
-//! The deployment under load, one run of it, and what that took.
+//! The deployment of a load benchmark, and the measurements of its runs.
 
 use core::fmt::{self, Display, Formatter};
 use std::fs;
@@ -15,25 +15,25 @@ use serde_json::{Value, json};
 use super::options::Options;
 use super::pictures;
 use crate::spread::Spread;
-use crate::trial::results::{self, Moment};
-use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
-use crate::trial::strike::{Blow, Strike};
+use crate::trial::injection::{Injector, ProcessFault};
+use crate::trial::results::{self, FrameResult};
+use crate::trial::synthetic::{self, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
-/// How long a stage waits for a view of cameras that do not exist, milliseconds.
+/// How long a stage waits for a late view of synthetic cameras, milliseconds.
 const DEADLINE_MS: u64 = 500;
-/// What is computed, in the order in which a frame passes it.
+/// The stages that compute, in pipeline order.
 const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
-/// Ticks of a second in which the kernel counts processor time (`USER_HZ`).
+/// Ticks per second in which the kernel counts processor time (`USER_HZ`).
 const TICKS_HZ: f64 = 100.0;
 
-/// One run.
+/// A kind of run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Case {
-    /// Cameras.
+    /// Number of cameras.
     pub n_views: usize,
-    /// Whether every frame is taken, as fast as that goes.
+    /// Whether every frame is processed, as fast as possible.
     pub is_lossless: bool,
-    /// Whether the process of the last camera is dead.
+    /// Whether the process of the last camera is killed.
     pub has_dead: bool,
 }
 
@@ -50,12 +50,12 @@ impl Display for Case {
 }
 
 impl Case {
-    /// The name of its folder.
+    /// The name of its output folder.
     fn folder(self) -> String {
         self.to_string().replace(", ", "-").replace(' ', "-")
     }
 
-    /// What is replaced in the deployment.
+    /// The `key=value` pairs that replace values of the deployment.
     fn set(self) -> Vec<&'static str> {
         let mut set = if self.is_lossless {
             vec!["capture.mode=lossless", "capture.pace=fast"]
@@ -69,36 +69,36 @@ impl Case {
     }
 }
 
-/// What a run took.
+/// The measurements of a run.
 #[derive(Debug)]
 pub(super) struct Measured {
-    /// The run.
+    /// The kind of run.
     pub case: Case,
-    /// Results; after its death if a camera died.
+    /// Number of results; after the kill, if a camera is killed.
     pub n_results: usize,
-    /// Results a second, from the first to the last.
+    /// Results per second, from the first to the last.
     pub rate_hz: Option<f64>,
-    /// From the first picture to the result, milliseconds.
+    /// Time from the capture of the first picture to the result, milliseconds.
     pub end_to_end: Option<Spread>,
-    /// Computing time of every stage, milliseconds; over the whole run.
+    /// Computing time of every stage over the whole run, milliseconds.
     pub stages: Vec<(&'static str, Spread)>,
-    /// Processor time of all processes, seconds; over the whole run.
+    /// Processor time of all processes over the whole run, seconds.
     pub cpu_seconds: f64,
     /// Frames and messages that were dropped.
     pub n_dropped: u64,
-    /// What `run` says of it.
+    /// The report of `launch` as JSON.
     pub run: Value,
 }
 
 impl Measured {
-    /// Processor time of a result, milliseconds. Of a run in which a camera died it would be that of another number of
-    /// results.
+    /// Processor time per result, milliseconds. None for a run with a killed camera: its results before the kill are not
+    /// counted.
     pub(super) fn cpu_ms_per_result(&self) -> Option<f64> {
         let is_whole = self.n_results > 0 && !self.case.has_dead;
         is_whole.then(|| 1e3 * self.cpu_seconds / self.n_results as f64)
     }
 
-    /// For programs.
+    /// The measurements as JSON.
     pub(super) fn json(&self) -> Value {
         let stages = self.stages.iter();
         let stages = stages.map(|(name, it)| ((*name).to_owned(), json!(it)));
@@ -117,29 +117,29 @@ impl Measured {
     }
 }
 
-/// The deployment under load.
+/// The deployment of a load benchmark.
 #[derive(Debug)]
-pub(super) struct Course {
-    /// Its file.
+pub(super) struct Workload {
+    /// The deployment file.
     file: PathBuf,
-    /// For the results, a folder for every run; absolute.
+    /// The absolute folder for the results; every run has a subfolder.
     folder: PathBuf,
-    /// Pictures that were made beforehand: a folder of each camera.
+    /// The folder of pictures rendered in advance, with a subfolder per camera.
     pictures: Option<PathBuf>,
-    /// What is replaced in the file for all runs.
+    /// The `key=value` pairs that replace values of the file in all runs.
     set: Vec<String>,
     n_views: usize,
     verbosity: Verbosity,
 }
 
-impl Course {
-    /// Looks at the deployment, or makes the one with cameras that do not exist. `None` if it was stopped meanwhile.
+impl Workload {
+    /// Reads the deployment, or writes one with synthetic cameras. `None` if it was interrupted.
     pub(super) fn new(
         options: &Options,
         verbosity: Verbosity,
         stop: &Stop,
     ) -> Result<Option<Self>, Failure> {
-        let folder = stage::absolute(&options.out)?;
+        let folder = synthetic::absolute(&options.out)?;
         inputs::make_folder(&folder)?;
         let name = toml::Value::from(options.name.clone());
         let mut set = options.set.clone();
@@ -147,7 +147,7 @@ impl Course {
         if options.spin {
             set.push("runtime.spin=true".to_owned());
         }
-        let mut course = Self {
+        let mut workload = Self {
             file: PathBuf::new(),
             folder,
             pictures: None,
@@ -157,24 +157,24 @@ impl Course {
         };
         let is_ready = match &options.deployment {
             Some(file) => {
-                course.file = stage::absolute(file)?;
-                course.shorten(options)?;
+                workload.file = synthetic::absolute(file)?;
+                workload.shorten(options)?;
                 true
             }
-            None => course.play(options, stop)?,
+            None => workload.write_synthetic(options, stop)?,
         };
-        Ok(is_ready.then_some(course))
+        Ok(is_ready.then_some(workload))
     }
 
-    /// Cameras.
+    /// The maximal number of cameras of a run.
     pub(super) fn n_views(&self) -> usize {
         self.n_views
     }
 
-    /// Writes the deployment with cameras that do not exist, and their pictures; false if it was stopped.
-    fn play(&mut self, options: &Options, stop: &Stop) -> Result<bool, Failure> {
+    /// Writes a deployment with synthetic cameras, and their pictures; false if it was interrupted.
+    fn write_synthetic(&mut self, options: &Options, stop: &Stop) -> Result<bool, Failure> {
         let n_frames = (options.rate_hz * f64::from(options.seconds)).round() as u64;
-        let cast = Cast {
+        let setup = SyntheticSetup {
             subject: 1,
             action: Action::Walking,
             seed: options.seed,
@@ -185,15 +185,15 @@ impl Course {
             name: "bench",
             command: "bench",
         };
-        let stage = Stage::new(&cast, self.folder.clone())?;
-        self.file = stage.write(&cast)?;
+        let synthetic = SyntheticDeployment::new(&setup, self.folder.clone())?;
+        self.file = synthetic.write(&setup)?;
         if options.live {
             return Ok(true);
         }
         let folder = self.folder.join("pictures");
         let is_done = pictures::draw(
-            &stage.settings,
-            cast.n_frames,
+            &synthetic.settings,
+            setup.n_frames,
             &folder,
             stop,
             self.verbosity.quiet,
@@ -202,7 +202,7 @@ impl Course {
         Ok(is_done)
     }
 
-    /// Takes no more of the footage than some seconds, and no more cameras than there are.
+    /// Limits the footage to some seconds, and refuses more cameras than there are.
     fn shorten(&mut self, options: &Options) -> Result<(), Failure> {
         let deployment = load::read(&self.file, &self.set)?.deployment;
         let n_cameras = deployment.cameras.len();
@@ -223,32 +223,34 @@ impl Course {
         Ok(())
     }
 
-    /// What is run.
+    /// The deployment of a run.
     fn deployment(&self, case: Case) -> Result<Deployment, Failure> {
         let more = case.set().into_iter().map(str::to_owned);
         let set: Vec<String> = self.set.iter().cloned().chain(more).collect();
-        let mut it = load::read(&self.file, &set)?.deployment;
-        it.output = self.folder.join(case.folder());
-        keep_views(&mut it, case.n_views);
+        let mut deployment = load::read(&self.file, &set)?.deployment;
+        deployment.output = self.folder.join(case.folder());
+        keep_views(&mut deployment, case.n_views);
         if let Some(folder) = &self.pictures {
-            for camera in &mut it.cameras {
+            for camera in &mut deployment.cameras {
                 camera.source = folder.join(&camera.name).to_string_lossy().into_owned();
             }
         }
-        Ok(it)
+        Ok(deployment)
     }
 
-    /// Runs it. `None` if it was stopped.
+    /// Runs the deployment and measures it. `None` if it was interrupted.
     pub(super) fn measure(&self, case: Case, stop: &Stop) -> Result<Option<Measured>, Failure> {
         let deployment = self.deployment(case)?;
         let planned = Planned::new(&deployment, self.verbosity.level)?;
         let victim = format!("capture-{}", case.n_views - 1);
-        let mut strike = case.has_dead.then(|| Strike::new(Blow::Kill, &victim, 0.0));
+        let mut injector = case
+            .has_dead
+            .then(|| Injector::new(ProcessFault::Kill, &victim, 0.0));
         let before = cpu_seconds_of_children()?;
         let report = planned.run(self.verbosity.quiet, stop, &mut |event| {
-            strike
+            injector
                 .as_mut()
-                .and_then(|it| it.note(event, now_nanos(), Blow::deal))
+                .and_then(|it| it.handle(event, now_nanos(), ProcessFault::inject))
         })?;
         let cpu_seconds = cpu_seconds_of_children()? - before;
         if stop.is_requested() {
@@ -259,27 +261,27 @@ impl Course {
             .iter()
             .map(|it| it.name.clone())
             .collect();
-        let mut moments = results::read(&deployment.output, &names)?;
-        if let Some(strike) = &strike {
-            let killed = strike.times().killed;
+        let mut results = results::read(&deployment.output, &names)?;
+        if let Some(injector) = &injector {
+            let killed = injector.times().injected;
             let since = killed.map_or(f64::INFINITY, |it| {
                 it.saturating_sub(planned.session()) as f64 / 1e6
             });
-            moments.retain(|it| it.captured_ms().is_some_and(|it| it > since));
+            results.retain(|it| it.captured_ms().is_some_and(|it| it > since));
         }
-        Ok(Some(measured(case, &moments, cpu_seconds, &report)))
+        Ok(Some(measured(case, &results, cpu_seconds, &report)))
     }
 }
 
-fn measured(case: Case, moments: &[Moment], cpu_seconds: f64, report: &Report) -> Measured {
-    let took = |it: &Moment| Some(it.sent_ms - it.captured_ms()?);
+fn measured(case: Case, results: &[FrameResult], cpu_seconds: f64, report: &Report) -> Measured {
+    let took = |it: &FrameResult| Some(it.sent_ms - it.captured_ms()?);
     let run = report.json();
     let stages = report.recorded().latency().map(|it| &it.stages);
     Measured {
         case,
-        n_results: moments.len(),
-        rate_hz: rate_hz(moments),
-        end_to_end: Spread::of(moments.iter().filter_map(took).collect()),
+        n_results: results.len(),
+        rate_hz: rate_hz(results),
+        end_to_end: Spread::of(results.iter().filter_map(took).collect()),
         stages: STAGES
             .into_iter()
             .filter_map(|it| Some((it, spread(stages?.get(it)?))))
@@ -290,14 +292,14 @@ fn measured(case: Case, moments: &[Moment], cpu_seconds: f64, report: &Report) -
     }
 }
 
-/// Results a second, from the first to the last.
-fn rate_hz(moments: &[Moment]) -> Option<f64> {
-    let sent = || moments.iter().map(|it| it.sent_ms);
+/// Results per second, from the first to the last.
+fn rate_hz(results: &[FrameResult]) -> Option<f64> {
+    let sent = || results.iter().map(|it| it.sent_ms);
     let (first, last) = (sent().reduce(f64::min)?, sent().reduce(f64::max)?);
-    (last > first).then(|| 1e3 * (moments.len() - 1) as f64 / (last - first))
+    (last > first).then(|| 1e3 * (results.len() - 1) as f64 / (last - first))
 }
 
-/// Percentiles as they are written.
+/// Converts percentiles of the latency report.
 fn spread(it: &Percentiles) -> Spread {
     Spread {
         n: it.count as usize,
@@ -308,26 +310,35 @@ fn spread(it: &Percentiles) -> Spread {
     }
 }
 
-/// Leaves the first cameras, and of the settings what speaks of no others.
-fn keep_views(it: &mut Deployment, n_views: usize) {
-    it.cameras.truncate(n_views);
-    let names: Vec<String> = it.cameras.iter().map(|it| it.name.clone()).collect();
+/// Keeps the first cameras, and removes settings that name others.
+fn keep_views(deployment: &mut Deployment, n_views: usize) {
+    deployment.cameras.truncate(n_views);
+    let names: Vec<String> = deployment
+        .cameras
+        .iter()
+        .map(|it| it.name.clone())
+        .collect();
     let is_kept = |name: &String| names.contains(name);
-    it.fuse.pairs.retain(|pair| pair.iter().all(is_kept));
-    it.fuse
+    deployment
+        .fuse
+        .pairs
+        .retain(|pair| pair.iter().all(is_kept));
+    deployment
+        .fuse
         .compatibility
         .retain(|it| it.views.iter().all(is_kept));
-    it.quality.views.retain(|name, _| is_kept(name));
+    deployment.quality.views.retain(|name, _| is_kept(name));
 }
 
-/// Processor time of the processes that this one has started and that have ended, seconds.
+/// Processor time of all child processes that have ended, seconds.
 fn cpu_seconds_of_children() -> Result<f64, Failure> {
     let stat = fs::read_to_string("/proc/self/stat").or_fail(ExitKind::Run)?;
     let seconds = parse_stat(&stat).ok_or("/proc/self/stat is not as it was expected");
     seconds.or_fail(ExitKind::Run)
 }
 
-/// Fields 16 and 17 (`proc_pid_stat(5)`), counted from behind the name, which may contain anything.
+/// The sum of fields 16 and 17 of `/proc/PID/stat` (`proc_pid_stat(5)`), seconds. Fields are counted from the end of the
+/// name, which may contain any character.
 fn parse_stat(stat: &str) -> Option<f64> {
     let (_, fields) = stat.rsplit_once(") ")?;
     let mut fields = fields.split(' ').skip(13);
@@ -340,36 +351,36 @@ mod tests {
     use runfiles::CameraTimes;
 
     use super::*;
-    use crate::trial::results::Seen;
+    use crate::trial::results::ViewResult;
 
-    fn moment(captured_ms: f64, sent_ms: f64) -> Moment {
-        let shot = CameraTimes {
+    fn moment(captured_ms: f64, sent_ms: f64) -> FrameResult {
+        let camera = CameraTimes {
             epoch: 0,
             captured_ms,
             sent_ms: captured_ms + 1.0,
         };
-        Moment {
+        FrameResult {
             frame: 0,
             epoch: 0,
             sent_ms,
             joints: Vec::new(),
-            views: vec![Seen {
-                shot: Some(shot),
-                ..Seen::default()
+            views: vec![ViewResult {
+                camera: Some(camera),
+                ..ViewResult::default()
             }],
         }
     }
 
     #[test]
-    fn results_are_counted_from_the_first_to_the_last() {
-        let moments = [0.0, 100.0, 250.0, 400.0].map(|it| moment(it, it + 30.0));
-        assert_eq!(rate_hz(&moments), Some(7.5));
-        assert_eq!(rate_hz(&moments[..1]), None);
+    fn the_rate_is_that_from_the_first_to_the_last_result() {
+        let results = [0.0, 100.0, 250.0, 400.0].map(|it| moment(it, it + 30.0));
+        assert_eq!(rate_hz(&results), Some(7.5));
+        assert_eq!(rate_hz(&results[..1]), None);
         assert_eq!(rate_hz(&[]), None);
     }
 
     #[test]
-    fn processor_time_of_children_is_read_whatever_the_program_is_called() {
+    fn the_name_of_a_program_may_contain_any_character() {
         let stat = "7 (a) b) S 1 2 3 4 5 6 7 8 9 10 1100 1200 250 50 20 0";
         assert_eq!(parse_stat(stat), Some(3.0));
         assert_eq!(parse_stat("7 (a) S 1 2"), None);
@@ -377,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn percentiles_are_read_as_they_are_written() {
+    fn percentiles_are_converted_one_to_one() {
         let written = Percentiles {
             count: 3,
             max_ms: 4.0,
@@ -396,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn every_run_has_a_folder_of_its_own() {
+    fn the_folder_of_a_run_is_named_after_it() {
         let case = Case {
             n_views: 2,
             is_lossless: false,

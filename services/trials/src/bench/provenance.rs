@@ -1,4 +1,4 @@
-//! When, where and of what something was measured.
+//! The provenance of a measurement: time, machine, load, version and commit.
 
 use std::fs;
 use std::path::Path;
@@ -7,23 +7,24 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 
-/// When, where and of what something was measured.
+/// The provenance of a measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Occasion {
+pub(super) struct Provenance {
     /// Date and time, UTC.
     pub date: String,
-    /// Processor, cores that may be used, kernel.
+    /// Processor, number of usable cores, kernel.
     pub machine: String,
-    /// Load averages of the last 1, 5 and 15 minutes, as it began.
+    /// Load averages of the last 1, 5 and 15 minutes, before the measurement.
     pub load: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Commit of the working tree that the executable lies in, with `-dirty` if that has changes; unknown elsewhere.
+    /// Commit of the working tree that contains the executable, with `-dirty` if it has changes; `unknown` outside a
+    /// working tree.
     pub commit: String,
 }
 
-impl Occasion {
-    /// This one.
+impl Provenance {
+    /// The provenance of a measurement that starts now.
     pub(super) fn now() -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         let cores = runtime::own_cores().map_or(0, |it| it.len());
@@ -40,7 +41,7 @@ impl Occasion {
         }
     }
 
-    /// In two lines.
+    /// The provenance in two lines.
     pub(super) fn text(&self) -> String {
         format!(
             "{}, version {}, commit {}\n{}, load average {}",
@@ -49,11 +50,11 @@ impl Occasion {
     }
 }
 
-/// What follows some words in the first line of a file that begins with them.
-fn first(file: &str, words: &str) -> String {
+/// The rest of the first line of a file that starts with a prefix; `unknown` if there is none.
+fn first(file: &str, prefix: &str) -> String {
     let text = fs::read_to_string(file).unwrap_or_default();
     let mut lines = text.lines();
-    let found = lines.find_map(|it| it.strip_prefix(words));
+    let found = lines.find_map(|it| it.strip_prefix(prefix));
     found.unwrap_or("unknown").trim().to_owned()
 }
 
@@ -73,9 +74,9 @@ fn git(folder: &Path, arguments: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// `2026-11-21 17:38:39 UTC`, of seconds since 1970.
+/// Formats seconds since 1970 as `2026-11-21 17:38:39 UTC`.
 ///
-/// The day by Howard Hinnant's `civil_from_days`: years begin in March, so that leap days come last.
+/// The date by Howard Hinnant's `civil_from_days`: years start in March, so that a leap day is the last of its year.
 fn date(seconds: u64) -> String {
     let (days, second) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);
@@ -112,10 +113,14 @@ mod tests {
     }
 
     #[test]
-    fn every_occasion_says_where_it_was() {
-        let it = Occasion::now();
-        assert!(it.machine.contains(" cores, Linux "), "{}", it.machine);
-        assert_eq!(it.load.split(' ').count(), 3, "{}", it.load);
-        assert!(it.text().contains(&it.commit));
+    fn the_provenance_names_machine_load_and_commit() {
+        let provenance = Provenance::now();
+        assert!(
+            provenance.machine.contains(" cores, Linux "),
+            "{}",
+            provenance.machine
+        );
+        assert_eq!(provenance.load.split(' ').count(), 3, "{}", provenance.load);
+        assert!(provenance.text().contains(&provenance.commit));
     }
 }

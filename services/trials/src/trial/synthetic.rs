@@ -1,4 +1,4 @@
-//! Cameras that do not exist around a person who does not either, and their deployment.
+//! Deployments with synthetic cameras around a synthetic person.
 
 use std::path::{Path, PathBuf};
 
@@ -10,88 +10,89 @@ use scene::{Action, Address, RigChoice, Scene, Settings};
 
 use super::Point;
 
-/// Cameras of a demo, evenly around the stage.
+/// The default number of synthetic cameras.
 pub(crate) const N_CAMERAS: usize = 4;
-/// How far from its middle, and how high, metres.
+/// Radius of the ring of cameras, metres.
 const RADIUS: f64 = 4.2;
+/// Height of the cameras, metres.
 const HEIGHT: f64 = 1.5;
-/// Pixels of a picture per pixel of a ring's: 320x240, so that two cores can make and solve four of them.
+/// Scale of the images relative to the ring's default: 320x240 pixels, so that two cores can make and process four views.
 const SCALE: f64 = 0.5;
-/// Every so manieth frame is drawn.
+/// Every n-th frame has overlays.
 const OVERLAY_EVERY: u64 = 4;
 
-/// What is played, and under which name.
+/// The settings of a synthetic deployment.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cast<'a> {
-    /// Number of the person.
+pub(crate) struct SyntheticSetup<'a> {
+    /// The number of the person, which determines shape and clothes.
     pub subject: u64,
-    /// What the person does.
+    /// The action of the person.
     pub action: Action,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     pub seed: u64,
-    /// Frames a second.
+    /// Frames per second.
     pub rate_hz: f64,
-    /// Frames of every camera.
+    /// Frames per camera.
     pub n_frames: u64,
-    /// Cameras, evenly around the stage.
+    /// Number of cameras, evenly spaced on a ring.
     pub n_cameras: usize,
-    /// How long a stage waits for a view that is late, milliseconds.
+    /// How long a stage waits for a late view, milliseconds.
     pub deadline_ms: u64,
-    /// Name of the deployment.
+    /// The name of the deployment.
     pub name: &'a str,
-    /// The command that writes it.
+    /// The command that writes it, for a comment in its file.
     pub command: &'a str,
 }
 
-/// Who is seen by whom.
+/// A deployment with synthetic cameras.
 #[derive(Debug)]
-pub(crate) struct Stage {
-    /// Of everything that is written, absolute.
+pub(crate) struct SyntheticDeployment {
+    /// The absolute folder for all its files.
     pub folder: PathBuf,
     /// The cameras.
     pub rig: Rig,
-    /// Of their pictures.
+    /// The settings of the rendered scene.
     pub settings: Settings,
 }
 
-impl Stage {
-    /// Makes the cameras, and the folder.
+impl SyntheticDeployment {
+    /// Places the cameras, and creates the folder.
     ///
-    /// * `folder`: absolute.
-    pub(crate) fn new(cast: &Cast<'_>, folder: PathBuf) -> Result<Self, Failure> {
+    /// * `folder`: an absolute path.
+    pub(crate) fn new(setup: &SyntheticSetup<'_>, folder: PathBuf) -> Result<Self, Failure> {
         inputs::make_folder(&folder)?;
         let ring = RigChoice::Ring {
-            n: cast.n_cameras,
+            n: setup.n_cameras,
             radius: RADIUS,
             height: HEIGHT,
         };
         let ring = ring.rig().or_fail(ExitKind::Run)?;
-        let cameras = ring.cameras().iter().map(smaller).collect();
+        let cameras = ring.cameras().iter().map(scaled).collect();
         Ok(Self {
             rig: Rig::new(cameras, ring.up_in_world(), ring.source()).or_fail(ExitKind::Run)?,
             settings: Settings {
                 rig: RigChoice::File(folder.join("rig.toml")),
-                subject: cast.subject,
-                action: cast.action,
-                seed: cast.seed,
-                rate_hz: cast.rate_hz,
+                subject: setup.subject,
+                action: setup.action,
+                seed: setup.seed,
+                rate_hz: setup.rate_hz,
                 ..Settings::default()
             },
             folder,
         })
     }
 
-    /// Writes the rig and the deployment; its file.
-    pub(crate) fn write(&self, cast: &Cast<'_>) -> Result<PathBuf, Failure> {
+    /// Writes the rig and the deployment; returns the deployment file.
+    pub(crate) fn write(&self, setup: &SyntheticSetup<'_>) -> Result<PathBuf, Failure> {
         let rig = self.folder.join("rig.toml");
         geometry::files::write(&rig, RigFormat::Own, &self.rig).or_fail(ExitKind::Input)?;
         let file = self.folder.join("deployment.toml");
-        let text = self.deployment(cast);
+        let text = self.deployment(setup);
         std::fs::write(&file, text).map_err(|error| runtime::in_file(&file, &error))?;
         Ok(file)
     }
 
-    fn deployment(&self, cast: &Cast<'_>) -> String {
+    fn deployment(&self, setup: &SyntheticSetup<'_>) -> String {
         let quoted = |it: &str| toml::Value::from(it).to_string();
         let settings = Settings {
             rig: RigChoice::File(PathBuf::from("rig.toml")),
@@ -101,7 +102,7 @@ impl Stage {
             let address = Address {
                 settings: settings.clone(),
                 camera: it.name.clone(),
-                n_frames: cast.n_frames,
+                n_frames: setup.n_frames,
             };
             let (name, source) = (quoted(&it.name), quoted(&address.to_string()));
             format!("\n[[camera]]\nname = {name}\nsource = {source}\n")
@@ -117,17 +118,17 @@ impl Stage {
              [results]\noverlay_every = {OVERLAY_EVERY}\n\n\
              [supervise]\ndeadline_ms = {}        # how long a stage waits for a view that is late\n\
              hang_limit_s = 60        # a machine that is busy is slow, not hung\n",
-            cast.command,
+            setup.command,
             self.settings.subject,
             self.settings.action.name(),
-            quoted(cast.name),
+            quoted(setup.name),
             cameras.concat(),
             self.settings.rate_hz,
-            cast.deadline_ms,
+            setup.deadline_ms,
         )
     }
 
-    /// Where the joints of `skeleton::PARSE14` are in some frames, metres in the world.
+    /// The true positions of the joints of `skeleton::PARSE14` in the given frames, metres in the world.
     pub(crate) fn truth(
         &self,
         frames: impl Iterator<Item = u64>,
@@ -138,25 +139,25 @@ impl Stage {
     }
 }
 
-/// The camera with pictures of fewer pixels.
-fn smaller(camera: &Camera) -> Camera {
-    let it = camera.intrinsics;
+/// The camera with images scaled by `SCALE`.
+fn scaled(camera: &Camera) -> Camera {
+    let intrinsics = camera.intrinsics;
     // The centre of the top-left pixel is at 0.
     let centre = |at: f64| SCALE * (at + 0.5) - 0.5;
     Camera {
         intrinsics: Intrinsics {
-            fx: SCALE * it.fx,
-            fy: SCALE * it.fy,
-            cx: centre(it.cx),
-            cy: centre(it.cy),
-            size: it.size.map(|side| (SCALE * f64::from(side)) as u32),
-            lens: it.lens,
+            fx: SCALE * intrinsics.fx,
+            fy: SCALE * intrinsics.fy,
+            cx: centre(intrinsics.cx),
+            cy: centre(intrinsics.cy),
+            size: intrinsics.size.map(|side| (SCALE * f64::from(side)) as u32),
+            lens: intrinsics.lens,
         },
         ..camera.clone()
     }
 }
 
-/// An absolute path, for processes that work in any folder.
+/// The absolute path of a file or folder.
 pub(crate) fn absolute(folder: &Path) -> Result<PathBuf, Failure> {
     std::path::absolute(folder).or_fail(ExitKind::Usage)
 }
@@ -168,15 +169,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_smaller_picture_shows_the_same_in_half_the_pixels() {
+    fn a_scaled_camera_has_the_same_view() {
         let ring = RigChoice::parse("ring:4").unwrap().rig().unwrap();
         for camera in ring.cameras() {
-            let half = smaller(camera);
+            let half = scaled(camera);
             assert_eq!(half.intrinsics.size, [320, 240]);
             for point in [Point3::new(0.0, 0.0, 0.9), Point3::new(0.5, -0.3, 1.7)] {
                 let whole = camera.project(&point).unwrap();
                 let seen = half.project(&point).unwrap();
-                // A pixel of the half picture covers two by two.
+                // A pixel of the scaled image covers two by two pixels.
                 assert!((2.0 * seen.x + 0.5 - whole.x).abs() < 1e-9);
                 assert!((2.0 * seen.y + 0.5 - whole.y).abs() < 1e-9);
             }

@@ -1,4 +1,4 @@
-//! The deployment that is put to the test, and one run of it.
+//! The deployment under test, and its runs.
 
 use std::path::PathBuf;
 
@@ -10,48 +10,49 @@ use scene::Action;
 use serde_json::Value;
 use supervise::Event;
 
-use super::census;
-use super::judge::Aftermath;
+use super::judge::RunOutcome;
 use super::options::Options;
-use crate::trial::results::{self, Moment};
-use crate::trial::stage::{self, Cast, N_CAMERAS, Stage};
+use super::resources;
+use crate::trial::results::{self, FrameResult};
+use crate::trial::synthetic::{self, N_CAMERAS, SyntheticDeployment, SyntheticSetup};
 
-/// Of the cameras that do not exist: frames a second, and how long a stage waits for a view that is late.
+/// Frames per second of the synthetic cameras.
 const RATE_HZ: f64 = 5.0;
+/// How long a stage waits for a late view of the synthetic cameras, milliseconds.
 const DEADLINE_MS: u64 = 500;
 
-/// The deployment that is put to the test.
+/// The deployment under test.
 #[derive(Debug)]
-pub(super) struct Ground {
-    /// Its file.
+pub(super) struct Testbed {
+    /// The deployment file.
     pub file: PathBuf,
-    /// For the results, a folder for every scenario; absolute.
+    /// The absolute folder for the results; every scenario has a subfolder.
     pub folder: PathBuf,
-    /// What is replaced in the file.
+    /// `key=value` pairs that replace values of the file.
     pub set: Vec<String>,
-    /// How much is said.
+    /// What is printed and logged.
     pub verbosity: Verbosity,
-    /// Ends everything.
+    /// Ends the trial.
     pub stop: Stop,
 }
 
-/// A run that is over.
+/// A completed run.
 #[derive(Debug)]
-pub(super) struct Ran {
-    /// What its summary said.
+pub(super) struct CompletedRun {
+    /// Its report, or why it failed.
     pub report: Result<Report, Failure>,
     /// Its results.
-    pub moments: Vec<Moment>,
-    /// What it left in shared memory.
-    pub left: Vec<String>,
+    pub results: Vec<FrameResult>,
+    /// The files that it left behind.
+    pub leftovers: Vec<String>,
 }
 
-impl Ground {
-    /// Looks at the deployment, or makes the one with cameras that do not exist.
+impl Testbed {
+    /// Reads the deployment, or writes one with synthetic cameras.
     pub(super) fn new(options: &Options, verbosity: Verbosity) -> Result<Self, Failure> {
-        let folder = stage::absolute(&options.out)?;
+        let folder = synthetic::absolute(&options.out)?;
         inputs::make_folder(&folder)?;
-        let mut ground = Self {
+        let mut testbed = Self {
             file: PathBuf::new(),
             folder,
             set: Vec::new(),
@@ -60,23 +61,25 @@ impl Ground {
         };
         let mut name = options.name.clone();
         if let Some(file) = &options.deployment {
-            ground.file = stage::absolute(file)?;
-            let its_name = ground.shorten(options.seconds)?;
+            testbed.file = synthetic::absolute(file)?;
+            let its_name = testbed.shorten(options.seconds)?;
             name.get_or_insert(format!("{its_name}-chaos"));
         } else {
-            ground.file = ground.play(options)?;
+            testbed.file = testbed.write_synthetic(options)?;
         }
         if let Some(name) = name {
-            ground.set.push(format!("name={}", toml::Value::from(name)));
+            testbed
+                .set
+                .push(format!("name={}", toml::Value::from(name)));
         }
         let more = ["results.overlay_every=0", "supervise.max_restarts=1000"];
-        ground.set.extend(more.map(str::to_owned));
-        Ok(ground)
+        testbed.set.extend(more.map(str::to_owned));
+        Ok(testbed)
     }
 
-    /// Writes the deployment with cameras that do not exist; its file.
-    fn play(&self, options: &Options) -> Result<PathBuf, Failure> {
-        let cast = Cast {
+    /// Writes a deployment with synthetic cameras; returns its file.
+    fn write_synthetic(&self, options: &Options) -> Result<PathBuf, Failure> {
+        let setup = SyntheticSetup {
             subject: 1,
             action: Action::Walking,
             seed: options.seed,
@@ -87,10 +90,10 @@ impl Ground {
             name: "chaos",
             command: "chaos",
         };
-        Stage::new(&cast, self.folder.clone())?.write(&cast)
+        SyntheticDeployment::new(&setup, self.folder.clone())?.write(&setup)
     }
 
-    /// Takes no more of the footage than some seconds; the name of the deployment.
+    /// Limits the footage to some seconds; returns the name of the deployment.
     fn shorten(&mut self, seconds: u32) -> Result<String, Failure> {
         let planned = self.plan("", &[])?;
         let resolved = planned.resolved();
@@ -104,27 +107,29 @@ impl Ground {
         Ok(resolved.deployment.name.clone())
     }
 
-    /// What is replaced in the file for a scenario.
+    /// The `key=value` pairs of a scenario.
+    ///
+    /// * `more`: pairs in addition to those of all scenarios.
     pub(super) fn set(&self, more: &[&str]) -> Vec<String> {
         let more = more.iter().copied().map(str::to_owned);
         self.set.iter().cloned().chain(more).collect()
     }
 
-    /// Its folder.
+    /// The output folder of a scenario.
     pub(super) fn output(&self, scenario: &str) -> PathBuf {
         self.folder.join(scenario)
     }
 
     /// Plans a run of the deployment.
     ///
-    /// * `more`: what else is replaced in the file.
+    /// * `more`: additional `key=value` pairs.
     pub(super) fn plan(&self, scenario: &str, more: &[&str]) -> Result<Planned, Failure> {
         self.plan_with(scenario, more, &|_| ())
     }
 
     /// As [`Self::plan`].
     ///
-    /// * `change`: what keys cannot say.
+    /// * `change`: changes that `key=value` pairs cannot express.
     pub(super) fn plan_with(
         &self,
         scenario: &str,
@@ -137,59 +142,59 @@ impl Ground {
         Planned::new(&loaded.deployment, self.verbosity.level)
     }
 
-    /// Runs it to its end, whatever that is.
+    /// Runs the deployment to its end or to a failure.
     ///
-    /// * `onlooker`: as that of [`Planned::run`].
-    pub(super) fn watch(
+    /// * `on_event`: as for [`Planned::run`].
+    pub(super) fn run(
         &self,
         planned: &Planned,
-        onlooker: &mut dyn FnMut(&Event<'_>) -> Option<String>,
-    ) -> Ran {
-        let report = planned.run(self.verbosity.quiet, &self.stop, onlooker);
+        on_event: &mut dyn FnMut(&Event<'_>) -> Option<String>,
+    ) -> CompletedRun {
+        let report = planned.run(self.verbosity.quiet, &self.stop, on_event);
         let deployment = &planned.resolved().deployment;
         let names = deployment.cameras.iter().map(|it| it.name.clone());
         let names: Vec<String> = names.collect();
         let read = |report| {
-            let moments = results::read(&deployment.output, &names)?;
-            Ok((report, moments))
+            let results = results::read(&deployment.output, &names)?;
+            Ok((report, results))
         };
-        let (report, moments) = match report.and_then(read) {
-            Ok((report, moments)) => (Ok(report), moments),
+        let (report, results) = match report.and_then(read) {
+            Ok((report, results)) => (Ok(report), results),
             Err(failure) => (Err(failure), Vec::new()),
         };
         let namespace = &planned.plan().namespace;
-        let mut left = census::left(namespace);
-        left.extend(
+        let mut leftovers = resources::shared_files(namespace);
+        leftovers.extend(
             namespace
                 .root()
                 .exists()
                 .then(|| namespace.root().display().to_string()),
         );
-        Ran {
+        CompletedRun {
             report,
-            moments,
-            left,
+            results,
+            leftovers,
         }
     }
 }
 
-impl Ran {
-    /// What is to be judged.
+impl CompletedRun {
+    /// The outcome to check.
     ///
-    /// * `struck`: how often a process was.
-    pub(super) fn aftermath(&self, struck: impl Fn(&str) -> u32) -> Aftermath {
+    /// * `n_faults`: the number of faults injected into a process.
+    pub(super) fn outcome(&self, n_faults: impl Fn(&str) -> u32) -> RunOutcome {
         let report = self.report.as_ref().ok();
-        Aftermath {
+        RunOutcome {
             failure: self.report.as_ref().err().map(ToString::to_string),
-            n_results: self.moments.len(),
+            n_results: self.results.len(),
             unanswered: report.map_or(0, |it| it.views().iter().map(|it| it.unanswered).sum()),
-            failed: report.map_or_else(Vec::new, |it| it.unexpected_failures(struck)),
-            left: self.left.clone(),
-            accused: report.map_or_else(Vec::new, Report::misplaced),
+            failed: report.map_or_else(Vec::new, |it| it.unexpected_failures(n_faults)),
+            leftovers: self.leftovers.clone(),
+            suspected: report.map_or_else(Vec::new, Report::misplaced),
         }
     }
 
-    /// For programs; null if the run failed.
+    /// The report as JSON; null if the run failed.
     pub(super) fn json(&self) -> Value {
         self.report.as_ref().map_or(Value::Null, Report::json)
     }
