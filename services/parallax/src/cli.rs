@@ -1,4 +1,4 @@
-//! The command line, as `--help` shows it.
+//! The command line: commands, global options and help texts.
 
 use clap::{Parser, Subcommand};
 
@@ -19,24 +19,24 @@ consists of one process per stage and camera, all started and watched by `parall
 
 const EXAMPLES: &str = "\
 Examples:
-    parallax demo                                       everything at work, and a report; needs nothing
+    parallax demo                                       a whole deployment of synthetic cameras, and a report
     parallax run configs/pose2sim-balancing.toml        four cameras to 3D
     parallax run my.toml --set capture.n_frames=20      the same, with one value replaced
     parallax run my.toml --dry-run                      what would be started, and its memory
     parallax run my.toml --latency-budget-ms 150        fails if 1 frame in 100 takes longer
     parallax top                                        where the time of a running deployment goes
-    parallax record my.toml --out run.mcap              the same as run, and every message in one file
-    parallax replay run.mcap --from fuse --set fuse.alpha=2     its later stages again, with another value
-    parallax chaos                                      processes killed on purpose, and what held
+    parallax record my.toml --out run.mcap              like run, and records every message
+    parallax replay run.mcap --from fuse --set fuse.alpha=2     runs the later stages again, with another value
+    parallax chaos                                      faults injected into a deployment, and what held
     parallax bench transport                            how long a message takes from process to process
     parallax config show my.toml                        every value, and where it comes from
     parallax config schema > parallax.schema.json       completion and checks in an editor
     parallax detect photo.jpg --model parse.mat --json  people in single images
-    parallax model import parse.mat --out parse.plx     another format's model as our own
+    parallax model import parse.mat --out parse.plx     converts another format's model
     parallax train fmp PARSE --only 1-100 --negatives neg/ --out person.fmp   a model of one's own
     parallax model judge person.fmp PARSE --only 101-200    how good it is
     parallax eval HumanEva_I --model he.txt --out out/he    the paper's evaluation
-    parallax synth out/walk --actions walking           pictures of people who do not exist, with the truth
+    parallax synth out/walk --actions walking           synthetic pictures, with the truth
     parallax calib show Calib.toml                      what a calibration file says
 ";
 
@@ -53,26 +53,26 @@ Examples:
     max_term_width = 100
 )]
 pub(crate) struct Cli {
-    /// Options of every command.
+    /// Options of all commands.
     #[command(flatten)]
     pub globals: Globals,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// The command.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show everything at work: four cameras that do not exist, one of them killed, and a report.
+    /// Run a whole deployment of four synthetic cameras, kill one of its processes, and report.
     Demo(demo::Arguments),
     /// Run a deployment: all its processes, from footage to 3D.
     Run(run::Arguments),
-    /// Run a deployment, and keep every message of it in one file.
+    /// Run a deployment, and record every message in one file.
     Record(record::Arguments),
-    /// Run the later stages of a recorded run once more.
+    /// Run the later stages of a recorded run again.
     Replay(replay::Arguments),
-    /// Kill and stop processes of a deployment on purpose, and judge what held.
+    /// Inject faults into a deployment: kill and stop processes, disturb cameras; and check limits.
     Chaos(chaos::Arguments),
     /// Measure how fast messages travel, and how fast whole deployments are.
     #[command(subcommand)]
@@ -95,15 +95,15 @@ pub(crate) enum Command {
     /// Show and check deployment files.
     #[command(subcommand)]
     Config(config::Command),
-    /// Make sequences of people who do not exist, with the truth.
+    /// Make synthetic sequences of people, with the truth.
     Synth(Box<synth::Arguments>),
-    /// Show which deployments run, and what dead ones have left in shared memory; or one of them in full.
+    /// List running deployments, and what dead ones have left in shared memory; or show the processes of one.
     Status(deployments::StatusArguments),
-    /// Watch the processes of a deployment that runs: rates, times, losses, memory.
+    /// Watch the processes of a running deployment: rates, times, losses, memory.
     Top(top::Arguments),
     /// Remove what dead deployments have left in shared memory.
     Clean(deployments::CleanArguments),
-    /// Become one process of a deployment; `run` does this.
+    /// Run one process of a deployment; started by `run`.
     #[command(hide = true)]
     Service(service::Arguments),
 }

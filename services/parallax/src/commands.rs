@@ -25,13 +25,13 @@ use runtime::{Failure, init_logging};
 
 use crate::cli::{Cli, Command};
 
-/// Does what the command line asks for.
+/// Runs the command of the command line.
 pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
-    let becomes_another = matches!(
+    let has_own_logging = matches!(
         cli.command,
         Command::Service(_) | Command::Bench(bench::Command::Receive(_))
     );
-    if !becomes_another {
+    if !has_own_logging {
         init_logging("parallax", cli.globals.level());
     }
     match cli.command {

@@ -1,34 +1,34 @@
-//! Poses as JSON, as users see them: pixels from 0, types and levels from 1.
+//! Poses as JSON for the user: pixels count from 0, types and levels from 1.
 
 use fmp::{Layout, Model, Pose};
 use geometry::Framing;
 use serde_json::{Map, Value, json};
 use skeleton::JointSet;
 
-/// A pose, and where its cells lie.
+/// A pose with the layout of its pyramid, and the mapping to the pixels that are reported.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placed<'a> {
     pose: &'a Pose,
     model: &'a Model,
     layout: &'a Layout,
     framing: Option<&'a Framing>,
-    /// Pixels that are told per pixel of the image.
-    enlarged: [f64; 2],
+    /// Reported pixels per pixel of the searched image, across and down.
+    scaled: [f64; 2],
 }
 
 impl<'a> Placed<'a> {
-    /// A pose in an image as it is.
+    /// A pose in pixels of the searched image.
     pub(crate) fn new(pose: &'a Pose, model: &'a Model, layout: &'a Layout) -> Self {
         Self {
             pose,
             model,
             layout,
             framing: None,
-            enlarged: [1.0; 2],
+            scaled: [1.0; 2],
         }
     }
 
-    /// Pixels of the footage that was framed, instead of those of the frame.
+    /// Reports pixels of the footage instead of those of the frame.
     pub(crate) fn in_footage(self, framing: &'a Framing) -> Self {
         Self {
             framing: Some(framing),
@@ -36,17 +36,17 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// Pixels of a picture of which the image is a smaller copy.
+    /// Reports pixels of the picture of which the searched image is a scaled copy.
     ///
     /// * `per_pixel`: pixels of the picture per pixel of the image, across and down.
-    pub(crate) fn enlarged(self, per_pixel: [f64; 2]) -> Self {
+    pub(crate) fn scaled(self, per_pixel: [f64; 2]) -> Self {
         Self {
-            enlarged: per_pixel,
+            scaled: per_pixel,
             ..self
         }
     }
 
-    /// Score, level, scale and parts; joints of the set if the model has the parts for it.
+    /// Score, level, scale and parts as JSON; also the joints of the set, null if the model lacks parts for them.
     pub(crate) fn json(&self, joints: Option<&JointSet>) -> Value {
         let centres: Vec<[f64; 2]> = self
             .pose
@@ -63,7 +63,7 @@ impl<'a> Placed<'a> {
         let mut value = json!({
             "score": self.pose.score,
             "level": self.pose.level + 1,
-            "scale": scale * self.enlarged[0],
+            "scale": scale * self.scaled[0],
             "parts": parts,
         });
         if let (Some(joints), Some(object)) = (joints, value.as_object_mut()) {
@@ -75,7 +75,7 @@ impl<'a> Placed<'a> {
     fn part(&self, part: usize, [x, y]: [f64; 2]) -> Value {
         let mixture = self.pose.parts[part].mixture + 1;
         if self.framing.is_some() {
-            // A box of a turned frame is no box in the footage.
+            // A box in a rotated frame is not axis-aligned in the footage.
             return json!({ "x": x, "y": y, "type": mixture });
         }
         let [x1, y1, x2, y2] = self.pose.part_box(self.model, self.layout, part);
@@ -85,20 +85,20 @@ impl<'a> Placed<'a> {
     }
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [right, down] = self.enlarged;
-        let larger = if self.enlarged == [1.0; 2] {
+        let [right, down] = self.scaled;
+        let scaled = if self.scaled == [1.0; 2] {
             [x, y]
         } else {
             [(x + 0.5) * right - 0.5, (y + 0.5) * down - 0.5]
         };
-        self.framing.map_or(larger, |it| {
+        self.framing.map_or(scaled, |it| {
             it.source_from_output()
                 .map(|row| row[0] * x + row[1] * y + row[2])
         })
     }
 }
 
-/// The joints of a pose by name; null if the model has other parts than the set is made of.
+/// The joints of a pose by name; null if the model lacks parts that the set needs.
 fn joints_of(centres: &[[f64; 2]], joints: &JointSet) -> Value {
     let needed = joints
         .joints
@@ -118,7 +118,7 @@ fn joints_of(centres: &[[f64; 2]], joints: &JointSet) -> Value {
     )
 }
 
-/// The joint set of that name, for the command line.
+/// Parses the name of a joint set.
 pub(crate) fn joint_set(name: &str) -> Result<&'static JointSet, String> {
     let known = || JointSet::ALL.map(|it| it.name).join(", ");
     JointSet::by_name(name).ok_or_else(|| format!("expected one of {}", known()))

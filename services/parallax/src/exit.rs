@@ -1,6 +1,6 @@
-//! How a command ends: the exit codes that users and scripts may rely on.
+//! The exit codes of commands, for users and scripts.
 
-/// The table of exit codes, as `--help` shows it.
+/// The table of exit codes in `--help`.
 pub(crate) const EXIT_CODES: &str = "\
 Exit codes:
     0  done
@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_is_in_the_table_that_users_read() {
+    fn every_exit_code_is_in_the_help() {
         for kind in ExitKind::ALL {
             let line = format!("{:>5}  ", kind.status());
             assert!(EXIT_CODES.contains(&line), "{kind:?}");

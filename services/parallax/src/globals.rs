@@ -1,22 +1,22 @@
-//! Options of every command.
+//! Options of all commands.
 
 use clap::{ArgAction, Args};
 use launch::output::Verbosity;
 use tracing::Level;
 
-/// Options of every command.
+/// Options of all commands.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct Globals {
-    /// Say less: errors only.
+    /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say more; twice says everything.
+    /// Log more: -v for information, -vv for debugging, -vvv for everything.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
 }
 
 impl Globals {
-    /// How much is said, for work that is done elsewhere.
+    /// What is printed and logged, for other crates.
     pub(crate) fn verbosity(self) -> Verbosity {
         Verbosity {
             quiet: self.quiet,
@@ -24,7 +24,7 @@ impl Globals {
         }
     }
 
-    /// The least important events that are logged.
+    /// The log level.
     pub(crate) fn level(self) -> Level {
         match (self.quiet, self.verbose) {
             (true, _) => Level::ERROR,

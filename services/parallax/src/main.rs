@@ -1,13 +1,13 @@
 //! Parallax: calibrated, synchronised cameras in, 3D human skeletons out. This is the start page of the API.
 //!
-//! The executable parses the command line, then becomes what it names: a command, or a process of a deployment
-//! (`parallax service <name>`). `docs/` is the book: guide, reference, the method, and `docs/architecture.md`, which
-//! says where to change what. The crates, by layer (dependencies go downwards):
+//! The executable parses the command line, and runs a command or a process of a deployment (`parallax service <name>`).
+//! `docs/` is the book: guide, reference, the method, and `docs/architecture.md`, which explains where to make changes.
+//! The crates, by layer (dependencies go downwards):
 //!
 //! | layer | crates |
 //! |---|---|
-//! | trials | [`trials`](../trials/index.html): runs with a fault made on purpose, and measured ones |
-//! | whole runs | [`launch`](../launch/index.html): a deployment made ready and run, and what became of it |
+//! | trials | [`trials`](../trials/index.html): fault injection, benchmarks and the demo |
+//! | whole runs | [`launch`](../launch/index.html): prepares and runs a deployment, and reports on it |
 //! | processes | [`capture`](../capture/index.html), [`pose`](../pose/index.html), [`quality`](../quality/index.html), [`fuse`](../fuse/index.html), [`triangulate`](../triangulate/index.html), [`results`](../results/index.html), [`record`](../record/index.html), [`replay`](../replay/index.html), [`supervise`](../supervise/index.html) |
 //! | the loop of a stage | [`stage`](../stage/index.html): wait, receive, check, join, compute, send, account, end |
 //! | at the wire | [`wire`](../wire/index.html): messages to domain types and back, checked |
@@ -20,8 +20,8 @@
 //! | tools | [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
 //! | ground | [`skeleton`](../skeleton/index.html), [`wording`](../wording/index.html), [`statistics`](../statistics/index.html), [`checksum`](../checksum/index.html), [`causes`](../causes/index.html), [`files`](../files/index.html), [`onnx`](../onnx/index.html); for tests only: [`testkit`](../testkit/index.html) |
 //!
-//! Begin with [`pipeline`](../pipeline/index.html) for the way of a frame, [`multiview`](../multiview/index.html) for the
-//! energy, [`messages`](../messages/index.html) for what travels between processes.
+//! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the
+//! energy, [`messages`](../messages/index.html) for the messages between processes.
 #![forbid(unsafe_code)]
 
 mod cli;

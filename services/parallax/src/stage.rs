@@ -1,23 +1,23 @@
-//! Stages of the pipeline as arguments of the command line.
+//! Parses stages of the pipeline on the command line.
 
 use clap::builder::{MapValueParser, PossibleValue, PossibleValuesParser, TypedValueParser as _};
 use deployment::Stage;
 
-/// What a replay from a stage on takes from its recording.
+/// The messages that a replay from a stage takes from the recording, in addition to those of the stage before.
 fn taken(from: Stage) -> &'static str {
     match from {
-        Stage::Capture => "From the footage on: nothing of the recording is sent",
-        Stage::Pose => "The frames are given",
-        Stage::Quality => "And the single-view poses, and their evidence",
+        Stage::Capture => "From the footage; no recorded messages are sent",
+        Stage::Pose => "With the recorded frames",
+        Stage::Quality => "And the single-view poses and their evidence",
         Stage::Fuse => "And the expected errors",
-        Stage::Triangulate => "And the answers of all pairs",
+        Stage::Triangulate => "And the pair poses",
     }
 }
 
-/// A parser of the stages' names, which `--help` explains.
+/// A parser of the names of stages, with their explanation in `--help`.
 pub(crate) fn parser() -> MapValueParser<PossibleValuesParser, fn(String) -> Stage> {
     let values = Stage::ALL.map(|it| PossibleValue::new(it.name()).help(taken(it)));
-    // Only names of stages get here.
+    // The parser has checked that this is the name of a stage.
     let stage: fn(String) -> Stage = |name| Stage::of_name(&name).unwrap_or(Stage::Capture);
     PossibleValuesParser::new(values).map(stage)
 }

@@ -1,4 +1,4 @@
-//! The progress of work from files to files on standard error, its events on standard output.
+//! Console output of offline work: progress on standard error, events and results on standard output.
 
 use core::time::Duration;
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use launch::output;
 
-/// Shows progress: a bar on a terminal, messages if not quiet; JSON on standard output if asked for.
+/// Shows progress as a bar on a terminal, and messages unless quiet; writes events as JSON if requested.
 #[derive(Debug)]
 pub(crate) struct Terminal {
     bar: ProgressBar,
@@ -18,15 +18,15 @@ pub(crate) struct Terminal {
 }
 
 impl Terminal {
-    /// Messages and events only.
+    /// Without a progress bar.
     pub(crate) fn without_bar(quiet: bool, json: bool) -> Self {
         let bar = ProgressBar::hidden();
         Self { bar, quiet, json }
     }
 
-    /// With a bar, where standard error is a terminal.
+    /// With a progress bar, if standard error is a terminal.
     ///
-    /// * `template`: how it looks, in the words of `indicatif`.
+    /// * `template`: a template of `indicatif`.
     pub(crate) fn with_bar(quiet: bool, json: bool, template: &str) -> Self {
         let bar = if quiet || !output::is_terminal() {
             ProgressBar::hidden()
@@ -39,7 +39,7 @@ impl Terminal {
         Self { bar, quiet, json }
     }
 
-    /// The same; the bar is drawn twice a second, also where nothing moves it.
+    /// Redraws the bar twice a second, also without progress.
     pub(crate) fn ticking(self) -> Self {
         self.bar.enable_steady_tick(Duration::from_millis(500));
         self

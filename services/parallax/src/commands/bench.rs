@@ -1,4 +1,4 @@
-//! `parallax bench`: how fast messages travel between processes, and how fast whole deployments are.
+//! `parallax bench`: benchmarks of the transport between processes, and of whole deployments.
 
 mod load;
 mod transport;
@@ -14,31 +14,31 @@ use trials::bench::{self, Kind, Report};
 
 use crate::globals::Globals;
 
-/// What to measure.
+/// The benchmark to run.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Measure one hop between two processes, without a deployment.
     Transport(transport::Arguments),
-    /// Measure how long a deployment takes from the picture to the result, stage by stage, and with a dead camera.
+    /// Measure the latency of a deployment from picture to result, stage by stage, also with a dead camera.
     Latency(load::Arguments),
-    /// Measure how many frames a second a deployment solves when none is dropped.
+    /// Measure how many frames per second a deployment processes when none is dropped.
     Throughput(load::Arguments),
-    /// Measure the latency with one camera, two, and so on.
+    /// Measure the latency with one camera, with two, and so on.
     Scale(load::Arguments),
-    /// Become the receiving process of `transport`.
+    /// Run the receiving process of `transport`.
     #[command(hide = true)]
     Receive(Receiver),
 }
 
-/// What the sending process says to the other one.
+/// The arguments of the receiving process.
 #[derive(Debug, Args)]
 pub(crate) struct Receiver {
-    /// About the deployment.
+    /// The launch arguments, from the sending process.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     rest: Vec<OsString>,
 }
 
-/// Where numbers go.
+/// Output options of all benchmarks.
 #[derive(Debug, Args)]
 struct Output {
     /// Print the numbers as JSON.
@@ -49,13 +49,13 @@ struct Output {
     record: Option<PathBuf>,
 }
 
-/// Exit codes of all of them.
+/// The exit codes of all benchmarks.
 const EXITS: &str = "\
 Exit codes: 0 measured, and every limit that was asked for held; 6 a limit was missed (the report says which); 1 it \
 could not be measured; 2 the command line is wrong; 3, 4, 5 the deployment or its inputs are wrong, as for `run`; \
 130 stopped by Ctrl-C.";
 
-/// Measures.
+/// Runs the benchmark.
 pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
     let verbosity = globals.verbosity();
     let load = |kind: Kind, it: &load::Arguments| {
@@ -74,9 +74,9 @@ pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failu
     }
 }
 
-/// Prints what was measured, and appends it to the record; the exit code.
+/// Prints the report, and appends it to the record. Returns the exit code.
 ///
-/// * `report`: none if it was stopped.
+/// * `report`: none if the benchmark was interrupted.
 fn publish(report: Option<Report>, to: &Output, globals: Globals) -> Result<ExitCode, Failure> {
     let Some(report) = report else {
         output::message("stopped: nothing is reported");

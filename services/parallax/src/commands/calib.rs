@@ -1,4 +1,4 @@
-//! `parallax calib`: calibrations read, shown, checked and converted.
+//! `parallax calib`: shows, checks and converts calibrations.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,10 +12,10 @@ use runfiles::ViewLine;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
-/// What to do with a calibration.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Print what a calibration says: cameras, image sizes, where they stand.
+    /// Print the content of a calibration: cameras, image sizes, positions.
     Show {
         #[command(flatten)]
         input: Input,
@@ -54,19 +54,19 @@ Examples:
     },
 }
 
-/// What to read, and what the files may leave out.
+/// The files to read, and values that they may lack.
 #[derive(Debug, Args)]
 pub(crate) struct Input {
-    /// The calibration file; several if every camera has its own.
+    /// The calibration file, or one file per camera.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Unit of lengths, where the format does not fix it.
+    /// Unit of lengths, if the format does not define it.
     #[arg(long, value_enum)]
     unit: Option<UnitName>,
-    /// Direction against gravity in the world, where the file does not say.
+    /// Direction against gravity in the world, if the file does not give it.
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_hyphen_values = true)]
     up: Option<Vec<f64>>,
-    /// Image size in pixels, where the file does not say.
+    /// Image size in pixels, if the file does not give it.
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
     size: Option<Vec<u32>>,
 }
@@ -82,18 +82,18 @@ pub(crate) enum UnitName {
     Mm,
 }
 
-/// Formats that can be written.
+/// Output formats.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum To {
     /// Parallax's own.
     Rig,
-    /// Pose2Sim, anipose, Caliscope and their kin.
+    /// Pose2Sim, anipose, Caliscope and similar programs.
     Pose2sim,
     /// OpenCV YAML.
     Opencv,
-    /// One `.cal` file a camera.
+    /// One `.cal` file per camera.
     Humaneva,
-    /// One `.ini` file a camera.
+    /// One `.ini` file per camera.
     Umpm,
 }
 
@@ -123,7 +123,7 @@ impl Input {
     }
 }
 
-/// Shows, checks or converts.
+/// Runs the subcommand.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Show { input, json } => show(&input.read()?, *json),
@@ -162,7 +162,7 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
         )?,
     }
     for camera in rig.cameras() {
-        let inside = &camera.intrinsics;
+        let intrinsics = &camera.intrinsics;
         let centre = camera.centre_in_world();
         let roll = upright_roll(camera, rig).map_or("unknown".to_owned(), |it| {
             format!("{:.1} degrees", it.to_degrees())
@@ -170,29 +170,32 @@ fn show(rig: &Rig, as_json: bool) -> Result<ExitCode, Failure> {
         output::line(format_args!(
             "  {:<10} {}x{} px, f ({:.1}, {:.1}), c ({:.1}, {:.1}), at ({:.3}, {:.3}, {:.3}) m, roll to upright {roll}",
             camera.name,
-            inside.size[0],
-            inside.size[1],
-            inside.fx,
-            inside.fy,
-            inside.cx,
-            inside.cy,
+            intrinsics.size[0],
+            intrinsics.size[1],
+            intrinsics.fx,
+            intrinsics.fy,
+            intrinsics.cx,
+            intrinsics.cy,
             centre.x,
             centre.y,
             centre.z,
         ))?;
-        output::line(format_args!("             lens {}", inside.lens.model()))?;
+        output::line(format_args!(
+            "             lens {}",
+            intrinsics.lens.model()
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn describe(camera: &Camera, rig: &Rig) -> Value {
-    let inside = &camera.intrinsics;
+    let intrinsics = &camera.intrinsics;
     json!({
         "name": camera.name,
-        "size_px": inside.size,
-        "focal_px": [inside.fx, inside.fy],
-        "principal_point_px": [inside.cx, inside.cy],
-        "lens": inside.lens.model().to_string(),
+        "size_px": intrinsics.size,
+        "focal_px": [intrinsics.fx, intrinsics.fy],
+        "principal_point_px": [intrinsics.cx, intrinsics.cy],
+        "lens": intrinsics.lens.model().to_string(),
         "centre_m": <[f64; 3]>::from(camera.centre_in_world().coords),
         "axis": <[f64; 3]>::from(camera.axis_in_world().into_inner()),
         "roll_to_upright_degrees": upright_roll(camera, rig).map(f64::to_degrees),
@@ -201,7 +204,7 @@ fn describe(camera: &Camera, rig: &Rig) -> Value {
 
 fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode, Failure> {
     let findings = geometry::files::check(rig);
-    let wrong = findings
+    let has_problems = findings
         .iter()
         .any(|it| it.severity() != geometry::files::Severity::Note);
     let report = detections
@@ -237,14 +240,14 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
             ))?;
         }
     }
-    Ok(if wrong {
+    Ok(if has_problems {
         ExitCode::from(ExitKind::Calibration.status())
     } else {
         ExitCode::SUCCESS
     })
 }
 
-/// The parts of every frame of a `pose2d.jsonl`, in every camera of the rig.
+/// The fused parts in a `pose2d.jsonl`, pixels: one entry per frame and part, with one point per camera of the rig.
 fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failure> {
     let n_cameras = rig.cameras().len();
     let mut frames = std::collections::BTreeMap::<u64, Vec<Vec<Option<Point2<f64>>>>>::new();
@@ -255,12 +258,12 @@ fn points(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Point2<f64>>>>, Failu
         };
         let points = frames.entry(line.frame).or_default();
         let parts = line.fused.iter().flat_map(|it| &it.parts);
-        for (part, it) in parts.enumerate() {
-            if points.len() <= part {
+        for (index, part) in parts.enumerate() {
+            if points.len() <= index {
                 points.push(vec![None; n_cameras]);
             }
-            let at = it.x.zip(it.y);
-            points[part][camera] = at.map(|(x, y)| Point2::new(x, y));
+            let position = part.x.zip(part.y);
+            points[index][camera] = position.map(|(x, y)| Point2::new(x, y));
         }
     }
     Ok(frames.into_values().flatten().collect())

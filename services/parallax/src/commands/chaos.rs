@@ -1,4 +1,4 @@
-//! `parallax chaos`: a deployment with a fault made on purpose, once for every fault, and what held.
+//! `parallax chaos`: injects faults into a deployment, one run per fault, and checks limits.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,36 +12,37 @@ use crate::globals::Globals;
 
 const HELP: &str = "\
 Every scenario is a run of its own, with real processes and a real fault; --list names them. Without a DEPLOYMENT the \
-cameras are those of `parallax demo`: four that do not exist, so nothing is needed. With one, what it says about mode, \
-pace, deadline and hang limit holds; its results stay where they are, for those of every scenario go to \
-OUT/<scenario>; it may run at the same time, for its name becomes <name>-chaos.
+cameras are those of `parallax demo`, four synthetic ones. A DEPLOYMENT keeps its mode, pace, deadline and hang limit. \
+Its own results are not touched: the results of a scenario go to OUT/<scenario>. It may run at the same time, because its \
+name becomes <name>-chaos.
 
-What must hold when a process is killed: its death is noticed within a second; it is back within --max-return-ms; \
-where others can go on without it, no pause between two results is longer than --max-pause-ms; what became of every \
-frame of every view is known, but for two that a killed process may have held; no other process failed; the run ends by \
-itself; nothing is left in shared memory. A process that is stopped (hang-...) is noticed by its missing signs of life \
-within three of them (450 ms, or supervise.missed_beats of the deployment) and a second, and may be away longer by that limit; \
-one that computes for ever (spin-...) gives signs of life but none of work, and is noticed as soon when it has used so much \
-processor time, and three times that of any frame before for one; where nothing may be lost, when its main loop has stood \
-still for three seconds, which the scenario sets (supervise.hang_limit_s). With \
-kill-random everything killed comes back (--max-return-ms for 99 in 100), and if the run is long enough (nine moments \
-a second apart at which all processes worked) memory, descriptors and files at last exceed those at first by no more than \
-a tenth, 32 MB and 8 files; a run of more than --part-seconds is also reported part by part. With kill-supervisor its \
-processes end by themselves within a second, and the next start of the same deployment removes what was left, and works.
+Limits when a process is killed: its death is noticed within a second; it is back within --max-return-ms; if the others \
+do not depend on it, no pause between two results is longer than --max-pause-ms; every frame of every view is accounted \
+for, except two that the process may have held; no other process failed; the run ends by itself; nothing is left in \
+shared memory. A process that is stopped (hang-...) is noticed within three heartbeats (450 ms, or \
+supervise.missed_beats of the deployment) plus a second, and may be away longer by that limit. A process in an endless loop \
+(spin-...) sends heartbeats but makes no progress. With realtime delivery it is noticed once an iteration has taken as \
+much processor time as that limit, and three times that of any frame before; with lossless delivery, once its main loop \
+has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s). With kill-random every killed \
+process comes back (--max-return-ms for 99 of 100); if the run is long enough (nine samples, a second apart, at which all \
+processes worked), memory, descriptors and files at the end exceed those at the start by at most a tenth, 32 MB and 8 \
+files; a run longer than --part-seconds is also reported in parts. With kill-supervisor its processes end by themselves \
+within a second, and the next start of the same deployment removes what is left, and works.
 
-With camera-... a camera fails for a fifth of the footage (its source does what `fault` says in a deployment): frames \
-are called what is wrong with them, the others' results go on (--max-pause-ms), and the camera has a part in results again within \
---max-return-ms. With camera-moved one camera of the rig is turned by two degrees: it must be named, and no other, which \
-takes four cameras and some seconds of results. With stall-results the results process stands still for three seconds and is left alone: where the latest frame \
-wins, results are made at no less than half the rate meanwhile; where nothing may be lost, nothing is.
+With camera-... a camera fails for a fifth of the footage (its source does what `fault` in a deployment describes): its \
+frames have the status of the fault, the results of the other cameras go on (--max-pause-ms), and the camera is used in \
+results again within --max-return-ms. With camera-moved one camera of the rig is turned by two degrees: it must be \
+identified, and no other, which takes four cameras and some seconds of results. With stall-results the process `results` \
+is stopped for three seconds and then resumed: with realtime delivery, results continue at half the rate at least; with \
+lossless delivery, nothing is lost.
 
-`back` is when the process sent what the first result of its new life is made of; of fuse, quality and results, which no \
-result names, when it gave a sign of having worked. Restarts are not limited here (supervise.max_restarts), and no \
-pictures are drawn.
+A process is back when it has sent its first message that contributes to a result. Results do not name fuse, quality and \
+results; these are back when they report that they have worked. The number of restarts is not limited here \
+(supervise.max_restarts), and no overlays are drawn.
 
-It leaves OUT/chaos.json, which --json prints too.
+The report is written to OUT/chaos.json; --json prints it too.
 
-Exit codes: 0 all held; 6 something did not (the table names it); 1 it could not be tried; 2 the command line is \
+Exit codes: 0 all limits held; 6 a limit was missed (the table names it); 1 the trial failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
 
 Examples:
@@ -50,34 +51,34 @@ Examples:
     parallax chaos my.toml --scenario kill-random --seconds 600 --seed 7 --json
     parallax chaos --scenario kill-random --seconds 7200 --part-seconds 600      # endurance";
 
-/// What to try.
+/// Options of `parallax chaos`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The deployment file; four cameras that do not exist if not given.
+    /// The deployment file; four synthetic cameras if not given.
     deployment: Option<PathBuf>,
-    /// What is to happen, separated by commas; everything that the deployment has processes for if not given.
+    /// The scenarios, separated by commas; if not given, all that are possible with the processes of the deployment.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Scenario::by_name)]
     scenario: Vec<Scenario>,
-    /// Name the scenarios, and do nothing.
+    /// List the scenarios and exit.
     #[arg(long)]
     list: bool,
-    /// Chooses the victims, and the performance of the person who does not exist.
+    /// Seed of the choice of processes and cameras, and of the synthetic scene.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Footage of every run, seconds; a busy machine needs some of them to start.
+    /// Length of the footage of every run, seconds; starting takes some of it on a busy machine.
     #[arg(long, value_name = "S", default_value_t = 30, value_parser = clap::value_parser!(u32).range(4..=36_000))]
     seconds: u32,
-    /// Seconds of a run in which one process after the other is killed that are reported together, for each such part by itself.
+    /// Length of the parts in which a run of kill-random is reported, seconds.
     #[arg(long, value_name = "S", default_value_t = 600, value_parser = clap::value_parser!(u32).range(1..))]
     part_seconds: u32,
-    /// Folder for the report and the results.
+    /// The folder for the report and the results.
     #[arg(long, value_name = "DIR", default_value = "out/chaos")]
     out: PathBuf,
-    /// Name of the deployment while it is tried: two that run at once need two.
+    /// Name of the deployment during the trial, unique among those that run at the same time.
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
-    /// Limits that can be asked for.
+    /// Configurable limits.
     #[command(flatten)]
     limits: Limits,
     /// Print the report as JSON.
@@ -85,15 +86,15 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Limits that can be asked for.
+/// Configurable limits.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the kill until the process has a part in a result again (or, of those that no result names,
-    /// until it has done something), milliseconds.
+    /// Longest time from the fault until the process contributes to a result again, milliseconds; for processes that
+    /// results do not name: until it reports that it has worked.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest time without a result while a process is away without which others can go on, milliseconds.
+    /// Longest pause between results while a process is away that the others do not depend on, milliseconds.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }
@@ -116,7 +117,7 @@ impl Arguments {
     }
 }
 
-/// Tries everything that is asked for, and says what held.
+/// Runs the scenarios, and prints the report.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.list {
         for it in Scenario::all() {

@@ -1,4 +1,4 @@
-//! `parallax config`: what a deployment file says, and whether it can be used.
+//! `parallax config`: shows and checks deployment files.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,17 +9,17 @@ use launch::{load, output, plan};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 
-/// What to do with a deployment file.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Print every value, what it means, and who said it.
+    /// Print every value with its meaning and its origin.
     Show(Arguments),
-    /// Check the file, and that what it names can be read.
+    /// Check the file, and that its inputs can be read.
     Check(Arguments),
     /// Print the JSON schema of deployment files, for editors.
     #[command(after_help = SCHEMA_HELP)]
     Schema,
-    /// Print every key, what it takes, and what it means.
+    /// Print every key with its type and its meaning.
     Keys(Keys),
 }
 
@@ -33,15 +33,15 @@ For VS Code with \"Even Better TOML\", and other editors that use taplo:
 and as the first line of the deployment file:
     #:schema ./parallax.schema.json";
 
-/// How to print the keys.
+/// Options of `config keys`.
 #[derive(Debug, Args)]
 pub(crate) struct Keys {
-    /// Print the settings reference: Markdown, a table for each section.
+    /// Print the settings reference: Markdown, one table per section.
     #[arg(long)]
     markdown: bool,
 }
 
-/// Which deployment file.
+/// Options of `config show` and `config check`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The deployment file.
@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Shows or checks.
+/// Runs the subcommand.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Show(it) => show(it),
@@ -98,7 +98,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The entries as a deployment file that says everything, with the origin of every value.
+/// The entries as the lines of a complete deployment file, with the origin of every value.
 fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";

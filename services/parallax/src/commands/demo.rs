@@ -1,4 +1,4 @@
-//! `parallax demo`: four cameras that do not exist, every process, one of them killed on purpose, and a report.
+//! `parallax demo`: a whole deployment of four synthetic cameras, one of whose processes is killed, and a report.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,29 +13,28 @@ use super::synth::rate;
 use crate::globals::Globals;
 
 const HELP: &str = "\
-Nothing is needed but this program: the pictures are made by the camera processes while they run (a person who does \
-not exist, see `parallax synth --help`), the model is the one that ships. Four cameras around the person, 320x240 \
-pixels, keep up with the clock. How many frames a second they take is measured first: for about two seconds frames are \
-made and solved on all cores, beside whatever else runs, and computing may take half of the time between two frames, up to \
-5 frames a second; a machine that is slow or busy is told so with numbers. Every stage and camera is a process of its own, as in `parallax run`. When two fifths \
-of the frames have passed, the process of camera c3 is killed (SIGKILL), as a crash would: the other three go on, the \
-supervisor starts it again, and it joins in at the frame that the clock is at.
+Nothing is needed but this program: the capture processes render pictures of a synthetic person during the run (see \
+`parallax synth --help`), and the model is the one that ships. Four cameras around the person, 320x240 pixels, capture in \
+real time. Their frame rate is chosen by a measurement: for about two seconds frames are rendered and processed on all \
+cores, beside whatever else runs. Computing may take half of the time between two frames, up to 5 frames a second; a slow \
+or busy machine is reported with numbers. Every stage and camera is a process of its own, as in `parallax run`. After two \
+fifths of the frames, the process of camera c3 is killed (SIGKILL), as a crash would: the other three go on, the \
+supervisor restarts it, and it continues with the current frame.
 
-What it leaves in OUT: report.html (open it in a browser: the skeleton in space, which turns, beside the truth; who \
-was there when; what the killed camera cost; latency of every stage; every frame accounted for; pictures with \
-skeletons), report.json (the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs \
-them again), and run/, the results as any run leaves them. Files of an earlier demo are replaced.
+OUT holds report.html (open it in a browser: a skeleton in space that can be turned, beside the truth; the views of every \
+result; the cost of the kill; latency of every stage; the account of all frames; pictures with skeletons), report.json \
+(the same numbers), deployment.toml and rig.toml (`parallax run OUT/deployment.toml` runs them again), and run/, the \
+results as of any run. Files of an earlier demo are replaced.
 
-It judges itself, by limits that a broken pipeline would miss: --min-results of the frames have a result, \
---min-skeletons of these a skeleton, and PCP3D of all of them is at least --min-pcp3d; the killed camera is back within \
---max-return-ms; the others gave results without it meanwhile, if it was away for longer than \
-results are apart and a stage waits, with no pause longer than --max-pause-ms; what became \
-of every frame of every view is known, but for two that a killed process may have held; no other process failed; all \
-results were written.
-Times are those of a machine that keeps up with 5 frames a second. Where the cameras take fewer, --max-return-ms is as many \
-times as long as frames are farther apart (20 at most). Where a frame takes longer than 100 ms of all cores together, before the run \
-or after it, --max-pause-ms, which is 20 such frames, is longer by the same factor; and a stage waits 1.5 times as long as two \
-frames are apart, 500 ms at least. With --rate nothing is measured or scaled.
+The demo checks limits that a broken pipeline would miss: --min-results of the frames have a result, --min-skeletons of \
+these a skeleton, and PCP3D over all of them is at least --min-pcp3d; the killed camera is back within --max-return-ms; \
+meanwhile there are results of the others, if it was away for longer than the interval of results and the deadline of a \
+stage, with no pause longer than --max-pause-ms; every frame of every view is accounted for, except two that the killed \
+process may have held; no other process failed; all results were written.
+Limits on times are for a machine that keeps up with 5 frames a second. At a lower frame rate --max-return-ms grows in \
+proportion to the interval of frames (by 20 at most). If a frame takes longer than 100 ms of all cores together, before or \
+after the run, --max-pause-ms, which is 20 such frames, grows in proportion; and a stage waits for 1.5 intervals of frames, \
+at least 500 ms. With --rate nothing is measured or scaled.
 
 Exit codes: 0 all limits held; 6 a limit was missed (the report says which); 1 the run failed; 2 the command line is \
 wrong; 130 stopped by Ctrl-C.
@@ -45,41 +44,41 @@ Examples:
     parallax demo --seconds 60 --action boxing --subject 4 --out /tmp/boxing
     parallax demo --no-kill --json";
 
-/// What to show.
+/// Options of `parallax demo`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Folder for the report and all that it is made of.
+    /// The folder for the report and the run.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
-    /// Frames of every camera; those of twenty seconds, but at least 30, if not given.
+    /// Frames per camera; if not given, those of twenty seconds, at least 30.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     frames: Option<u64>,
-    /// How long the cameras run, seconds; instead of --frames.
+    /// Duration of the run, seconds; instead of --frames.
     #[arg(long, value_name = "S", conflicts_with = "frames", value_parser = clap::value_parser!(u32).range(2..=36_000))]
     seconds: Option<u32>,
-    /// Frames a second; what this machine is found to be able to, at most 5, if not given.
+    /// Frames per second; if not given, as many as this machine can process, at most 5.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
-    /// What the person does; `parallax synth --help` names the actions.
+    /// The action of the person; `parallax synth --help` lists them.
     #[arg(long, value_name = "NAME", default_value = "walking", value_parser = action)]
     action: Action,
-    /// Number of the person: shape, clothes, manners.
+    /// Number of the person: shape, clothes, way of moving.
     #[arg(long, value_name = "N", default_value_t = 1)]
     subject: u64,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How long a stage waits for a view that is late, milliseconds; 500, or what this machine needs, if not given.
+    /// How long a stage waits for a late view, milliseconds; if not given, 500, or more on a slow machine.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=60_000))]
     deadline_ms: Option<u64>,
     /// Kill no process.
     #[arg(long)]
     no_kill: bool,
-    /// Limits that can be asked for.
+    /// Configurable limits.
     #[command(flatten)]
     limits: Limits,
-    /// Name of the deployment: two that run at once need two.
+    /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "demo")]
     name: String,
     /// Print the report as JSON.
@@ -87,30 +86,30 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Limits that can be asked for.
+/// Configurable limits.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Least share of the frames with a result, percent; slow machines pass frames over, which is counted.
+    /// Least share of frames with a result, percent; slow machines drop frames, which are counted.
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0)]
     min_results: f64,
-    /// Least share of the results with a skeleton, percent.
+    /// Least share of results with a skeleton, percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 90.0)]
     min_skeletons: f64,
     /// Least PCP3D at gamma 0.5 over all results, percent.
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     min_pcp3d: f64,
-    /// Longest time until the killed camera has a frame in a result again, milliseconds on a machine that keeps up
-    /// with 5 frames a second.
+    /// Longest time until a frame of the killed camera is used in a result again, milliseconds, on a machine that keeps
+    /// up with 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
-    /// Longest time without a result while the killed camera is away, milliseconds on a machine that keeps up with
-    /// 5 frames a second.
+    /// Longest pause between results while the killed camera is away, milliseconds, on a machine that keeps up with
+    /// 5 frames per second.
     #[arg(long, value_name = "MS", default_value_t = 2000.0)]
     max_pause_ms: f64,
 }
 
-/// The action of a name, for the command line.
+/// Parses the name of an action.
 fn action(name: &str) -> Result<Action, String> {
     let known = || Action::ALL.map(Action::name).join(", ");
     Action::by_name(name).ok_or_else(|| format!("expected one of {}", known()))
@@ -141,7 +140,7 @@ impl Arguments {
     }
 }
 
-/// Runs the demo, and says what it found out.
+/// Runs the demo, and prints the report.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let Some(outcome) = demo::run(&arguments.options(), globals.verbosity())? else {
         output::message("stopped: nothing is judged, and no report written");

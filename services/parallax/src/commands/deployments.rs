@@ -1,4 +1,4 @@
-//! `parallax status` and `parallax clean`: what runs, and what dead runs left in shared memory.
+//! `parallax status` and `parallax clean`: running deployments, and the remains of dead ones in shared memory.
 
 use std::process::ExitCode;
 
@@ -12,33 +12,33 @@ use serde_json::{Value, json};
 
 use crate::commands::top;
 
-/// What is said of a directory among those of deployments that is none.
+/// The status of a directory that does not belong to a deployment.
 const UNMARKED: &str = "not a deployment: left alone";
 
-/// How to show what is there.
+/// Options of `parallax status`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 With a DEPLOYMENT, it is that of `parallax top --once`: every process, its state, and the percentiles of its stages
 (`parallax top --help` explains them). Times are in milliseconds, memory in bytes with --json.")]
 pub(crate) struct StatusArguments {
-    /// Name of a deployment that runs, or its file: show its processes and where their time goes.
+    /// Name of a running deployment, or its file: show its processes and where their time goes.
     deployment: Option<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// What to remove.
+/// Options of `parallax clean`.
 #[derive(Debug, Args)]
 pub(crate) struct CleanArguments {
-    /// Names of dead deployments; all of them if none is given.
+    /// Names of dead deployments; all if none is given.
     names: Vec<String>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Shows the deployments of this user.
+/// Lists the deployments of this user, or shows the processes of one.
 pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     if let Some(named) = &arguments.deployment {
         return status_of(named, arguments.json);
@@ -65,7 +65,7 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Shows the processes of one deployment that runs.
+/// Shows the processes of a running deployment.
 fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
     let namespace = top::namespace(Some(named))?;
     let snapshot = Live::open(&namespace)?.first_snapshot()?;
@@ -77,7 +77,7 @@ fn status_of(named: &str, json: bool) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Removes what dead deployments of this user left behind; those that run are left alone.
+/// Removes the remains of dead deployments of this user; running ones are not touched.
 pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     let found = deployments(&Namespace::usual_base())?;
     for name in &arguments.names {
@@ -86,7 +86,7 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
             return Err(Failure::new(ExitKind::Usage, message));
         }
     }
-    let is_meant = |it: &&Remains| match &arguments.names[..] {
+    let is_selected = |it: &&Remains| match &arguments.names[..] {
         [] => it.supervisor.is_none() && it.is_marked,
         names => names.iter().any(|name| name == it.namespace.name()),
     };
@@ -95,7 +95,7 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
         output::message(format_args!("{path}: {UNMARKED}"));
     }
     let (mut removed, mut failed) = (Vec::new(), Vec::new());
-    for it in found.iter().filter(is_meant) {
+    for it in found.iter().filter(is_selected) {
         match it.remove() {
             Ok(()) => removed.push(it),
             Err(error) => failed.push((it.namespace.name(), error.to_string())),

@@ -1,4 +1,4 @@
-//! `parallax detect`: people in single images.
+//! `parallax detect`: finds people in single images.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,13 +16,13 @@ use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
 
-/// Longest side that is searched unless somebody asks for more, pixels.
+/// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;
 
-/// Lowest score of a person, for the model that ships: chosen on pictures; see [`Arguments`].
+/// The default detection threshold of the shipped model, chosen by measurement; see [`Arguments`].
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
-/// Which images, and how.
+/// Options of `parallax detect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A picture is searched as people see it: turned as its orientation tag (EXIF) says. One with a side longer than \
@@ -55,26 +55,26 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Lowest score of a detection; -0.5 for the model that ships, of another the trained threshold, but at most
-    /// -1, if not given.
+    /// Lowest score of a detection; if not given, -0.5 for the model that ships, and for another model the trained
+    /// threshold, but at most -1.
     #[arg(long, value_name = "SCORE", allow_hyphen_values = true)]
     threshold: Option<f64>,
-    /// Largest share of a better detection's boxes that a worse one may cover.
+    /// Non-maximum suppression: the largest share of a better detection's boxes that a worse one may cover.
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     overlap: f64,
-    /// Most detections of an image.
+    /// Maximal number of detections per image.
     #[arg(long, value_name = "N", default_value_t = 100)]
     max: usize,
-    /// Longest side that is searched, pixels; larger pictures are made smaller first.
+    /// Longest side of a searched image, pixels; larger images are scaled down.
     #[arg(long, value_name = "PIXELS", default_value_t = SIZE, value_parser = side)]
     size: usize,
-    /// Search all pixels, however large the picture is.
+    /// Search all pixels, whatever the size of the image.
     #[arg(long, conflicts_with = "size")]
     full: bool,
-    /// Of a video, every n-th frame.
+    /// Of a video, search every n-th frame.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Of a video, at most so many frames.
+    /// Of a video, search at most this many frames.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// Print one line of JSON per image.
@@ -83,21 +83,21 @@ pub(crate) struct Arguments {
     /// Draw the detections into this folder, as PNG.
     #[arg(long, value_name = "DIR")]
     overlay: Option<PathBuf>,
-    /// Draw thumbnails with the best detection of every image into this file, as PNG; more than 40 images make
-    /// several files, numbered before the ending.
+    /// Draw thumbnails with the best detection of every image into this file, as PNG; for more than 40 images several
+    /// files, numbered before the extension.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
-    /// How exactly the filters are evaluated: f32, or bf16, which is faster, moves scores by some thousandths
-    /// and needs a processor with AMX.
+    /// Precision of the filter responses: f32, or bf16, which is faster, changes scores by some thousandths and needs a
+    /// processor with AMX.
     #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
     precision: Precision,
 }
 
 impl Arguments {
-    /// Which frames of a video are searched.
+    /// The frames of a video to search.
     fn wanted(&self) -> Frames {
         Frames {
             every: self.every,
@@ -106,13 +106,13 @@ impl Arguments {
     }
 }
 
-/// A side that can be searched.
+/// Parses the longest side of a searched image, pixels.
 fn side(text: &str) -> Result<usize, String> {
     let side = text.parse().ok().filter(|it| (40..=65535).contains(it));
     side.ok_or_else(|| format!("expected 40 to 65535 pixels, got {text:?}"))
 }
 
-/// A precision that this machine has.
+/// Parses a precision, and checks that this machine supports it.
 fn precision(name: &str) -> Result<Precision, String> {
     let precision = match name {
         "f32" => Precision::F32,
@@ -124,17 +124,17 @@ fn precision(name: &str) -> Result<Precision, String> {
     Ok(precision)
 }
 
-/// Detects.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
-    let usual = match arguments.model {
+    let default = match arguments.model {
         None => SHIPPED_THRESHOLD,
         Some(_) => model.detection_threshold(),
     };
     let detector = Detector {
         arguments,
         settings: CandidateSettings {
-            threshold: arguments.threshold.unwrap_or(usual) as f32,
+            threshold: arguments.threshold.unwrap_or(default) as f32,
             overlap: arguments.overlap,
             max: arguments.max,
         },
@@ -189,7 +189,11 @@ struct Detector<'a> {
 }
 
 impl Detector<'_> {
-    /// Searches all pictures of a file. What is wrong with the file is the inner failure: others go on.
+    /// Searches all pictures of a file.
+    ///
+    /// # Errors
+    ///
+    /// The inner failure concerns the file: the other files can still be searched. The outer one ends the command.
     fn file(
         &self,
         path: &Path,
@@ -231,7 +235,7 @@ impl Detector<'_> {
     ) -> Result<(), Failure> {
         let (layout, model) = (searched.layout(), &self.search.model);
         if self.arguments.json {
-            let placed = |it| Placed::new(it, model, layout).enlarged(searched.per_pixel());
+            let placed = |it| Placed::new(it, model, layout).scaled(searched.per_pixel());
             let detections = found.iter().map(placed);
             let detections: Vec<_> = detections
                 .map(|it| it.json(Some(self.arguments.joints)))
@@ -298,18 +302,18 @@ impl Detector<'_> {
         }
     }
 
-    /// Draws every detection, if somebody asked for it; the best one last, over the others.
+    /// Draws the detections if overlays are requested; the best one last, on top.
     fn draw(&self, picture: &Picture, searched: &Searched, found: &[Pose]) -> Result<(), Failure> {
         let Some(folder) = &self.arguments.overlay else {
             return Ok(());
         };
         let mut canvas = Canvas::from_rgb(picture.size, &picture.rgb);
-        let beside = 4.0 * line_width(picture.size);
+        let label_offset = 4.0 * line_width(picture.size);
         for pose in found.iter().rev() {
             let skeleton = self.skeleton(searched, pose);
             draw_limbs(&mut canvas, &skeleton.points, &skeleton.limbs);
             let [x, y] = skeleton.points[0];
-            canvas.label([x + beside, y], &format!("{:.2}", pose.score), ACCENT);
+            canvas.label([x + label_offset, y], &format!("{:.2}", pose.score), ACCENT);
         }
         let file = folder.join(format!("{}.png", picture.stem()));
         canvas.save_png(&file).or_fail(ExitKind::Input)

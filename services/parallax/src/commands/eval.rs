@@ -1,4 +1,4 @@
-//! `parallax eval`: the paper's evaluation on sequences whose joints are known.
+//! `parallax eval`: the paper's evaluation on sequences with ground truth.
 
 mod pictures;
 mod report;
@@ -25,7 +25,7 @@ use super::judge::selection;
 use crate::globals::Globals;
 use crate::terminal::Terminal;
 
-/// The bar of the progress.
+/// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {bar:30} {pos}/{len} frames, {msg}";
 
 const HELP: &str = "\
@@ -60,7 +60,7 @@ Examples:
     parallax eval PARSE --only 101-200 --model parse.mat --out out/parse
     parallax eval HumanEva_I --model he.txt --fuse he.toml --sigma errors.csv --out out/humaneva --resume";
 
-/// What to evaluate, and how.
+/// Options of `parallax eval`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 #[expect(
@@ -74,64 +74,64 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Where the report goes.
+    /// The folder for the report.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// What is compared, separated by commas; the others are compared with the first.
+    /// The versions to compare, separated by commas; each is compared with the first.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     versions: Vec<Version>,
-    /// Settings of fusion.
+    /// File with settings of fusion.
     #[arg(long, value_name = "FILE")]
     fuse: Option<PathBuf>,
-    /// What was learned about several views (`train consistency`), instead of what --fuse says; "shipped": what ships.
+    /// Learned consistency (`train consistency`), instead of that of --fuse; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// Table of expected errors, as the authors released it.
+    /// Table of expected errors, in the authors' format.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
-    /// Network that predicts the errors, an ONNX file; "shipped": the one that ships.
+    /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
-    /// Expect the true errors: a part is off beyond a tenth of the person's size.
+    /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
     #[arg(long)]
     oracle: bool,
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
     size: Option<[u32; 2]>,
-    /// Size of the frames as a share of the footage's.
+    /// Size of the frames as a share of that of the footage.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// Do not turn the frames upright.
     #[arg(long)]
     no_upright: bool,
-    /// Most candidates of a view.
+    /// Maximal number of candidates per view.
     #[arg(long, value_name = "N", default_value_t = 8)]
     candidates: usize,
-    /// Take the first and every so many-th frame after it.
+    /// Use the first and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Most frames of each sequence.
+    /// Maximal number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Single pictures: who is judged, everybody if not given.
+    /// Single pictures: the people to evaluate, all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
-    /// Single pictures: who is left out.
+    /// Single pictures: the people to leave out.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     without: Option<Selection>,
-    /// Which part of each sequence: 0.8-1 is the last fifth.
+    /// The part of each sequence to use: 0.8-1 is the last fifth.
     #[arg(long, value_name = "FROM-TO", value_parser = share)]
     share: Option<[f64; 2]>,
-    /// UMPM: every frame with the pose of the frame before, as the released tools have it.
+    /// UMPM: compare every frame with the pose of the frame before, as the released tools do.
     #[arg(long)]
     umpm_late: bool,
-    /// Frames that are drawn together for confidence intervals.
+    /// Length of the blocks of frames that the bootstrap draws for confidence intervals.
     #[arg(long, value_name = "N", default_value_t = 1)]
     block: usize,
-    /// Threads; one a core if not given. The numbers do not depend on it.
+    /// Threads; one per core if not given. The numbers do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Go on with a run that was interrupted.
+    /// Continue an interrupted run.
     #[arg(long)]
     resume: bool,
     /// Print the numbers as JSON.
@@ -162,7 +162,7 @@ fn share(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// Evaluates.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     if are_pictures(arguments)? {
@@ -173,7 +173,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let config = config(arguments)?;
     let learned = inputs::learned(config.consistency.as_deref(), &model)?;
     let (sigma, network) = expected(arguments, model.n_parts())?;
-    let _mine = Claim::of(&arguments.out, "eval")?;
+    let _claim = Claim::of(&arguments.out, "eval")?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
     let pool = rayon::ThreadPoolBuilder::new()
@@ -222,7 +222,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     outcome(&done)
 }
 
-/// The table of expected errors, and the network that predicts them.
+/// Reads the table of expected errors, and the network that predicts them, if they are given.
 fn expected(
     arguments: &Arguments,
     n_parts: usize,
@@ -238,7 +238,7 @@ fn expected(
     Ok((sigma, network))
 }
 
-/// How the views of a sequence are solved together.
+/// The settings and part-type tables for a sequence.
 ///
 /// * `scale`: pixels of the frame per pixel of the footage.
 fn fusion(
@@ -257,7 +257,7 @@ fn fusion(
     Ok((settings, tables))
 }
 
-/// Whether all that was asked for was judged.
+/// The exit status: an error if frames were left out or no frame was evaluated.
 fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     match done.n_missing {
         0 => {
@@ -274,7 +274,7 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Whether single pictures are to be judged; refuses them besides sequences.
+/// Whether single pictures are evaluated; refuses pictures together with sequences.
 fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     let n = arguments
         .sequences
@@ -332,7 +332,7 @@ fn config(arguments: &Arguments) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// Reads a section `[fuse]`, if there is one.
+/// Reads the `[fuse]` settings from a file; the defaults if there is none.
 fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
     let Some(file) = file else {
         return Ok(Config::default());
@@ -355,7 +355,7 @@ fn fuse_section(file: Option<&Path>) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// What is compared: what was asked for, or all that can be.
+/// The versions to compare: the requested ones, or all that are possible with the given inputs.
 fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Failure> {
     let expects = arguments.sigma.is_some() || arguments.network.is_some() || arguments.oracle;
     if let [_, ..] = arguments.versions[..] {
@@ -382,7 +382,7 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
     Ok(versions)
 }
 
-/// All that what is found depends on, besides the sequence and its frames.
+/// A text with all settings that the poses depend on, besides the sequence and its frames.
 fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
         let bytes = fs::read(file).map_err(|error| runtime::in_file(file, &error))?;

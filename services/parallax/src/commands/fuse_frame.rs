@@ -1,4 +1,4 @@
-//! `parallax fuse-frame`: one synchronised set of still images, in this process.
+//! `parallax fuse-frame`: fuses one synchronised set of still images, in this process.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,16 +19,16 @@ use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
 
-/// Which energy ties two views together.
+/// The energy of fusion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Energy {
     /// The paper's.
     Paper,
-    /// What the authors' program computes; one candidate a view and no facing unless asked for.
+    /// That of the authors' program; by default with one candidate per view and without `facing`.
     Released,
 }
 
-/// Which images, and how.
+/// Options of `parallax fuse-frame`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ Examples:
     parallax fuse-frame --rig rig.toml --model he.txt --energy released --no-upright \\
         --ptc C1wrtC2.csv --ptc C2wrtC1.csv C1=one.png C2=two.png --json")]
 pub(crate) struct Arguments {
-    /// One image per camera of the rig, in its order, or CAMERA=FILE for some of them.
+    /// One image per camera, in the order of the rig; or CAMERA=FILE for some cameras.
     #[arg(required = true)]
     images: Vec<String>,
     /// The calibration.
@@ -45,52 +45,52 @@ pub(crate) struct Arguments {
     /// The model file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Which energy.
+    /// The energy.
     #[arg(long, value_enum, default_value_t = Energy::Paper)]
     energy: Energy,
-    /// What was learned about several views: part-type tables, weights, thresholds, joints; "shipped": what ships.
+    /// Learned consistency: part-type tables, weights, thresholds, joints; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// Weight of the geometric term; as learned, else by energy, if not given.
+    /// Weight of the geometric term; if not given, the learned one, or the default of the energy.
     #[arg(long)]
     alpha: Option<f64>,
     /// Weight of the part-type term.
     #[arg(long)]
     beta: Option<f64>,
-    /// Part-type table of the first two views, `first wrt second`; and again, `second wrt first`.
+    /// Part-type tables of the first two views: given twice, `first wrt second` and `second wrt first`.
     #[arg(long, value_name = "FILE")]
     ptc: Vec<PathBuf>,
-    /// Expected errors in pixels: one line per view, one number per part.
+    /// File of expected errors in pixels: one line per view, one number per part.
     #[arg(long, value_name = "FILE")]
     sigma: Option<PathBuf>,
     /// Thresholds of the expected errors: none, learned, humaneva or umpm.
     #[arg(long, value_enum, default_value_t = Threshold::None)]
     tau: Threshold,
-    /// Most candidates of a view.
+    /// Maximal number of candidates per view.
     #[arg(long, value_name = "N")]
     candidates: Option<usize>,
-    /// Decide who sees the person from behind; with `paper` it is unless this says false.
+    /// Decide which views see the person from behind; by default true with `paper`, false with `released`.
     #[arg(long, value_name = "BOOL")]
     facing: Option<bool>,
     /// Do not turn the images upright.
     #[arg(long)]
     no_upright: bool,
-    /// Take the cameras as pinholes, whatever their lenses.
+    /// Ignore lens distortion: treat the cameras as pinholes.
     #[arg(long)]
     no_lens: bool,
-    /// Size of the frames as a share of the images'.
+    /// Size of the frames as a share of that of the images.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Most single-view solutions of a pair.
+    /// Maximal number of solutions per pair.
     #[arg(long, value_name = "N")]
     max_iterations: Option<usize>,
-    /// Mean movement below which a view counts as settled, pixels.
+    /// Mean movement below which a view counts as converged, pixels.
     #[arg(long, value_name = "PX")]
     epsilon: Option<f64>,
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
-    /// How a view's pose is made of those of its pairs.
+    /// How the poses of a view from its pairs are combined.
     #[arg(long, value_enum, default_value_t = Combine::Mean)]
     combine: Combine,
     /// Print JSON.
@@ -98,16 +98,16 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// How a view's pose is made of those of its pairs.
+/// How the poses of a view from its pairs are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Combine {
     /// Their mean, as in the paper.
     Mean,
-    /// Part by part the answers that all views can mean together.
+    /// Part by part, the pair poses that are consistent over all views.
     Consensus,
 }
 
-/// Thresholds that are known by name.
+/// Named sets of thresholds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Threshold {
     /// No part is switched off.
@@ -120,14 +120,14 @@ pub(crate) enum Threshold {
     Umpm,
 }
 
-/// One view: its picture, framed.
+/// A view with its framed image.
 struct View {
     file: String,
     framing: Framing,
     rgb: Vec<u8>,
 }
 
-/// Fuses.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let rig = inputs::rig(
@@ -168,7 +168,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     launch::no_results::require(is_found, "no joint has a place in space")
 }
 
-/// The cameras that were given an image, in the rig's order, with their images framed.
+/// The cameras with an image, in the order of the rig, with their framed images.
 fn views(arguments: &Arguments, rig: &Rig) -> Result<Vec<View>, Failure> {
     let n = rig.cameras().len();
     let mut files: Vec<Option<&str>> = vec![None; n];
@@ -227,7 +227,7 @@ fn view(arguments: &Arguments, rig: &Rig, camera: usize, file: &str) -> Result<V
     })
 }
 
-/// What the command line says about fusion.
+/// The `[fuse]` settings from the command line.
 fn config(arguments: &Arguments) -> deployment::fuse::Config {
     let defaults = deployment::fuse::Config::default();
     let is_released = arguments.energy == Energy::Released;
@@ -309,7 +309,7 @@ fn settings(
     })
 }
 
-/// Expected errors: one line per view, in pixels of the images.
+/// Reads the expected errors of every view, and scales them to pixels of the frames.
 fn sigma(
     file: Option<&Path>,
     scales: &[f32],
@@ -349,7 +349,7 @@ fn sigma(
         .collect()
 }
 
-/// What is said about the estimate.
+/// The report on an estimate.
 struct Report<'a> {
     views: &'a [View],
     model: &'a Arc<Model>,

@@ -1,4 +1,4 @@
-//! `parallax model judge`: a model tried on people whose joints are known.
+//! `parallax model judge`: evaluates a model on annotated people.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,7 +13,7 @@ use runtime::Failure;
 use serde_json::json;
 use skeleton::PARSE14;
 
-/// Which model, and on whom.
+/// Options of `parallax model judge`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 DATASET and SELECTION are those of `parallax train fmp`. Two detections of an image are judged: the \
@@ -30,16 +30,15 @@ Example:
 pub(crate) struct Arguments {
     /// The model file, of 26 parts.
     model: PathBuf,
-    /// People with 14 joints.
+    /// The data set: people with 14 joints.
     dataset: PathBuf,
-    /// Who is judged, everybody if not given.
+    /// The people to evaluate, all if not given.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     only: Option<Selection>,
-    /// Who is left out.
+    /// The people to leave out.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     without: Option<Selection>,
-    /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
-    /// exchanged.
+    /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
     /// Print JSON.
@@ -51,7 +50,7 @@ pub(super) fn selection(text: &str) -> Result<Selection, String> {
     Selection::from_argument(text).map_err(|it| it.to_string())
 }
 
-/// Tries the model.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let model = inputs::model(&arguments.model)?;
     judged::check(&model, &arguments.model.display().to_string())?;
@@ -85,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Who is judged: people with the 14 joints.
+/// Options for reading the people to evaluate, with 14 joints.
 pub(super) fn options(only: Option<&Selection>, without: Option<&Selection>) -> ReadOptions {
     ReadOptions {
         only: only.cloned(),

@@ -1,4 +1,4 @@
-//! `parallax model`: what a model is made of, how good it is, and other formats as our own.
+//! `parallax model`: converts, shows and evaluates models.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::judge;
 
-/// What to do with a model.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Convert a model (Yang & Ramanan's .mat, the authors' .txt) into Parallax's own format.
@@ -22,27 +22,27 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print what a model is made of, or draw it.
+    /// Print the structure of a model, or draw it.
     Show {
         /// The model file.
         file: PathBuf,
         /// Print JSON.
         #[arg(long)]
         json: bool,
-        /// Draw the model into this file instead, one page for a browser: the filters of every part and type, the
-        /// tree with its springs, the biases.
+        /// Draw the model into this HTML file instead: the filters of every part and type, the tree with its springs,
+        /// the biases.
         #[arg(long, value_name = "FILE", conflicts_with = "json")]
         html: Option<PathBuf>,
-        /// With --html: images of people, or folders of them, from which every type of every part is shown by
-        /// example. The page then holds pieces of these images.
+        /// With --html: images of people, or folders of them. The page then shows examples of every type of every
+        /// part, cut from these images.
         #[arg(long, value_name = "IMAGES", num_args = 1.., requires = "html")]
         examples: Vec<PathBuf>,
     },
-    /// Try a model on people whose joints are known: PCP and PCK.
+    /// Evaluate a model on annotated people: PCP and PCK.
     Judge(judge::Arguments),
 }
 
-/// Imports or shows.
+/// Runs the subcommand.
 pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Import { file, out } => import(file, out),
@@ -119,7 +119,7 @@ fn show(file: &Path, as_json: bool) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Parts and parents count from 1, as in the models' own tables.
+/// The structure of a model as JSON. Parts and parents count from 1, as in the published tables.
 fn description(file: &Path, model: &Model) -> Value {
     let spec = model.spec();
     let parts: Vec<Value> = spec

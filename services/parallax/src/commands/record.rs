@@ -1,6 +1,6 @@
-//! `parallax record`: a run, and every message of it in one file.
+//! `parallax record`: runs a deployment, and records every message in one file.
 
-mod room;
+mod disk_space;
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -12,24 +12,24 @@ use launch::{Planned, Resolved, load, output, plan, recorded};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
 use crate::globals::Globals;
-use room::{Forecast, Growth, PerFrame};
+use disk_space::{Forecast, Growth, PerFrame};
 
-/// Lives of the recording process that are looked for.
-const MOST_LIVES: u32 = 64;
+/// The maximal number of epochs of the recording process whose files are looked for.
+const MAX_EPOCHS: u32 = 64;
 
-/// What to record.
+/// Options of `parallax record`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The file is MCAP: chunked, indexed, not compressed, its messages CDR with ROS 2 schemas; its metadata holds
 the settings of the run and fingerprints of the files that it read. The run leaves its results as `run` does.
 
-Where nothing may be lost (capture.mode = \"lossless\") a slow disk makes the run slower. Where the latest wins
-it never does: what does not fit into the queue is left out, counted by topic in the file, and told at the end.
-A file whose end was never written, because of a full disk or a crash, holds all up to there; a recording
-process that had to be restarted goes on in FILE.1.mcap. With anything lost the exit code is 7.
+With lossless delivery (capture.mode = \"lossless\") a slow disk makes the run slower. With realtime delivery it does
+not: messages that do not fit into the queue are left out, counted by topic in the file, and reported at the end.
+A file whose end was not written, because of a full disk or a crash, contains everything up to there; a recording
+process that was restarted continues in FILE.1.mcap. If anything was lost the exit code is 7.
 
-Before it begins it says how much a frame and a second will take at most, and how much is free; it does not begin
-where there is no room for ten frames (or for all, if they are fewer).
+Before the run it prints how much a frame and a second will take at most, and how much is free; it does not start
+if there is no space for ten frames (or for all, if they are fewer).
 
 Examples:
     parallax record my.toml --out run.mcap
@@ -37,16 +37,16 @@ Examples:
 pub(crate) struct Arguments {
     /// The deployment file.
     config: PathBuf,
-    /// The recording.
+    /// The file to record to.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replace FILE if it is there.
+    /// Replace FILE if it exists.
     #[arg(long)]
     force: bool,
-    /// Leave out what takes most room; may be given twice.
+    /// Leave out the largest messages; may be given twice.
     #[arg(long, value_name = "WHAT")]
     without: Vec<Bulk>,
-    /// Memory for what waits to be written, millions of bytes.
+    /// Memory for messages that wait to be written, millions of bytes.
     #[arg(long, value_name = "MB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..=65_536))]
     queue_mb: u64,
     /// Folder for the results, instead of the file's `output`.
@@ -60,12 +60,12 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What takes most room.
+/// The kinds of large messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bulk {
-    /// The pixels of frames; without them nothing can be replayed from pose on.
+    /// The pixels of frames; without them a replay from pose is impossible.
     Pixels,
-    /// Response maps; without them nothing can be replayed from fuse on.
+    /// The response maps; without them a replay from fuse is impossible.
     Evidence,
 }
 
@@ -89,15 +89,15 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let planned = Planned::of(resolved, globals.level())?;
     let forecast = forecast(&planned, &file, arguments)?;
     forecast.check(&file)?;
-    make_way(&file, arguments.force)?;
+    remove_existing(&file, arguments.force)?;
     if !globals.quiet {
         output::message(forecast.text(&file));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let mut growth = Growth::new(&file, &forecast);
-    let report = planned.run(globals.quiet, &stop, &mut |_| growth.note())?;
+    let report = planned.run(globals.quiet, &stop, &mut |_| growth.message())?;
     let recording = recorded::open(&file)?;
-    let later = (1..MOST_LIVES).map(|it| record::file_of_life(&file, it));
+    let later = (1..MAX_EPOCHS).map(|it| record::file_of_life(&file, it));
     let later: Vec<PathBuf> = later.take_while(|it| it.exists()).collect();
     if arguments.json {
         let mut value = report.json();
@@ -112,12 +112,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             output::line(format_args!("  goes on in {}", file.display()))?;
         }
     }
-    let flawed = !recorded::is_whole(&recording) || !later.is_empty();
-    let kind = report.kind().or(flawed.then_some(ExitKind::Degraded));
+    let is_flawed = !recorded::is_whole(&recording) || !later.is_empty();
+    let kind = report.kind().or(is_flawed.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// How much room the recording will take.
+/// The disk space that the recording will take.
 fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<Forecast, Failure> {
     let resolved = planned.resolved();
     let replaced = if arguments.force {
@@ -130,14 +130,18 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
         without: [Bulk::Pixels, Bulk::Evidence].map(|it| arguments.without.contains(&it)),
         n_frames: resolved.n_frames(),
         rate_hz: resolved.footage.iter().find_map(|it| it.frame_rate_hz),
-        free_bytes: room::free_beside(file)? + replaced,
+        free_bytes: disk_space::free_beside(file)? + replaced,
     })
 }
 
-/// Sees that no file is in the way.
-fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
-    let lives = (0..MOST_LIVES).map(|it| record::file_of_life(file, it));
-    for file in lives.filter(|it| it.exists()) {
+/// Removes the files of an earlier recording.
+///
+/// # Errors
+///
+/// A file exists and `force` is not set, is a folder, or is being recorded to.
+fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
+    let files = (0..MAX_EPOCHS).map(|it| record::file_of_life(file, it));
+    for file in files.filter(|it| it.exists()) {
         if file.is_dir() {
             let message = format!("{} is a folder", file.display());
             let failure = Failure::new(ExitKind::Usage, message);
@@ -150,9 +154,9 @@ fn make_way(file: &Path, force: bool) -> Result<(), Failure> {
             let failure = Failure::new(ExitKind::Usage, message);
             return Err(failure.with_hint("take another name, or --force to replace it"));
         }
-        let busy = File::open(&file)
+        let is_busy = File::open(&file)
             .is_ok_and(|it| matches!(it.try_lock_shared(), Err(TryLockError::WouldBlock)));
-        if busy {
+        if is_busy {
             let message = format!("{} is being recorded to by another run", file.display());
             let failure = Failure::new(ExitKind::Config, message);
             return Err(failure.with_hint("wait until it ends, or take another name"));

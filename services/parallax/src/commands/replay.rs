@@ -1,4 +1,4 @@
-//! `parallax replay`: the later stages of a recorded run once more.
+//! `parallax replay`: runs the later stages of a recorded run again.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,31 +15,31 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use crate::globals::Globals;
 use crate::stage;
 
-/// What to replay.
+/// Options of `parallax replay`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The stages before --from are not run: processes under their names send what the file holds of them. The
-others run for real, with the settings of the recorded run but for what --set replaces. Where nothing may be
-lost their results are those of the recorded run, bit for bit, if neither settings nor files are others.
+The stages before --from are not run: processes with their names send the recorded messages instead. The other
+stages run with the settings of the recorded run, except those that --set replaces. With lossless delivery, and with
+the same settings and files, their results are those of the recorded run, bit for bit.
 
-A file that was cut off is replayed as far as it goes. Every message has a checksum; one that is not what was
-written is named, counted and left out. In both cases the exit code is 7. End-to-end latency means something
-at --speed 1 only; the times of the stages that run always do.
+A truncated file is replayed as far as it goes. Every message has a checksum; a damaged one is named, counted and
+left out. In both cases the exit code is 7. End-to-end latency is meaningful at --speed 1 only; the times of the
+stages that run always are.
 
 Examples:
-    parallax replay run.mcap                                         from pose on, the frames are given
-    parallax replay run.mcap --from fuse --set fuse.alpha=2          without looking at the frames again
-    parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, the latest wins")]
+    parallax replay run.mcap                                         from pose on, with the recorded frames
+    parallax replay run.mcap --from fuse --set fuse.alpha=2          without the frames
+    parallax replay run.mcap --speed 2 --set capture.mode=realtime   twice as fast, with realtime delivery")]
 pub(crate) struct Arguments {
     /// The recording.
     file: PathBuf,
     /// The first stage that runs.
     #[arg(long, value_name = "STAGE", value_parser = stage::parser(), default_value = "pose")]
     from: Stage,
-    /// So many times as fast as recorded, or `max`; without it `max` where nothing may be lost, else 1.
+    /// Speed relative to the recording, or `max`; if not given, `max` with lossless delivery, else 1.
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<Speed>,
-    /// Folder for the results; the name of the recording with `-replay` if not given.
+    /// Folder for the results; if not given, the name of the recording with `-replay` appended.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace a value of the stages that run, or capture.mode; may be given several times.
@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// How fast.
+/// The speed of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Speed {
     Max,
@@ -67,7 +67,7 @@ fn speed(text: &str) -> Result<Speed, String> {
     }
 }
 
-/// Replays the recording.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let file = std::path::absolute(&arguments.file).or_fail(ExitKind::Usage)?;
     let recording = recorded::open(&file)?;
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let out = arguments.out.clone();
     let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
     loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
-    warn_of_other_files(&settings);
+    warn_of_changed_files(&settings);
     let mode = loaded.deployment.capture.mode;
     let resolved = if from == Stage::Capture {
         plan::resolve(&loaded.deployment)?
@@ -125,12 +125,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         }
     }
     let is_sound = damaged.is_empty() && recorded::is_undamaged(&recording);
-    let is_less = from != Stage::Capture && !is_sound;
-    let kind = report.kind().or(is_less.then_some(ExitKind::Degraded));
+    let is_flawed = from != Stage::Capture && !is_sound;
+    let kind = report.kind().or(is_flawed.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// The settings of the recorded run.
+/// Reads the settings of the recorded run.
 fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
     let about = recording.about.as_ref();
     let about = about.map_err(|error| runtime::in_file(file, error))?;
@@ -143,7 +143,7 @@ fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure> {
     })
 }
 
-/// Why a value may not be replaced, if it may not: its stage is given by the recording.
+/// Why a value may not be replaced: its stage is replaced by the recording. None if it may.
 fn refused(key: &str, from: Stage) -> Option<String> {
     let section = key.split('.').next().unwrap_or_default();
     let is_given = match Stage::of_name(section) {
@@ -154,8 +154,8 @@ fn refused(key: &str, from: Stage) -> Option<String> {
     is_given.then(|| format!("this is given by the recording with --from {from}"))
 }
 
-/// Says which files are not what they were.
-fn warn_of_other_files(settings: &Settings) {
+/// Warns of input files that have changed since the recorded run.
+fn warn_of_changed_files(settings: &Settings) {
     for (file, recorded) in &settings.files {
         let now = match Shipped::of_name(file) {
             Some(it) => Some(checksum::fnv1a(it.bytes())),
@@ -170,7 +170,7 @@ fn warn_of_other_files(settings: &Settings) {
     }
 }
 
-/// Sees that the recording holds what the first stages would send.
+/// Checks that the recording contains the messages of the stages that are not run.
 fn check(
     file: &Path,
     recording: &Recording,
@@ -180,12 +180,12 @@ fn check(
     let without = recording.about.as_ref().map(|it| it.without);
     let without = without.unwrap_or_default();
     let n_pairs = resolved.deployment.cameras.len().saturating_sub(1);
-    let looks =
+    let needs_pixels =
         from == Stage::Pose || (from == Stage::Quality && resolved.deployment.has_network());
-    let fuses = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
-    let lacks = if looks && without.pixels {
+    let needs_evidence = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
+    let missing = if needs_pixels && without.pixels {
         Some("the pixels of its frames")
-    } else if fuses && without.evidence {
+    } else if needs_evidence && without.evidence {
         Some("evidence")
     } else {
         needed(resolved, from).find_map(|(kind, what)| {
@@ -194,7 +194,7 @@ fn check(
             (n == 0).then_some(what)
         })
     };
-    let Some(what) = lacks else { return Ok(()) };
+    let Some(what) = missing else { return Ok(()) };
     let message = format!(
         "{} lacks {what}, which --from {} needs",
         file.display(),
@@ -203,13 +203,13 @@ fn check(
     Err(Failure::new(ExitKind::Input, message))
 }
 
-/// What the stages before `from` send.
+/// The kinds of messages that the stages before `from` send, with their names for the user.
 fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'static str)> {
     let all = [
         (Stage::Capture, Kind::Frame, "frames"),
         (Stage::Pose, Kind::ViewPose, "single-view poses"),
         (Stage::Quality, Kind::ViewQuality, "expected errors"),
-        (Stage::Fuse, Kind::PairPose, "answers of pairs"),
+        (Stage::Fuse, Kind::PairPose, "pair poses"),
     ];
     let has_quality = resolved.deployment.has_quality();
     let n_cameras = resolved.deployment.cameras.len();
@@ -229,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_speed_is_max_or_a_number_above_nothing() {
+    fn a_speed_is_max_or_a_positive_number() {
         assert_eq!(speed("max"), Ok(Speed::Max));
         assert_eq!(speed("2"), Ok(Speed::Times(2.0)));
         for other in ["0", "-1", "nan", "inf", "fast", "", "1e9"] {
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_recording_gives_may_not_be_replaced() {
+    fn settings_of_recorded_stages_may_not_be_replaced() {
         let may = |key, from| refused(key, from).is_none();
         assert!(may("fuse.alpha", Stage::Fuse) && may("rig", Stage::Fuse));
         assert!(!may("fuse.workers", Stage::Triangulate));
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_is_known_by_its_service() {
+    fn a_stage_is_found_by_the_name_of_its_service() {
         for (service, stage) in [
             ("pose", Some(Stage::Pose)),
             ("results", None),

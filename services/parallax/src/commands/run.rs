@@ -1,4 +1,4 @@
-//! `parallax run`: a whole deployment, from footage to the summary.
+//! `parallax run`: runs a whole deployment.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use supervise::Plan;
 
 use crate::globals::Globals;
 
-/// What to run.
+/// Options of `parallax run`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A second Ctrl-C, half a second or more after the first, ends the run at once. The output folder holds
@@ -42,8 +42,7 @@ pub(crate) struct Arguments {
     /// as `--set supervise.latency_budget_ms=N`.
     #[arg(long, value_name = "N", value_parser = above_zero, allow_negative_numbers = true)]
     latency_budget_ms: Option<f64>,
-    /// Show what would be started and how much shared memory it needs, and start nothing; fails where the run would not
-    /// begin.
+    /// Show the processes and the shared memory that they need, and start nothing; fails if the run could not start.
     #[arg(long)]
     dry_run: bool,
     /// Print the summary as JSON.
@@ -51,7 +50,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Runs the deployment until its footage ends, or it is told to stop.
+/// Runs the deployment until its footage ends or a stop is requested.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let budget = arguments.latency_budget_ms;
     let budget = budget.map(|it| format!("supervise.latency_budget_ms={it:?}"));
@@ -86,7 +85,7 @@ fn above_zero(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "not above 0".to_owned())
 }
 
-/// Processes, topics and memory.
+/// Prints processes, shared memory and the largest topics.
 fn show(plan: &Plan) -> Result<ExitCode, Failure> {
     output::line(format_args!("{} processes:", plan.processes.len()))?;
     for process in &plan.processes {
@@ -110,7 +109,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
             mb(topic.pool_bytes())
         ))?;
     }
-    // What the run would ask before it starts anything.
+    // The same check as before a run.
     preflight(&plan.topics)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,4 +1,4 @@
-//! `parallax service`: become one process of a deployment.
+//! `parallax service`: runs one process of a deployment.
 
 use std::ffi::OsString;
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
-//! `parallax synth`: sequences of people who do not exist, with the truth.
+//! `parallax synth`: makes synthetic sequences of people, with the truth.
 
-mod chosen;
 mod motion;
+mod parse;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,30 +15,30 @@ use serde_json::json;
 
 use crate::globals::Globals;
 use crate::terminal::Terminal;
-pub(crate) use chosen::rate;
-use chosen::{actions, rig, subjects};
 use motion::MotionArguments;
+pub(crate) use parse::rate;
+use parse::{actions, rig, subjects};
 
 const HELP: &str = "\
-A folder OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), \
-rig.toml, the pictures (cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and on every \
-picture, what is visible, when it was taken) and people.jsonl (the same as annotated people, for `train fmp` and \
-`model judge`; people-as-seen.jsonl with left and right as published models call them). The format is in \
-shared/scene/TRUTH.md. Several subjects or actions make a folder each, OUT/s1-walking, and people.jsonl of all.
+OUT holds what a recording would, and more: deployment.toml (`parallax run OUT/deployment.toml`), rig.toml, the pictures \
+(cameras/NAME/000000.png), masks, and the truth: truth.jsonl (joints in 3D and in every picture, visibility, capture \
+times) and people.jsonl (the same as annotated people, for `train fmp` and `model judge`; people-as-seen.jsonl with left \
+and right as published models define them). The format is in shared/scene/TRUTH.md. Several subjects or actions have a \
+folder each, OUT/s1-walking, and a people.jsonl of all.
 
-The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: \
-shape, clothes, manners. The seed chooses the performance, the room and the lamps.
+The same options give the same files, bit for bit, on any number of threads. A subject is a person by number: shape, \
+clothes, way of moving. The seed determines the motion, the room and the lighting.
 
 RIG is humaneva (3 cameras, 640x480), umpm (4, 644x486), ring:N[:RADIUS[:HEIGHT]] (metres; 4.2 and 1.5 if not \
 given), or a rig file. Actions: walking, jogging, boxing, gestures, throw-catch, chair, grab, lean, table, lying.
 
-With --motion the subjects do what a C3D or TRC file has: limbs point as they did, lengths are those of the subject, \
-and the way is moved to the middle of the room. No joint is kept within limits. A table (--markers) says how markers \
-become joints; gaps are bridged up to --motion-gap seconds, longer ones are refused by their frames, and so is what no \
-person does: legs of another length, a head below the feet, knees that fold forward.
+With --motion the subjects move as recorded in a C3D or TRC file: limbs have the recorded directions and the lengths of \
+the subject, and the path is moved to the middle of the room. Joints are not kept within limits. A table (--markers) maps \
+markers to joints. Gaps are interpolated up to --motion-gap seconds; longer ones are refused, with their frames, and so \
+are impossible motions: implausible lengths of the legs, a head below the feet, knees that bend forward.
 
 With --live no pictures are written: the cameras of the deployment are addresses, synth://RIG?camera=C1&action=..., \
-from which each capture process makes its own pictures while it runs, and the truth is that of the same pictures.
+from which each capture process renders its pictures during the run, and the truth is that of the same pictures.
 
 With --json one object: {\"schema_version\", \"sequences\": [{\"folder\", \"subject\", \"action\", \"seed\", \
 \"pictures\", \"people\"}], \"seconds\", \"pictures_per_second\"}.
@@ -54,12 +54,12 @@ Examples:
     parallax synth out/punch --motion 02_05.c3d --motion-frames 1-600 --rig umpm
     parallax synth out/live --live --frames 900 --rig umpm --actions gestures";
 
-/// How pictures are stored.
+/// The file format of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// Lossless.
     Png,
-    /// Smaller, and as most cameras would have it (quality 95).
+    /// Smaller, as most cameras store them (quality 95).
     Jpg,
 }
 
@@ -72,11 +72,11 @@ impl From<Format> for synth::Format {
     }
 }
 
-/// Who does what before which cameras.
+/// Options of `parallax synth`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Folder to write; absent or empty.
+    /// The folder to write, which must be empty or absent.
     out: PathBuf,
     /// The cameras: humaneva, umpm, a ring (ring:N, ring:N:RADIUS, ring:N:RADIUS:HEIGHT), or a rig file.
     #[arg(long, value_name = "RIG", default_value = "humaneva", value_parser = rig)]
@@ -84,40 +84,40 @@ pub(crate) struct Arguments {
     /// Numbers of the subjects: 3, or 1-20,25.
     #[arg(long, value_name = "LIST", default_value = "1", value_parser = subjects)]
     subjects: Subjects,
-    /// What they do: names with commas, or all.
+    /// Their actions: names separated by commas, or all.
     #[arg(long, value_name = "LIST", default_value = "walking", value_parser = actions)]
     actions: Actions,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Frames of every camera; 60, or as many as were recorded, if not given.
+    /// Frames per camera; if not given, 60, or those of the recorded motion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     frames: Option<u64>,
-    /// Frames a second; few make pictures that differ.
-    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = chosen::rate)]
+    /// Frames per second; at a low rate successive pictures differ more.
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = parse::rate)]
     rate: f64,
-    /// How pictures are stored.
+    /// The file format of pictures.
     #[arg(long, value_enum, default_value_t = Format::Png)]
     format: Format,
     /// Write no masks.
     #[arg(long)]
     no_masks: bool,
-    /// Put a photograph of this folder behind the person, in the place of a room.
+    /// Use photographs from this folder as the background, instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// The model that the deployment names; without it the person model that ships with Parallax.
+    /// The model for the deployment file; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Write no pictures: cameras of the deployment make them while it runs.
+    /// Write no pictures: the capture processes of the deployment render them during the run.
     #[arg(long)]
     live: bool,
-    /// What was recorded.
+    /// Recorded motion.
     #[command(flatten)]
     motion: MotionArguments,
-    /// What is wrong with the cameras.
+    /// Flaws of the cameras.
     #[command(flatten)]
     flaws: FlawArguments,
-    /// Threads; one a core if not given. The files do not depend on it.
+    /// Threads; one per core if not given. The files do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Print a summary as JSON.
@@ -128,17 +128,17 @@ pub(crate) struct Arguments {
 type Subjects = Vec<u64>;
 type Actions = Vec<Action>;
 
-/// What is wrong with the cameras; nothing if not given.
+/// Flaws of the cameras; none by default.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Flaws of the cameras")]
 struct FlawArguments {
-    /// Deviation of the noise, grey levels.
+    /// Standard deviation of the noise, grey levels.
     #[arg(long, value_name = "LEVELS", default_value_t = 0.0)]
     noise: f64,
-    /// Deviation of the blur, pixels.
+    /// Standard deviation of the blur, pixels.
     #[arg(long, value_name = "PX", default_value_t = 0.0)]
     blur: f64,
-    /// Doublings of the light, negative for darker.
+    /// Change of the exposure, stops; negative is darker.
     #[arg(
         long,
         value_name = "STOPS",
@@ -146,16 +146,16 @@ struct FlawArguments {
         allow_hyphen_values = true
     )]
     exposure: f64,
-    /// Clocks of all cameras but the first are off by at most this, seconds.
+    /// Largest clock offset of all cameras except the first, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     desync: f64,
-    /// Share of frames that a camera drops; the picture before stands in their place.
+    /// Share of frames that a camera drops; each is replaced by the picture before.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     drop: f64,
-    /// rig.toml has every camera turned by this, degrees; the truth is exact.
+    /// Rotation error of every camera in rig.toml, degrees; the truth is exact.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0)]
     calibration_degrees: f64,
-    /// rig.toml has every camera moved by this, millimetres; the truth is exact.
+    /// Position error of every camera in rig.toml, millimetres; the truth is exact.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     calibration_mm: f64,
 }
@@ -176,13 +176,13 @@ impl FlawArguments {
     }
 }
 
-/// The bar of the progress.
+/// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {msg} {bar:20} {pos}/{len} pictures, {per_sec}, {eta} left";
 
-/// Frames of every camera where nothing is said.
+/// Default number of frames per camera.
 const N_FRAMES: u64 = 60;
 
-/// Writes all sequences.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let it = arguments;
     it.rig.rig().map_err(synth::rig_failure)?;
@@ -203,7 +203,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         model: it.model.clone(),
         live: it.live,
     };
-    begin(&it.out)?;
+    create_folder(&it.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let threads = it.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
@@ -213,12 +213,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         .or_fail(ExitKind::Run)?;
     let terminal = Terminal::with_bar(globals.quiet, it.json, BAR);
     let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
-    tell(arguments, globals, &done)?;
+    report(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes the folder; refuses one in which something lies.
-fn begin(out: &Path) -> Result<(), Failure> {
+/// Creates the folder; refuses one that is not empty.
+fn create_folder(out: &Path) -> Result<(), Failure> {
     inputs::make_folder(out)?;
     let mut inside = std::fs::read_dir(out).map_err(|error| runtime::in_file(out, &error))?;
     if inside.next().is_some() {
@@ -230,7 +230,7 @@ fn begin(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-fn tell(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
+fn report(arguments: &Arguments, globals: Globals, done: &Done) -> Result<(), Failure> {
     let Done { sequences, seconds } = done;
     let pictures: u64 = sequences.iter().map(|it| it.n_pictures).sum();
     let rate = pictures as f64 / seconds.max(1e-9);

@@ -1,4 +1,4 @@
-//! `parallax top`: a running deployment as a table that is drawn again and again.
+//! `parallax top`: shows a running deployment as a table that is updated continuously.
 
 mod screen;
 
@@ -14,7 +14,7 @@ use launch::{
 };
 use runtime::{ExitKind, Failure, Namespace, OrFail as _, Stop, deployments};
 
-/// What to look at.
+/// Options of `parallax top`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Keys: space, j or page down shows the next page, k or page up the one before, the arrows move by one line; q, Escape
@@ -29,17 +29,17 @@ computing; publishing, until the result is sent (with lossless delivery slow rec
 capture of the frame to this process's message; end to end, from the capture to the result. Percentiles are over the
 lifetime of the process; rates are over the last five seconds.")]
 pub(crate) struct Arguments {
-    /// Name of the deployment, or its file; the one that runs if there is only one.
+    /// Name of the deployment, or its file; may be left out if only one is running.
     deployment: Option<String>,
-    /// Print one table and end; so it is where standard output is no terminal.
+    /// Print one table and exit; the default if standard output is not a terminal.
     #[arg(long)]
     once: bool,
-    /// Pause between two tables, seconds.
+    /// Interval of updates, seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = pause)]
     every: f64,
 }
 
-/// Shows a deployment until it ends, or the user has seen enough.
+/// Shows a deployment until it ends or the user quits.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut live = Live::open(&namespace(arguments.deployment.as_deref())?)?;
     let snapshot = live.first_snapshot()?;
@@ -54,9 +54,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The deployment that is meant.
+/// The namespace of a running deployment.
 ///
-/// * `named`: its name or its file; none for the only one that runs.
+/// * `named`: its name or its file; none for the only running one.
 pub(crate) fn namespace(named: Option<&str>) -> Result<Namespace, Failure> {
     if let Some(named) = named {
         let is_file = Path::new(named).extension().is_some_and(|it| it == "toml");
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_are_of_a_sensible_length() {
+    fn pauses_are_limited() {
         assert_eq!(pause("0.5"), Ok(0.5));
         for wrong in ["0", "-1", "nan", "inf", "x", "3601"] {
             assert!(pause(wrong).is_err(), "{wrong}");

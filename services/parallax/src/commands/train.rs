@@ -1,4 +1,4 @@
-//! `parallax train`: a model from annotated people, and what several views have in common.
+//! `parallax train`: trains models, networks and multi-view consistency.
 
 mod consistency;
 mod people;
@@ -18,7 +18,7 @@ use crate::terminal::Terminal;
 use launch::output;
 use people::People;
 
-/// The bar of the progress.
+/// The template of the progress bar.
 const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} images{msg}";
 
 const HELP: &str = "\
@@ -59,54 +59,53 @@ Examples:
     parallax train fmp --print-settings > settings.toml
     parallax model judge person.fmp PARSE --only 101-200";
 
-/// What to train.
+/// The subcommands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Train a flexible mixture of parts: the model that finds people in single views.
     Fmp(Box<Arguments>),
-    /// Learn what several views of a person have in common: part types, weights, thresholds, joints.
+    /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
-    /// Train a network that predicts how far off every part of a single view is.
+    /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
-    /// Search pictures with known joints, and keep what the quality network is trained on.
+    /// Search pictures with known joints, and write the samples for training the quality network.
     QualitySamples(Box<quality::samples::Arguments>),
 }
 
-/// What to train on, and how.
+/// Options of `train fmp`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// The people.
+    /// The data.
     #[command(flatten)]
     data: People,
     /// The model file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     out: Option<PathBuf>,
-    /// How to train, as TOML; what it does not say has its default, see --print-settings.
+    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Print the settings that would be used, as TOML, and end.
+    /// Print the settings that would be used, as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// Seed of everything random, instead of the settings' one.
+    /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Threads; one a core if not given. The model does not depend on it.
+    /// Threads; one per core if not given. The model does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Folder of images without people on which false alarms are counted at the end; the negatives
-    /// themselves if not given.
+    /// Folder of images without people on which false alarms are counted at the end; the negatives if not given.
     #[arg(long, value_name = "DIR")]
     judge: Option<PathBuf>,
-    /// Go on from the checkpoint of an interrupted training; from the beginning if there is none.
+    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
     #[arg(long)]
     resume: bool,
-    /// Print events and the summary as JSON, one object a line.
+    /// Print events and the summary as JSON, one object per line.
     #[arg(long)]
     json: bool,
 }
 
-/// Trains until the model is written, or it is told to stop.
+/// Runs the subcommand until the model is written or a stop is requested.
 pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failure> {
     let arguments = match command {
         Command::Fmp(it) => it,
@@ -151,7 +150,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     }
 }
 
-/// What the thread that trains shares with the one that waits for it.
+/// State shared by the training thread and the thread that waits for it.
 struct Shared {
     store: Store,
     progress: Progress,
@@ -168,7 +167,7 @@ fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
     if let Some(seed) = arguments.seed {
         settings.seed = u64::from(seed);
     }
-    // Without mirror images left is not the mirror image of right.
+    // Without mirrored images left and right parts need not be symmetric.
     settings.symmetric &= arguments.data.with_mirror();
     settings.check().or_fail(ExitKind::Config)?;
     Ok(settings)

@@ -1,4 +1,4 @@
-//! `parallax bench latency|throughput|scale`: whole deployments under load.
+//! `parallax bench latency|throughput|scale`: benchmarks of whole deployments.
 
 use std::path::PathBuf;
 
@@ -10,77 +10,77 @@ use super::{EXITS, Output};
 use crate::commands::synth::rate;
 
 const HELP: &str = "\
-Every run is a deployment of real processes, as `parallax run` starts it. Without a deployment file its cameras show a \
-person who does not exist, 320x240 pixels, `--rate` frames a second; the pictures are made beforehand, into OUT/pictures \
-(with --live by the camera processes while they run, which then compete with the others for the cores). They are \
+Every run is a deployment of real processes, as `parallax run` starts it. Without a deployment file its cameras are \
+synthetic, 320x240 pixels, `--rate` frames a second; their pictures are rendered in advance, into OUT/pictures \
+(with --live by the capture processes during the run, which then compete with the others for the cores). They are \
 searched near the last pose, as the demo's are (`--set pose.search=full`: everywhere).
 
-latency     --views cameras that keep up with the clock; then the same while the process of the last camera is dead
-throughput  --views cameras, every frame, as fast as they are taken
-scale       as latency with 1, 2, ... --views cameras; then with all of them, the last one dead
+latency     --views cameras in real time; then the same with the process of the last camera killed
+throughput  --views cameras, every frame, as fast as possible
+scale       as latency with 1, 2, ... --views cameras; then all of them with the last one killed
 
-The table says for every run how many results there were and how many a second, how long they took from the capture of \
-the first picture to the sending of the result (end to end) and in every stage, milliseconds, and how much processor \
-time a result took, all processes together. A dead camera is killed at the first result and not started again; what \
-is measured then begins with its death.
+The table shows for every run the number of results and their rate, the latency from the capture of \
+the first picture to the result (end to end) and that of every stage, milliseconds, and the processor \
+time per result, all processes together. The camera is killed at the first result and not restarted; only what \
+follows its death is measured.
 
-The numbers of a run are in its folder, OUT/<run>, as any run leaves them.";
+The results of a run are in its folder, OUT/<run>.";
 
-/// What to measure.
+/// Options of the load benchmarks.
 #[derive(Debug, Args)]
 #[command(after_help = EXITS, after_long_help = format!("{HELP}\n\n{EXITS}"))]
 pub(crate) struct Arguments {
-    /// The deployment file; cameras that do not exist if not given.
+    /// The deployment file; synthetic cameras if not given.
     deployment: Option<PathBuf>,
-    /// Cameras; of a deployment file the first so many, all if not given. 4 of those that do not exist.
+    /// Number of cameras: the first ones of the deployment file, all if not given; 4 if they are synthetic.
     #[arg(long, value_name = "N", value_parser = views)]
     views: Option<usize>,
-    /// Footage of every run, seconds.
+    /// Length of the footage of every run, seconds.
     #[arg(long, value_name = "S", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=36_000))]
     seconds: u32,
-    /// Frames a second of cameras that do not exist.
+    /// Frames per second of synthetic cameras.
     #[arg(long, value_name = "HZ", default_value_t = 5.0, value_parser = rate)]
     rate: f64,
-    /// Seed of the performance, the room and the lamps.
+    /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Let camera processes make their pictures while they run.
+    /// Let capture processes render their pictures during the run.
     #[arg(long, conflicts_with = "deployment")]
     live: bool,
-    /// Let stages look for messages without pause: `--set runtime.spin=true`.
+    /// Let stages poll for messages: `--set runtime.spin=true`.
     #[arg(long)]
     spin: bool,
     /// Replace a value of the deployment, for example `--set fuse.workers=2`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Folder for pictures and results.
+    /// The folder for pictures and results.
     #[arg(long, value_name = "DIR", default_value = "out/bench")]
     out: PathBuf,
-    /// Name of the deployment: two that run at once need two.
+    /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "bench")]
     name: String,
-    /// Largest median end to end, milliseconds, of the run with all cameras.
+    /// Largest median latency end to end of the run with all cameras, milliseconds.
     #[arg(long, value_name = "MS")]
     max_p50_ms: Option<f64>,
-    /// Largest 99th percentile, likewise.
+    /// Largest 99th percentile of the same.
     #[arg(long, value_name = "MS")]
     max_p99_ms: Option<f64>,
-    /// Least results a second, likewise.
+    /// Least rate of results of the same run, per second.
     #[arg(long, value_name = "HZ")]
     min_rate: Option<f64>,
-    /// Where numbers go.
+    /// Output options.
     #[command(flatten)]
     pub(super) output: Output,
 }
 
-/// A number of cameras, for the command line.
+/// Parses a number of cameras.
 fn views(text: &str) -> Result<usize, String> {
     let n = text.parse().ok().filter(|it| (1..=MAX_VIEWS).contains(it));
     n.ok_or_else(|| format!("expected 1 to {MAX_VIEWS}"))
 }
 
 impl Arguments {
-    /// What is to be measured.
+    /// The options of the benchmark.
     pub(super) fn options(&self) -> Options {
         Options {
             deployment: self.deployment.clone(),
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_of_cameras_is_one_that_a_deployment_may_have() {
+    fn the_number_of_cameras_is_limited_to_that_of_a_deployment() {
         assert_eq!(views("16"), Ok(16));
         for wrong in ["0", "17", "-1", "four"] {
             views(wrong).unwrap_err();

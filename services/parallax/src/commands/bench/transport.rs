@@ -1,4 +1,4 @@
-//! `parallax bench transport`: one hop between two processes, woken by an event and polling.
+//! `parallax bench transport`: one hop between two processes.
 
 use clap::Args;
 use trials::bench::Transport;
@@ -6,32 +6,32 @@ use trials::bench::Transport;
 use super::{EXITS, Output};
 
 const HELP: &str = "\
-One process writes messages into shared memory at a steady pace, another receives them. A hop is the time from just \
-before sending to just after receiving, by the one clock of the machine; that the receiver slept is part of it, and \
-writing the message is not. Measured are a small message and a frame of pixels, each with a receiver that sleeps until \
-an event wakes it (the default of a deployment) and with one that polls (`runtime.spin`), which takes a core for \
-itself.
+One process writes messages into shared memory at a fixed interval, another receives them. A hop is the time from just \
+before sending to just after receiving, by the clock of the machine. It includes the wake-up of the receiver, and \
+excludes the writing of the message. Measured are a small message and a frame of pixels, each with a receiver that sleeps until \
+an event wakes it (the default of a deployment) and with one that polls (`runtime.spin`), which occupies a \
+core.
 
-It also proves that nothing is copied: both processes say at which place of which file of /dev/shm the first messages \
-lie, which must be the same for both, and count the bytes that their ports copied, which must be none.
+It also checks that nothing is copied: both processes record the file in /dev/shm and the offset of the first messages, \
+which must be the same, and count the bytes that their ports copied, which must be none.
 
-On a machine with one core, or whose cores others use, the numbers say more of those than of the transport: --cores \
-and --priority keep others off, and the load average stands in the report.";
+On a machine with one core, or with other load, the numbers depend more on the scheduler than on the transport: --cores \
+and --priority reduce that, and the report shows the load average.";
 
-/// What to measure.
+/// Options of the transport benchmark.
 #[derive(Debug, Args)]
 #[command(after_help = EXITS, after_long_help = format!("{HELP}\n\n{EXITS}"))]
 pub(crate) struct Arguments {
-    /// Messages of every series.
+    /// Messages per series.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     messages: u64,
-    /// From one message to the next, microseconds.
+    /// Interval between messages, microseconds.
     #[arg(long, value_name = "US", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(50..=1_000_000))]
     interval_us: u64,
-    /// Bytes of the small message and of the frame.
+    /// Sizes of the small message and of the frame, bytes.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "64,921600", value_parser = bytes)]
     bytes: Vec<usize>,
-    /// Only the receiver that polls.
+    /// Measure the polling receiver only.
     #[arg(long)]
     spin: bool,
     /// Cores for the sender and the receiver.
@@ -40,28 +40,28 @@ pub(crate) struct Arguments {
     /// Real-time priority of both, 1 to 99.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
     priority: Option<u8>,
-    /// Largest median of a hop when woken, microseconds.
+    /// Largest median of a hop with a receiver that is woken by an event, microseconds.
     #[arg(long, value_name = "US")]
     max_event_us: Option<f64>,
-    /// Largest median of a hop when polling, microseconds.
+    /// Largest median of a hop with a polling receiver, microseconds.
     #[arg(long, value_name = "US")]
     max_polled_us: Option<f64>,
-    /// Name of the deployment: two that run at once need two.
+    /// Name of the deployment, unique among those that run at the same time.
     #[arg(long, value_name = "NAME", default_value = "bench-transport")]
     name: String,
-    /// Where numbers go.
+    /// Output options.
     #[command(flatten)]
     pub(super) output: Output,
 }
 
-/// Bytes of a message, for the command line.
+/// Parses the size of a message, bytes.
 fn bytes(text: &str) -> Result<usize, String> {
     let n = text.parse().ok().filter(|it| (16..=1 << 30).contains(it));
     n.ok_or_else(|| "expected 16 to 1073741824 bytes".to_owned())
 }
 
 impl Arguments {
-    /// What is to be measured.
+    /// The options of the benchmark.
     pub(super) fn options(&self) -> Transport {
         Transport {
             messages: self.messages,

@@ -1,4 +1,4 @@
-//! Single pictures of annotated people: PARSE, LSP, and JSON lines of one's own.
+//! Evaluation on single pictures of annotated people: PARSE, LSP, and JSON lines.
 
 use std::process::ExitCode;
 
@@ -14,9 +14,9 @@ use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use super::Arguments;
 use crate::commands::judge;
 
-/// Evaluates.
+/// Runs the evaluation.
 pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failure> {
-    refuse_what_has_no_meaning(arguments)?;
+    refuse_sequence_options(arguments)?;
     let options = judge::options(arguments.only.as_ref(), arguments.without.as_ref());
     let mut all: Vec<(String, People)> = Vec::new();
     for path in &arguments.sequences {
@@ -58,23 +58,22 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses options of sequences.
-fn refuse_what_has_no_meaning(arguments: &Arguments) -> Result<(), Failure> {
-    let it = arguments;
+/// Refuses options that apply to sequences only.
+fn refuse_sequence_options(arguments: &Arguments) -> Result<(), Failure> {
     let given = [
-        ("--versions", !it.versions.is_empty()),
-        ("--fuse", it.fuse.is_some()),
-        ("--consistency", it.consistency.is_some()),
-        ("--sigma", it.sigma.is_some()),
-        ("--network", it.network.is_some()),
-        ("--oracle", it.oracle),
-        ("--size", it.size.is_some()),
-        ("--scale", it.scale != 1.0),
-        ("--every", it.every != 1),
-        ("--frames", it.frames.is_some()),
-        ("--share", it.share.is_some()),
-        ("--umpm-late", it.umpm_late),
-        ("--resume", it.resume),
+        ("--versions", !arguments.versions.is_empty()),
+        ("--fuse", arguments.fuse.is_some()),
+        ("--consistency", arguments.consistency.is_some()),
+        ("--sigma", arguments.sigma.is_some()),
+        ("--network", arguments.network.is_some()),
+        ("--oracle", arguments.oracle),
+        ("--size", arguments.size.is_some()),
+        ("--scale", arguments.scale != 1.0),
+        ("--every", arguments.every != 1),
+        ("--frames", arguments.frames.is_some()),
+        ("--share", arguments.share.is_some()),
+        ("--umpm-late", arguments.umpm_late),
+        ("--resume", arguments.resume),
     ];
     match given.iter().find(|it| it.1) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! What is left behind: the report for people, for programs and for papers.
+//! Writes the report of an evaluation.
 
 use deployment::fuse::Config;
 use evaluation::Bootstrap;
@@ -8,7 +8,7 @@ use runtime::Failure;
 
 use super::Arguments;
 
-/// Writes the report, and prints its short form.
+/// Writes the report, and prints a summary.
 pub(super) fn write(
     arguments: &Arguments,
     config: &Config,

@@ -1,4 +1,4 @@
-//! Recorded motion in the place of an action.
+//! Options for recorded motion, which replaces an action.
 
 use std::path::PathBuf;
 
@@ -8,27 +8,27 @@ use runtime::Failure;
 use scene::Recording;
 use sequences::MotionOptions;
 
-/// What was recorded; nothing if not given.
+/// Recorded motion; none by default.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Recorded motion")]
 pub(super) struct MotionArguments {
-    /// The subjects do what a C3D or TRC file has, in the place of an action.
+    /// Let the subjects move as recorded in a C3D or TRC file, instead of an action.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["actions", "live"])]
     motion: Option<PathBuf>,
-    /// How its markers become joints: cmu, pose2sim, parallax, optitrack36, or a file like those of configs/markers;
-    /// the first of these four whose markers are there if not given.
+    /// Table that maps its markers to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in
+    /// configs/markers; if not given, the first of these four whose markers are in the file.
     #[arg(long, value_name = "TABLE", requires = "motion")]
     markers: Option<PathBuf>,
-    /// First and last frame of the file, as it counts; all if not given.
+    /// First and last frame, by the numbers in the file; all if not given.
     #[arg(long, value_name = "FIRST-LAST", requires = "motion", value_parser = frames)]
     motion_frames: Option<[u32; 2]>,
-    /// Longest gap of a marker that is bridged by a straight line, seconds.
+    /// Longest gap of a marker that is interpolated linearly, seconds.
     #[arg(long, value_name = "S", default_value_t = MotionOptions::default().max_gap_s, requires = "motion")]
     motion_gap: f64,
 }
 
 impl MotionArguments {
-    /// Reads what was recorded, if anything is to be performed.
+    /// Reads the recorded motion, if a file is given.
     pub(super) fn recording(&self) -> Result<Option<Recording>, Failure> {
         let Some(file) = &self.motion else {
             return Ok(None);
@@ -43,7 +43,7 @@ impl MotionArguments {
     }
 }
 
-/// `FIRST-LAST`.
+/// Parses `FIRST-LAST`.
 fn frames(text: &str) -> Result<[u32; 2], String> {
     let range = text.split_once('-');
     let range = range.and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_of_the_file_are_two_numbers() {
+    fn a_range_of_frames_is_two_numbers() {
         assert_eq!(frames("1-600"), Ok([1, 600]));
         for text in ["", "5", "5-", "-5", "a-b"] {
             assert!(frames(text).is_err(), "{text}");

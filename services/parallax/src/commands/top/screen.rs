@@ -1,4 +1,4 @@
-//! The table of `top` on a terminal: drawn again and again, scrolled by keys.
+//! The table of `top` on a terminal: updated continuously, scrolled by keys.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -12,53 +12,53 @@ use ratatui::widgets::Paragraph;
 use ratatui::{DefaultTerminal, Frame};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 
-/// How often a stop request and the end of the deployment are looked for.
-const TURN: Duration = Duration::from_millis(100);
+/// How often a stop request and the end of the deployment are checked.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// What a key asks for.
+/// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Key {
     NextPage,
     PreviousPage,
     NextLine,
     PreviousLine,
-    /// The terminal has another size.
+    /// The size of the terminal has changed.
     Resized,
     Quit,
 }
 
 /// Shows a deployment until it ends, the user quits, or a stop is requested. Returns whether the deployment has ended.
 ///
-/// * `pause`: between two tables.
+/// * `pause`: the interval of updates.
 ///
 /// # Errors
 ///
-/// The terminal cannot be used; what the observer reports.
+/// The terminal cannot be used, or the metrics cannot be received.
 pub(super) fn show(live: &mut Live, stop: &Stop, pause: Duration) -> Result<bool, Failure> {
     let mut screen = Screen {
         terminal: ratatui::try_init().or_fail(ExitKind::Run)?,
     };
     let mut first = 0;
     let mut text = live::table(&live.snapshot()?);
-    let mut looked_at = Instant::now();
+    let mut updated_at = Instant::now();
     while !stop.is_requested() {
         if live.is_over() {
             return Ok(true);
         }
-        if looked_at.elapsed() >= pause {
+        if updated_at.elapsed() >= pause {
             text = live::table(&live.snapshot()?);
-            looked_at = Instant::now();
+            updated_at = Instant::now();
         }
-        let mut room = 1;
+        let mut page_len = 1;
         let drawn = screen.terminal.draw(|frame| {
-            [first, room] = draw(frame, &text, first);
+            [first, page_len] = draw(frame, &text, first);
         });
         drawn.or_fail(ExitKind::Run)?;
-        let left = pause.saturating_sub(looked_at.elapsed());
-        match next_key(left.min(TURN))? {
+        let left = pause.saturating_sub(updated_at.elapsed());
+        match next_key(left.min(POLL_INTERVAL))? {
             Some(Key::Quit) => break,
-            Some(Key::NextPage) => first += room,
-            Some(Key::PreviousPage) => first = first.saturating_sub(room),
+            Some(Key::NextPage) => first += page_len,
+            Some(Key::PreviousPage) => first = first.saturating_sub(page_len),
             Some(Key::NextLine) => first += 1,
             Some(Key::PreviousLine) => first = first.saturating_sub(1),
             Some(Key::Resized) | None => {}
@@ -81,16 +81,16 @@ impl Drop for Screen {
     }
 }
 
-/// Draws the lines from `first` on, above a line that names the keys. Returns the first line that is shown, and how many
-/// fit: at the end of the text the last page is full.
+/// Draws the lines from `first` on, above a line that lists the keys. Returns the first line that is shown, which is less
+/// than `first` near the end so that the last page is full, and the number of lines that fit.
 fn draw(frame: &mut Frame<'_>, text: &str, first: usize) -> [usize; 2] {
     let [body, foot] =
         Layout::vertical([Constraint::Min(1), Constraint::Length(1)]).areas(frame.area());
     let lines: Vec<Line<'_>> = text.trim_end().lines().map(styled).collect();
-    let (n, room) = (lines.len(), usize::from(body.height).max(1));
-    let first = first.min(n.saturating_sub(room));
-    let end = n.min(first + room);
-    let keys = if n > room {
+    let (n, page_len) = (lines.len(), usize::from(body.height).max(1));
+    let first = first.min(n.saturating_sub(page_len));
+    let end = n.min(first + page_len);
+    let keys = if n > page_len {
         format!(
             "lines {} to {end} of {n}; space: next page, k: previous page, arrows: one line, q: quit",
             first + 1
@@ -98,13 +98,13 @@ fn draw(frame: &mut Frame<'_>, text: &str, first: usize) -> [usize; 2] {
     } else {
         "q: quit".to_owned()
     };
-    let shown: Vec<Line<'_>> = lines.into_iter().skip(first).take(room).collect();
+    let shown: Vec<Line<'_>> = lines.into_iter().skip(first).take(page_len).collect();
     frame.render_widget(Paragraph::new(shown), body);
     frame.render_widget(Paragraph::new(Line::from(keys).dim()), foot);
-    [first, room]
+    [first, page_len]
 }
 
-/// Titles are bold; a process that is dead or silent is marked.
+/// Styles a line: titles are bold, dead processes red, silent ones yellow.
 fn styled(line: &str) -> Line<'_> {
     let has = |word: &str| line.split_whitespace().any(|it| it == word);
     let style = if line.starts_with("PROCESS") {
@@ -124,13 +124,13 @@ fn next_key(wait: Duration) -> Result<Option<Key>, Failure> {
         return Ok(None);
     }
     Ok(match event::read().or_fail(ExitKind::Run)? {
-        Event::Key(key) if key.is_press() => meaning(key),
+        Event::Key(key) if key.is_press() => action_of(key),
         Event::Resize(..) => Some(Key::Resized),
         _ => None,
     })
 }
 
-fn meaning(key: KeyEvent) -> Option<Key> {
+fn action_of(key: KeyEvent) -> Option<Key> {
     let is_control = key.modifiers.contains(KeyModifiers::CONTROL);
     Some(match key.code {
         KeyCode::Char('c') if is_control => Key::Quit,
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_is_shown_whole() {
+    fn a_text_that_fits_is_shown_completely() {
         let (lines, shown) = drawn("one\ntwo\n", 0, [20, 4]);
         assert_eq!(lines, ["one", "two", "", "q: quit"]);
         assert_eq!(shown, [0, 3]);
@@ -211,13 +211,13 @@ mod tests {
     }
 
     #[test]
-    fn keys_mean_what_the_help_says() {
-        let plain = |code| meaning(KeyEvent::new(code, KeyModifiers::NONE));
+    fn keys_have_the_actions_in_the_help() {
+        let plain = |code| action_of(KeyEvent::new(code, KeyModifiers::NONE));
         assert_eq!(plain(KeyCode::Char(' ')), Some(Key::NextPage));
         assert_eq!(plain(KeyCode::Char('k')), Some(Key::PreviousPage));
         assert_eq!(plain(KeyCode::Char('q')), Some(Key::Quit));
         assert_eq!(plain(KeyCode::Char('c')), None);
         let ctrl_c = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
-        assert_eq!(meaning(ctrl_c), Some(Key::Quit));
+        assert_eq!(action_of(ctrl_c), Some(Key::Quit));
     }
 }

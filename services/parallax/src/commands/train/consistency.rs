@@ -1,4 +1,4 @@
-//! `parallax train consistency`: what several views of a person have in common, from sequences with truth.
+//! `parallax train consistency`: learns the consistency of several views of a person from sequences with truth.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -36,7 +36,7 @@ Examples:
     parallax train consistency out/ring --scale 0.5 --out person.consistency
     parallax train consistency HumanEva_I --model he.txt --rig humaneva --hold-out S3 --out he.consistency";
 
-/// What to learn from, and how.
+/// Options of `train consistency`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
@@ -49,42 +49,42 @@ pub(crate) struct Arguments {
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Subjects that the weights are chosen on, separated by commas; without it the last fourth of them.
+    /// Subjects to choose the weights on, separated by commas; if not given, the last quarter of them.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
-    /// Most instants of the subjects held out that weights are tried on, evenly over all of them.
+    /// Maximal number of instants of the held-out subjects that weights are tried on, evenly spaced.
     #[arg(long, value_name = "N", default_value_t = 48)]
     tries: usize,
-    /// Learn the pairs of these cameras by name too; all sequences are of one rig.
+    /// Learn tables by camera names too, for a rig of this name; all sequences must be of one rig.
     #[arg(long, value_name = "NAME")]
     rig: Option<String>,
-    /// Leave joints as they are, each at its own parts.
+    /// Do not learn the map from parts to joints.
     #[arg(long)]
     no_joints: bool,
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, conflicts_with = "scale")]
     size: Option<[u32; 2]>,
-    /// Size of the frames as a share of the footage's.
+    /// Size of the frames as a share of that of the footage.
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
     /// Do not turn the frames upright.
     #[arg(long)]
     no_upright: bool,
-    /// Take the first and every so many-th frame after it.
+    /// Use the first and every n-th frame after it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     every: usize,
-    /// Most frames of each sequence.
+    /// Maximal number of frames per sequence.
     #[arg(long, value_name = "N")]
     frames: Option<usize>,
-    /// Threads; one a core if not given. The file does not depend on it.
+    /// Threads; one per core if not given. The file does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Print what was found as JSON.
+    /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Learns.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let sequences = Sequences::read(
@@ -102,17 +102,17 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let job = job(arguments, format!("{:016x}", checksum::fnv1a(&bytes)));
     let terminal = Terminal::without_bar(globals.quiet, false);
     let learning = Learning::new(&job, &terminal, model, stop);
-    let keep = |learned: &Learned| {
+    let save = |learned: &Learned| {
         let text = learned.write().or_fail(ExitKind::Run)?;
-        let wrong = |error: std::io::Error| runtime::in_file(&arguments.out, &error);
-        std::fs::write(&arguments.out, text).map_err(wrong)
+        let failure = |error: std::io::Error| runtime::in_file(&arguments.out, &error);
+        std::fs::write(&arguments.out, text).map_err(failure)
     };
-    let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &keep))?;
+    let done = pool.install(|| learning.run(&sequences.train, &sequences.held_out, &save))?;
     print(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// What is learned, and how.
+/// The settings of the learning.
 fn job(arguments: &Arguments, fingerprint: String) -> Job {
     Job {
         tries: arguments.tries,

@@ -1,4 +1,4 @@
-//! Options of `train fmp` that name its people, and its images without people.
+//! Options of `train fmp` for its data: annotated people, and images without people.
 
 use std::path::PathBuf;
 
@@ -7,41 +7,41 @@ use datasets::{FaultKind, SkeletonTable};
 use offline::person::{Chosen, parse_skeleton};
 use runtime::Failure;
 
-/// Which people, which images without people, and what is made of them.
+/// The data options.
 #[derive(Debug, Args)]
 pub(super) struct People {
     /// Annotated people: folders or files, see below.
     #[arg(value_name = "DATASET", required_unless_present = "print_settings")]
     datasets: Vec<PathBuf>,
-    /// Folder of images without people, all of which are used; may be given several times.
+    /// Folder of images without people; may be given several times.
     #[arg(long, value_name = "DIR", required_unless_present = "print_settings")]
     negatives: Vec<PathBuf>,
-    /// Who of a data set is trained on, everybody if not given.
+    /// People of a data set to train on, all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// Who of a data set is left out: a test set.
+    /// People of a data set to leave out, for example a test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
-    /// Whose left and right: `marked`, or `seen`, for which people who are seen from behind have them
-    /// exchanged; marked if not given.
+    /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
+    /// `marked` if not given.
     #[arg(long, value_name = "[DATASET=]SIDES")]
     sides: Vec<String>,
-    /// Train on turned copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
+    /// Train on rotated copies too, degrees, anticlockwise: -15,-7.5,7.5,15.
     #[arg(long, value_name = "[DATASET=]DEGREES,...", allow_hyphen_values = true)]
     rotate: Vec<String>,
-    /// Do not train on mirror images.
+    /// Do not train on mirrored images.
     #[arg(long)]
     no_mirror: bool,
-    /// The parts of the model and where they lie between the joints, as TOML; the published 26 parts
-    /// between 14 joints if not given.
+    /// The parts of the model and their positions between the joints, as TOML; the published 26 parts for 14 joints if
+    /// not given.
     #[arg(long, value_name = "FILE")]
     skeleton: Option<PathBuf>,
-    /// Kinds of bad labels that end the training instead of leaving the person out: a list, or `all`.
+    /// Kinds of label faults that end the training instead of leaving the person out: a list, or `all`.
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = fatal)]
     fatal: Vec<Fatal>,
 }
 
-/// Faults that end the training.
+/// Label faults that end the training.
 #[derive(Debug, Clone, Copy)]
 enum Fatal {
     All,
@@ -59,12 +59,12 @@ fn fatal(name: &str) -> Result<Fatal, String> {
 }
 
 impl People {
-    /// Whether mirror images are trained on.
+    /// Whether to train on mirrored images.
     pub(super) fn with_mirror(&self) -> bool {
         !self.no_mirror
     }
 
-    /// The skeleton that is trained.
+    /// Reads the skeleton of the model.
     pub(super) fn table(&self) -> Result<SkeletonTable, Failure> {
         match &self.skeleton {
             Some(file) => parse_skeleton(file, &runtime::read_text(file)?),
@@ -72,7 +72,7 @@ impl People {
         }
     }
 
-    /// The same for the training.
+    /// The data options for the training.
     pub(super) fn chosen(&self) -> Chosen {
         let mut fatal: Vec<FaultKind> = Vec::new();
         for fault in &self.fatal {

@@ -1,4 +1,4 @@
-//! `parallax train quality`: the network that predicts how far off every part of a single view is.
+//! `parallax train quality`: trains the network that predicts the error of every part in a single view.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,14 +29,14 @@ setting is wrong; 4 samples, weights or a checkpoint cannot be used; 130 stopped
 Example:
     parallax train quality --samples train.samples --judge test.samples --out person.quality.onnx";
 
-/// Which network.
+/// The architecture of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Network {
-    /// What the search knows, without the picture: a baseline.
+    /// Features of the search only, without the picture: a baseline.
     Evidence,
-    /// A few separable convolutions, looked at around every part, and what the search knows.
+    /// A few separable convolutions, sampled around every part, and the features of the search.
     Small,
-    /// The paper's.
+    /// The network of the paper.
     Vgg16,
 }
 
@@ -50,46 +50,46 @@ impl From<Network> for Kind {
     }
 }
 
-/// What to train on, and how.
+/// Options of `train quality`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
     /// Samples to learn from and to validate on.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     samples: Vec<PathBuf>,
-    /// Samples to judge the network on, which it never saw; every file by itself.
+    /// Samples to test the network on, which are not trained on; every file separately.
     #[arg(long, value_name = "FILE")]
     judge: Vec<PathBuf>,
     /// The ONNX file to write.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     out: Option<PathBuf>,
-    /// How to train, as TOML; what it does not say has its default, see --print-settings.
+    /// Settings of the training, as TOML; for missing keys and defaults see --print-settings.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Print the settings that would be used, as TOML, and end.
+    /// Print the settings that would be used, as TOML, and exit.
     #[arg(long)]
     print_settings: bool,
-    /// Which network, instead of the settings' one.
+    /// The network, instead of that of the settings.
     #[arg(long, value_enum)]
     network: Option<Network>,
-    /// Seed of everything random, instead of the settings' one.
+    /// Random seed, instead of that of the settings.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Weights of torchvision's VGG-16 to begin with, as .safetensors.
+    /// Initial weights: torchvision's VGG-16, as .safetensors.
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// What the file says that it is; its name if not given.
+    /// The identity stored in the file; its name if not given.
     #[arg(long, value_name = "TEXT")]
     identity: Option<String>,
-    /// Go on from the checkpoint of an interrupted training; from the beginning if there is none.
+    /// Continue from the checkpoint of an interrupted training; start anew if there is none.
     #[arg(long)]
     resume: bool,
-    /// Print events and the summary as JSON, one object a line.
+    /// Print events and the summary as JSON, one object per line.
     #[arg(long)]
     json: bool,
 }
 
-/// Trains, in a Parallax that can.
+/// Runs the command; an error if this executable was built without training.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let settings = settings(arguments)?;
     if arguments.print_settings {

@@ -1,4 +1,4 @@
-//! `parallax train quality-samples`: what the single-view model makes of pictures with known joints.
+//! `parallax train quality-samples`: makes training samples from pictures with known joints.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,7 +24,7 @@ Example:
     parallax train quality-samples --scenes 200 --subjects 1-100 --out train.samples
     parallax train quality-samples --scenes 40 --subjects 901-920 --seed 2 --out test.samples";
 
-/// Which network the tiles are for.
+/// The network that the tiles are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum TileOf {
     /// 160 x 64 pixels.
@@ -42,49 +42,49 @@ impl TileOf {
     }
 }
 
-/// Which pictures, and where to.
+/// Options of `train quality-samples`.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
     /// Annotated people: folders or files, as for `train fmp`.
     #[arg(value_name = "DATASET")]
     datasets: Vec<PathBuf>,
-    /// Who of a data set is used, everybody if not given.
+    /// People of a data set to use, all if not given.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     only: Vec<String>,
-    /// Who of a data set is left out: a test set.
+    /// People of a data set to leave out, for example a test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
-    /// Number of scenes that do not exist; each gives some pictures of every camera.
+    /// Number of synthetic scenes; each gives some pictures of every camera.
     #[arg(long, value_name = "N", default_value_t = 0)]
     scenes: u32,
     /// Numbers of the people in the scenes.
     #[arg(long, value_name = "FROM-TO", default_value = "1-100", value_parser = subjects)]
     subjects: [u64; 2],
-    /// Frames of every camera of a scene, some seconds apart.
+    /// Frames per camera of a scene, some seconds apart.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     frames: u16,
-    /// Photographs without people that stand in the place of every third room.
+    /// Photographs without people, used as the background of every third scene instead of a room.
     #[arg(long, value_name = "DIR")]
     backdrop: Option<PathBuf>,
-    /// Seed of everything random.
+    /// Random seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// The single-view model; the person model that ships with Parallax if not given.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Which network the tiles are for.
+    /// The network that the tiles are for.
     #[arg(long, value_enum, default_value_t = TileOf::Small)]
     tile: TileOf,
     /// The file of samples to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Threads; one a core if not given. The samples do not depend on it.
+    /// Threads; one per core if not given. The samples do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
 
-/// Makes the samples.
+/// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     if arguments.scenes == 0 && arguments.datasets.is_empty() {
         let failure = Failure::new(
@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads `FROM-TO`.
+/// Parses `FROM-TO`.
 fn subjects(text: &str) -> Result<[u64; 2], String> {
     let ends = text.split_once('-').unwrap_or((text, text));
     match (ends.0.trim().parse(), ends.1.trim().parse()) {
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn subjects_are_a_range() {
+    fn a_range_of_subjects_is_parsed() {
         assert_eq!(subjects("3-7"), Ok([3, 7]));
         assert_eq!(subjects("5"), Ok([5, 5]));
         for wrong in ["", "7-3", "a-b", "-1"] {

@@ -1,4 +1,4 @@
-//! What the command line says about who does what, and before which cameras.
+//! Parses rigs, subjects, actions and rates from the command line.
 
 use std::ops::RangeInclusive;
 
@@ -8,10 +8,10 @@ pub(super) fn rig(text: &str) -> Result<RigChoice, String> {
     RigChoice::parse(text).map_err(|it| it.to_string())
 }
 
-/// Most subjects of one command.
-const MOST: usize = 10_000;
+/// Maximal number of subjects of one command.
+const MAX_SUBJECTS: usize = 10_000;
 
-/// `3`, or `1-20,25`, each once, in the order in which they are said.
+/// Parses a list of subjects: `3`, or `1-20,25`. Keeps the order and removes duplicates.
 pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
     let wrong =
         || format!("{text:?}: expected numbers and ranges with commas, for example 1-20,25");
@@ -23,8 +23,8 @@ pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
     let mut subjects = Vec::new();
     for part in text.split(',') {
         for subject in range(part).ok_or_else(wrong)? {
-            if subjects.len() == MOST {
-                return Err(format!("more than {MOST} subjects"));
+            if subjects.len() == MAX_SUBJECTS {
+                return Err(format!("more than {MAX_SUBJECTS} subjects"));
             }
             if !subjects.contains(&subject) {
                 subjects.push(subject);
@@ -34,7 +34,7 @@ pub(super) fn subjects(text: &str) -> Result<Vec<u64>, String> {
     Ok(subjects)
 }
 
-/// Names with commas, or `all`.
+/// Parses a list of actions: names separated by commas, or `all`.
 pub(super) fn actions(text: &str) -> Result<Vec<Action>, String> {
     if text == "all" {
         return Ok(Action::ALL.to_vec());
@@ -52,7 +52,7 @@ pub(super) fn actions(text: &str) -> Result<Vec<Action>, String> {
     Ok(actions)
 }
 
-/// Frames a second, for the command line.
+/// Parses a frame rate, frames per second.
 pub(crate) fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     let rate = rate.filter(|it| (0.1..=1000.0).contains(it));
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_are_what_they_say_each_once() {
+    fn lists_are_parsed_without_duplicates() {
         assert_eq!(subjects("1-3,2,7").unwrap(), [1, 2, 3, 7]);
         for wrong in ["", "1,", "a", "3-1", "-1", "1-2-3", "0-99999999"] {
             subjects(wrong).unwrap_err();
@@ -79,7 +79,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_text_is_a_list_or_an_error(text in "[0-9,a-z -]{0,12}") {
+        fn no_text_makes_the_parsers_panic(text in "[0-9,a-z -]{0,12}") {
             drop(subjects(&text));
             drop(actions(&text));
             drop(rate(&text));

@@ -1,4 +1,4 @@
-//! How much room a recording will take, and how much there is.
+//! The disk space that a recording takes, and that is free.
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -8,22 +8,22 @@ use std::time::Instant;
 use recording::Kind;
 use runtime::{ExitKind, Failure, OrFail as _, TopicPlan, free_space};
 
-/// A recording of fewer frames is not begun.
-const FEWEST_FRAMES: u64 = 10;
-/// Pause between two words about how large it has become.
+/// A recording starts only if there is space for this many frames.
+const MIN_FRAMES: u64 = 10;
+/// Interval of messages about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
-/// Bytes that one frame of all views takes in the file, at most.
+/// The largest size of one instant of all views in the file, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PerFrame {
     pub pixels: u64,
     pub evidence: u64,
-    /// Everything else.
+    /// All other messages.
     pub rest: u64,
 }
 
 impl PerFrame {
-    /// Of the topics of a deployment.
+    /// The sizes for the topics of a deployment.
     pub(super) fn new(topics: &[TopicPlan]) -> Self {
         let mut sum = Self::default();
         for it in topics {
@@ -31,7 +31,7 @@ impl PerFrame {
             match Kind::of_topic(it.topic()) {
                 Some(Kind::Frame) => sum.pixels += bytes,
                 Some(Kind::Evidence) => sum.evidence += bytes,
-                // Signs of life are few, and small.
+                // Health messages are few and small.
                 None | Some(Kind::Health) => {}
                 Some(_) => sum.rest += bytes,
             }
@@ -39,8 +39,8 @@ impl PerFrame {
         sum
     }
 
-    /// Without what is left out.
-    fn kept(self, without: [bool; 2]) -> u64 {
+    /// The sum without pixels or evidence, if they are left out.
+    fn bytes(self, without: [bool; 2]) -> u64 {
         let [pixels, evidence] = without;
         let pixels = if pixels { 0 } else { self.pixels };
         let evidence = if evidence { 0 } else { self.evidence };
@@ -48,35 +48,35 @@ impl PerFrame {
     }
 }
 
-/// What is known before a recording begins.
+/// The expected size of a recording, and the free disk space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
     /// Whether pixels and evidence are left out.
     pub without: [bool; 2],
     pub n_frames: u64,
-    /// Frames a second of the footage that are used, where that is known.
+    /// Used frames of the footage per second, if it is known.
     pub rate_hz: Option<f64>,
     pub free_bytes: u64,
 }
 
 impl Forecast {
-    /// Bytes of a frame.
-    fn frame(&self) -> u64 {
-        self.per_frame.kept(self.without)
+    /// The size of an instant, bytes.
+    fn frame_bytes(&self) -> u64 {
+        self.per_frame.bytes(self.without)
     }
 
-    /// Frames for which there is room.
+    /// The number of frames that fit on the disk.
     fn n_that_fit(&self) -> u64 {
-        self.free_bytes / self.frame().max(1)
+        self.free_bytes / self.frame_bytes().max(1)
     }
 
-    /// For people, before it begins.
+    /// The forecast as text.
     pub(super) fn text(&self, file: &Path) -> String {
         let mut text = format!(
             "recording {}: up to {} a frame",
             file.display(),
-            size(self.frame())
+            size(self.frame_bytes())
         );
         // Writing to a string cannot fail.
         let _infallible = self.write(&mut text);
@@ -85,10 +85,10 @@ impl Forecast {
 
     fn write(&self, text: &mut String) -> core::fmt::Result {
         if let Some(rate) = self.rate_hz {
-            let second = (self.frame() as f64 * rate) as u64;
+            let second = (self.frame_bytes() as f64 * rate) as u64;
             write!(text, ", {} for a second of {rate:.0} frames", size(second))?;
         }
-        let all = size(self.frame().saturating_mul(self.n_frames));
+        let all = size(self.frame_bytes().saturating_mul(self.n_frames));
         write!(
             text,
             ", {all} for all {} frames; {} are free",
@@ -105,34 +105,34 @@ impl Forecast {
         self.write_smaller(text)
     }
 
-    /// What would take less.
+    /// Writes how much smaller the recording would be without evidence and pixels.
     fn write_smaller(&self, text: &mut String) -> core::fmt::Result {
         let [pixels, evidence] = self.without;
         if !evidence {
-            let left = self.per_frame.kept([pixels, true]);
+            let left = self.per_frame.bytes([pixels, true]);
             write!(text, "\n  --without evidence: {} a frame", size(left))?;
         }
         if !evidence && !pixels {
-            let left = self.per_frame.kept([true, true]);
+            let left = self.per_frame.bytes([true, true]);
             write!(text, "; and --without pixels: {}", size(left))?;
         } else if !pixels {
-            let left = self.per_frame.kept([true, true]);
+            let left = self.per_frame.bytes([true, true]);
             write!(text, "\n  --without pixels too: {} a frame", size(left))?;
         }
         Ok(())
     }
 
-    /// Sees that there is room for a few frames.
+    /// Checks that there is space for a few frames.
     pub(super) fn check(&self, file: &Path) -> Result<(), Failure> {
-        let n = FEWEST_FRAMES.min(self.n_frames);
+        let n = MIN_FRAMES.min(self.n_frames);
         if self.n_that_fit() >= n {
             return Ok(());
         }
         let message = format!(
             "there is no room for {}: {n} frames of {} take {}, {} are free",
             file.display(),
-            size(self.frame()),
-            size(self.frame().saturating_mul(n)),
+            size(self.frame_bytes()),
+            size(self.frame_bytes().saturating_mul(n)),
             size(self.free_bytes)
         );
         let mut hint = "make room, or name a file on another disk".to_owned();
@@ -142,7 +142,7 @@ impl Forecast {
     }
 }
 
-/// The folder of a file that shall be written, and what is free there.
+/// The free space on the disk of a file that will be written, bytes.
 pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
     let folder = file.parent().unwrap_or(Path::new("/"));
     if !folder.is_dir() {
@@ -157,29 +157,29 @@ pub(super) fn free_beside(file: &Path) -> Result<u64, Failure> {
     free_space(folder).or_fail(ExitKind::Input)
 }
 
-/// Says from time to time how large the file has become.
+/// Reports the size of the file every few seconds.
 #[derive(Debug)]
 pub(super) struct Growth {
     file: PathBuf,
     frame_bytes: u64,
-    said_at: Instant,
+    reported_at: Instant,
 }
 
 impl Growth {
     pub(super) fn new(file: &Path, forecast: &Forecast) -> Self {
         Self {
             file: file.to_owned(),
-            frame_bytes: forecast.frame().max(1),
-            said_at: Instant::now(),
+            frame_bytes: forecast.frame_bytes().max(1),
+            reported_at: Instant::now(),
         }
     }
 
-    /// Whenever something happens.
-    pub(super) fn note(&mut self) -> Option<String> {
-        if self.said_at.elapsed() < PERIOD {
+    /// The next message, if it is due; called on every event of the run.
+    pub(super) fn message(&mut self) -> Option<String> {
+        if self.reported_at.elapsed() < PERIOD {
             return None;
         }
-        self.said_at = Instant::now();
+        self.reported_at = Instant::now();
         let bytes = std::fs::metadata(&self.file).ok()?.len();
         let free = free_space(&self.file).ok()?;
         let n = free / self.frame_bytes;
@@ -191,7 +191,7 @@ impl Growth {
     }
 }
 
-/// Bytes in decimal units.
+/// Formats a number of bytes in decimal units.
 fn size(bytes: u64) -> String {
     let bytes = bytes as f64;
     let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_it_will_take_is_said_with_what_would_take_less() {
+    fn the_forecast_shows_the_size_and_smaller_options() {
         let text = forecast(70_000_000_000, [false; 2]).text(Path::new("run.mcap"));
         assert_eq!(
             text,
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_that_will_be_full_is_told_before() {
+    fn the_forecast_warns_of_a_full_disk() {
         let small = forecast(5_000_000_000, [false; 2]);
         assert!(
             small
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn less_room_than_for_a_few_frames_is_refused() {
+    fn too_little_space_for_a_few_frames_is_refused() {
         let refused = forecast(1_723_999_999, [false; 2])
             .check(Path::new("a"))
             .unwrap_err();
