@@ -131,34 +131,46 @@ fn processes(resolved: &Resolved, file: &Path) -> Vec<ProcessSpec> {
         .collect()
 }
 
-fn process(it: &Process, topology: &Topology, resolved: &Resolved, file: &Path) -> ProcessSpec {
+fn process(
+    process: &Process,
+    topology: &Topology,
+    resolved: &Resolved,
+    file: &Path,
+) -> ProcessSpec {
     let mut args: Vec<OsString> = vec!["--plan".into(), file.into()];
-    if let Some(index) = it.index {
+    if let Some(index) = process.index {
         args.extend(["--index".into(), index.to_string().into()]);
     }
-    if it.is_replayed {
-        args.extend(["--stage".into(), it.service.into()]);
+    if process.is_replayed {
+        args.extend(["--stage".into(), process.service.into()]);
     }
-    let is_hurried = resolved.delivery() == Delivery::Realtime && !it.is_replayed;
-    let is_even = Stage::of_name(it.service).is_some();
-    let service = if it.is_replayed {
+    let is_realtime = resolved.delivery() == Delivery::Realtime && !process.is_replayed;
+    let is_comparable = Stage::of_name(process.service).is_some();
+    let service = if process.is_replayed {
         Name::Replay.name()
     } else {
-        it.service
+        process.service
     };
     ProcessSpec {
-        name: it.name.clone(),
+        name: process.name.clone(),
         service: service.to_owned(),
         args,
-        role: match it.role {
+        role: match process.role {
             deployment::Role::Essential => Role::Essential,
             deployment::Role::Redundant => Role::Redundant,
             deployment::Role::Optional => Role::Optional,
         },
-        senders: topology.senders_to(it).map(|it| it.name.clone()).collect(),
-        scheduling: scheduling::requested(&resolved.deployment.runtime, it.service, &it.name),
+        senders: topology
+            .senders_to(process)
+            .map(|it| it.name.clone())
+            .collect(),
+        scheduling: scheduling::requested(
+            &resolved.deployment.runtime,
+            process.service,
+            &process.name,
+        ),
         // Not for stages that write files, whose work varies, and not with lossless delivery, which has no deadlines.
-        most_work: (is_hurried && is_even).then_some(MAX_WORK_FACTOR),
+        most_work: (is_realtime && is_comparable).then_some(MAX_WORK_FACTOR),
     }
 }
 

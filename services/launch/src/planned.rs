@@ -68,7 +68,7 @@ impl Planned {
         &self.plan
     }
 
-    /// The session: the time of planning, `runtime::now_nanos`.
+    /// The session, which is the time of planning (`runtime::now_nanos`).
     pub fn session(&self) -> u64 {
         self.plan.session
     }

@@ -19,26 +19,26 @@ use crate::resolved::Resolved;
 /// The processes of a deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Name {
-    /// One a view: footage to frames.
+    /// One per view: footage to frames.
     Capture,
-    /// One a view: frames to candidates and evidence.
+    /// One per view: frames to candidates and evidence.
     Pose,
-    /// One a view: expected errors.
+    /// One per view: expected errors.
     Quality,
-    /// One a worker: pairs of views.
+    /// One per worker: pairs of views.
     Fuse,
-    /// Joints in the world.
+    /// Triangulation: joints in the world.
     Triangulate,
-    /// The output folder.
+    /// Results: the files in the output folder.
     Results,
-    /// Every message into one file.
+    /// The recording of every message in one file.
     Record,
-    /// What a recording holds of another process.
+    /// The recorded messages of another process.
     Replay,
 }
 
 impl Name {
-    /// All of them, in the order of the pipeline.
+    /// All processes, in pipeline order.
     pub const ALL: [Self; 8] = [
         Self::Capture,
         Self::Pose,
@@ -50,7 +50,7 @@ impl Name {
         Self::Replay,
     ];
 
-    /// What the command line calls it: the service of [`deployment::Process`], or `replay`.
+    /// Its name on the command line: the service of [`deployment::Process`], or `replay`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Capture => Stage::Capture.name(),
@@ -64,29 +64,29 @@ impl Name {
         }
     }
 
-    /// The process of that name.
+    /// The process with the given name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|it| it.name() == name)
     }
 
-    /// What it does, for the help of the command line.
+    /// Its description in the help of the command line.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Capture => "One a view: footage to frames",
-            Self::Pose => "One a view: frames to candidates and evidence",
-            Self::Quality => "One a view: expected errors",
-            Self::Fuse => "One a worker: pairs of views",
+            Self::Capture => "One per view: footage to frames",
+            Self::Pose => "One per view: frames to candidates and evidence",
+            Self::Quality => "One per view: expected errors",
+            Self::Fuse => "One per worker: pairs of views",
             Self::Triangulate => "Joints in the world",
             Self::Results => "The output folder",
             Self::Record => "Every message into one file",
-            Self::Replay => "What a recording holds of another process",
+            Self::Replay => "The recorded messages of another process",
         }
     }
 }
 
-/// What a process is told of itself; what it is told of the deployment stands in its standard input.
+/// The arguments of a process; the deployment itself is in its standard input.
 #[derive(Debug, Clone)]
-pub struct Own {
+pub struct ProcessArguments {
     /// The file of the resolved deployment, which is read if standard input is empty.
     pub plan: PathBuf,
     /// The number of its view or worker, from 0.
@@ -102,19 +102,19 @@ pub struct Own {
 /// # Errors
 ///
 /// The resolved deployment cannot be read or used, it has no such process, or the service fails.
-pub fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure> {
-    let resolved = Resolved::read(&own.plan)?;
+pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Result<(), Failure> {
+    let resolved = Resolved::read(&arguments.plan)?;
     let n_views = resolved.deployment.cameras.len();
     let per_view = matches!(name, Name::Capture | Name::Pose | Name::Quality);
-    if per_view && own.index >= n_views {
-        let message = format!("there is no view {}, only {n_views}", own.index);
+    if per_view && arguments.index >= n_views {
+        let message = format!("there is no view {}, only {n_views}", arguments.index);
         return Err(Failure::new(ExitKind::Usage, message));
     }
     if per_view {
-        let camera = &resolved.deployment.cameras[own.index].name;
-        service.health().belongs_to(own.index, camera);
+        let camera = &resolved.deployment.cameras[arguments.index].name;
+        service.health().belongs_to(arguments.index, camera);
     }
-    if let Some(frame) = own.spin_after.filter(|_| service.epoch() == 0) {
+    if let Some(frame) = arguments.spin_after.filter(|_| service.epoch() == 0) {
         service.health().spin_after(frame);
     }
     let n_threads = if name == Name::Pose {
@@ -124,14 +124,14 @@ pub fn become_it(service: &Service, name: Name, own: &Own) -> Result<(), Failure
     };
     pool(n_threads).build_global().or_fail(ExitKind::Run)?;
     match name {
-        Name::Capture => capture(service, &resolved, own.index),
-        Name::Pose => pose(service, &resolved, own.index),
-        Name::Quality => quality(service, &resolved, own.index),
-        Name::Fuse => fuse(service, &resolved, own.index),
+        Name::Capture => capture(service, &resolved, arguments.index),
+        Name::Pose => pose(service, &resolved, arguments.index),
+        Name::Quality => quality(service, &resolved, arguments.index),
+        Name::Fuse => fuse(service, &resolved, arguments.index),
         Name::Triangulate => triangulate(service, &resolved),
         Name::Results => results(service, &resolved),
         Name::Record => record(service, &resolved),
-        Name::Replay => replay(service, &resolved, own),
+        Name::Replay => replay(service, &resolved, arguments),
     }
 }
 
@@ -307,8 +307,12 @@ fn record(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     record::run(service, job)
 }
 
-fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failure> {
-    let recording = resolved.replay.as_ref().zip(own.stage);
+fn replay(
+    service: &Service,
+    resolved: &Resolved,
+    arguments: &ProcessArguments,
+) -> Result<(), Failure> {
+    let recording = resolved.replay.as_ref().zip(arguments.stage);
     let (plan, stage) = recording
         .ok_or("there is no recording, or no --stage")
         .or_fail(ExitKind::Config)?;
@@ -316,7 +320,7 @@ fn replay(service: &Service, resolved: &Resolved, own: &Own) -> Result<(), Failu
     let mut processes = topology.processes().iter();
     let replayed = processes.find(|process| {
         let index = process.index.unwrap_or(0);
-        process.service == stage.name() && index == own.index
+        process.service == stage.name() && index == arguments.index
     });
     let replayed = replayed
         .ok_or("there is no such process in this deployment")
@@ -344,7 +348,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_process_of_a_deployment_is_one_of_these() {
+    fn every_process_of_a_deployment_has_a_name() {
         let text = "name = 'a'\nrig = 'r'\noutput = 'o'\n[quality]\nnetwork = 'shipped'\n\
             [[camera]]\nname = 'b'\nsource = 's'\n[[camera]]\nname = 'c'\nsource = 's'\n";
         let loaded = Loaded::parse(text, Path::new("d.toml"), &[], &AnyMachine).unwrap();

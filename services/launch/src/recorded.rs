@@ -138,9 +138,11 @@ pub fn damaged_text(damaged: &[Damaged]) -> Option<String> {
         "  {} damaged messages are left out: they are not what their checksums say",
         damaged.len()
     );
-    let named = damaged.iter().take(MAX_LISTED).map(|it| {
-        let frame = it.frame.map_or(String::new(), |it| format!(", frame {it}"));
-        format!("\n    {}{frame}, at byte {}", it.topic, it.offset)
+    let named = damaged.iter().take(MAX_LISTED).map(|message| {
+        let frame = message
+            .frame
+            .map_or(String::new(), |it| format!(", frame {it}"));
+        format!("\n    {}{frame}, at byte {}", message.topic, message.offset)
     });
     text.extend(named);
     if damaged.len() > MAX_LISTED {
@@ -187,8 +189,8 @@ fn write_flaws(text: &mut String, recording: &Recording) -> core::fmt::Result {
             "\n  not complete: {why}; read up to byte {whole} of {all}"
         )?;
     }
-    for it in extent.damage.iter().take(MAX_LISTED) {
-        write!(text, "\n  damaged at byte {}: {}", it.offset, it.what)?;
+    for place in extent.damage.iter().take(MAX_LISTED) {
+        write!(text, "\n  damaged at byte {}: {}", place.offset, place.what)?;
     }
     if extent.damage.len() > MAX_LISTED {
         let more = extent.damage.len() - MAX_LISTED;

@@ -133,11 +133,11 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
         Vector3::x_axis(),
         -Vector3::x_axis(),
     ];
-    let near = |it: UnitVector3<f64>| {
+    let near = |direction: UnitVector3<f64>| {
         let near = world
             .iter()
-            .find(|axis| axis.angle(&it).to_degrees() < NEAR_AXIS);
-        near.copied().unwrap_or(it)
+            .find(|axis| axis.angle(&direction).to_degrees() < NEAR_AXIS);
+        near.copied().unwrap_or(direction)
     };
     let found = [level, upright].map(|it| it.map(near));
     let [level, upright] = found;
@@ -147,12 +147,12 @@ fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
         .chain(upright.map(|it| -it));
     let opposite = level.map(|it| -it);
     let mut directions: Vec<UnitVector3<f64>> = Vec::new();
-    for it in likely.chain(world).chain(opposite) {
+    for direction in likely.chain(world).chain(opposite) {
         if directions
             .iter()
-            .all(|other| other.angle(&it).to_degrees() > SAME_DIRECTION)
+            .all(|other| other.angle(&direction).to_degrees() > SAME_DIRECTION)
         {
-            directions.push(it);
+            directions.push(direction);
         }
     }
     directions

@@ -58,9 +58,9 @@ could not be measured; 2 the command line is wrong; 3, 4, 5 the deployment or it
 /// Runs the benchmark.
 pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
     let verbosity = globals.verbosity();
-    let load = |kind: Kind, it: &load::Arguments| {
-        let report = bench::load(kind, &it.options(), verbosity)?;
-        publish(report, &it.output, globals)
+    let load = |kind: Kind, arguments: &load::Arguments| {
+        let report = bench::load(kind, &arguments.options(), verbosity)?;
+        publish(report, &arguments.output, globals)
     };
     match command {
         Command::Transport(it) => {

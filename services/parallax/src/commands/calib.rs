@@ -218,8 +218,8 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
             .iter()
             .map(|it| json!({ "severity": format!("{:?}", it.severity()).to_lowercase(), "text": it.to_string() }))
             .collect();
-        let cameras = report.as_ref().map(|it| {
-            let each = it.cameras.iter();
+        let cameras = report.as_ref().map(|report| {
+            let each = report.cameras.iter();
             each.map(|it| json!({ "camera": name(it.camera), "median_px": it.median_px, "points": it.n_points }))
                 .collect::<Vec<_>>()
         });
@@ -231,12 +231,12 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
         if findings.is_empty() {
             output::line("nothing odd was found")?;
         }
-        for it in report.iter().flat_map(|it| &it.cameras) {
+        for camera in report.iter().flat_map(|it| &it.cameras) {
             output::line(format_args!(
                 "{}: median epipolar error {:.2} px over {} pairs of points",
-                name(it.camera),
-                it.median_px,
-                it.n_points
+                name(camera.camera),
+                camera.median_px,
+                camera.n_points
             ))?;
         }
     }

@@ -52,15 +52,20 @@ pub(crate) fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     if found.is_empty() {
         output::message("no deployment runs, and none has left anything behind");
     }
-    for it in &found {
-        let name = it.namespace.name();
-        let how = match it.supervisor {
-            _ if !it.is_marked => UNMARKED.to_owned(),
-            Some(pid) => format!("runs (process {pid}), {} processes", it.processes.len()),
-            None if it.processes.is_empty() => "dead: `parallax clean` removes it".to_owned(),
-            None => format!("dead, but for {}", it.processes.join(", ")),
+    for deployment in &found {
+        let name = deployment.namespace.name();
+        let how = match deployment.supervisor {
+            _ if !deployment.is_marked => UNMARKED.to_owned(),
+            Some(pid) => format!(
+                "runs (process {pid}), {} processes",
+                deployment.processes.len()
+            ),
+            None if deployment.processes.is_empty() => {
+                "dead: `parallax clean` removes it".to_owned()
+            }
+            None => format!("dead, but for {}", deployment.processes.join(", ")),
         };
-        output::line(format_args!("{name:<32} {:>10}  {how}", size(it)))?;
+        output::line(format_args!("{name:<32} {:>10}  {how}", size(deployment)))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -127,17 +132,17 @@ pub(crate) fn clean(arguments: &CleanArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-fn describe(it: &Remains) -> Value {
+fn describe(remains: &Remains) -> Value {
     json!({
-        "name": it.namespace.name(),
-        "is_deployment": it.is_marked,
-        "supervisor": it.supervisor,
-        "processes": it.processes,
-        "files": it.n_files,
-        "bytes": it.bytes,
+        "name": remains.namespace.name(),
+        "is_deployment": remains.is_marked,
+        "supervisor": remains.supervisor,
+        "processes": remains.processes,
+        "files": remains.n_files,
+        "bytes": remains.bytes,
     })
 }
 
-fn size(it: &Remains) -> String {
-    format!("{:.1} MB", it.bytes as f64 / 1e6)
+fn size(remains: &Remains) -> String {
+    format!("{:.1} MB", remains.bytes as f64 / 1e6)
 }

@@ -304,16 +304,16 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
     let mut all: Vec<Sequence> = Vec::new();
     for path in &arguments.sequences {
         let read = sequences::read(path, &options);
-        for mut it in read.map_err(offline::sequence_failure)? {
-            it.thin_out(arguments.every, arguments.frames);
+        for mut sequence in read.map_err(offline::sequence_failure)? {
+            sequence.thin_out(arguments.every, arguments.frames);
             if all
                 .iter()
-                .any(|other| other.name == it.name && other.dataset == it.dataset)
+                .any(|other| other.name == sequence.name && other.dataset == sequence.dataset)
             {
-                let message = format!("{} {} is given twice", it.dataset, it.name);
+                let message = format!("{} {} is given twice", sequence.dataset, sequence.name);
                 return Err(Failure::new(ExitKind::Usage, message));
             }
-            all.push(it);
+            all.push(sequence);
         }
     }
     Ok(all)

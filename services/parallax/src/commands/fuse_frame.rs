@@ -428,8 +428,8 @@ impl Report<'_> {
         let hypotheses: Vec<Value> = pair
             .hypotheses
             .iter()
-            .map(|it| {
-                let iterations: Vec<Value> = it
+            .map(|hypothesis| {
+                let iterations: Vec<Value> = hypothesis
                     .iterations
                     .iter()
                     .map(|step| {
@@ -443,12 +443,12 @@ impl Report<'_> {
                     })
                     .collect();
                 json!({
-                    "exchanged": it.start.exchanged,
-                    "energy": it.energy,
-                    "converged": it.converged,
-                    "active": it.active,
+                    "exchanged": hypothesis.start.exchanged,
+                    "energy": hypothesis.energy,
+                    "converged": hypothesis.converged,
+                    "active": hypothesis.active,
                     "iterations": iterations,
-                    "poses": [self.pose(pair.views[0], &it.poses[0]), self.pose(pair.views[1], &it.poses[1])],
+                    "poses": [self.pose(pair.views[0], &hypothesis.poses[0]), self.pose(pair.views[1], &hypothesis.poses[1])],
                 })
             })
             .collect();
@@ -464,8 +464,8 @@ impl Report<'_> {
             output::line(format_args!("{}: {score}", self.name(view)))?;
         }
         for pair in &self.estimate.pairs {
-            for it in &pair.hypotheses {
-                let facing = if it.start.exchanged {
+            for fused in &pair.hypotheses {
+                let facing = if fused.start.exchanged {
                     "opposite"
                 } else {
                     "same"
@@ -474,9 +474,9 @@ impl Report<'_> {
                     "{} - {}, {facing} facing: energy {:.4} after {} iterations{}",
                     self.name(pair.views[0]),
                     self.name(pair.views[1]),
-                    it.energy,
-                    it.iterations.len(),
-                    if it.converged { "" } else { ", not settled" }
+                    fused.energy,
+                    fused.iterations.len(),
+                    if fused.converged { "" } else { ", not settled" }
                 ))?;
             }
         }

@@ -125,12 +125,12 @@ fn description(file: &Path, model: &Model) -> Value {
     let parts: Vec<Value> = spec
         .parts
         .iter()
-        .map(|it| {
+        .map(|part| {
             json!({
-                "name": it.name,
-                "types": it.filter_of_type.len(),
-                "parent": it.edge.as_ref().map(|edge| edge.parent + 1),
-                "springs": it.edge.as_ref().map(|edge| match edge.springs {
+                "name": part.name,
+                "types": part.filter_of_type.len(),
+                "parent": part.edge.as_ref().map(|edge| edge.parent + 1),
+                "springs": part.edge.as_ref().map(|edge| match edge.springs {
                     Springs::PerChildType(_) => "per child type",
                     Springs::PerTypePair(_) => "per pair of types",
                 }),

@@ -12,58 +12,58 @@ use runtime::{ExitKind, Failure, Launch, OrFail as _, run_service};
 
 use crate::stage;
 
-/// Which process.
+/// Options of `parallax service`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Which process to become.
+    /// The process to run.
     #[arg(value_parser = names())]
     name: Name,
-    /// What the supervisor says: --plan, --index, and about the deployment.
+    /// Arguments from the supervisor: --plan, --index, and those of the launch.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     rest: Vec<OsString>,
 }
 
-/// The service's own arguments.
+/// The arguments of the process itself.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true)]
-struct Own {
-    /// The resolved deployment, where standard input does not hold it.
+struct ServiceArguments {
+    /// The file of the resolved deployment, which is read if standard input is empty.
     #[arg(long)]
     plan: PathBuf,
     /// View or worker, from 0.
     #[arg(long, default_value_t = 0)]
     index: usize,
-    /// What a recording stands in for.
+    /// The stage that a replay process stands in for.
     #[arg(long, value_parser = stage::parser())]
     stage: Option<Stage>,
-    /// Compute for ever in the first life, once something of a later frame has been sent.
+    /// Enter an endless loop in epoch 0, once a message about a later frame has been sent; for tests.
     #[arg(long)]
     spin_after: Option<u64>,
 }
 
-/// A parser of the names of processes, which `--help` explains.
+/// A parser of the names of processes, with their description in `--help`.
 fn names() -> impl TypedValueParser<Value = Name> {
     let values = Name::ALL.map(|it| PossibleValue::new(it.name()).help(it.help()));
     PossibleValuesParser::new(values)
         .try_map(|name| Name::of_name(&name).ok_or("there is no such process"))
 }
 
-/// Becomes the process.
+/// Runs the process.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let (launch, rest) = Launch::from_args(arguments.rest.iter().cloned())?;
-    let Own {
+    let ServiceArguments {
         plan,
         index,
         stage,
         spin_after,
-    } = Own::try_parse_from(rest).or_fail(ExitKind::Usage)?;
-    let own = process::Own {
+    } = ServiceArguments::try_parse_from(rest).or_fail(ExitKind::Usage)?;
+    let process_arguments = process::ProcessArguments {
         plan,
         index,
         stage,
         spin_after,
     };
     Ok(run_service(launch, |service| {
-        process::become_it(service, arguments.name, &own)
+        process::run(service, arguments.name, &process_arguments)
     }))
 }

@@ -184,34 +184,38 @@ const N_FRAMES: u64 = 60;
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let it = arguments;
-    it.rig.rig().map_err(synth::rig_failure)?;
-    let recording = it.motion.recording()?;
+    arguments.rig.rig().map_err(synth::rig_failure)?;
+    let recording = arguments.motion.recording()?;
     let job = Job {
-        out: it.out.clone(),
-        rig: it.rig.clone(),
-        subjects: it.subjects.clone(),
-        actions: it.actions.clone(),
-        seed: it.seed,
-        flaws: it.flaws.flaws()?,
-        n_frames: synth::n_frames(it.frames, it.rate, recording.as_ref(), N_FRAMES)?,
+        out: arguments.out.clone(),
+        rig: arguments.rig.clone(),
+        subjects: arguments.subjects.clone(),
+        actions: arguments.actions.clone(),
+        seed: arguments.seed,
+        flaws: arguments.flaws.flaws()?,
+        n_frames: synth::n_frames(
+            arguments.frames,
+            arguments.rate,
+            recording.as_ref(),
+            N_FRAMES,
+        )?,
         recording,
-        rate_hz: it.rate,
-        format: it.format.into(),
-        with_masks: !it.no_masks,
-        backdrop: it.backdrop.clone(),
-        model: it.model.clone(),
-        live: it.live,
+        rate_hz: arguments.rate,
+        format: arguments.format.into(),
+        with_masks: !arguments.no_masks,
+        backdrop: arguments.backdrop.clone(),
+        model: arguments.model.clone(),
+        live: arguments.live,
     };
-    create_folder(&it.out)?;
+    create_folder(&arguments.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let threads = it.threads.map_or(0, usize::from);
+    let threads = arguments.threads.map_or(0, usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|it| format!("synth-{it}"))
         .build()
         .or_fail(ExitKind::Run)?;
-    let terminal = Terminal::with_bar(globals.quiet, it.json, BAR);
+    let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
     let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
     report(arguments, globals, &done)?;
     Ok(ExitCode::SUCCESS)

@@ -143,17 +143,20 @@ fn table(all: &[Measured]) -> Vec<Vec<String>> {
         "run", "results", "a second", "p50", "p99", "p99.9", "max", "cpu", "dropped",
     ];
     let mut rows = vec![heads.map(str::to_owned).to_vec()];
-    for it in all {
+    for measured in all {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |it| format!("{it:.1}"));
         let mut row = vec![
-            it.case.to_string(),
-            it.n_results.to_string(),
-            number(it.rate_hz),
+            measured.case.to_string(),
+            measured.n_results.to_string(),
+            number(measured.rate_hz),
         ];
-        row.extend(Spread::cells(it.end_to_end, 1));
-        row.extend([number(it.cpu_ms_per_result()), it.n_dropped.to_string()]);
+        row.extend(Spread::cells(measured.end_to_end, 1));
+        row.extend([
+            number(measured.cpu_ms_per_result()),
+            measured.n_dropped.to_string(),
+        ]);
         rows.push(row);
-        for (stage, spread) in &it.stages {
+        for (stage, spread) in &measured.stages {
             let mut row = vec![format!("  {stage}"), String::new(), String::new()];
             row.extend(Spread::cells(Some(*spread), 1));
             rows.push(row);

@@ -118,8 +118,8 @@ impl Transport {
     fn report(&self, provenance: Provenance, rows: &[Row]) -> Report {
         let heads = ["receiver", "bytes", "p50", "p99", "p99.9", "max", "lost"];
         let table = [heads.map(str::to_owned).to_vec()].into_iter();
-        let [sender, receiver] = [0, 1].map(|it| {
-            let core = self.cores.get(it).map(ToString::to_string);
+        let [sender, receiver] = [0, 1].map(|index| {
+            let core = self.cores.get(index).map(ToString::to_string);
             core.unwrap_or_else(|| "any".to_owned())
         });
         Report {
@@ -186,17 +186,17 @@ impl Row {
     }
 
     fn json(&self) -> Value {
-        let it = &self.measured;
+        let measured = &self.measured;
         json!({
             "receiver": if self.spins { "poll" } else { "event" },
             "bytes": self.bytes,
-            "sent": it.sent,
-            "received": it.receiver.received,
+            "sent": measured.sent,
+            "received": measured.receiver.received,
             "lost": self.lost(),
-            "broken": it.receiver.broken,
-            "hop_us": it.receiver.hop_us,
-            "places": { "compared": it.n_compared, "same": it.n_same_place },
-            "copied_bytes": it.copied_bytes,
+            "broken": measured.receiver.broken,
+            "hop_us": measured.receiver.hop_us,
+            "places": { "compared": measured.n_compared, "same": measured.n_same_place },
+            "copied_bytes": measured.copied_bytes,
         })
     }
 }

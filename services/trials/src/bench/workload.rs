@@ -264,8 +264,8 @@ impl Workload {
         let mut results = results::read(&deployment.output, &names)?;
         if let Some(injector) = &injector {
             let killed = injector.times().injected;
-            let since = killed.map_or(f64::INFINITY, |it| {
-                it.saturating_sub(planned.session()) as f64 / 1e6
+            let since = killed.map_or(f64::INFINITY, |killed| {
+                killed.saturating_sub(planned.session()) as f64 / 1e6
             });
             results.retain(|it| it.captured_ms().is_some_and(|it| it > since));
         }
@@ -300,13 +300,13 @@ fn rate_hz(results: &[FrameResult]) -> Option<f64> {
 }
 
 /// Converts percentiles of the latency report.
-fn spread(it: &Percentiles) -> Spread {
+fn spread(percentiles: &Percentiles) -> Spread {
     Spread {
-        n: it.count as usize,
-        p50: it.p50_ms,
-        p99: it.p99_ms,
-        p99_9: it.p99_9_ms,
-        max: it.max_ms,
+        n: percentiles.count as usize,
+        p50: percentiles.p50_ms,
+        p99: percentiles.p99_ms,
+        p99_9: percentiles.p99_9_ms,
+        max: percentiles.max_ms,
     }
 }
 

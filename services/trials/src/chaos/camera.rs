@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn the_results_show_the_absence_and_the_return_of_a_camera() {
         let gone = Some("camera gone");
-        let it = failed(&[
+        let failure = failed(&[
             moment(1, 100.0, None),
             moment(2, 200.0, gone),
             moment(3, 300.0, Some("late")),
@@ -204,8 +204,8 @@ mod tests {
             longest_pause_ms: Some(150.0),
             back_ms: Some(150.0),
         };
-        assert_eq!(it, expected);
-        assert_eq!(missed(&it), [""; 0]);
+        assert_eq!(failure, expected);
+        assert_eq!(missed(&failure), [""; 0]);
     }
 
     #[test]
@@ -215,9 +215,9 @@ mod tests {
             .collect();
         assert_eq!(missed(&failed(&unnoticed)), ["frames called camera gone"]);
         let gone = Some("camera gone");
-        let for_ever: Vec<FrameResult> = (0..8)
+        let never_back: Vec<FrameResult> = (0..8)
             .map(|it| moment(it, 100.0 * it as f64, gone.filter(|_| it > 1)))
             .collect();
-        assert_eq!(missed(&failed(&for_ever)), ["back after, ms"]);
+        assert_eq!(missed(&failed(&never_back)), ["back after, ms"]);
     }
 }

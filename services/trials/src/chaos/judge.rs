@@ -304,14 +304,14 @@ mod tests {
             shared_bytes: 5_000_000,
         };
         let mut last = first;
-        let mut it = RandomKillsOutcome {
+        let mut kills = RandomKillsOutcome {
             n_kills: 3,
             downtime_ms: Spread::of(vec![500.0, 700.0, 900.0]),
             resources: None,
         };
-        change(&mut it, &mut last);
-        it.resources = Some([first, last]);
-        missed(random(&ASKED, &it, &good().1))
+        change(&mut kills, &mut last);
+        kills.resources = Some([first, last]);
+        missed(random(&ASKED, &kills, &good().1))
     }
 
     #[test]

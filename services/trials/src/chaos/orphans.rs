@@ -46,8 +46,8 @@ pub(super) fn kill(
         .arg("--out")
         .arg(&output)
         .arg("--quiet");
-    for it in testbed.set(&[]) {
-        command.arg("--set").arg(it);
+    for pair in testbed.set(&[]) {
+        command.arg("--set").arg(pair);
     }
     let command = command.stdin(Stdio::null()).stdout(Stdio::null());
     let mut supervisor = command.spawn().or_fail(ExitKind::Run)?;

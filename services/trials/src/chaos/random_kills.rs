@@ -41,7 +41,7 @@ impl Kill {
     /// The downtime, milliseconds: from the kill until the process sent its first message that contributed to a
     /// result, or, for processes that results do not name, until it reported that it has worked.
     ///
-    /// * `session`: the session: the time of planning, `runtime::now_nanos`.
+    /// * `session`: the session, which is the time of planning (`runtime::now_nanos`).
     pub(super) fn downtime_ms(
         &self,
         source: EpochSource,

@@ -29,7 +29,7 @@ pub(super) struct Part {
 /// Divides a run into parts.
 ///
 /// * `length`: the length of a part, nanoseconds; the last one may be shorter.
-/// * `session`: the session: the time of planning, `runtime::now_nanos`.
+/// * `session`: the session, which is the time of planning (`runtime::now_nanos`).
 pub(super) fn parts(
     length: u64,
     session: u64,
@@ -62,10 +62,10 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
         return Vec::new();
     }
     let head = "  from s  kills  results   p50 ms   p99 ms  p99.9 ms   max ms  memory MB  shared MB  descriptors  files";
-    let lines = parts.iter().map(|it| {
-        let mut line = format!("{:>8.0}{:>7}{:>9}", it.from_s, it.kills, it.results);
-        let latency = Spread::cells(it.end_to_end_ms, 0);
-        let resources = it.resources.map(|used| {
+    let lines = parts.iter().map(|part| {
+        let mut line = format!("{:>8.0}{:>7}{:>9}", part.from_s, part.kills, part.results);
+        let latency = Spread::cells(part.end_to_end_ms, 0);
+        let resources = part.resources.map(|used| {
             let mb = |bytes: u64| format!("{:.1}", bytes as f64 / 1e6);
             let memory = used.memory_bytes + used.supervisor_memory_bytes;
             let [memory, shared] = [memory, used.shared_bytes].map(mb);
@@ -104,13 +104,13 @@ mod tests {
 
     fn moment(captured_s: f64, sent_s: f64) -> FrameResult {
         let [captured_ms, sent_ms] = [captured_s, sent_s].map(|it| it * 1000.0);
-        let shot = CameraTimes {
+        let camera = CameraTimes {
             epoch: 0,
             captured_ms,
             sent_ms: captured_ms,
         };
-        let seen = ViewResult {
-            camera: Some(shot),
+        let view = ViewResult {
+            camera: Some(camera),
             ..ViewResult::default()
         };
         FrameResult {
@@ -118,7 +118,7 @@ mod tests {
             epoch: 0,
             sent_ms,
             joints: Vec::new(),
-            views: vec![seen],
+            views: vec![view],
         }
     }
 

@@ -129,21 +129,21 @@ impl StallInjector {
 ///
 /// * `every_frame`: the number of frames, with lossless delivery.
 fn judge(
-    asked: &Limits,
-    it: Option<&StallMeasurement>,
+    requested: &Limits,
+    measurement: Option<&StallMeasurement>,
     every_frame: Option<u64>,
     outcome: &RunOutcome,
 ) -> Vec<Limit> {
-    let most_ms = STALL_NANOS as f64 / 1e6 + asked.max_pause_ms;
+    let most_ms = STALL_NANOS as f64 / 1e6 + requested.max_pause_ms;
     let mut limits = vec![at_most(
         "it stood still, ms",
         most_ms,
-        it.map(|it| it.stall_ms),
+        measurement.map(|it| it.stall_ms),
     )];
     limits.push(if let Some(n) = every_frame {
         at_least("results written", n as f64, Some(outcome.n_results as f64))
     } else {
-        let [before, meanwhile] = it.map_or([f64::NAN; 2], |it| it.rates_hz);
+        let [before, meanwhile] = measurement.map_or([f64::NAN; 2], |it| it.rates_hz);
         let meanwhile = Some(meanwhile).filter(|it| it.is_finite());
         at_least("results a second meanwhile", SHARE * before, meanwhile)
     });
@@ -165,20 +165,20 @@ pub(super) fn attempt(testbed: &Testbed, options: &Options) -> Result<Verdict, F
         })
     });
     let outcome = run.outcome(|_| 0);
-    let it = stall.measurement();
+    let measurement = stall.measurement();
     let is_lossless = planned.resolved().delivery() == runtime::Delivery::Lossless;
     let every_frame = is_lossless.then(|| planned.resolved().n_frames());
-    let [before, meanwhile] = it.map_or([0.0; 2], |it| it.rates_hz);
+    let [before, meanwhile] = measurement.map_or([0.0; 2], |it| it.rates_hz);
     Ok(Verdict {
         scenario: STALL.to_owned(),
         measured: format!(
             "results stood still for {}; results a second {before:.1} before, {meanwhile:.1} meanwhile; {} results written",
-            ms(it.map(|it| it.stall_ms)),
+            ms(measurement.map(|it| it.stall_ms)),
             outcome.n_results
         ),
         details: Vec::new(),
-        numbers: json!(it),
-        limits: judge(&options.limits, it.as_ref(), every_frame, &outcome),
+        numbers: json!(measurement),
+        limits: judge(&options.limits, measurement.as_ref(), every_frame, &outcome),
         run: run.json(),
     })
 }

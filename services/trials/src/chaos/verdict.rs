@@ -54,16 +54,20 @@ pub(super) fn table(verdicts: &[Verdict]) -> String {
 
 fn write(text: &mut String, verdicts: &[Verdict]) -> core::fmt::Result {
     writeln!(text, "{:<8}{:<17} measured", "", "scenario")?;
-    for it in verdicts {
-        let word = if it.is_held() { "held" } else { "MISSED" };
-        writeln!(text, "{word:<8}{:<17} {}", it.scenario, it.measured)?;
-        for limit in it.limits.iter().filter(|it| !it.held) {
+    for verdict in verdicts {
+        let word = if verdict.is_held() { "held" } else { "MISSED" };
+        writeln!(
+            text,
+            "{word:<8}{:<17} {}",
+            verdict.scenario, verdict.measured
+        )?;
+        for limit in verdict.limits.iter().filter(|it| !it.held) {
             let Limit {
                 what, asked, got, ..
             } = limit;
             writeln!(text, "{:<8}{:<17}   {what}: {got} (asked: {asked})", "", "")?;
         }
-        for line in &it.details {
+        for line in &verdict.details {
             writeln!(text, "{:<8}{line}", "")?;
         }
     }

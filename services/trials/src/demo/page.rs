@@ -244,18 +244,18 @@ fn accounts(run: &Run<'_>) -> Table {
         .report
         .views()
         .iter()
-        .map(|it| {
+        .map(|view| {
             let counts = [
-                it.frames,
-                it.used,
-                it.empty,
-                it.late,
-                it.dropped,
-                it.lost,
-                it.unanswered,
+                view.frames,
+                view.used,
+                view.empty,
+                view.late,
+                view.dropped,
+                view.lost,
+                view.unanswered,
             ];
             [
-                vec![it.name.clone()],
+                vec![view.name.clone()],
                 counts.map(|it| it.to_string()).into(),
             ]
             .concat()
@@ -272,24 +272,28 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
             .join(camera)
             .join(format!("{frame:06}.png"))
     };
-    let is_drawn = |it: &&FrameResult| {
+    let is_drawn = |result: &&FrameResult| {
         run.cameras
             .iter()
-            .any(|camera| file(camera, it.frame).exists())
+            .any(|camera| file(camera, result.frame).exists())
     };
     let drawn: Vec<&FrameResult> = run.results.iter().filter(is_drawn).collect();
     let shown = chosen(&drawn, cost.and_then(|it| it.last_frame));
-    let picture = |moment: &FrameResult, view: usize| Picture {
+    let picture = |result: &FrameResult, view: usize| Picture {
         caption: run.cameras[view].clone(),
-        jpeg: jpeg(&file(&run.cameras[view], moment.frame)).map_err(|_none| {
-            let why = moment.views[view].missing.as_deref();
+        jpeg: jpeg(&file(&run.cameras[view], result.frame)).map_err(|_none| {
+            let why = result.views[view].missing.as_deref();
             why.unwrap_or("no picture").to_owned()
         }),
     };
-    let strip = |it: &&FrameResult| Strip {
-        caption: format!("frame {}, {:.1} s", it.frame, it.frame as f64 / run.rate_hz),
+    let strip = |result: &&FrameResult| Strip {
+        caption: format!(
+            "frame {}, {:.1} s",
+            result.frame,
+            result.frame as f64 / run.rate_hz
+        ),
         pictures: (0..run.cameras.len())
-            .map(|view| picture(it, view))
+            .map(|view| picture(result, view))
             .collect(),
     };
     shown.iter().map(strip).collect()

@@ -98,13 +98,13 @@ impl SyntheticDeployment {
             rig: RigChoice::File(PathBuf::from("rig.toml")),
             ..self.settings.clone()
         };
-        let camera = |it: &Camera| {
+        let camera = |camera: &Camera| {
             let address = Address {
                 settings: settings.clone(),
-                camera: it.name.clone(),
+                camera: camera.name.clone(),
                 n_frames: setup.n_frames,
             };
-            let (name, source) = (quoted(&it.name), quoted(&address.to_string()));
+            let (name, source) = (quoted(&camera.name), quoted(&address.to_string()));
             format!("\n[[camera]]\nname = {name}\nsource = {source}\n")
         };
         let cameras: Vec<String> = self.rig.cameras().iter().map(camera).collect();

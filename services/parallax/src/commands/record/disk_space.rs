@@ -26,9 +26,9 @@ impl PerFrame {
     /// The sizes for the topics of a deployment.
     pub(super) fn new(topics: &[TopicPlan]) -> Self {
         let mut sum = Self::default();
-        for it in topics {
-            let bytes = it.message_bytes();
-            match Kind::of_topic(it.topic()) {
+        for topic in topics {
+            let bytes = topic.message_bytes();
+            match Kind::of_topic(topic.topic()) {
                 Some(Kind::Frame) => sum.pixels += bytes,
                 Some(Kind::Evidence) => sum.evidence += bytes,
                 // Health messages are few and small.
