@@ -17,6 +17,8 @@ pub mod epipolar;
 
 mod framing;
 
+pub mod search_size;
+
 mod triangulate;
 
 mod rig_watch;

@@ -1,0 +1,171 @@
+//! How large frames are to be searched, from the calibration alone: a person should be as high in them as models know people.
+
+mod shared_space;
+
+use crate::Rig;
+use shared_space::heights;
+
+pub use shared_space::PERSON_METRES;
+
+/// The height of a person that is aimed at, pixels of the searched frame.
+pub const AIM_PX: f64 = 200.0;
+/// Heights of a person with which the search is at its best, pixels of the searched frame.
+pub const GOOD_PX: [f64; 2] = [150.0, 250.0];
+/// Heights of a person that the search still does well, pixels of the searched frame.
+pub const USABLE_PX: [f64; 2] = [110.0, 350.0];
+/// Most pixels of a frame that is searched unless somebody asks for more, which cost about 0.41 CPU-seconds.
+///
+/// Four views of 1088x1920 with all defaults took, processor time per frame and view of all processes together (Intel
+/// Xeon, two cores, AVX-512): 0.22 s at 272x480, 0.32 s at 363x640, 0.43 s at 435x768 and 0.63 s at 544x960. Full HD
+/// becomes 640x360 at most; 640x480 stays what it is.
+pub const MOST_PIXELS: u64 = 320_000;
+
+/// The scales that are chosen from, largest first. Neighbours differ by a quarter at most, so that a person is within
+/// 16 % of [`AIM_PX`]; resampling by one over a whole number is exact.
+const SCALES: [f64; 15] = [
+    1.0,
+    0.75,
+    2.0 / 3.0,
+    0.5,
+    0.4,
+    1.0 / 3.0,
+    0.25,
+    0.2,
+    1.0 / 6.0,
+    0.125,
+    0.1,
+    1.0 / 12.0,
+    0.0625,
+    0.05,
+    1.0 / 24.0,
+];
+
+/// How large the frames of one camera are searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchSize {
+    /// The camera.
+    pub camera: String,
+    /// Size of the frame as a share of the calibrated image: see [`OutSize::Scale`](crate::OutSize::Scale).
+    pub scale: f64,
+    /// Width and height of the frame, pixels.
+    pub frame_size: [u32; 2],
+    /// How high a person of [`PERSON_METRES`] stands in the calibrated image, pixels: the median over the space that the
+    /// camera shares with others. None of a camera that shares no space.
+    pub person_px: Option<f64>,
+    /// The scale that would be chosen if time did not matter; larger than `scale` where it does.
+    pub wanted: f64,
+}
+
+impl SearchSize {
+    /// How high the person stands in the frame, pixels.
+    pub fn person_in_frame_px(&self) -> Option<f64> {
+        self.person_px.map(|it| it * self.scale)
+    }
+
+    /// Whether the person is smaller than [`GOOD_PX`], for the sake of time.
+    pub fn is_limited(&self) -> bool {
+        let px = self.person_in_frame_px();
+        self.scale < self.wanted && px.is_some_and(|it| it < GOOD_PX[0])
+    }
+}
+
+/// How large the frames of all cameras of a rig are searched.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchSizes {
+    /// Of every camera, in the order of the rig.
+    pub cameras: Vec<SearchSize>,
+    /// The most cameras that share a space in which a person can stand; 0 if no two do.
+    pub n_sharing: usize,
+}
+
+/// Chooses how large frames are searched.
+///
+/// A person of [`PERSON_METRES`] who stands in the space that the cameras share is to be [`AIM_PX`] high, and between
+/// [`GOOD_PX`] in every camera: by one scale for all cameras if one does, else by one for each. No frame is larger than the
+/// calibrated image, nor has more than [`MOST_PIXELS`]. Where no two cameras share a space it is
+/// the largest frame within that limit. The same cameras give the same sizes, whatever their footage is.
+pub fn search_sizes(rig: &Rig) -> SearchSizes {
+    let found = heights(rig);
+    let sizes = rig.cameras().iter().map(|it| it.intrinsics.size);
+    let limits: Vec<f64> = sizes.map(largest).collect();
+    let common = common(&found.median_px, &limits);
+    let cameras = rig.cameras().iter().zip(&found.median_px).zip(limits);
+    let cameras = cameras.map(|((camera, person_px), limit)| {
+        let own = |limit| person_px.map_or(limit, |px| nearest(px, limit));
+        let scale = common.map_or_else(|| own(limit), |it| it.min(limit));
+        SearchSize {
+            camera: camera.name.clone(),
+            scale,
+            frame_size: at_scale(camera.intrinsics.size, scale),
+            person_px: *person_px,
+            wanted: own(1.0).max(scale),
+        }
+    });
+    SearchSizes {
+        cameras: cameras.collect(),
+        n_sharing: found.n_sharing,
+    }
+}
+
+/// The one scale for all cameras that gives good heights in all, nearest to what is aimed at.
+fn common(person_px: &[Option<f64>], limits: &[f64]) -> Option<f64> {
+    let known: Vec<f64> = person_px.iter().flatten().copied().collect();
+    let limits = person_px.iter().zip(limits).filter(|it| it.0.is_some());
+    let limit = limits.map(|it| *it.1).fold(1.0, f64::min);
+    let is_good = |scale: f64| {
+        let mut px = known.iter().map(|it| it * scale);
+        px.all(|it| (GOOD_PX[0]..=GOOD_PX[1]).contains(&it))
+    };
+    let off = |scale: f64| {
+        let logs = known.iter().map(|px| (px * scale / AIM_PX).ln());
+        logs.sum::<f64>().abs()
+    };
+    let good = SCALES.into_iter().filter(|it| *it <= limit && is_good(*it));
+    good.filter(|_| !known.is_empty())
+        .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+}
+
+/// The scale up to a limit that brings a height nearest to what is aimed at.
+fn nearest(person_px: f64, limit: f64) -> f64 {
+    let off = |scale: f64| (person_px * scale / AIM_PX).ln().abs();
+    let within = SCALES.into_iter().filter(|it| *it <= limit);
+    let nearest = within.min_by(|a, b| off(*a).total_cmp(&off(*b)));
+    nearest.unwrap_or(limit)
+}
+
+/// The largest scale at which a frame is not too large to search.
+fn largest(image: [u32; 2]) -> f64 {
+    let pixels = |scale: f64| {
+        at_scale(image, scale)
+            .into_iter()
+            .map(u64::from)
+            .product::<u64>()
+    };
+    let largest = SCALES.into_iter().find(|it| pixels(*it) <= MOST_PIXELS);
+    largest.unwrap_or_else(|| (MOST_PIXELS as f64 / pixels(1.0) as f64).sqrt())
+}
+
+/// Width and height of a frame, as [`OutSize::Scale`](crate::OutSize::Scale) rounds them.
+fn at_scale(image: [u32; 2], scale: f64) -> [u32; 2] {
+    image.map(|it| (f64::from(it) * scale).round().max(1.0) as u32)
+}
+
+/// The scale that brings people to the height that is aimed at, as a number to write down.
+///
+/// * `seen`: of every camera, the scale at which it was searched, and how high people were in its frames, pixels.
+///
+/// `None` without any; more than 1 enlarges.
+pub fn better_scale(seen: &[[f64; 2]]) -> Option<f64> {
+    let logs: Vec<f64> = seen
+        .iter()
+        .map(|[scale, px]| (scale * AIM_PX / px).ln())
+        .collect();
+    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+    let [least, most] = [SCALES[SCALES.len() - 1], 2.0];
+    let exact = mean.exp().clamp(least, most);
+    let digits = if exact < 0.1 { 1000.0 } else { 100.0 };
+    exact.is_finite().then(|| (exact * digits).round() / digits)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,285 @@
+//! The space that cameras share, and how high a standing person is seen there.
+
+use nalgebra::{Point2, Point3, UnitVector3, Vector3};
+
+use crate::{Camera, Rig};
+
+/// Height of a standing person, metres.
+pub const PERSON_METRES: f64 = 1.7;
+/// Points on the rays of a camera: cells of its image either way, and depths.
+const CELLS: usize = 9;
+const DEPTHS: usize = 24;
+/// The highest a person is who is seen whole, and in part, in sides of the picture along him.
+const WHOLE: f64 = 1.25;
+const IN_PART: f64 = 4.0;
+/// The smallest a person is in a picture, in sides of the picture along him.
+const SMALLEST: f64 = 0.0625;
+/// What is looked at, best first; taken is the first that as many cameras share as any. People are near the point at which
+/// cameras are aimed; the space that parallel cameras share has no end.
+const BOUNDS: [Bound; 4] = [
+    Bound::NearFocus,
+    Bound::Sides(0.25),
+    Bound::Sides(0.125),
+    Bound::Sides(SMALLEST),
+];
+/// Within this factor of the distance to the focus is near it.
+const NEAR: f64 = 1.6;
+/// Axes that differ by less are not aimed at one point, radians (4 degrees).
+const AIMED: f64 = 0.07;
+/// So much of the space that two cameras share is enough for more cameras to count as sharing it.
+const ENOUGH: f64 = 0.03;
+/// A person is taken to be at least so high, as a share of what is seen from the side: parts do not shrink from above.
+const FORESHORTENED: f64 = 0.7;
+
+/// How high a standing person is seen by every camera in the space that it shares with others.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Heights {
+    /// Of every camera: the median, pixels of the calibrated image; none of a camera that shares no space.
+    pub(super) median_px: Vec<Option<f64>>,
+    /// The most cameras that share a space worth the name; 0 if no two do.
+    pub(super) n_sharing: usize,
+}
+
+/// A part of space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Bound {
+    /// About as far from the camera as what the cameras are aimed at.
+    NearFocus,
+    /// Where a person is not smaller than this, in sides of the picture along him.
+    Sides(f64),
+}
+
+/// A person as one camera sees him.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Height, pixels of the calibrated image.
+    px: f64,
+    /// Height, in sides of the picture along him.
+    sides: f64,
+    /// Distance over that of the focus, or the inverse, if that is larger; infinite without a focus.
+    from_focus: f64,
+}
+
+impl Seen {
+    fn is_within(&self, bound: Bound) -> bool {
+        match bound {
+            Bound::NearFocus => self.from_focus <= NEAR,
+            Bound::Sides(least) => self.sides >= least,
+        }
+    }
+}
+
+/// A place where a person may stand: what every camera sees of him.
+struct Place {
+    seen: Vec<Option<Seen>>,
+}
+
+impl Place {
+    fn seen_by(&self, camera: usize, bound: Bound) -> Option<Seen> {
+        self.seen[camera].filter(|it| it.is_within(bound))
+    }
+
+    fn n_seen(&self, bound: Bound) -> usize {
+        let seen = self.seen.iter().flatten();
+        seen.filter(|it| it.is_within(bound)).count()
+    }
+}
+
+/// Looks where cameras see a standing person together: the whole of him, or else the middle.
+///
+/// Without an up direction a person is as high as seen from the side.
+pub(super) fn heights(rig: &Rig) -> Heights {
+    let n = rig.cameras().len();
+    for is_whole in [true, false] {
+        let places = places(rig, is_whole);
+        let found = BOUNDS.map(|bound| (bound, n_sharing(&places, n, bound)));
+        let most = found.iter().map(|it| it.1).max().unwrap_or(0);
+        let first = found.iter().find(|it| it.1 == most && most >= 2);
+        if let Some((bound, n_sharing)) = first {
+            let median = |camera| median_px(&places, camera, *bound, *n_sharing);
+            return Heights {
+                median_px: (0..n).map(median).collect(),
+                n_sharing: *n_sharing,
+            };
+        }
+    }
+    Heights {
+        median_px: vec![None; n],
+        n_sharing: 0,
+    }
+}
+
+/// The most cameras that share enough of the space that two cameras share; 0 if there is none.
+fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
+    let n_of: Vec<usize> = places.iter().map(|it| it.n_seen(bound)).collect();
+    let shared_by = |n: usize| n_of.iter().filter(|it| **it >= n).count();
+    let enough = (ENOUGH * shared_by(2) as f64).max(1.0);
+    let mut sharing = (2..=n_cameras).rev();
+    let found = sharing.find(|n| shared_by(*n) as f64 >= enough);
+    found.unwrap_or(0)
+}
+
+/// The median height in a camera, over the places that it shares with as many others as it can.
+fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) -> Option<f64> {
+    let of = |n: usize, bound: Bound| {
+        let shared = places.iter().filter(|it| it.n_seen(bound) >= n);
+        let seen = shared.filter_map(|it| it.seen_by(camera, bound));
+        let mut px: Vec<f64> = seen.map(|it| it.px).collect();
+        px.sort_by(f64::total_cmp);
+        px.get(px.len() / 2).copied()
+    };
+    let fewer = (2..=n_sharing).rev();
+    let found = fewer.clone().find_map(|n| of(n, bound));
+    // One that looks elsewhere than the others.
+    found.or_else(|| {
+        BOUNDS
+            .iter()
+            .find_map(|it| fewer.clone().find_map(|n| of(n, *it)))
+    })
+}
+
+/// Places on the rays of all cameras that at least two of them see.
+fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
+    let (up, focus) = (rig.up_in_world(), aim(rig));
+    let eye = |it| Eye::new(it, up, focus, is_whole);
+    let eyes: Vec<Eye<'_>> = rig.cameras().iter().map(eye).collect();
+    let points = eyes.iter().flat_map(Eye::points);
+    let place = |point: Point3<f64>| Place {
+        seen: eyes.iter().map(|it| it.person(&point)).collect(),
+    };
+    let is_shared = |it: &Place| it.seen.iter().flatten().count() >= 2;
+    points.map(place).filter(is_shared).collect()
+}
+
+/// The point at which cameras are aimed; none if their axes are as good as parallel.
+fn aim(rig: &Rig) -> Option<Point3<f64>> {
+    let axes: Vec<_> = rig.cameras().iter().map(Camera::axis_in_world).collect();
+    let differ = |a: &UnitVector3<f64>| axes.iter().any(|b| a.angle(b) > AIMED);
+    rig.focus().filter(|_| axes.iter().any(differ))
+}
+
+/// A camera that looks for people.
+struct Eye<'a> {
+    camera: &'a Camera,
+    up: Option<UnitVector3<f64>>,
+    /// The highest a person is, in sides of the picture along him.
+    highest: f64,
+    is_whole: bool,
+    /// How far in front of it is what the cameras are aimed at, metres.
+    focus_depth: Option<f64>,
+    /// Focal length, pixels: the mean of both.
+    focal: f64,
+    /// Side of the image along a standing person, pixels.
+    side: f64,
+}
+
+impl<'a> Eye<'a> {
+    fn new(
+        camera: &'a Camera,
+        up: Option<UnitVector3<f64>>,
+        focus: Option<Point3<f64>>,
+        is_whole: bool,
+    ) -> Self {
+        let intrinsics = &camera.intrinsics;
+        let [width, height] = intrinsics.size.map(f64::from);
+        let up_in_camera = up.map(|it| camera.camera_from_world.rotation * it.into_inner());
+        let across = up_in_camera.map_or(0.0, |it| it.xy().norm());
+        // Seen from above, or with nobody to say what is up, a person may lie any way in the picture.
+        let side = match up_in_camera.filter(|_| across > 0.3) {
+            Some(up) => (width * across / up.x.abs()).min(height * across / up.y.abs()),
+            None => (width * height).sqrt(),
+        };
+        Self {
+            camera,
+            up,
+            highest: if is_whole { WHOLE } else { IN_PART },
+            is_whole,
+            focus_depth: focus
+                .map(|it| (camera.camera_from_world * it).z)
+                .filter(|depth| *depth > 0.0),
+            focal: (intrinsics.fx * intrinsics.fy).sqrt(),
+            side,
+        }
+    }
+
+    /// Points on its rays, from where a person fills the image to where he is small in it; each twofold distance has as
+    /// many.
+    fn points(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
+        let [width, height] = self.camera.intrinsics.size.map(f64::from);
+        let middle = |nth: usize, n: usize| (nth as f64 + 0.5) / n as f64;
+        let cells = (0..CELLS * CELLS).filter_map(move |cell| {
+            let x = middle(cell % CELLS, CELLS) * width - 0.5;
+            let y = middle(cell / CELLS, CELLS) * height - 0.5;
+            self.camera.ray(&Point2::new(x, y))
+        });
+        cells.flat_map(move |ray| {
+            let axis = self.camera.axis_in_world();
+            let along = ray.direction.dot(&axis).max(0.05);
+            (0..DEPTHS).map(move |nth| {
+                let sides = self.highest * (SMALLEST / self.highest).powf(middle(nth, DEPTHS));
+                let depth = self.focal * PERSON_METRES / (sides * self.side);
+                ray.origin + ray.direction.into_inner() * (depth / along)
+            })
+        })
+    }
+
+    /// What it sees of a person whose middle is at a point.
+    fn person(&self, middle: &Point3<f64>) -> Option<Seen> {
+        let centre = self.inside(middle)?;
+        let depth = (self.camera.camera_from_world * middle).z;
+        let from_side = self.focal * PERSON_METRES / depth;
+        let px = match self.up {
+            Some(up) => self.between_ends(
+                middle,
+                &(up.into_inner() * (PERSON_METRES / 2.0)),
+                from_side,
+            )?,
+            None if self.is_whole && !self.has_room(&centre, from_side) => return None,
+            None => from_side,
+        };
+        let px = px.max(FORESHORTENED * from_side);
+        let sides = px / self.side;
+        let ratio = self.focus_depth.map_or(f64::INFINITY, |it| depth / it);
+        (px.is_finite() && sides <= self.highest).then_some(Seen {
+            px,
+            sides,
+            from_focus: ratio.max(1.0 / ratio),
+        })
+    }
+
+    /// From head to feet, pixels; none if they are to be in the picture and are not.
+    ///
+    /// * `half`: from the middle to the head.
+    /// * `otherwise`: where the lens shows no head or no feet.
+    fn between_ends(
+        &self,
+        middle: &Point3<f64>,
+        half: &Vector3<f64>,
+        otherwise: f64,
+    ) -> Option<f64> {
+        let ends = [middle + half, middle - half];
+        if self.is_whole {
+            let [head, feet] = [self.inside(&ends[0])?, self.inside(&ends[1])?];
+            return Some((head - feet).norm());
+        }
+        let [head, feet] = ends.map(|it| self.camera.project(&it));
+        let px = head.zip(feet).map(|(head, feet)| (head - feet).norm());
+        Some(px.unwrap_or(otherwise))
+    }
+
+    /// Whether a person of a height fits into the picture around a pixel, upright or across.
+    fn has_room(&self, centre: &Point2<f64>, px: f64) -> bool {
+        let [width, height] = self.camera.intrinsics.size.map(f64::from);
+        let across = centre.x.min(width - centre.x);
+        let upright = centre.y.min(height - centre.y);
+        2.0 * across.max(upright) >= px
+    }
+
+    /// The pixel of a point, if it is in the picture.
+    fn inside(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
+        let [width, height] = self.camera.intrinsics.size.map(f64::from);
+        let pixel = self.camera.project(point)?;
+        let is_in = (-0.5..width).contains(&pixel.x) && (-0.5..height).contains(&pixel.y);
+        is_in.then_some(pixel)
+    }
+}
