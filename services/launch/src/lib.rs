@@ -22,6 +22,7 @@ mod prepare;
 mod resolved;
 mod sanity;
 mod scheduling;
+mod search_size;
 
 mod shipped;
 mod vertical;
@@ -42,6 +43,7 @@ pub use claim::Claim;
 pub use planned::Planned;
 pub use prepare::{Prepared, View, frame_scale};
 pub use resolved::{Resolved, SERVICES};
+pub use search_size::{CameraSize, SearchSize};
 
 pub use shipped::Shipped;
 pub use summary::{Recorded, Report, Watcher};

@@ -19,6 +19,7 @@ use crate::process::Name;
 use crate::resolved::Resolved;
 use crate::sanity;
 use crate::scheduling;
+use crate::search_size::SearchSize;
 use crate::vertical;
 
 /// Where the iterations of a main loop are comparable (a frame, or a level of a pair): how many times the processor time
@@ -36,6 +37,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
         deployment: deployment.clone(),
+        search_size: None,
         recording: None,
         replay: None,
     };
@@ -45,6 +47,8 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
         tracing::warn!("{}", found.why);
         resolved.deployment.up = Some(found.up);
     }
+    let rig = inputs::rig_of(&resolved.deployment)?;
+    resolved.search_size = SearchSize::of(&resolved.deployment, &rig);
     Ok(resolved)
 }
 
@@ -60,13 +64,18 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     if let Some(padding) = &prepared.padding {
         tracing::warn!("{padding}");
     }
+    if let Some(small) = resolved.search_size.as_ref().and_then(SearchSize::warning) {
+        tracing::warn!("{small}");
+    }
     let n_frames = resolved.n_frames();
     let pairs = match prepared.settings.views {
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
         pipeline::Views::All => "solved at once".to_owned(),
     };
+    let size = resolved.search_size.as_ref();
+    let size = size.map_or_else(String::new, |it| format!("\n{}", it.text()));
     Ok(format!(
-        "{} views, {pairs}, {n_frames} frames, a model of {} parts",
+        "{} views, {pairs}, {n_frames} frames, a model of {} parts{size}",
         prepared.views.len(),
         prepared.model.n_parts()
     ))

@@ -14,6 +14,7 @@ use crate::plan;
 use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use crate::scheduling;
+use crate::search_size::SearchSize;
 use crate::summary::{Report, Watcher};
 
 /// A deployment with the plan of its run.
@@ -50,6 +51,9 @@ impl Planned {
         let file = resolved_file(&resolved.deployment);
         if let Some(padding) = &prepared.padding {
             tracing::warn!("{padding}");
+        }
+        if let Some(small) = resolved.search_size.as_ref().and_then(SearchSize::warning) {
+            tracing::warn!("{small}");
         }
         let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
         for warning in scheduling::remove_denied(&mut plan.processes, Scheduling::rehearse) {

@@ -176,7 +176,11 @@ pub(crate) fn framing(resolved: &Resolved, rig: &Rig, index: usize) -> Result<Fr
     })?;
     let out_size = match (deployment.capture.size, deployment.capture.scale) {
         (Some(size), _) => OutSize::Exact(size.map(|it| it as u32)),
-        (None, scale) => OutSize::Scale(scale.unwrap_or(1.0)),
+        (None, Some(scale)) => OutSize::Scale(scale),
+        (None, None) => {
+            let chosen = resolved.search_size.as_ref();
+            OutSize::Scale(chosen.map_or(1.0, |it| it.scale(&entry.name)))
+        }
     };
     let roll = if deployment.capture.upright {
         upright_roll(camera, rig).unwrap_or(0.0)

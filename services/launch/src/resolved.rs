@@ -9,6 +9,7 @@ use runtime::{Delivery, ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
 
 use crate::inputs::Footage;
+use crate::search_size::SearchSize;
 
 /// A deployment with the metadata of its footage, the input of every process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -17,6 +18,10 @@ pub struct Resolved {
     pub deployment: Deployment,
     /// The footage of every camera.
     pub footage: Vec<Footage>,
+    /// The sizes of the frames, if the deployment sets none. Not in the recordings of earlier versions, which had the size of
+    /// the images then.
+    #[serde(default)]
+    pub search_size: Option<SearchSize>,
     /// The recording to write, if there is one.
     #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,

@@ -1,6 +1,7 @@
 //! The progress of a run, and the report at its end.
 
 mod cameras;
+mod people;
 mod recorded;
 
 use core::fmt::Write as _;
@@ -21,7 +22,10 @@ use crate::live;
 use crate::no_results;
 use crate::output;
 use crate::resolved::Resolved;
+use crate::search_size::SearchSize;
 use crate::views::ViewReport;
+
+use people::Outside;
 
 pub use recorded::Recorded;
 
@@ -143,6 +147,10 @@ pub struct Report {
     is_lossless: bool,
     views: Vec<ViewReport>,
     budget: Option<Budget>,
+    /// The sizes of the frames, if the deployment sets none.
+    search_size: Option<SearchSize>,
+    /// Where people were too small or too large.
+    outside: Option<Outside>,
     /// The last metrics of every process.
     measured: BTreeMap<String, Value>,
     /// The summary of the process `results`: `summary.json`.
@@ -189,6 +197,8 @@ impl Report {
                 .supervise
                 .latency_budget_ms
                 .map(|it| Budget::new(it, recorded.latency())),
+            search_size: resolved.search_size.clone(),
+            outside: recorded.outside(resolved.deployment.capture.size.is_some()),
             measured: measured(outcome),
             recorded,
         }
@@ -294,6 +304,7 @@ impl Report {
             "refused": self.refused.iter().map(|(name, counts)| (name.as_str(), by_cause(counts))).collect::<BTreeMap<_, _>>(),
             "views": self.views,
             "latency_budget": self.budget.as_ref().map(Budget::json),
+            "search_size": { "by_itself": self.search_size, "outside": self.outside },
             "processes": self.measured,
             "recorded": self.recorded.json(),
         })
@@ -373,6 +384,9 @@ impl Report {
     fn write_views(&self, text: &mut String, summary: &Summary) -> core::fmt::Result {
         if let Some(why) = self.no_results_reason() {
             writeln!(text, "  no results    {why}")?;
+        }
+        if let Some(outside) = &self.outside {
+            writeln!(text, "  size          {}", outside.text())?;
         }
         let used = summary.views_used.iter();
         let used: Vec<String> = used.map(|(view, n)| format!("{view} {n}")).collect();

@@ -24,5 +24,6 @@ mod remains;
 mod resources;
 mod rogue;
 mod scheduling;
+mod search_size;
 mod synth;
 mod train;

@@ -25,6 +25,7 @@ mod summary;
 mod output;
 
 mod gather;
+mod height;
 
 mod job;
 mod service;

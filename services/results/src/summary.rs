@@ -8,6 +8,7 @@ use messages::Status;
 use runfiles::{FrameLine, Missing, Summary};
 
 use crate::calibration::Calibration;
+use crate::height::Heights;
 use crate::pose3d::{is_placed, joints, missing};
 use crate::{FrameRecord, Scene};
 
@@ -23,6 +24,7 @@ pub(crate) struct Tally {
     /// By view: bytes of evidence, and frames.
     evidence: Vec<[u64; 2]>,
     calibration: Calibration,
+    heights: Heights,
 }
 
 impl Tally {
@@ -43,6 +45,7 @@ impl Tally {
             dropped: vec![0; scene.views.len()],
             evidence: vec![[0; 2]; scene.views.len()],
             calibration: Calibration::new(scene),
+            heights: Heights::new(scene.views.len()),
         }
     }
 
@@ -87,6 +90,7 @@ impl Tally {
         }
         self.searches(scene, record);
         self.calibration.add(scene, record);
+        self.heights.add(scene, pose);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
         }
@@ -189,6 +193,7 @@ impl Tally {
             frames_dropped_by_capture: self.dropped.iter().sum(),
             calibration: self.calibration.fits(names.clone().cloned()),
             exchanged: self.calibration.exchanged().cloned(),
+            person_px: self.heights.medians(names.clone().cloned()),
             contradicted: self.calibration.contradicted(names.cloned()),
             ..self.summary.clone()
         }

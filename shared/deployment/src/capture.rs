@@ -54,9 +54,10 @@ pub struct Config {
     pub mode: Mode,
     /// `fast`: as fast as frames are taken; `realtime`: at the frame rate.
     pub pace: Pace,
-    /// `[width, height]` of the frames that the pipeline sees, pixels.
+    /// `[width, height]` of the frames that the pipeline sees, pixels; in place of `scale`.
     pub size: Option<[usize; 2]>,
-    /// Size of the frames as a share of the camera's image; without either: the camera's size.
+    /// Size of the frames as a share of the camera's image; without `scale` and `size`: by itself, for every camera the one
+    /// in which a standing person is about 200 pixels high where the cameras see together; `run --dry-run` shows it.
     pub scale: Option<f64>,
     /// Turn frames until the world's up points up.
     pub upright: bool,

@@ -70,6 +70,9 @@ pub struct Summary {
     pub frames_with_pose: u64,
     /// Results without every view of the rig.
     pub frames_with_views_missing: u64,
+    /// How high people are in the frames that were searched, pixels, by name: the median over the results that used the view, of
+    /// the longer side of the rectangle around a pose's parts; null without any. Since the process was started last.
+    pub person_px: BTreeMap<String, Option<f64>>,
     /// Root mean square reprojection error over all joints, pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,

@@ -7,6 +7,8 @@ use std::path::Path;
 use runfiles::{LatencyReport, RunSummary, Summary};
 use serde_json::{Value, json};
 
+use super::people::Outside;
+
 /// The summary that the process `results` wrote.
 #[derive(Debug)]
 pub enum Recorded {
@@ -36,6 +38,13 @@ impl Recorded {
     /// The counts of the run, if there is a summary.
     pub fn summary(&self) -> Option<&Summary> {
         self.written().map(|it| &it.summary)
+    }
+
+    /// Where people were too small or too large for the search.
+    ///
+    /// * `has_size`: whether the deployment sets `capture.size`.
+    pub(super) fn outside(&self, has_size: bool) -> Option<Outside> {
+        Outside::of(self.written()?, has_size)
     }
 
     /// The latency report of the run, if there is a summary.

@@ -102,6 +102,8 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
 fn document(entries: &[Entry]) -> Vec<String> {
     let mut lines = Vec::new();
     let mut section = "";
+    let of_size = |it: &&Entry| ["capture.size", "capture.scale"].contains(&it.key.as_str());
+    let is_by_itself = entries.iter().filter(of_size).all(|it| it.value.is_none());
     for entry in entries {
         let (of, name) = entry.key.split_once('.').unwrap_or(("", &entry.key));
         if of != section {
@@ -111,6 +113,9 @@ fn document(entries: &[Entry]) -> Vec<String> {
         lines.push(format!("# {}", entry.meaning));
         lines.push(match &entry.value {
             Some(value) => format!("{name} = {value}  # {}", entry.origin.name()),
+            None if entry.key == "capture.scale" && is_by_itself => {
+                format!("# {name} is by itself: `run --dry-run` shows it")
+            }
             None => format!("# {name} is not set"),
         });
     }

@@ -91,6 +91,9 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     forecast.check(&file)?;
     remove_existing(&file, arguments.force)?;
     if !globals.quiet {
+        if let Some(size) = &planned.resolved().search_size {
+            output::message(size.text());
+        }
         output::message(forecast.text(&file));
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;

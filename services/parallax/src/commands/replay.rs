@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use deployment::{Replay, Stage};
+use deployment::{Deployment, Replay, Stage};
 use launch::{
     Planned, Resolved, Shipped, load, output, plan,
     recorded::{self, Settings},
@@ -83,25 +83,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let out = out.unwrap_or_else(|| file.with_file_name(format!("{name}-replay")));
     loaded.deployment.output = std::path::absolute(out).or_fail(ExitKind::Usage)?;
     warn_of_changed_files(&settings);
-    let mode = loaded.deployment.capture.mode;
-    let resolved = if from == Stage::Capture {
-        plan::resolve(&loaded.deployment)?
-    } else {
-        Resolved {
-            footage: settings.resolved.footage,
-            deployment: loaded.deployment,
-            recording: None,
-            replay: Some(Replay {
-                file: file.clone(),
-                from,
-                speed: match (arguments.speed, mode) {
-                    (Some(Speed::Times(it)), _) => Some(it),
-                    (None, deployment::capture::Mode::Realtime) => Some(1.0),
-                    (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
-                },
-            }),
-        }
-    };
+    let resolved = resolve(loaded.deployment, settings.resolved, &file, arguments)?;
     check(&file, &recording, &resolved, from)?;
     let damaged = recorded::damaged(&file, &recording, &resolved, from)?;
     if let Some(text) = recorded::damaged_text(&damaged).filter(|_| !globals.quiet) {
@@ -128,6 +110,46 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let is_flawed = from != Stage::Capture && !is_sound;
     let kind = report.kind().or(is_flawed.then_some(ExitKind::Degraded));
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
+}
+
+/// What the stages that run are given.
+///
+/// * `recorded`: what those of the recorded run were given.
+fn resolve(
+    deployment: Deployment,
+    recorded: Resolved,
+    file: &Path,
+    arguments: &Arguments,
+) -> Result<Resolved, Failure> {
+    let (from, capture) = (arguments.from, &deployment.capture);
+    let (mode, is_sized) = (
+        capture.mode,
+        capture.size.is_some() || capture.scale.is_some(),
+    );
+    // The size is part of what was recorded, unless another is asked for.
+    let search_size = recorded.search_size.filter(|_| !is_sized);
+    if from == Stage::Capture {
+        return Ok(Resolved {
+            search_size,
+            ..plan::resolve(&deployment)?
+        });
+    }
+    let speed = match (arguments.speed, mode) {
+        (Some(Speed::Times(it)), _) => Some(it),
+        (None, deployment::capture::Mode::Realtime) => Some(1.0),
+        (Some(Speed::Max), _) | (None, deployment::capture::Mode::Lossless) => None,
+    };
+    Ok(Resolved {
+        footage: recorded.footage,
+        deployment,
+        search_size,
+        recording: None,
+        replay: Some(Replay {
+            file: file.to_path_buf(),
+            from,
+            speed,
+        }),
+    })
 }
 
 /// Reads the settings of the recorded run.

@@ -61,7 +61,18 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     }
     let planned = Planned::new(&loaded.deployment, globals.level())?;
     if arguments.dry_run {
+        if let Some(size) = &planned.resolved().search_size {
+            output::line(size.text())?;
+        }
         return show(planned.plan());
+    }
+    if let Some(size) = planned
+        .resolved()
+        .search_size
+        .as_ref()
+        .filter(|_| !globals.quiet)
+    {
+        output::message(size.text());
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let report = planned.run(globals.quiet, &stop, &mut |_| None)?;

@@ -1,0 +1,232 @@
+//! The size in which frames are searched where nobody set one: chosen from the calibration, and told.
+
+use core::fmt::Write as _;
+
+use deployment::Deployment;
+use geometry::search_size::{GOOD_PX, PERSON_METRES, USABLE_PX, better_scale, search_sizes};
+use geometry::{Camera, Rig};
+use serde::{Deserialize, Serialize};
+
+/// The sizes of all cameras, chosen from the calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SearchSize {
+    /// Of every camera, as they are numbered.
+    pub cameras: Vec<CameraSize>,
+    /// The most cameras that share a space in which a person can stand; 0 if no two do.
+    pub n_sharing: usize,
+}
+
+/// The size of one camera's frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraSize {
+    /// The camera.
+    pub name: String,
+    /// As a share of its image.
+    pub scale: f64,
+    /// Width and height, pixels.
+    pub frame_size: [u32; 2],
+    /// How high a person stands in its image, in the space that it shares with others, pixels.
+    pub person_px: Option<f64>,
+    /// The same in its frames.
+    pub person_in_frame_px: Option<f64>,
+    /// Whether the person is smaller than is good for the sake of time.
+    pub is_limited: bool,
+}
+
+impl SearchSize {
+    /// Chooses the size of every camera, unless the deployment says it.
+    ///
+    /// * `rig`: as [`crate::inputs::rig_of`] reads it.
+    ///
+    /// `None` as well of cameras that the rig does not have, which who makes their frames says.
+    pub fn of(deployment: &Deployment, rig: &Rig) -> Option<Self> {
+        let capture = &deployment.capture;
+        if capture.size.is_some() || capture.scale.is_some() {
+            return None;
+        }
+        let named = deployment.cameras.iter().map(|it| rig.camera(&it.name));
+        let named: Option<Vec<_>> = named.map(Option::<&Camera>::cloned).collect();
+        let used = Rig::new(named?, rig.up_in_world(), rig.source()).ok()?;
+        let chosen = search_sizes(&used);
+        let cameras = chosen.cameras.into_iter().map(|it| CameraSize {
+            person_in_frame_px: it.person_in_frame_px(),
+            is_limited: it.is_limited(),
+            name: it.camera,
+            scale: it.scale,
+            frame_size: it.frame_size,
+            person_px: it.person_px,
+        });
+        Some(Self {
+            cameras: cameras.collect(),
+            n_sharing: chosen.n_sharing,
+        })
+    }
+
+    /// The scale of a camera's frames.
+    pub(crate) fn scale(&self, camera: &str) -> f64 {
+        let found = self.cameras.iter().find(|it| it.name == camera);
+        found.map_or(1.0, |it| it.scale)
+    }
+
+    /// The choice and why, on one line.
+    pub fn text(&self) -> String {
+        let mut alike: Vec<Vec<&CameraSize>> = Vec::new();
+        for it in &self.cameras {
+            let same = |group: &&mut Vec<&CameraSize>| {
+                let first = group[0];
+                let is_known = first.person_px.is_some() == it.person_px.is_some();
+                first.frame_size == it.frame_size && first.scale == it.scale && is_known
+            };
+            match alike.iter_mut().find(same) {
+                Some(group) => group.push(it),
+                None => alike.push(vec![it]),
+            }
+        }
+        let chosen: Vec<String> = alike.iter().map(|it| said(it, alike.len() > 1)).collect();
+        let why = match self.n_sharing {
+            0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
+                .to_owned(),
+            n => format!("a person of {PERSON_METRES:.2} m stands where {n} cameras see him"),
+        };
+        format!(
+            "capture.scale by itself: {}; {why} (capture.scale or capture.size sets it)",
+            chosen.join("; ")
+        )
+    }
+
+    /// What is not good about it, and what to set, if anything is not.
+    pub fn warning(&self) -> Option<String> {
+        let px = |it: &CameraSize| it.person_in_frame_px.unwrap_or(f64::INFINITY);
+        let small = self.cameras.iter();
+        let small = small.filter(|it| it.is_limited || px(it) < USABLE_PX[0]);
+        let small: Vec<&CameraSize> = small.collect();
+        let first = small.first()?;
+        let seen: Vec<[f64; 2]> = small.iter().map(|it| [it.scale, px(it)]).collect();
+        let scale = better_scale(&seen)?;
+        let names: Vec<&str> = small.iter().map(|it| it.name.as_str()).collect();
+        let mut text = format!(
+            "a person is about {:.0} px high in the frames of {}, where {} to {} are good: ",
+            px(first),
+            names.join(", "),
+            GOOD_PX[0],
+            GOOD_PX[1]
+        );
+        // Writing to a string cannot fail.
+        let _infallible = if first.is_limited {
+            write!(
+                text,
+                "larger ones would take more than half a CPU-second each; if that may be, set capture.scale = {scale} ({:.0} \
+                 times the pixels)",
+                (scale / first.scale).powi(2)
+            )
+        } else {
+            write!(
+                text,
+                "the image has no more; set capture.scale = {scale} to search it enlarged"
+            )
+        };
+        Some(text)
+    }
+}
+
+/// The size of some cameras that have the same.
+///
+/// * `is_named`: there are others.
+fn said(cameras: &[&CameraSize], is_named: bool) -> String {
+    let first = cameras[0];
+    let names: Vec<&str> = cameras.iter().map(|it| it.name.as_str()).collect();
+    let names = if is_named {
+        format!(" for {}", names.join(", "))
+    } else {
+        String::new()
+    };
+    let [width, height] = first.frame_size;
+    let px = range(cameras.iter().filter_map(|it| it.person_px));
+    let in_frame = range(cameras.iter().filter_map(|it| it.person_in_frame_px));
+    let scale = (first.scale * 1e4).round() / 1e4;
+    match (px, in_frame) {
+        (Some(px), Some(in_frame)) => format!(
+            "{scale}{names}, a person is {px} px high in the image and {in_frame} px in {width}x{height}"
+        ),
+        _ => format!("{scale}{names}, {width}x{height}"),
+    }
+}
+
+/// Numbers as one, or as the least and the most; none of none.
+fn range(numbers: impl Iterator<Item = f64> + Clone) -> Option<String> {
+    let least = numbers.clone().reduce(f64::min)?.round();
+    let most = numbers.reduce(f64::max)?.round();
+    Some(if least == most {
+        format!("{least}")
+    } else {
+        format!("{least} to {most}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size(cameras: &[(f64, Option<f64>, bool)], n_sharing: usize) -> SearchSize {
+        let cameras = cameras.iter().zip(["a", "b", "c"]);
+        let cameras = cameras.map(|((scale, person_px, is_limited), name)| CameraSize {
+            name: name.to_owned(),
+            scale: *scale,
+            frame_size: [1920.0, 1080.0].map(|it: f64| (it * scale).round() as u32),
+            person_px: *person_px,
+            person_in_frame_px: person_px.map(|it| it * scale),
+            is_limited: *is_limited,
+        });
+        SearchSize {
+            cameras: cameras.collect(),
+            n_sharing,
+        }
+    }
+
+    #[test]
+    fn cameras_of_one_size_are_told_together_and_others_by_name() {
+        let alike = size(&[(0.25, Some(690.0), false), (0.25, Some(710.0), false)], 2);
+        assert_eq!(
+            alike.text(),
+            "capture.scale by itself: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; a person \
+             of 1.70 m stands where 2 cameras see him (capture.scale or capture.size sets it)"
+        );
+        assert_eq!(alike.warning(), None);
+        let text = size(&[(0.25, Some(690.0), false), (0.5, None, false)], 2).text();
+        assert!(text.contains("0.25 for a, a person is 690 px"), "{text}");
+        assert!(text.contains("; 0.5 for b, 960x540;"), "{text}");
+        let nothing = size(&[(0.25, None, false); 2], 0);
+        assert!(
+            nothing.text().contains("no two cameras share"),
+            "{}",
+            nothing.text()
+        );
+        assert_eq!(nothing.warning(), None);
+    }
+
+    #[test]
+    fn what_is_too_small_is_warned_of_with_what_to_set() {
+        let limited = size(&[(0.25, Some(300.0), true), (0.25, Some(700.0), false)], 2);
+        let warning = limited.warning().unwrap();
+        assert!(
+            warning.contains("75 px high in the frames of a, where 150 to 250"),
+            "{warning}"
+        );
+        assert!(
+            warning.contains("set capture.scale = 0.67 (7 times"),
+            "{warning}"
+        );
+        let small = size(&[(1.0, Some(100.0), false)], 1).warning().unwrap();
+        assert!(
+            small.ends_with("set capture.scale = 2 to search it enlarged"),
+            "{small}"
+        );
+    }
+
+    #[test]
+    fn a_recording_of_an_earlier_version_keeps_the_size_of_its_images() {
+        let text = r#"{"deployment": {"name": "n", "rig": "r", "output": "o", "camera": []}, "footage": []}"#;
+        let resolved: crate::Resolved = serde_json::from_str(text).unwrap();
+        assert_eq!(resolved.search_size, None);
+    }
+}

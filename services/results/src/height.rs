@@ -1,0 +1,154 @@
+//! How high people are in the frames that are searched.
+
+use std::collections::BTreeMap;
+
+use geometry::search_size::USABLE_PX;
+use messages::{FusedView, MAX_PARTS, Pose3d, Status};
+
+use crate::Scene;
+
+/// So many poses of a view tell how high people are in it.
+const ENOUGH: u64 = 20;
+
+/// Counts the heights of people, by view.
+#[derive(Debug)]
+pub(crate) struct Heights {
+    /// By whole pixels: how many poses.
+    counts: Vec<BTreeMap<u32, u64>>,
+    is_told: bool,
+}
+
+impl Heights {
+    pub(crate) fn new(n_views: usize) -> Self {
+        Self {
+            counts: vec![BTreeMap::new(); n_views],
+            is_told: false,
+        }
+    }
+
+    /// Takes in a result; logs once that people are smaller or larger than the search is good for.
+    pub(crate) fn add(&mut self, scene: &Scene, pose: &Pose3d) {
+        if pose.status != Status::OK {
+            return;
+        }
+        let n_views = pose.n_views as usize;
+        let views = pose.views.iter().take(n_views).zip(&mut self.counts);
+        for (view, (fused, counts)) in views.enumerate() {
+            let is_used = pose.views_used >> view & 1 == 1 && fused.status == Status::OK;
+            if let Some(px) = height_px(fused).filter(|_| is_used) {
+                *counts.entry(px.round() as u32).or_default() += 1;
+            }
+        }
+        self.tell(scene);
+    }
+
+    fn tell(&mut self, scene: &Scene) {
+        if self.is_told {
+            return;
+        }
+        let known = self.counts.iter().enumerate();
+        let mut known = known.filter(|(_, it)| it.values().sum::<u64>() >= ENOUGH);
+        let outside = known.find_map(|(view, counts)| {
+            let px = median(counts)?;
+            let [least, most] = USABLE_PX;
+            (!(least..=most).contains(&px)).then_some((view, px))
+        });
+        if let Some((view, px)) = outside {
+            self.is_told = true;
+            tracing::warn!(
+                "people are {px:.0} px high in the frames of {}, where {} to {} is what the search does well: see capture.scale",
+                scene.views[view].name,
+                USABLE_PX[0],
+                USABLE_PX[1],
+            );
+        }
+    }
+
+    /// The median of every view, pixels of the frame, by name; none of a view without a pose.
+    pub(crate) fn medians(
+        &self,
+        names: impl Iterator<Item = String>,
+    ) -> BTreeMap<String, Option<f64>> {
+        names.zip(self.counts.iter().map(median)).collect()
+    }
+}
+
+/// The longer side of the rectangle around the centres of the parts, pixels of the frame.
+fn height_px(fused: &FusedView) -> Option<f64> {
+    let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
+    let side = |axis: usize| {
+        let values = parts.iter().map(|it| it[axis]);
+        let [low, high] = [f64::min, f64::max].map(|of| values.clone().reduce(of));
+        Some(high? - low?)
+    };
+    let px = side(0)?.max(side(1)?);
+    px.is_finite().then_some(px)
+}
+
+/// The lower median.
+fn median(counts: &BTreeMap<u32, u64>) -> Option<f64> {
+    let half = counts.values().sum::<u64>().div_ceil(2);
+    let mut n = 0;
+    let found = counts.iter().find(|it| {
+        n += it.1;
+        n >= half
+    });
+    found.map(|it| f64::from(*it.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{pose3d, scene};
+
+    fn of_height(px: f64) -> Pose3d {
+        let mut pose = pose3d(0);
+        for view in &mut pose.views[..2] {
+            view.n_parts = 3;
+            view.centres_px[..3].copy_from_slice(&[[40.0, 5.0], [60.0, 5.0 + px], [50.0, 9.0]]);
+        }
+        pose
+    }
+
+    #[test]
+    fn a_height_is_the_longer_side_around_the_parts_of_poses_that_were_used() {
+        let scene = scene();
+        let mut heights = Heights::new(2);
+        for px in [90.0, 400.0, 120.0] {
+            heights.add(&scene, &of_height(px));
+        }
+        let mut other = of_height(500.0);
+        other.views_used = 0b01;
+        other.views[0].status = Status::NO_DETECTION;
+        heights.add(&scene, &other);
+        other.status = Status::NO_DETECTION;
+        heights.add(&scene, &other);
+        let names = || scene.views.iter().map(|it| it.name.clone());
+        let both = heights.medians(names());
+        assert_eq!(
+            both,
+            ["left", "right"]
+                .map(|it| (it.to_owned(), Some(120.0)))
+                .into()
+        );
+        assert_eq!(Heights::new(2).medians(names())["left"], None);
+        let lying = FusedView {
+            n_parts: 2,
+            centres_px: core::array::from_fn(|it| [70.0 * it as f64, 1.0]),
+            ..FusedView::default()
+        };
+        assert_eq!(height_px(&lying), Some(70.0));
+    }
+
+    #[test]
+    fn it_is_told_once_that_people_are_too_small() {
+        let scene = scene();
+        let told = |px: f64, n: u64| {
+            let mut heights = Heights::new(2);
+            (0..n).for_each(|_| heights.add(&scene, &of_height(px)));
+            heights.is_told
+        };
+        assert!(told(109.0, ENOUGH) && told(351.0, ENOUGH));
+        assert!(!told(110.0, ENOUGH) && !told(350.0, ENOUGH) && !told(20.0, ENOUGH - 1));
+    }
+}
