@@ -7,26 +7,26 @@ use messages::{FusedView, MAX_PARTS, Pose3d, Status};
 
 use crate::Scene;
 
-/// So many poses of a view tell how high people are in it.
-const ENOUGH: u64 = 20;
+/// Fewest poses of a view after which its median height is judged.
+const MIN_POSES: u64 = 20;
 
 /// Counts the heights of people, by view.
 #[derive(Debug)]
 pub(crate) struct Heights {
     /// By whole pixels: how many poses.
     counts: Vec<BTreeMap<u32, u64>>,
-    is_told: bool,
+    has_warned: bool,
 }
 
 impl Heights {
     pub(crate) fn new(n_views: usize) -> Self {
         Self {
             counts: vec![BTreeMap::new(); n_views],
-            is_told: false,
+            has_warned: false,
         }
     }
 
-    /// Takes in a result; logs once that people are smaller or larger than the search is good for.
+    /// Adds a result; warns once if people are smaller or larger than the search is good for.
     pub(crate) fn add(&mut self, scene: &Scene, pose: &Pose3d) {
         if pose.status != Status::OK {
             return;
@@ -39,22 +39,22 @@ impl Heights {
                 *counts.entry(px.round() as u32).or_default() += 1;
             }
         }
-        self.tell(scene);
+        self.warn(scene);
     }
 
-    fn tell(&mut self, scene: &Scene) {
-        if self.is_told {
+    fn warn(&mut self, scene: &Scene) {
+        if self.has_warned {
             return;
         }
         let known = self.counts.iter().enumerate();
-        let mut known = known.filter(|(_, it)| it.values().sum::<u64>() >= ENOUGH);
+        let mut known = known.filter(|(_, it)| it.values().sum::<u64>() >= MIN_POSES);
         let outside = known.find_map(|(view, counts)| {
             let px = median(counts)?;
             let [least, most] = USABLE_PX;
             (!(least..=most).contains(&px)).then_some((view, px))
         });
         if let Some((view, px)) = outside {
-            self.is_told = true;
+            self.has_warned = true;
             tracing::warn!(
                 "people are {px:.0} px high in the frames of {}, where {} to {} is what the search does well: see capture.scale",
                 scene.views[view].name,
@@ -76,13 +76,7 @@ impl Heights {
 /// The longer side of the rectangle around the centres of the parts, pixels of the frame.
 fn height_px(fused: &FusedView) -> Option<f64> {
     let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
-    let side = |axis: usize| {
-        let values = parts.iter().map(|it| it[axis]);
-        let [low, high] = [f64::min, f64::max].map(|of| values.clone().reduce(of));
-        Some(high? - low?)
-    };
-    let px = side(0)?.max(side(1)?);
-    px.is_finite().then_some(px)
+    geometry::longer_side(parts.iter().copied()).filter(|px| px.is_finite())
 }
 
 /// The lower median.
@@ -141,14 +135,16 @@ mod tests {
     }
 
     #[test]
-    fn it_is_told_once_that_people_are_too_small() {
+    fn it_has_warned_once_that_people_are_too_small() {
         let scene = scene();
-        let told = |px: f64, n: u64| {
+        let warns = |px: f64, n: u64| {
             let mut heights = Heights::new(2);
             (0..n).for_each(|_| heights.add(&scene, &of_height(px)));
-            heights.is_told
+            heights.has_warned
         };
-        assert!(told(109.0, ENOUGH) && told(351.0, ENOUGH));
-        assert!(!told(110.0, ENOUGH) && !told(350.0, ENOUGH) && !told(20.0, ENOUGH - 1));
+        assert!(warns(109.0, MIN_POSES) && warns(351.0, MIN_POSES));
+        assert!(
+            !warns(110.0, MIN_POSES) && !warns(350.0, MIN_POSES) && !warns(20.0, MIN_POSES - 1)
+        );
     }
 }

@@ -10,6 +10,7 @@
 mod lens;
 
 mod camera;
+mod extent;
 
 mod rig;
 
@@ -29,6 +30,7 @@ pub mod files;
 mod testing;
 
 pub use camera::{Camera, Intrinsics, Ray};
+pub use extent::longer_side;
 pub use framing::{Framing, FramingError, OutSize, upright_roll};
 pub use lens::{Lens, LensModel};
 pub use rig::{NotARotation, PLAIN_NAME, Rig, RigError, is_plain_name, rotation_from_matrix};

@@ -97,15 +97,8 @@ impl ViewPlan {
     /// The size of the person of a pose: the longer side of the rectangle around the centres of its
     /// parts, pixels of the frame.
     pub fn size(&self, pose: &Pose) -> f64 {
-        let parts = 0..pose.parts.len();
-        let side = |axis: usize| {
-            let values = parts.clone().map(|part| self.centre(pose, part)[axis]);
-            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| {
-                [low.min(it), high.max(it)]
-            });
-            high - low
-        };
-        side(0).max(side(1)).max(0.0)
+        let centres = (0..pose.parts.len()).map(|part| self.centre(pose, part));
+        geometry::longer_side(centres).unwrap_or(0.0)
     }
 
     /// Centre of a part of a pose, pixels of the frame.
