@@ -1,16 +1,18 @@
-//! The size in which frames are searched where nobody set one: chosen from the calibration, and told.
+//! The size in which frames are searched if the deployment sets none: the choice from the calibration, and its description.
 
 use core::fmt::Write as _;
 
 use deployment::Deployment;
-use geometry::search_size::{GOOD_PX, PERSON_METRES, USABLE_PX, better_scale, search_sizes};
+use geometry::search_size::{
+    GOOD_PX, MOST_PIXELS, PERSON_METRES, USABLE_PX, better_scale, search_sizes,
+};
 use geometry::{Camera, Rig};
 use serde::{Deserialize, Serialize};
 
 /// The sizes of all cameras, chosen from the calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchSize {
-    /// Of every camera, as they are numbered.
+    /// The size of every camera's frames, in the order of the deployment.
     pub cameras: Vec<CameraSize>,
     /// The most cameras that share a space in which a person can stand; 0 if no two do.
     pub n_sharing: usize,
@@ -25,11 +27,11 @@ pub struct CameraSize {
     pub scale: f64,
     /// Width and height, pixels.
     pub frame_size: [u32; 2],
-    /// How high a person stands in its image, in the space that it shares with others, pixels.
+    /// Height of a person in its image, in the space that it shares with others, pixels.
     pub person_px: Option<f64>,
     /// The same in its frames.
     pub person_in_frame_px: Option<f64>,
-    /// Whether the person is smaller than is good for the sake of time.
+    /// Whether the person is smaller than is good because the number of pixels is limited.
     pub is_limited: bool,
 }
 
@@ -38,7 +40,7 @@ impl SearchSize {
     ///
     /// * `rig`: as [`crate::inputs::rig_of`] reads it.
     ///
-    /// `None` as well of cameras that the rig does not have, which who makes their frames says.
+    /// Also `None` if the rig lacks a camera: that error is reported where the frames are planned.
     pub fn of(deployment: &Deployment, rig: &Rig) -> Option<Self> {
         let capture = &deployment.capture;
         if capture.size.is_some() || capture.scale.is_some() {
@@ -68,25 +70,28 @@ impl SearchSize {
         found.map_or(1.0, |it| it.scale)
     }
 
-    /// The choice and why, on one line.
+    /// The choice and its reason, on one line.
     pub fn text(&self) -> String {
-        let mut alike: Vec<Vec<&CameraSize>> = Vec::new();
+        let mut groups: Vec<Vec<&CameraSize>> = Vec::new();
         for it in &self.cameras {
             let same = |group: &&mut Vec<&CameraSize>| {
                 let first = group[0];
                 let is_known = first.person_px.is_some() == it.person_px.is_some();
                 first.frame_size == it.frame_size && first.scale == it.scale && is_known
             };
-            match alike.iter_mut().find(same) {
+            match groups.iter_mut().find(same) {
                 Some(group) => group.push(it),
-                None => alike.push(vec![it]),
+                None => groups.push(vec![it]),
             }
         }
-        let chosen: Vec<String> = alike.iter().map(|it| said(it, alike.len() > 1)).collect();
+        let chosen: Vec<String> = groups
+            .iter()
+            .map(|it| describe(it, groups.len() > 1))
+            .collect();
         let why = match self.n_sharing {
             0 => "no two cameras share a space in which a person can stand, so the frames are as large as time permits"
                 .to_owned(),
-            n => format!("a person of {PERSON_METRES:.2} m stands where {n} cameras see him"),
+            n => format!("{n} cameras share the space in which a person of {PERSON_METRES:.2} m stands"),
         };
         format!(
             "capture.scale by itself: {}; {why} (capture.scale or capture.size sets it)",
@@ -94,7 +99,7 @@ impl SearchSize {
         )
     }
 
-    /// What is not good about it, and what to set, if anything is not.
+    /// A warning if a person is too small in some frames, with what to set.
     pub fn warning(&self) -> Option<String> {
         let px = |it: &CameraSize| it.person_in_frame_px.unwrap_or(f64::INFINITY);
         let small = self.cameras.iter();
@@ -115,8 +120,8 @@ impl SearchSize {
         let _infallible = if first.is_limited {
             write!(
                 text,
-                "larger ones would take more than half a CPU-second each; if that may be, set capture.scale = {scale} ({:.0} \
-                 times the pixels)",
+                "frames have {MOST_PIXELS} pixels at most unless it is set, to limit the time; for larger ones \
+                 set capture.scale = {scale} ({:.0} times the pixels)",
                 (scale / first.scale).powi(2)
             )
         } else {
@@ -129,10 +134,10 @@ impl SearchSize {
     }
 }
 
-/// The size of some cameras that have the same.
+/// Describes the size of cameras that have the same one.
 ///
-/// * `is_named`: there are others.
-fn said(cameras: &[&CameraSize], is_named: bool) -> String {
+/// * `is_named`: whether to name them.
+fn describe(cameras: &[&CameraSize], is_named: bool) -> String {
     let first = cameras[0];
     let names: Vec<&str> = cameras.iter().map(|it| it.name.as_str()).collect();
     let names = if is_named {
@@ -152,7 +157,7 @@ fn said(cameras: &[&CameraSize], is_named: bool) -> String {
     }
 }
 
-/// Numbers as one, or as the least and the most; none of none.
+/// The range of numbers, rounded, as text; `None` without numbers.
 fn range(numbers: impl Iterator<Item = f64> + Clone) -> Option<String> {
     let least = numbers.clone().reduce(f64::min)?.round();
     let most = numbers.reduce(f64::max)?.round();
@@ -184,12 +189,12 @@ mod tests {
     }
 
     #[test]
-    fn cameras_of_one_size_are_told_together_and_others_by_name() {
+    fn cameras_of_one_size_are_described_together_and_others_by_name() {
         let alike = size(&[(0.25, Some(690.0), false), (0.25, Some(710.0), false)], 2);
         assert_eq!(
             alike.text(),
-            "capture.scale by itself: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; a person \
-             of 1.70 m stands where 2 cameras see him (capture.scale or capture.size sets it)"
+            "capture.scale by itself: 0.25, a person is 690 to 710 px high in the image and 173 to 178 px in 480x270; 2 cameras \
+             share the space in which a person of 1.70 m stands (capture.scale or capture.size sets it)"
         );
         assert_eq!(alike.warning(), None);
         let text = size(&[(0.25, Some(690.0), false), (0.5, None, false)], 2).text();

@@ -1,35 +1,38 @@
 //! The space that cameras share, and how high a standing person is seen there.
 
 use nalgebra::{Point2, Point3, UnitVector3, Vector3};
+use statistics::Sorted;
 
 use crate::{Camera, Rig};
 
 /// Height of a standing person, metres.
 pub const PERSON_METRES: f64 = 1.7;
-/// Points on the rays of a camera: cells of its image either way, and depths.
+/// Sample points on the rays of a camera: cells of its image in either direction, and depths.
 const CELLS: usize = 9;
 const DEPTHS: usize = 24;
-/// The highest a person is who is seen whole, and in part, in sides of the picture along him.
-const WHOLE: f64 = 1.25;
-const IN_PART: f64 = 4.0;
-/// The smallest a person is in a picture, in sides of the picture along him.
-const SMALLEST: f64 = 0.0625;
-/// What is looked at, best first; taken is the first that as many cameras share as any. People are near the point at which
-/// cameras are aimed; the space that parallel cameras share has no end.
+/// Largest height of a person who must be in the image whole, and of one who need not be: shares of the image's side
+/// along the person.
+const MAX_SHARE_WHOLE: f64 = 1.25;
+const MAX_SHARE_PARTIAL: f64 = 4.0;
+/// Smallest height of a person, the same share.
+const MIN_SHARE: f64 = 0.0625;
+/// Parts of space, in order of preference: the first that as many cameras share as any other is used. People are near
+/// the point at which cameras are aimed; the space that parallel cameras share has no end.
 const BOUNDS: [Bound; 4] = [
     Bound::NearFocus,
-    Bound::Sides(0.25),
-    Bound::Sides(0.125),
-    Bound::Sides(SMALLEST),
+    Bound::MinShare(0.25),
+    Bound::MinShare(0.125),
+    Bound::MinShare(MIN_SHARE),
 ];
-/// Within this factor of the distance to the focus is near it.
-const NEAR: f64 = 1.6;
-/// Axes that differ by less are not aimed at one point, radians (4 degrees).
-const AIMED: f64 = 0.07;
-/// So much of the space that two cameras share is enough for more cameras to count as sharing it.
-const ENOUGH: f64 = 0.03;
-/// A person is taken to be at least so high, as a share of what is seen from the side: parts do not shrink from above.
-const FORESHORTENED: f64 = 0.7;
+/// Depths within this factor of the focus's are near it.
+const NEAR_FACTOR: f64 = 1.6;
+/// Optical axes that differ by less have no common focus, radians (4 degrees).
+const MIN_AXIS_ANGLE: f64 = 0.07;
+/// Smallest share of the space of two cameras that counts as shared by more cameras.
+const MIN_SPACE_SHARE: f64 = 0.03;
+/// Smallest height of a person seen from above, as a share of the height seen from the side: the size of the parts does
+/// not change.
+const MIN_FORESHORTENING: f64 = 0.7;
 
 /// How high a standing person is seen by every camera in the space that it shares with others.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,37 +48,37 @@ pub(super) struct Heights {
 enum Bound {
     /// About as far from the camera as what the cameras are aimed at.
     NearFocus,
-    /// Where a person is not smaller than this, in sides of the picture along him.
-    Sides(f64),
+    /// Where the height of a person is at least this share of the image's side along the person.
+    MinShare(f64),
 }
 
-/// A person as one camera sees him.
+/// The image of a person in one camera.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct Projection {
     /// Height, pixels of the calibrated image.
     px: f64,
-    /// Height, in sides of the picture along him.
-    sides: f64,
-    /// Distance over that of the focus, or the inverse, if that is larger; infinite without a focus.
+    /// Height as a share of the image's side along the person.
+    share: f64,
+    /// Depth over that of the focus, or the inverse, whichever is larger; infinite without a focus.
     from_focus: f64,
 }
 
-impl Seen {
+impl Projection {
     fn is_within(&self, bound: Bound) -> bool {
         match bound {
-            Bound::NearFocus => self.from_focus <= NEAR,
-            Bound::Sides(least) => self.sides >= least,
+            Bound::NearFocus => self.from_focus <= NEAR_FACTOR,
+            Bound::MinShare(least) => self.share >= least,
         }
     }
 }
 
-/// A place where a person may stand: what every camera sees of him.
+/// A place where a person may stand, with the image of the person in every camera.
 struct Place {
-    seen: Vec<Option<Seen>>,
+    seen: Vec<Option<Projection>>,
 }
 
 impl Place {
-    fn seen_by(&self, camera: usize, bound: Bound) -> Option<Seen> {
+    fn seen_by(&self, camera: usize, bound: Bound) -> Option<Projection> {
         self.seen[camera].filter(|it| it.is_within(bound))
     }
 
@@ -85,9 +88,10 @@ impl Place {
     }
 }
 
-/// Looks where cameras see a standing person together: the whole of him, or else the middle.
+/// Finds the heights of a standing person in the space that the cameras share: where the whole person is in the images, or
+/// else the middle of the person.
 ///
-/// Without an up direction a person is as high as seen from the side.
+/// Without an up direction the height is that seen from the side.
 pub(super) fn heights(rig: &Rig) -> Heights {
     let n = rig.cameras().len();
     for is_whole in [true, false] {
@@ -113,7 +117,7 @@ pub(super) fn heights(rig: &Rig) -> Heights {
 fn n_sharing(places: &[Place], n_cameras: usize, bound: Bound) -> usize {
     let n_of: Vec<usize> = places.iter().map(|it| it.n_seen(bound)).collect();
     let shared_by = |n: usize| n_of.iter().filter(|it| **it >= n).count();
-    let enough = (ENOUGH * shared_by(2) as f64).max(1.0);
+    let enough = (MIN_SPACE_SHARE * shared_by(2) as f64).max(1.0);
     let mut sharing = (2..=n_cameras).rev();
     let found = sharing.find(|n| shared_by(*n) as f64 >= enough);
     found.unwrap_or(0)
@@ -124,13 +128,12 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
     let of = |n: usize, bound: Bound| {
         let shared = places.iter().filter(|it| it.n_seen(bound) >= n);
         let seen = shared.filter_map(|it| it.seen_by(camera, bound));
-        let mut px: Vec<f64> = seen.map(|it| it.px).collect();
-        px.sort_by(f64::total_cmp);
-        px.get(px.len() / 2).copied()
+        let px: Vec<f64> = seen.map(|it| it.px).collect();
+        Sorted::new(px).upper_median()
     };
     let fewer = (2..=n_sharing).rev();
     let found = fewer.clone().find_map(|n| of(n, bound));
-    // One that looks elsewhere than the others.
+    // For a camera that is aimed elsewhere than the others.
     found.or_else(|| {
         BOUNDS
             .iter()
@@ -141,31 +144,31 @@ fn median_px(places: &[Place], camera: usize, bound: Bound, n_sharing: usize) ->
 /// Places on the rays of all cameras that at least two of them see.
 fn places(rig: &Rig, is_whole: bool) -> Vec<Place> {
     let (up, focus) = (rig.up_in_world(), aim(rig));
-    let eye = |it| Eye::new(it, up, focus, is_whole);
-    let eyes: Vec<Eye<'_>> = rig.cameras().iter().map(eye).collect();
-    let points = eyes.iter().flat_map(Eye::points);
+    let viewpoint = |it| Viewpoint::new(it, up, focus, is_whole);
+    let viewpoints: Vec<Viewpoint<'_>> = rig.cameras().iter().map(viewpoint).collect();
+    let points = viewpoints.iter().flat_map(Viewpoint::points);
     let place = |point: Point3<f64>| Place {
-        seen: eyes.iter().map(|it| it.person(&point)).collect(),
+        seen: viewpoints.iter().map(|it| it.person(&point)).collect(),
     };
     let is_shared = |it: &Place| it.seen.iter().flatten().count() >= 2;
     points.map(place).filter(is_shared).collect()
 }
 
-/// The point at which cameras are aimed; none if their axes are as good as parallel.
+/// The point at which cameras are aimed; none if their axes are nearly parallel.
 fn aim(rig: &Rig) -> Option<Point3<f64>> {
     let axes: Vec<_> = rig.cameras().iter().map(Camera::axis_in_world).collect();
-    let differ = |a: &UnitVector3<f64>| axes.iter().any(|b| a.angle(b) > AIMED);
+    let differ = |a: &UnitVector3<f64>| axes.iter().any(|b| a.angle(b) > MIN_AXIS_ANGLE);
     rig.focus().filter(|_| axes.iter().any(differ))
 }
 
-/// A camera that looks for people.
-struct Eye<'a> {
+/// A camera, with what the heights of people in it depend on.
+struct Viewpoint<'a> {
     camera: &'a Camera,
     up: Option<UnitVector3<f64>>,
-    /// The highest a person is, in sides of the picture along him.
-    highest: f64,
+    /// Largest height of a person, as a share of `side`.
+    max_share: f64,
     is_whole: bool,
-    /// How far in front of it is what the cameras are aimed at, metres.
+    /// Depth of the point at which the cameras are aimed, metres.
     focus_depth: Option<f64>,
     /// Focal length, pixels: the mean of both.
     focal: f64,
@@ -173,7 +176,7 @@ struct Eye<'a> {
     side: f64,
 }
 
-impl<'a> Eye<'a> {
+impl<'a> Viewpoint<'a> {
     fn new(
         camera: &'a Camera,
         up: Option<UnitVector3<f64>>,
@@ -184,7 +187,7 @@ impl<'a> Eye<'a> {
         let [width, height] = intrinsics.size.map(f64::from);
         let up_in_camera = up.map(|it| camera.camera_from_world.rotation * it.into_inner());
         let across = up_in_camera.map_or(0.0, |it| it.xy().norm());
-        // Seen from above, or with nobody to say what is up, a person may lie any way in the picture.
+        // Projection from above, or with nobody to say what is up, a person may lie any way in the picture.
         let side = match up_in_camera.filter(|_| across > 0.3) {
             Some(up) => (width * across / up.x.abs()).min(height * across / up.y.abs()),
             None => (width * height).sqrt(),
@@ -192,7 +195,11 @@ impl<'a> Eye<'a> {
         Self {
             camera,
             up,
-            highest: if is_whole { WHOLE } else { IN_PART },
+            max_share: if is_whole {
+                MAX_SHARE_WHOLE
+            } else {
+                MAX_SHARE_PARTIAL
+            },
             is_whole,
             focus_depth: focus
                 .map(|it| (camera.camera_from_world * it).z)
@@ -202,8 +209,8 @@ impl<'a> Eye<'a> {
         }
     }
 
-    /// Points on its rays, from where a person fills the image to where he is small in it; each twofold distance has as
-    /// many.
+    /// Points on its rays, from where a person fills the image to where a person is small in it; every doubling of the depth has
+    /// as many.
     fn points(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let middle = |nth: usize, n: usize| (nth as f64 + 0.5) / n as f64;
@@ -216,15 +223,15 @@ impl<'a> Eye<'a> {
             let axis = self.camera.axis_in_world();
             let along = ray.direction.dot(&axis).max(0.05);
             (0..DEPTHS).map(move |nth| {
-                let sides = self.highest * (SMALLEST / self.highest).powf(middle(nth, DEPTHS));
-                let depth = self.focal * PERSON_METRES / (sides * self.side);
+                let share = self.max_share * (MIN_SHARE / self.max_share).powf(middle(nth, DEPTHS));
+                let depth = self.focal * PERSON_METRES / (share * self.side);
                 ray.origin + ray.direction.into_inner() * (depth / along)
             })
         })
     }
 
-    /// What it sees of a person whose middle is at a point.
-    fn person(&self, middle: &Point3<f64>) -> Option<Seen> {
+    /// The image of a person whose middle is at a point.
+    fn person(&self, middle: &Point3<f64>) -> Option<Projection> {
         let centre = self.inside(middle)?;
         let depth = (self.camera.camera_from_world * middle).z;
         let from_side = self.focal * PERSON_METRES / depth;
@@ -237,20 +244,20 @@ impl<'a> Eye<'a> {
             None if self.is_whole && !self.has_room(&centre, from_side) => return None,
             None => from_side,
         };
-        let px = px.max(FORESHORTENED * from_side);
-        let sides = px / self.side;
+        let px = px.max(MIN_FORESHORTENING * from_side);
+        let share = px / self.side;
         let ratio = self.focus_depth.map_or(f64::INFINITY, |it| depth / it);
-        (px.is_finite() && sides <= self.highest).then_some(Seen {
+        (px.is_finite() && share <= self.max_share).then_some(Projection {
             px,
-            sides,
+            share,
             from_focus: ratio.max(1.0 / ratio),
         })
     }
 
-    /// From head to feet, pixels; none if they are to be in the picture and are not.
+    /// Distance from head to feet, pixels; none if they must be in the image and are not.
     ///
     /// * `half`: from the middle to the head.
-    /// * `otherwise`: where the lens shows no head or no feet.
+    /// * `otherwise`: the result where the lens model has no image of head or feet.
     fn between_ends(
         &self,
         middle: &Point3<f64>,
