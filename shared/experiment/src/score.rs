@@ -16,6 +16,8 @@ pub struct FrameScore {
     pub joints_m: Vec<Option<f64>>,
     /// The same after the best alignment; empty where there is none.
     pub aligned_m: Vec<Option<f64>>,
+    /// Whether the body fits the truth better with left and right exchanged; `None` without joints to tell.
+    pub is_exchanged: Option<bool>,
     /// For each view the 14 joints that were found (if any) and the true ones, pixels of the footage; `None`
     /// if a true joint is unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
@@ -53,12 +55,34 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
         segments: segment_errors(&segments, &found.joints, truth),
         joints_m: joint_errors(&found.joints, truth),
         aligned_m: aligned_m.unwrap_or_default(),
+        is_exchanged: is_exchanged(&parse14(sequence.joints, &found.joints), &in_space),
         views: views.collect(),
         iterations: found.iterations.clone(),
         unsettled: found.unsettled,
         solutions: found.solutions,
         on: found.on,
     }
+}
+
+/// Whether the joints on the right are nearer to the true ones on the left, and the other way round, than as they are
+/// named: by the sum of the distances.
+///
+/// * `found`, `truth`: of `skeleton::PARSE14`, metres.
+/// * Returns `None` if no pair of joints of both sides is found and known.
+fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool> {
+    /// Right and left, joints of `skeleton::PARSE14`.
+    const SIDES: [[usize; 2]; 6] = [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]];
+    let distance = |a: Point, b: Point| (Point3::from(a) - Point3::from(b)).norm();
+    let (mut n, mut as_named, mut exchanged) = (0, 0.0, 0.0);
+    for [right, left] in SIDES {
+        let of = |joints: &[Option<Point>]| Some([(*joints.get(right)?)?, (*joints.get(left)?)?]);
+        if let (Some(found), Some(truth)) = (of(found), of(truth)) {
+            n += 1;
+            as_named += distance(found[0], truth[0]) + distance(found[1], truth[1]);
+            exchanged += distance(found[0], truth[1]) + distance(found[1], truth[0]);
+        }
+    }
+    (n > 0).then_some(exchanged < as_named)
 }
 
 /// The true joints in an image; `None` if one is not known, or behind the camera.
@@ -72,4 +96,21 @@ pub fn projected(camera: &Camera, offset: [f64; 2], joints: &[Option<Point>]) ->
         *pixel = [at.x - offset[0], at.y - offset[1]];
     }
     Some(pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_with_its_sides_exchanged_is_told() {
+        let truth: Vec<Option<Point>> = (0..14).map(|it| Some([f64::from(it), 0.0, 1.0])).collect();
+        let mut found = truth.clone();
+        assert_eq!(is_exchanged(&found, &truth), Some(false));
+        for [right, left] in [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]] {
+            found.swap(right, left);
+        }
+        assert_eq!(is_exchanged(&found, &truth), Some(true));
+        assert_eq!(is_exchanged(&[None; 14], &truth), None);
+    }
 }

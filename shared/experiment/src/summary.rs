@@ -86,6 +86,10 @@ pub struct Numbers {
     pub mpjpe_interval: Option<[f64; 2]>,
     /// The same after the best alignment of every frame, mm.
     pub aligned_mpjpe_mm: Option<f64>,
+    /// Frames whose left and right are exchanged, of the whole body, percent.
+    pub exchanged: Option<f64>,
+    /// Its confidence interval.
+    pub exchanged_interval: Option<[f64; 2]>,
     /// Joints within 150 mm, percent; those that were not found are not.
     pub pck3d: Option<f64>,
     /// Joints that could not be triangulated, percent.
@@ -231,6 +235,7 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
     let gains = own.iter().zip(&first).map(|(own, first)| gain(own, first));
     let gains: Vec<Share> = gains.collect();
     let errors = each(|it| errors_mm(&it.joints_m));
+    let exchanged = each(|it| Share::of(it.is_exchanged.map(percent)));
     let images = images(&own);
     let effort = own.iter().flat_map(|it| &it.iterations);
     let effort = Share::of(effort.map(|it| f64::from(*it)));
@@ -247,6 +252,8 @@ fn numbers(frames: &[&Vec<FrameScore>], version: usize, bootstrap: &Bootstrap) -
         mpjpe_mm: Share::mean(&errors),
         mpjpe_interval: bootstrap.interval(&errors),
         aligned_mpjpe_mm: Share::mean(&each(|it| errors_mm(&it.aligned_m))),
+        exchanged: Share::mean(&exchanged),
+        exchanged_interval: bootstrap.interval(&exchanged),
         pck3d: of_joints(|it| it <= PCK_M),
         lost: of_joints(|it| !it.is_finite()),
         pcp2d: images
@@ -321,6 +328,7 @@ mod tests {
         let error = |nth: usize| Some(if nth < n_right { 0.25 } else { 0.75 });
         let truth = [[5.0, 5.0]; 14];
         FrameScore {
+            is_exchanged: None,
             segments: (0..12).map(error).collect(),
             joints_m: vec![Some(0.1), Some(0.2), Some(f64::INFINITY), None],
             aligned_m: vec![Some(0.05)],

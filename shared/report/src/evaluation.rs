@@ -131,7 +131,7 @@ fn interval(ends: Option<[f64; 2]>, digits: usize) -> Html {
 fn measures(out: &mut Html, group: &Group, titles: &[String]) {
     /// A number, its interval, and how many decimals both have.
     type Cell = fn(&Numbers) -> (Option<f64>, Option<[f64; 2]>, usize);
-    let rows: [(&str, Cell); 16] = [
+    let rows: [(&str, Cell); 17] = [
         ("PCP3D at 0.5, %", |it| (it.pcp3d, it.pcp3d_interval, 2)),
         ("gain over the first, points", |it| {
             (it.gain, it.gain_interval, 2)
@@ -139,6 +139,9 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
         ("MPJPE, mm", |it| (it.mpjpe_mm, it.mpjpe_interval, 1)),
         ("MPJPE after alignment, mm", |it| {
             (it.aligned_mpjpe_mm, None, 1)
+        }),
+        ("left and right exchanged, %", |it| {
+            (it.exchanged, it.exchanged_interval, 1)
         }),
         ("joints within 150 mm, %", |it| (it.pck3d, None, 1)),
         ("joints not found, %", |it| (it.lost, None, 2)),
