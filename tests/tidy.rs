@@ -29,6 +29,7 @@ const LAYERS: &[&[&str]] = &[
     &["metrics", "recording", "fmp", "scene", "deployment"],
     &["runtime"],
     &["multiview", "viewquality"],
+    &["orientation"],
     &["pipeline", "evaluation", "datasets", "consistency"],
     &["wire", "training", "qualitytraining", "sequences"],
     &["experiment", "stage"],

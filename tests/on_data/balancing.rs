@@ -9,7 +9,7 @@ use ::footage::{Fill, Size, Source, SourceSpec, Warp};
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
 use nalgebra::Point3;
-use pipeline::{Combine, Estimator, EstimatorSettings};
+use pipeline::{Combine, Estimator, EstimatorSettings, Views};
 use skeleton::PARSE14;
 use statistics::Sorted;
 use trc::Trc;
@@ -138,6 +138,7 @@ fn errors(
     switches: Switches,
 ) -> [Errors; 2] {
     let mut settings = EstimatorSettings::default();
+    settings.views = Views::Pairs;
     settings.fuse.facing = switches.facing;
     settings.skeleton.facing = switches.facing;
     settings.skeleton.combine = switches.combine;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use fmp::{Model, Pose, Scope, TrackSettings};
 use kernels::Rgb8View;
 use nalgebra::Point3;
-use pipeline::{Combine, Estimator, EstimatorSettings, ViewSettings, ViewStep};
+use pipeline::{Combine, Estimator, EstimatorSettings, ViewSettings, ViewStep, Views};
 use skeleton::PARSE14;
 
 use crate::balancing::{Clip, SIZE, clip, compare, reference};
@@ -159,6 +159,7 @@ fn fused(
     (truth, track): (&[Vec<Point3<f64>>], Option<TrackSettings>),
 ) -> [f64; 2] {
     let mut settings = EstimatorSettings::default();
+    settings.views = Views::Pairs;
     settings.view.track = track;
     settings.fuse.facing = true;
     settings.skeleton.facing = true;

@@ -2,12 +2,14 @@
 
 use fmp::Pose;
 use messages::ViewQuality;
+use multiview::FrontEvidence;
 use wire::WireError;
 
 /// A decoded message.
 #[derive(Debug, Clone)]
 pub(crate) enum Input {
-    Candidates(Vec<Pose>),
+    /// Distinct poses, and what the picture says of the front of each.
+    Candidates(Vec<Pose>, Vec<FrontEvidence>),
     Errors(Errors),
 }
 

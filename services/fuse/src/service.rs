@@ -21,7 +21,8 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     for (view, plan) in job.plans.iter().enumerate() {
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
-            Ok(Input::Candidates(candidates))
+            let front = wire::front_from_message(pose, candidates.len())?;
+            Ok(Input::Candidates(candidates, front))
         })?;
     }
     for view in (0..n_views).filter(|_| job.has_quality) {

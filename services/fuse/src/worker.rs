@@ -76,8 +76,10 @@ impl Worker<'_> {
             let waited = now.saturating_sub(item.timing.sent_at_nanos);
             let health = self.service.health();
             health.spent(Span::WAITING, Some(view), waited);
-            let candidates = match item.value {
-                Input::Candidates(candidates) if !candidates.is_empty() => candidates,
+            let (candidates, front) = match item.value {
+                Input::Candidates(candidates, front) if !candidates.is_empty() => {
+                    (candidates, front)
+                }
                 _ => {
                     answers.push(None);
                     continue;
@@ -85,6 +87,7 @@ impl Worker<'_> {
             };
             let mut answer = ViewResult {
                 candidates,
+                front,
                 sigma_px: None,
                 tau_px: None,
             };

@@ -16,6 +16,7 @@ use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::{Compatibility, TypeTables};
 use nalgebra::UnitVector3;
+use orientation::Detector;
 use pipeline::PairTables;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde::{Deserialize, Serialize};
@@ -210,6 +211,32 @@ pub fn learned(file: Option<&Path>, model: &Model) -> Result<Option<Learned>, Fa
     let checked = learned.check_model(&Shape::of(model));
     checked.map_err(|error| in_file(file, &error))?;
     Ok(Some(learned))
+}
+
+/// Reads what tells in which direction a person faces; nothing for the word `none`, and for a model of other parts
+/// than those it was learned for.
+///
+/// # Errors
+///
+/// The file cannot be read, or is another one.
+pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, Failure> {
+    let has_head = model.n_parts() == skeleton::N_PARTS;
+    if deployment::is_none(file) || (!has_head && deployment::is_shipped(file)) {
+        return Ok(None);
+    }
+    if !has_head {
+        let message = format!(
+            "{}: for models of {} parts, this one has {}",
+            file.display(),
+            skeleton::N_PARTS,
+            model.n_parts()
+        );
+        return Err(Failure::new(ExitKind::Input, message));
+    }
+    let bytes = Shipped::Orientation.read(file)?;
+    let network =
+        orientation::Network::from_bytes(&bytes).map_err(|error| in_file(file, &error))?;
+    Ok(Some(Arc::new(Detector::new(network))))
 }
 
 /// The part-type tables of all pairs of the given cameras: those named in the settings, else the learned ones.

@@ -8,7 +8,7 @@ use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
-use pipeline::{EstimatorSettings, SkeletonSettings};
+use pipeline::{EstimatorSettings, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
 use viewquality::Predictor;
@@ -233,7 +233,10 @@ fn settings(
     let defaults = SkeletonSettings::default();
     let joints = JointSet::by_name(&deployment.triangulate.joints).unwrap_or(defaults.joints);
     Ok(EstimatorSettings {
-        view: pose::settings(&deployment.pose),
+        view: ViewSettings {
+            orientation: inputs::orientation(&deployment.pose.orientation, model)?,
+            ..pose::settings(&deployment.pose)
+        },
         fuse: fuse::settings(
             &config,
             deployment.pose.candidates,
@@ -241,7 +244,7 @@ fn settings(
             learned.as_ref(),
         ),
         tables,
-        views: fuse::views(deployment.fuse.views),
+        views: fuse::views(deployment.views()),
         skeleton: SkeletonSettings {
             joints,
             joint_map: learned.and_then(|it| it.joint_map(joints)),

@@ -64,10 +64,13 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
         let bytes = std::fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
         files.insert(file.clone(), checksum::fnv1a(&bytes));
     }
+    let orientation = &deployment.pose.orientation;
+    let orientation = (!deployment::is_none(orientation)).then(|| orientation.clone());
     for (kind, file) in [
         (Shipped::Model, &deployment.model),
         (Shipped::Network, &deployment.quality.network),
         (Shipped::Consistency, &deployment.fuse.consistency),
+        (Shipped::Orientation, &orientation),
     ] {
         let Some(file) = file else { continue };
         // The deployment calls all shipped files "shipped".

@@ -19,15 +19,26 @@ pub enum Shipped {
     Network,
     /// The learned multi-view consistency of the model.
     Consistency,
+    /// The network that tells in which direction a person faces.
+    Orientation,
 }
 
 impl Shipped {
+    /// All of them.
+    const ALL: [Self; 4] = [
+        Self::Model,
+        Self::Network,
+        Self::Consistency,
+        Self::Orientation,
+    ];
+
     /// The content of the file.
     pub fn bytes(self) -> &'static [u8] {
         match self {
             Self::Model => include_bytes!("../../../configs/models/person.fmp"),
             Self::Network => include_bytes!("../../../configs/models/person.quality.onnx"),
             Self::Consistency => include_bytes!("../../../configs/models/person.consistency"),
+            Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
         }
     }
 
@@ -37,14 +48,14 @@ impl Shipped {
             Self::Model => "model",
             Self::Network => "network",
             Self::Consistency => "consistency",
+            Self::Orientation => "orientation",
         };
         format!("{SHIPPED}:{kind}").into()
     }
 
     /// The file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
-        let mut all = [Self::Model, Self::Network, Self::Consistency].into_iter();
-        all.find(|it| it.name() == name)
+        Self::ALL.into_iter().find(|it| it.name() == name)
     }
 
     /// Reads a file of this kind; `shipped` stands for the shipped one.
@@ -78,6 +89,7 @@ impl Shipped {
             Self::Model => ["model", "train fmp"],
             Self::Network => ["quality.network", "train quality"],
             Self::Consistency => ["fuse.consistency", "train consistency"],
+            Self::Orientation => ["pose.orientation", "train orientation"],
         };
         format!(
             "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
@@ -96,5 +108,6 @@ mod tests {
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
         consistency::Learned::parse(text).unwrap();
+        orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
     }
 }

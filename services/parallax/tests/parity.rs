@@ -15,7 +15,7 @@ fn unchanged_frames() {
     let case = Case::new("parity", &[20; 3], PLAIN);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    OneProcess::default().assert_same(&case, 3, 20);
+    in_pairs().assert_same(&case, 3, 20);
 }
 
 #[test]
@@ -46,6 +46,7 @@ fn the_released_energy() {
     let one = OneProcess {
         settings: EstimatorSettings {
             fuse: fuse::settings(&config, n_candidates, 1.0, None),
+            views: Views::Pairs,
             ..EstimatorSettings::default()
         },
         ..OneProcess::default()
@@ -61,7 +62,7 @@ fn sigma_px(frame: usize, view: usize) -> Vec<f32> {
 
 #[test]
 fn parts_switched_off_by_expected_errors() {
-    switched_off("expected", "", Views::Pairs);
+    switched_off("expected", "views = \"pairs\"\n", Views::Pairs);
 }
 
 #[test]
@@ -103,6 +104,17 @@ fn switched_off(name: &str, fuse: &str, views: Views) {
         ..OneProcess::default()
     };
     one.assert_same(&case, 3, 10);
+}
+
+/// One process that solves pairs of views, as several workers do.
+fn in_pairs() -> OneProcess {
+    OneProcess {
+        settings: EstimatorSettings {
+            views: Views::Pairs,
+            ..EstimatorSettings::default()
+        },
+        ..OneProcess::default()
+    }
 }
 
 /// One process that solves all views at once.
@@ -156,6 +168,7 @@ fn tracked_poses() {
         let one = OneProcess {
             settings: EstimatorSettings {
                 view: pose::settings(&pose),
+                views: Views::Pairs,
                 ..EstimatorSettings::default()
             },
             ..OneProcess::default()
@@ -183,7 +196,7 @@ fn concurrent_deployments_do_not_interfere() {
         let ended = started.wait();
         assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     }
-    OneProcess::default().assert_same(&cases[0], 2, 12);
-    OneProcess::default().assert_same(&cases[1], 3, 9);
+    in_pairs().assert_same(&cases[0], 2, 12);
+    in_pairs().assert_same(&cases[1], 3, 9);
     cases.iter().for_each(Case::assert_nothing_left);
 }

@@ -118,6 +118,7 @@ fn answers(plans: &[Arc<ViewPlan>], frames: &[usize]) -> Vec<Option<ViewResult>>
         let found = step.run(image, Scope::whole(&layout), &mut responses);
         Some(ViewResult {
             candidates: found.candidates,
+            front: found.front,
             sigma_px: None,
             tau_px: None,
         })

@@ -392,6 +392,13 @@ fn invalid_results_and_heartbeats_are_refused() {
         views_used: u32::MAX,
         n_pairs: u32::MAX,
         facing_margin: f64::NAN,
+        sides_margin: f64::NAN,
+        stature_m: f64::NAN,
+        body_deviation: f64::NAN,
+        sides: messages::Sides(9),
+        kept: messages::Kept(9),
+        n_people: u32::MAX,
+        reserved: 0,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
     };

@@ -4,7 +4,7 @@ use deployment::pose::{All, Config, Precision, Search, Window};
 use fmp::TrackSettings;
 use pipeline::{EvidenceWindow, ViewSettings};
 
-/// The settings of the single-view step.
+/// The settings of the single-view step, without what is read of files.
 pub fn settings(config: &Config) -> ViewSettings {
     ViewSettings {
         window: match config.evidence_window {
@@ -24,6 +24,7 @@ pub fn settings(config: &Config) -> ViewSettings {
             max_gap_s: config.tracked_max_gap_ms / 1000.0,
             full_every_s: config.tracked_full_every_ms / 1000.0,
         }),
+        orientation: None,
     }
 }
 

@@ -100,6 +100,7 @@ impl View<'_> {
         let message = wire::candidates_to_message(&estimate.candidates, layout.image_size);
         let mut message = message.or_fail(ExitKind::Run)?;
         wire::local_to_message(&mut message, &estimate.local).or_fail(ExitKind::Run)?;
+        wire::front_to_message(&mut message, &estimate.front).or_fail(ExitKind::Run)?;
         let n_values = evidence
             .as_ref()
             .map_or(0, |_| layout.n_values(&estimate.scope));

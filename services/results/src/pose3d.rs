@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::Zeroable as _;
 use messages::{Joint3d, Pose3d, Status};
-use runfiles::{FrameLine, JointLine, PlacedJoint};
+use runfiles::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
 
 use crate::{Absent, FrameRecord, Scene};
 
@@ -42,8 +42,18 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
         joints: joints
             .map(|(name, it)| (name.to_owned(), joint(scene, it)))
             .collect(),
+        kept: Some(match pose.kept {
+            messages::Kept::START => Kept::Start,
+            _ => Kept::Solved,
+        }),
         pairs: pose.n_pairs,
         reason: None,
+        sides: Some(match pose.sides {
+            messages::Sides::SURE => Sides::Sure,
+            messages::Sides::UNSURE => Sides::Unsure,
+            _ => Sides::AsSeen,
+        }),
+        sides_margin: finite(pose.sides_margin),
         status: pose.status.reason().to_owned(),
         time_s: scene.time_s(pose.stamp.frame),
         views_missing: missing
@@ -66,8 +76,11 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         facing_margin: None,
         frame: it.frame,
         joints: BTreeMap::new(),
+        kept: None,
         pairs: 0,
         reason: Some(it.reason.clone()),
+        sides: None,
+        sides_margin: None,
         status: FrameLine::NO_RESULT.to_owned(),
         time_s: scene.time_s(it.frame),
         views_missing: views

@@ -96,6 +96,13 @@ pub(crate) fn pose3d(frame: u64) -> Pose3d {
         views_used: 0b11,
         n_pairs: 1,
         facing_margin: 1.0,
+        sides_margin: 4.0,
+        stature_m: 0.0,
+        body_deviation: 0.0,
+        sides: messages::Sides::SURE,
+        kept: messages::Kept::SOLVED,
+        n_people: 0,
+        reserved: 0,
         joints: [joint; MAX_JOINTS],
         views: [fused; MAX_VIEWS],
     }

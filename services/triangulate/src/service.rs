@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
-use multiview::ViewPlan;
+use multiview::{FrontEvidence, ViewPlan};
 use pipeline::{PairResult, Skeleton, SkeletonStep, ViewResult, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use stage::{Frame, Item, Stage};
@@ -42,7 +42,8 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
     for (view, plan) in job.plans.iter().enumerate() {
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
-            Ok(Input::Candidates(candidates))
+            let front = wire::front_from_message(pose, candidates.len())?;
+            Ok(Input::Candidates(candidates, front))
         })?;
     }
     let pairs = stage.pair_inputs(job.n_workers, job.pairs.len(), |pair| {
@@ -53,7 +54,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let pairs: Vec<PairInput> = (pairs..pairs + job.pairs.len())
             .filter_map(|slot| match frame.take(slot)?.value {
                 Input::Pair(pair) => Some(*pair),
-                Input::Candidates(_) => None,
+                Input::Candidates(..) => None,
             })
             .collect();
         let views = view_answers(frame, n_views, &pairs);
@@ -68,7 +69,8 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
 /// A decoded message.
 #[derive(Debug)]
 enum Input {
-    Candidates(Vec<Pose>),
+    /// With what their pictures say about the direction in which they face.
+    Candidates(Vec<Pose>, Vec<FrontEvidence>),
     Pair(Box<PairInput>),
 }
 
@@ -103,7 +105,7 @@ fn view_answers(
 ) -> Vec<Option<ViewResult>> {
     let answer = |view: usize| {
         let Some(Item {
-            value: Input::Candidates(candidates),
+            value: Input::Candidates(candidates, front),
             ..
         }) = frame.take(view)
         else {
@@ -116,6 +118,7 @@ fn view_answers(
         let latest = of_view.min_by_key(|(age, _)| *age);
         (!candidates.is_empty()).then(|| ViewResult {
             candidates,
+            front,
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
         })

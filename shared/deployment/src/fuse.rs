@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::{Deployment, triangulate};
+
 /// The energy that ties the views together, and its optimiser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -12,8 +14,9 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// `paper`: the paper's; `released`: what the authors' program computes.
     pub energy: Energy,
-    /// `pairs`: pairs of views, then combined, as in the paper; `all`: every view with all others at once.
-    pub views: Views,
+    /// `pairs`: pairs of views, then combined, as in the paper; `all`: every view with all others at once. Without it: `all`
+    /// of 3 to 8 cameras, unless another key is set that pairs alone have (`energy`, `pairs`, `workers`, `combine`).
+    pub views: Option<Views>,
     /// What `parallax train consistency` learned, or `"shipped"`: part-type tables, weights, thresholds, joints.
     pub consistency: Option<PathBuf>,
     /// Rig of that file whose cameras these are; tables go by the angle between two cameras without it.
@@ -48,7 +51,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             energy: Energy::Paper,
-            views: Views::Pairs,
+            views: None,
             consistency: None,
             consistency_rig: None,
             alpha: None,
@@ -66,22 +69,41 @@ impl Default for Config {
     }
 }
 
-impl Config {
-    /// Most processes that have something to do: all views at once are one piece of work.
+/// Most cameras that can be solved at once.
+pub(crate) const MOST_AT_ONCE: usize = 8;
+
+impl Deployment {
+    /// What the views of a frame are solved in: what the file says; else all at once from three cameras on, if nothing is
+    /// asked for that only pairs have.
+    pub fn views(&self) -> Views {
+        let fuse = &self.fuse;
+        let needs_pairs = fuse.energy != Energy::Paper
+            || !fuse.pairs.is_empty()
+            || fuse.workers > 1
+            || self.triangulate.combine != triangulate::Combine::Mean;
+        match fuse.views {
+            Some(views) => views,
+            None if needs_pairs || !(3..=MOST_AT_ONCE).contains(&self.cameras.len()) => {
+                Views::Pairs
+            }
+            None => Views::All,
+        }
+    }
+
+    /// Most fusion processes that have something to do: all views at once are one piece of work.
     pub(crate) fn most_workers(&self) -> usize {
-        match self.views {
-            Views::Pairs => self.workers,
+        match self.views() {
+            Views::Pairs => self.fuse.workers,
             Views::All => 1,
         }
     }
 }
 
 /// What the views of a frame are solved in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
     /// Pairs, whose poses are then combined, as in the paper.
-    #[default]
     Pairs,
     /// All at once, every view supported by all others.
     All,

@@ -50,7 +50,7 @@ pub use ranges::MAX_CORES;
 pub use reference::reference;
 pub use rules::fuse_numbers;
 pub use schema::{Key, schema};
-pub use shipped::{SHIPPED, is_shipped, relative_to};
+pub use shipped::{NONE, SHIPPED, is_none, is_shipped, relative_to};
 pub use topology::{
     Content, Process, RecordingPlan, Replay, Role, Room, Stage, Topology, ViewSize,
 };
@@ -207,6 +207,9 @@ impl Deployment {
         let may_ship = [&mut quality.network, &mut self.fuse.consistency];
         for file in may_ship.into_iter().flatten() {
             *file = relative_to(file, base);
+        }
+        if !is_none(&self.pose.orientation) {
+            self.pose.orientation = relative_to(&self.pose.orientation, base);
         }
         if let fuse::Tau::File(tau) = &mut self.fuse.tau {
             tau.file = base.join(&tau.file);

@@ -1,7 +1,11 @@
 //! Section `[pose]` of a deployment file.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::shipped::SHIPPED;
 
 /// The single-view solver, and what it hands on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,6 +18,9 @@ pub struct Config {
     pub candidates: usize,
     /// Least mean distance of two candidates' parts, in box sides.
     pub min_separation: f64,
+    /// What tells from the picture in which direction a person faces, for left and right: a file that
+    /// `parallax train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
+    pub orientation: PathBuf,
     /// Threads of one pose process.
     pub threads: usize,
     /// `f32`: the same bits everywhere; `bf16`: faster and less exact, needs a processor with AMX.
@@ -66,6 +73,7 @@ impl Default for Config {
             evidence_window: Window::All(All::All),
             candidates: 8,
             min_separation: 1.0,
+            orientation: PathBuf::from(SHIPPED),
             threads: 1,
             precision: Precision::F32,
             search: Search::Full,

@@ -5,9 +5,6 @@ use crate::older::OLDER;
 use crate::topology::{process_name, services};
 use crate::{Deployment, Machine, capture, fuse, limits, pose, quality, triangulate};
 
-/// Most cameras that can be solved at once: the starts that are tried double with every one.
-const MOST_AT_ONCE: usize = 8;
-
 /// Checks the values that the types alone do not.
 pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     name(&it.name)?;
@@ -208,15 +205,18 @@ fn fuse(deployment: &Deployment) -> Result<(), Complaint> {
 /// What has no meaning where all views are solved at once.
 fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
     let it = &deployment.fuse;
-    if it.views == fuse::Views::Pairs {
+    if deployment.views() == fuse::Views::Pairs {
         return Ok(());
     }
     let n_views = deployment.cameras.len();
     demand(
-        n_views <= MOST_AT_ONCE,
+        n_views <= fuse::MOST_AT_ONCE,
         "fuse.views",
         &format!("\"all\" of {n_views} cameras"),
-        &format!("at most {MOST_AT_ONCE} cameras at once, or \"pairs\""),
+        &format!(
+            "at most {} cameras at once, or \"pairs\"",
+            fuse::MOST_AT_ONCE
+        ),
     )?;
     demand(
         it.energy == fuse::Energy::Paper,

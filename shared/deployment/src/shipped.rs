@@ -1,4 +1,4 @@
-//! The word that names a file which is built into Parallax.
+//! The words that stand for a file which is built into Parallax, and for no file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,14 @@ pub const SHIPPED: &str = "shipped";
 /// Whether a name is that of a file that ships.
 pub fn is_shipped(file: &Path) -> bool {
     file == Path::new(SHIPPED)
+}
+
+/// The word that stands for no file, where there is one without it; `./none` is a file of that name.
+pub const NONE: &str = "none";
+
+/// Whether a name stands for no file.
+pub fn is_none(file: &Path) -> bool {
+    file == Path::new(NONE)
 }
 
 /// A name with relative paths taken as relative to `base`.

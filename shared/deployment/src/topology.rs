@@ -69,7 +69,7 @@ pub(crate) fn services(deployment: &Deployment) -> Vec<(&'static str, usize)> {
     let n_views = deployment.cameras.len();
     let of_stage = |stage: Stage| match stage {
         Stage::Capture | Stage::Pose | Stage::Quality => n_views,
-        Stage::Fuse => deployment.fuse.most_workers(),
+        Stage::Fuse => deployment.most_workers(),
         Stage::Triangulate => 0,
     };
     let stages = Stage::ALL.map(|it| (it.name(), of_stage(it)));
@@ -157,7 +157,7 @@ impl Topology {
         let pairs = pairs(deployment);
         let mut topology = Self {
             processes: Vec::new(),
-            n_workers: deployment.fuse.most_workers().min(pairs.len()),
+            n_workers: deployment.most_workers().min(pairs.len()),
             n_views: deployment.cameras.len(),
             pairs,
         };
@@ -371,7 +371,7 @@ fn process(
 /// The pairs of views that are fused, ascending.
 fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
     let n_views = deployment.cameras.len();
-    if deployment.fuse.views == fuse::Views::All {
+    if deployment.views() == fuse::Views::All {
         return (1..n_views).map(|view| [view - 1, view]).collect();
     }
     let mut pairs: Vec<[usize; 2]> = if deployment.fuse.pairs.is_empty() {

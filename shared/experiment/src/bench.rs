@@ -123,7 +123,7 @@ impl Bench {
             .iter()
             .map(|it| {
                 let layout = Arc::new(it.layout().clone());
-                ViewStep::new(Arc::clone(&setup.model), layout, setup.view)
+                ViewStep::new(Arc::clone(&setup.model), layout, setup.view.clone())
             })
             .collect::<Result<_, _>>()?;
         let responses = views.iter().map(|it| vec![0.0; it.layout().n_responses()]);
@@ -209,6 +209,7 @@ impl Bench {
             let expected = expected(&single);
             Some(ViewResult {
                 candidates: it.candidates.clone(),
+                front: it.front.clone(),
                 tau_px: expected.as_ref().and_then(|it| it.tau.clone()),
                 sigma_px: expected.map(|it| it.sigma),
             })

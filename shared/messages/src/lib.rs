@@ -25,7 +25,7 @@ pub use metrics::{
     Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
 };
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
-pub use pose3d::{FusedView, Joint3d, Pose3d};
+pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
 pub use quality::ViewQuality;
 pub use refusal::Refusal;
 pub use stamp::{Stamp, Status, Timing};
@@ -48,12 +48,12 @@ const _: () = {
     assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
-    assert!(size_of::<ViewPose>() == 1808);
+    assert!(size_of::<ViewPose>() == 1872);
     assert!(size_of::<ViewQuality>() == 344);
     assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
-    assert!(size_of::<Pose3d>() == 11600);
+    assert!(size_of::<Pose3d>() == 11640);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
     assert!(size_of::<Metrics>() == 176 + MAX_ROWS * 56);

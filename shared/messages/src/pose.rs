@@ -64,7 +64,7 @@ impl Searched {
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v3")]
+#[type_name("ViewPose.v4")]
 #[repr(C)]
 pub struct ViewPose {
     /// The frame and the view.
@@ -89,6 +89,10 @@ pub struct ViewPose {
     pub candidates: [PoseMessage; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
     pub local: [LocalMessage; MAX_PARTS],
+    /// What the picture says about the direction in which the person of every candidate faces:
+    /// `multiview::FrontEvidence`, `[towards the right of the picture, towards the camera]`; zeros where
+    /// there is no evidence.
+    pub front: [[f32; 2]; MAX_CANDIDATES],
 }
 
 /// The result of a pair of views under one assumption about facing.

@@ -44,9 +44,58 @@ pub struct FusedView {
     pub single_score: f64,
 }
 
+/// Whether left and right of a skeleton are decided. A transparent number, as [`Status`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
+#[type_name("Sides.v1")]
+#[repr(C)]
+pub struct Sides(pub u32);
+
+impl Sides {
+    /// Nothing was decided: left and right are those of the pictures.
+    pub const AS_SEEN: Self = Self(0);
+    /// They are decided.
+    pub const SURE: Self = Self(1);
+    /// They are decided, but too little speaks for it.
+    pub const UNSURE: Self = Self(2);
+
+    /// The name for people and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AS_SEEN => "as seen",
+            Self::SURE => "sure",
+            Self::UNSURE => "unsure",
+            Self(_) => "unknown",
+        }
+    }
+}
+
+/// Which poses the skeleton was triangulated from. A transparent number, as [`Status`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
+#[type_name("Kept.v1")]
+#[repr(C)]
+pub struct Kept(pub u32);
+
+impl Kept {
+    /// Those that fusion solved for.
+    pub const SOLVED: Self = Self(0);
+    /// The single-view poses that fusion started from: they agree better.
+    pub const START: Self = Self(1);
+
+    /// The name for people and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SOLVED => "solved",
+            Self::START => "start",
+            Self(_) => "unknown",
+        }
+    }
+}
+
 /// The skeleton of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Pose3d.v1")]
+#[type_name("Pose3d.v2")]
 #[repr(C)]
 pub struct Pose3d {
     /// The frame; `view` is 0.
@@ -65,9 +114,23 @@ pub struct Pose3d {
     pub views_used: u32,
     /// Number of pairs with a result.
     pub n_pairs: u32,
-    /// How certain the decision about left and right is: energy of the chosen assignment minus that
-    /// of the best other one.
+    /// How certain it is which views see the person from the same side: energy of the chosen assignment
+    /// minus that of the best other one.
     pub facing_margin: f64,
+    /// How certain it is that left and right are not exchanged in all views: log-odds, nats.
+    pub sides_margin: f64,
+    /// Height of the person standing upright, by the lengths of the bones, metres; 0 if it is not known.
+    pub stature_m: f64,
+    /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
+    pub body_deviation: f64,
+    /// Whether the margin of the sides is enough.
+    pub sides: Sides,
+    /// Whether the poses are those that fusion solved for.
+    pub kept: Kept,
+    /// Number of people that several views agree on; 0 if it was not counted.
+    pub n_people: u32,
+    /// Explicit padding.
+    pub reserved: u32,
     /// The joints.
     pub joints: [Joint3d; MAX_JOINTS],
     /// The views.

@@ -62,6 +62,9 @@ impl Status {
     /// The picture cannot be decoded.
     pub const DAMAGED: Self = Self(14);
 
+    /// The body that was found is none that a person can have.
+    pub const IMPLAUSIBLE: Self = Self(15);
+
     /// Camera faults: all reasons for a frame without a picture that a camera itself can cause.
     pub const CAMERA_FAULTS: [Self; 9] = [
         Self::NO_FRAME,
@@ -94,6 +97,7 @@ impl Status {
             Self::UNPLUGGED => "camera gone",
             Self::LEFT_OUT => "left out by the camera",
             Self::DAMAGED => "damaged picture",
+            Self::IMPLAUSIBLE => "implausible",
             Self(_) => "unknown",
         }
     }

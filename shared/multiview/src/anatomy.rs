@@ -8,20 +8,17 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
+use crate::front::{L_HIP, L_SHOULDER, NECK, R_HIP, R_SHOULDER, front, trunk};
+
 /// Indices of the PARSE joints that the evidence uses.
 const R_ANKLE: usize = 0;
 const R_KNEE: usize = 1;
-const R_HIP: usize = 2;
-const L_HIP: usize = 3;
 const L_KNEE: usize = 4;
 const L_ANKLE: usize = 5;
 const R_WRIST: usize = 6;
 const R_ELBOW: usize = 7;
-const R_SHOULDER: usize = 8;
-const L_SHOULDER: usize = 9;
 const L_ELBOW: usize = 10;
 const L_WRIST: usize = 11;
-const NECK: usize = 12;
 const HEAD: usize = 13;
 
 /// Evidence that left and right of a labelled skeleton are correct, in trunk lengths.
@@ -39,26 +36,23 @@ pub fn anatomical_evidence(
 ) -> f64 {
     let at = |joint: usize| joints.get(joint).copied().flatten();
     let middle = |a: usize, b: usize| Some(nalgebra::center(&at(a)?, &at(b)?));
-    let across = |right: usize, left: usize| Some(at(left)? - at(right)?);
-    let sides = [across(R_SHOULDER, L_SHOULDER), across(R_HIP, L_HIP)];
-    let left: Vector3<f64> = sides.into_iter().flatten().sum();
-    let (Some(neck), Some(pelvis)) = (at(NECK), middle(R_HIP, L_HIP)) else {
+    let (Some(trunk), Some(front)) = (trunk(joints), front(joints)) else {
         return 0.0;
     };
-    let trunk = neck - pelvis;
     let length = trunk.norm();
-    let Some(front) = left.cross(&trunk).try_normalize(1e-9) else {
-        return 0.0;
-    };
+    let neck = at(NECK);
     let ahead = |joint: usize, from: Option<Point3<f64>>| {
         at(joint)
             .zip(from)
             .map_or(0.0, |(joint, from)| (joint - from).dot(&front))
     };
+    let across = |right: usize, left: usize| Some(at(left)? - at(right)?);
+    let sides = [across(R_SHOULDER, L_SHOULDER), across(R_HIP, L_HIP)];
+    let left: Vector3<f64> = sides.into_iter().flatten().sum();
     let lean = up_in_world
         .and_then(|up| left.cross(&up).try_normalize(1e-9))
         .map_or(0.0, |front| trunk.dot(&front));
-    let sum = ahead(HEAD, Some(neck))
+    let sum = ahead(HEAD, neck)
         + ahead(R_KNEE, middle(R_HIP, R_ANKLE))
         + ahead(L_KNEE, middle(L_HIP, L_ANKLE))
         - ahead(R_ELBOW, middle(R_SHOULDER, R_WRIST))

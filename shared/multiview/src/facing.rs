@@ -64,16 +64,13 @@ pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
     exchanges >> view & 1 == 1
 }
 
-/// One assignment of a frame, with its evidence.
+/// One assignment of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingHypothesis {
     /// Exchanges with respect to the first view.
     pub exchanges: Exchanges,
     /// Energy of all views under it.
     pub energy: f64,
-    /// Evidence that the labelled skeleton is anatomically correct under it; that of the complement
-    /// is its negative (see [`anatomical_evidence`](crate::anatomical_evidence)).
-    pub anatomy: f64,
 }
 
 /// How strongly the facing of a frame depends on the frame before.
@@ -84,8 +81,6 @@ pub struct FacingSettings {
     /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves it in 34
     /// frames: people face one way for longer than a stoop or a stride takes.
     pub memory: f64,
-    /// Energy per unit of anatomical evidence.
-    pub anatomy_weight: f64,
 }
 
 impl Default for FacingSettings {
@@ -93,7 +88,6 @@ impl Default for FacingSettings {
         Self {
             change_cost: 1.0,
             memory: 0.98,
-            anatomy_weight: 1.0,
         }
     }
 }
@@ -101,19 +95,20 @@ impl Default for FacingSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
-    /// Which views see the person from behind.
+    /// Which views see the person from another side than the first one.
     pub exchanges: Exchanges,
     /// The index of the hypothesis that it belongs to.
     pub hypothesis: usize,
-    /// How far it is ahead of the best assignment with other agreements between views; infinite if
-    /// there is none.
+    /// How far it is ahead of the best other assignment; infinite if there is none.
     pub margin: f64,
 }
 
-/// Tracks the facing of all views over time: a hidden Markov model with a Viterbi filter.
+/// Tracks over time which views see the person from the same side: a hidden Markov model with a Viterbi
+/// filter. An assignment and its complement are the same here: [`SidesFilter`](crate::SidesFilter)
+/// decides between them.
 ///
 /// The score of an assignment is its score in this frame plus the best score of a path from the
-/// frame before, where every exchanged view has a cost. The first frame is decided by its own
+/// frame before, where every view that changes has a cost. The first frame is decided by its own
 /// energies alone.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FacingFilter {
@@ -135,45 +130,32 @@ impl FacingFilter {
         hypotheses: &[FacingHypothesis],
         present: Exchanges,
     ) -> Facing {
-        let mut scored: Vec<(usize, Exchanges, f64)> = Vec::with_capacity(2 * hypotheses.len());
-        for (i, hypothesis) in hypotheses.iter().enumerate() {
-            let anatomy = settings.anatomy_weight * hypothesis.anatomy;
-            let complement = !hypothesis.exchanges & present;
-            for (exchanges, own) in [
-                (hypothesis.exchanges, hypothesis.energy + anatomy),
-                (complement, hypothesis.energy - anatomy),
-            ] {
-                let score = own + self.best_path(settings, exchanges, present);
-                scored.push((i, exchanges, score));
-            }
-        }
-        assert!(!scored.is_empty(), "at least one hypothesis");
-        let (hypothesis, exchanges, top) =
-            scored
-                .iter()
-                .copied()
-                .fold((0, 0, f64::NEG_INFINITY), |best, next| {
-                    if next.2 > best.2 { next } else { best }
-                });
-        let runner_up = scored
-            .iter()
-            .filter(|scored| scored.0 != hypothesis)
-            .map(|scored| scored.2)
-            .fold(f64::NEG_INFINITY, f64::max);
-        self.scores = scored
-            .iter()
-            .map(|scored| (scored.1, scored.2 - top))
-            .collect();
+        assert!(!hypotheses.is_empty(), "at least one hypothesis");
+        let score = |it: &FacingHypothesis| {
+            let path = self.best_path(settings, it.exchanges, present);
+            (it.exchanges, it.energy + path)
+        };
+        let scored: Vec<(Exchanges, f64)> = hypotheses.iter().map(score).collect();
+        let better = |best: (usize, f64), (i, next): (usize, &(Exchanges, f64))| {
+            if next.1 > best.1 { (i, next.1) } else { best }
+        };
+        let all = scored.iter().enumerate();
+        let (hypothesis, top) = all.fold((0, f64::NEG_INFINITY), better);
+        let others = scored.iter().enumerate().filter(|it| it.0 != hypothesis);
+        let runner_up = others.map(|it| it.1.1).fold(f64::NEG_INFINITY, f64::max);
+        self.scores = scored.iter().map(|it| (it.0, it.1 - top)).collect();
         Facing {
-            exchanges,
+            exchanges: scored[hypothesis].0,
             hypothesis,
             margin: top - runner_up,
         }
     }
 
     fn best_path(&self, settings: &FacingSettings, to: Exchanges, present: Exchanges) -> f64 {
+        let n = present.count_ones();
         let from = |&(exchanges, score): &(Exchanges, f64)| {
             let changed = ((exchanges ^ to) & present).count_ones();
+            let changed = changed.min(n - changed);
             settings.memory * score - settings.change_cost * f64::from(changed)
         };
         let best = self
@@ -196,12 +178,8 @@ mod tests {
         }
     }
 
-    fn hypothesis(exchanges: Exchanges, energy: f64, anatomy: f64) -> FacingHypothesis {
-        FacingHypothesis {
-            exchanges,
-            energy,
-            anatomy,
-        }
+    fn hypothesis(exchanges: Exchanges, energy: f64) -> FacingHypothesis {
+        FacingHypothesis { exchanges, energy }
     }
 
     #[test]
@@ -242,49 +220,42 @@ mod tests {
     }
 
     #[test]
-    fn anatomy_distinguishes_an_assignment_from_its_complement() {
+    fn an_assignment_alone_has_no_rival() {
         let mut filter = FacingFilter::default();
-        let settings = FacingSettings::default();
-        let got = filter.decide(&settings, &[hypothesis(0b010, 1.0, -0.3)], 0b011);
-        assert_eq!(got.exchanges, 0b001);
-        assert_eq!(got.margin, f64::INFINITY);
+        let got = filter.decide(&FacingSettings::default(), &[hypothesis(0b010, 1.0)], 0b011);
+        assert_eq!((got.exchanges, got.margin), (0b010, f64::INFINITY));
     }
 
     #[test]
     fn the_previous_frame_breaks_a_near_tie() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
-        let clear = [hypothesis(0b000, 2.0, 0.2), hypothesis(0b010, 0.0, 0.0)];
+        let clear = [hypothesis(0b000, 2.0), hypothesis(0b010, 0.0)];
         assert_eq!(filter.decide(&settings, &clear, 0b011).exchanges, 0b000);
-        let unclear = [hypothesis(0b000, 1.0, 0.1), hypothesis(0b010, 1.1, 0.1)];
+        let unclear = [hypothesis(0b000, 1.0), hypothesis(0b010, 1.1)];
         assert_eq!(filter.decide(&settings, &unclear, 0b011).exchanges, 0b000);
         let alone = FacingFilter::default().decide(&settings, &unclear, 0b011);
         assert_eq!(alone.exchanges, 0b010);
     }
 
     #[test]
-    fn a_person_turning_round_is_followed() {
+    fn an_assignment_and_its_complement_are_the_same() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
-        let front = [hypothesis(0b00, 1.0, 0.5)];
-        let back = [hypothesis(0b00, 1.0, -0.5)];
-        for _ in 0..5 {
-            assert_eq!(filter.decide(&settings, &front, 0b11).exchanges, 0b00);
-        }
-        let n_held = (0..30)
-            .take_while(|_| filter.decide(&settings, &back, 0b11).exchanges == 0b00)
-            .count();
-        assert!((1..30).contains(&n_held), "held for {n_held} frames");
+        let first = [hypothesis(0b011, 2.0), hypothesis(0b010, 0.0)];
+        filter.decide(&settings, &first, 0b111);
+        let then = [hypothesis(0b010, 1.1), hypothesis(0b100, 1.0)];
+        assert_eq!(filter.decide(&settings, &then, 0b111).exchanges, 0b100);
     }
 
     #[test]
     fn a_missing_view_does_not_count_as_a_change() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
-        let all = [hypothesis(0b110, 2.0, 0.2), hypothesis(0b000, 0.0, 0.2)];
+        let all = [hypothesis(0b110, 2.0), hypothesis(0b000, 0.0)];
         assert_eq!(filter.decide(&settings, &all, 0b111).exchanges, 0b110);
         // Without view 1 the same state is 0b100.
-        let without = [hypothesis(0b100, 1.0, 0.1), hypothesis(0b000, 1.0, 0.1)];
+        let without = [hypothesis(0b100, 1.0), hypothesis(0b000, 1.0)];
         assert_eq!(filter.decide(&settings, &without, 0b101).exchanges, 0b100);
     }
 }

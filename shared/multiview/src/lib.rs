@@ -125,6 +125,8 @@ mod start;
 mod anatomy;
 mod angle;
 mod compatibility;
+mod front;
+mod sides;
 
 pub use all_views::{AllViewsEstimate, AllViewsInput, AllViewsStart, estimate_all_views};
 pub use anatomy::anatomical_evidence;
@@ -136,10 +138,12 @@ pub use facing::{
     Exchanges, Facing, FacingFilter, FacingHypothesis, FacingSettings, PairEnergies, is_exchanged,
     rank_facing,
 };
+pub use front::{FrontEvidence, front, front_in_view, front_log_ratio};
 pub use heat_map::heat_map;
 pub use optimise::{Iteration, PairEstimate, PairStart, estimate_pair};
 pub use pair::PairInput;
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
+pub use sides::{Sides, SidesFilter, SidesSettings};
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;
 pub use view::{ViewInput, ViewPlan};

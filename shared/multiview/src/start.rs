@@ -7,6 +7,9 @@ use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
 /// Up to this number of joint states the search is exhaustive.
 const MAX_STATES: usize = 200_000;
 
+/// Up to this number of views besides the first every assumption about facing is tried.
+const MAX_FREE: usize = 6;
+
 /// The joint start of all views of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
@@ -43,7 +46,8 @@ pub fn choose_start<'a>(
 /// The best start under every assumption about which views see the person from behind, highest
 /// energy first.
 ///
-/// There are `2^(n - 1)` of them for `n` views if `facing` is to be decided, else one. Equals are
+/// There are `2^(n - 1)` of them for `n` views if `facing` is to be decided, else one. Of more than
+/// seven views only the assumption of [`choose_start`] is tried, and those that differ from it in one view. Equals are
 /// ordered by the binary number with bit `v - 1` for view `v`.
 pub fn rank_starts<'a>(
     settings: &Settings,
@@ -71,7 +75,20 @@ pub fn rank_starts<'a>(
         });
         best_of(settings, views, tables, &states.collect::<Vec<_>>())
     };
-    let mut starts: Vec<Start> = (0..1 << n_free).map(start).collect();
+    let patterns: Vec<usize> = if n_free <= MAX_FREE {
+        (0..1 << n_free).collect()
+    } else {
+        let best = choose_start(settings, views, tables).exchanged;
+        let flipped = best.iter().skip(1).enumerate();
+        let best = flipped.fold(0, |pattern, (bit, it)| pattern | usize::from(*it) << bit);
+        // The first view alone is never exchanged: all others are, in its place.
+        let all = (1 << n_free) - 1;
+        let one = (0..n_free).map(|bit| best ^ 1 << bit);
+        let mut some: Vec<usize> = one.chain([best, best ^ all]).collect();
+        some.sort_unstable();
+        some
+    };
+    let mut starts: Vec<Start> = patterns.into_iter().map(start).collect();
     starts.sort_by(|a, b| b.energy.total_cmp(&a.energy));
     starts
 }

@@ -7,6 +7,7 @@
 //! * [`person`]: a model that finds people, from annotated people.
 //! * [`consistency`]: what several views of a person have in common, from sequences with truth.
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
+//! * [`orientation`]: the network that tells the direction in which a person faces.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`examples`]: what a model takes for each type of its parts.
@@ -18,6 +19,8 @@ mod console;
 mod failures;
 mod interrupt;
 mod memory;
+mod scenes;
+mod searches;
 
 pub mod images;
 
@@ -25,6 +28,7 @@ pub mod consistency;
 pub mod eval;
 pub mod examples;
 pub mod judged;
+pub mod orientation;
 pub mod person;
 pub mod pictures;
 pub mod quality;

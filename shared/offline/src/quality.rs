@@ -6,7 +6,6 @@ pub mod samples;
 
 mod observer;
 mod replace;
-mod scenes;
 mod work;
 
-pub use scenes::Scenes;
+pub use crate::scenes::Scenes;

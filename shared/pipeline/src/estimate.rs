@@ -85,7 +85,7 @@ impl Estimator {
             .iter()
             .map(|plan| {
                 let layout = Arc::new(plan.layout().clone());
-                ViewStep::new(Arc::clone(model), layout, settings.view)
+                ViewStep::new(Arc::clone(model), layout, settings.view.clone())
             })
             .collect::<Result<_, _>>()?;
         Ok(Self {
@@ -146,6 +146,7 @@ impl Estimator {
                 step.update(tracker, frame, &estimate);
                 let answer = (!estimate.candidates.is_empty()).then(|| ViewResult {
                     candidates: estimate.candidates.clone(),
+                    front: estimate.front.clone(),
                     sigma_px: sigma_px.get(view).cloned().flatten(),
                     tau_px: None,
                 });

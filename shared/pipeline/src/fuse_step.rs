@@ -5,16 +5,24 @@ use std::sync::Arc;
 
 use fmp::{Model, Pose, Responses, Solver};
 use multiview::{
-    AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, PairEstimate, PairInput,
-    PairStart, Settings, Start, TypeTables, ViewInput, ViewPlan, angle_between, choose_start,
-    estimate_all_views, estimate_pair, rank_starts,
+    AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, Exchanges,
+    FrontEvidence, PairEstimate, PairInput, PairStart, Settings, Start, TypeTables, ViewInput,
+    ViewPlan, angle_between, choose_start, estimate_all_views, estimate_pair, is_exchanged,
+    rank_starts,
 };
+
+use crate::fused_view::{Candidate, FusedView};
+use crate::skeleton_settings::SkeletonSettings;
+use crate::space::Space;
 
 /// The single-view result of one frame, besides its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewResult {
     /// Distinct poses, best first; never empty.
     pub candidates: Vec<Pose>,
+    /// What the picture says about the direction in which the person of every candidate faces; empty
+    /// without a detector of it.
+    pub front: Vec<FrontEvidence>,
     /// Expected error of every part, pixels of the frame, if there is a prediction.
     pub sigma_px: Option<Vec<f32>>,
     /// Thresholds that came with the prediction, pixels of the frame; used where the settings have
@@ -46,6 +54,7 @@ pub struct FuseStep {
     settings: Settings,
     plans: Vec<Arc<ViewPlan>>,
     tables: PairTables,
+    space: Space,
 }
 
 /// The result of a pair: one estimate per assumption about facing.
@@ -57,6 +66,9 @@ pub struct PairResult {
     pub hypotheses: Vec<PairEstimate>,
 }
 
+/// Number of assumptions about facing, those of the highest energies, that are judged in space.
+const N_RANKED: usize = 32;
+
 /// Number of assumptions about facing that are tried with all views at once; the message of a pair
 /// has room for as many.
 const N_STARTS: usize = 2;
@@ -65,9 +77,9 @@ const N_STARTS: usize = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Views {
     /// In pairs, whose poses are then combined: the paper's method.
-    #[default]
     Pairs,
     /// All at once; each view is supported by the mean of the terms of all others.
+    #[default]
     All,
 }
 
@@ -95,6 +107,8 @@ pub struct AllViewsHypothesis {
     /// Whether left and right of each view were assumed to be exchanged with respect to the first
     /// view.
     pub exchanged: Vec<bool>,
+    /// The candidate of each view from which it started.
+    pub candidates: Vec<usize>,
     /// The result, by index into the views.
     pub estimate: AllViewsEstimate,
 }
@@ -111,6 +125,8 @@ impl AllViewsResult {
         self.views = kept.iter().map(|idx| self.views[*idx]).collect();
         for hypothesis in &mut self.hypotheses {
             hypothesis.exchanged = kept.iter().map(|idx| hypothesis.exchanged[*idx]).collect();
+            let candidates = kept.iter().map(|idx| hypothesis.candidates[*idx]);
+            hypothesis.candidates = candidates.collect();
             let poses = &hypothesis.estimate.poses;
             hypothesis.estimate.poses = kept.iter().map(|idx| poses[*idx].clone()).collect();
         }
@@ -128,11 +144,17 @@ impl FuseStep {
         plans: Vec<Arc<ViewPlan>>,
         tables: PairTables,
     ) -> Self {
+        let space = Space {
+            plans: plans.clone(),
+            up_in_world: None,
+            settings: SkeletonSettings::default(),
+        };
         Self {
             solver: Solver::new(model),
             settings,
             plans,
             tables,
+            space,
         }
     }
 
@@ -266,8 +288,8 @@ impl FuseStep {
                 Support::Mean => 1.0 / (present.len() - 1) as f64,
             },
         };
-        let mut starts = rank_starts(&self.settings, &views, input.tables);
-        starts.truncate(N_STARTS);
+        let starts = rank_starts(&self.settings, &views, input.tables);
+        let starts = self.most_likely(starts, &present, answers);
         let solve = |start: Start| {
             let from = AllViewsStart {
                 candidates: &start.candidates,
@@ -276,12 +298,63 @@ impl FuseStep {
             AllViewsHypothesis {
                 estimate: estimate_all_views(&self.solver, &self.settings, &input, &evidence, from),
                 exchanged: start.exchanged,
+                candidates: start.candidates,
             }
         };
         Some(AllViewsResult {
             hypotheses: starts.into_iter().map(solve).collect(),
             views: present,
         })
+    }
+
+    /// The best starts by their energies, the agreement of the views in space, and what the views see of the front.
+    ///
+    /// * `starts`: highest energy first.
+    fn most_likely(
+        &self,
+        mut starts: Vec<Start>,
+        present: &[usize],
+        answers: &[Option<ViewResult>],
+    ) -> Vec<Start> {
+        starts.truncate(N_RANKED);
+        if starts.len() > N_STARTS && self.space.can_exchange() {
+            let score = |start: &Start| {
+                let views = self.start_views(start, present, answers);
+                // A start's energy counts every view once for each other view.
+                let of_one = start.energy / (present.len() - 1).max(1) as f64;
+                of_one + self.space.judge(answers, &views).score
+            };
+            let mut scored: Vec<(f64, Start)> =
+                starts.into_iter().map(|it| (score(&it), it)).collect();
+            scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+            starts = scored.into_iter().map(|it| it.1).collect();
+        }
+        starts.truncate(N_STARTS);
+        starts
+    }
+
+    /// The candidates of a start, parts named by the side of the body; one entry for each view of the rig.
+    fn start_views(
+        &self,
+        start: &Start,
+        present: &[usize],
+        answers: &[Option<ViewResult>],
+    ) -> Vec<Option<FusedView>> {
+        let exchanges = present
+            .iter()
+            .zip(&start.exchanged)
+            .fold(0, |mask, (view, it)| mask | Exchanges::from(*it) << view);
+        let mut views = vec![None; self.plans.len()];
+        for (&view, &candidate) in present.iter().zip(&start.candidates) {
+            let pose = answers[view].as_ref().map(|it| &it.candidates[candidate]);
+            views[view] = pose.map(|pose| {
+                let mirror = self.space.mirror(view, exchanges);
+                let start =
+                    Candidate::of_pose(pose, f64::from(pose.score), &self.plans[view], mirror);
+                start.alone(is_exchanged(exchanges, view))
+            });
+        }
+        views
     }
 
     fn view_answer<'a>(&'a self, view: usize, answer: &'a ViewResult) -> ViewInput<'a> {

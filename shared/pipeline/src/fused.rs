@@ -57,12 +57,7 @@ impl<'a> Fused<'a> {
                 pairs.iter().filter_map(of_pair).collect()
             }
             Self::AllViews(result) => {
-                let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
-                let fits = |hypothesis: &&AllViewsHypothesis| {
-                    [exchanged & all, !exchanged & all].contains(&exchanges(result, hypothesis))
-                };
-                let chosen = result.hypotheses.iter().find(fits);
-                let chosen = chosen.or_else(|| result.hypotheses.first());
+                let chosen = of_facing(result, exchanged);
                 let idx = result.views.iter().position(|other| *other == view);
                 let pose = |(hypothesis, idx): (&'a AllViewsHypothesis, usize)| {
                     (hypothesis.estimate.energy, &hypothesis.estimate.poses[idx])
@@ -71,6 +66,33 @@ impl<'a> Fused<'a> {
             }
         }
     }
+}
+
+impl Fused<'_> {
+    /// The candidate of a view from which fusion started, under an assumption about facing; `None` for a
+    /// view that was not fused.
+    pub(crate) fn start(&self, view: usize, exchanged: Exchanges) -> Option<usize> {
+        match self {
+            Self::Pairs(pairs) => pairs.iter().find_map(|pair| {
+                let side = pair.views.iter().position(|other| *other == view)?;
+                Some(chosen(pair, exchanged)?.start.candidates[side])
+            }),
+            Self::AllViews(result) => {
+                let idx = result.views.iter().position(|other| *other == view)?;
+                Some(of_facing(result, exchanged)?.candidates[idx])
+            }
+        }
+    }
+}
+
+/// The hypothesis of an assumption about facing or of its complement, else the best one.
+fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsHypothesis> {
+    let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
+    let fits = |hypothesis: &&AllViewsHypothesis| {
+        [exchanged & all, !exchanged & all].contains(&exchanges(result, hypothesis))
+    };
+    let chosen = result.hypotheses.iter().find(fits);
+    chosen.or_else(|| result.hypotheses.first())
 }
 
 /// The views that a hypothesis assumes to be exchanged with respect to the first.
@@ -116,6 +138,7 @@ mod tests {
     fn result() -> AllViewsResult {
         let hypothesis = |exchanged: [bool; 3], energy: f64, x: u16| AllViewsHypothesis {
             exchanged: exchanged.to_vec(),
+            candidates: vec![0; 3],
             estimate: AllViewsEstimate {
                 energy,
                 iterations: Vec::new(),

@@ -6,7 +6,10 @@
 
 mod fuse_step;
 mod fused;
+mod fused_view;
+mod skeleton_settings;
 mod skeleton_step;
+mod space;
 mod view_step;
 
 mod estimate;
@@ -16,5 +19,7 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, ViewResult,
     Views, all_pairs,
 };
-pub use skeleton_step::{Combine, FusedView, Skeleton, SkeletonSettings, SkeletonStep};
+pub use fused_view::FusedView;
+pub use skeleton_settings::{Combine, SkeletonSettings};
+pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -1,13 +1,15 @@
 //! The single-view step: pixels in, candidates and evidence out.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fmp::{
     Bounds, Extractor, FrameTime, Layout, LocalScore, Model, Pose, Precision, Responses, Scope,
     Solver, TrackSettings, Tracker, local_scores,
 };
 use kernels::{NoAmx, Rgb8View};
+use multiview::FrontEvidence;
+use orientation::Detector;
 
 /// Which levels of the pyramid a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,7 +36,7 @@ impl EvidenceWindow {
 }
 
 /// Settings of the single-view step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ViewSettings {
     /// Levels offered as evidence.
     pub window: EvidenceWindow,
@@ -46,6 +48,8 @@ pub struct ViewSettings {
     pub precision: Precision,
     /// How poses are tracked from frame to frame; without it every frame is searched in full.
     pub track: Option<TrackSettings>,
+    /// What tells in which direction a person faces; without it nothing does.
+    pub orientation: Option<Arc<Detector>>,
 }
 
 impl Default for ViewSettings {
@@ -56,6 +60,7 @@ impl Default for ViewSettings {
             min_separation: 1.0,
             precision: Precision::F32,
             track: None,
+            orientation: None,
         }
     }
 }
@@ -65,6 +70,9 @@ impl Default for ViewSettings {
 pub struct ViewEstimate {
     /// Distinct poses, best first.
     pub candidates: Vec<Pose>,
+    /// What the picture says about the direction in which the person of every candidate faces; empty: nothing was
+    /// asked.
+    pub front: Vec<FrontEvidence>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
     /// How well each part of the best pose fits at its position; empty without a pose.
@@ -82,6 +90,7 @@ pub struct ViewStep {
     solver: Solver,
     layout: Arc<Layout>,
     settings: ViewSettings,
+    looking: Mutex<orientation::Workspace>,
 }
 
 impl ViewStep {
@@ -100,6 +109,7 @@ impl ViewStep {
             solver: Solver::new(model),
             layout,
             settings,
+            looking: Mutex::default(),
         })
     }
 
@@ -137,12 +147,30 @@ impl ViewStep {
         let local = best.map(|pose| local_scores(self.solver.model(), &evidence, pose));
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
+            front: self.front(image, &candidates),
             candidates,
             local: local.unwrap_or_default(),
             levels,
             bounds,
             scope,
         }
+    }
+
+    /// In which direction the person of every candidate faces; nothing without a detector.
+    fn front(&self, image: Rgb8View<'_>, candidates: &[Pose]) -> Vec<FrontEvidence> {
+        let Some(detector) = &self.settings.orientation else {
+            return Vec::new();
+        };
+        let mut workspace = self.looking.lock().unwrap_or_else(PoisonError::into_inner);
+        let (model, layout) = (self.solver.model(), &*self.layout);
+        let mut of_candidate = |pose: &Pose| {
+            let bounds = pose.bounding_box(model, layout);
+            match orientation::head_of(&pose.centres(model, layout)) {
+                Some(head) => detector.evidence(image, bounds, head, &mut workspace),
+                None => [0.0; 2],
+            }
+        };
+        candidates.iter().map(&mut of_candidate).collect()
     }
 
     /// Whether the result near the last pose is unreliable, so that the frame must be searched in

@@ -221,7 +221,8 @@ mod tests {
         for other in [
             "frame/v2/0",
             "frame/v1",
-            "pose3d/v1/0",
+            "pose3d/v1",
+            "pose3d/v2/0",
             "pose3d",
             "",
             "/",

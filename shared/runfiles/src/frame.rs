@@ -10,18 +10,29 @@ use crate::nullable::{nullable, numbers};
 /// A line of `pose3d.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameLine {
-    /// By how much the decision which way the person faces was won; none where it was not made.
+    /// By how much the decision which views see the person from the same side was won; none where it was
+    /// not made.
     #[serde(deserialize_with = "nullable")]
     pub facing_margin: Option<f64>,
     /// Number of the frame in the footage.
     pub frame: u64,
     /// The joints, by name; none in a line without a result.
     pub joints: BTreeMap<String, JointLine>,
+    /// Whether the skeleton is made of the poses that fusion solved for, or of those that it started from; none in a
+    /// line without a result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept: Option<Kept>,
     /// Pairs of views that have a part in the result.
     pub pairs: u32,
     /// Why there is no result; only in a line without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// Whether left and right are certain; none in a line without a result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sides: Option<Sides>,
+    /// Log-odds that left and right are not exchanged in all views, nats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sides_margin: Option<f64>,
     /// [`FrameLine::OK`], [`FrameLine::NO_RESULT`], or why the result has no skeleton.
     pub status: String,
     /// When the frame was taken, seconds after frame 0 of the footage, where its rate is known.
@@ -50,6 +61,28 @@ impl FrameLine {
     pub fn has_pose(&self) -> bool {
         self.status == Self::OK
     }
+}
+
+/// Whether left and right of a skeleton are certain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sides {
+    /// They are not decided, but those of the pictures.
+    AsSeen,
+    /// They are certain.
+    Sure,
+    /// Too little speaks for them.
+    Unsure,
+}
+
+/// Which poses a skeleton is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kept {
+    /// Those that fusion solved for.
+    Solved,
+    /// The single-view poses that it started from, which agree better.
+    Start,
 }
 
 /// A joint of a line.

@@ -24,7 +24,7 @@ mod summary;
 mod times;
 mod view;
 
-pub use frame::{FrameLine, JointLine, PlacedJoint};
+pub use frame::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
 pub use latency::{LatencyReport, Percentiles};
 pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};

@@ -75,7 +75,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
 fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     let hypothesis = |it: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
-            candidates: [0; 2],
+            candidates: [0, place].map(|it_is| it.candidates[it_is]),
             exchanged: it.exchanged[place] != it.exchanged[0],
         },
         energy: it.estimate.energy,
@@ -129,6 +129,7 @@ pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResul
                 });
             }
             into.exchanged.push(from.start.exchanged);
+            into.candidates.push(from.start.candidates[1]);
             into.estimate.poses.push(from.poses[1].clone());
         }
     }
@@ -139,6 +140,7 @@ pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResul
 fn alone(it: &PairEstimate) -> AllViewsHypothesis {
     AllViewsHypothesis {
         exchanged: vec![false],
+        candidates: vec![it.start.candidates[0]],
         estimate: AllViewsEstimate {
             energy: it.energy,
             iterations: Vec::new(),
@@ -185,6 +187,7 @@ mod tests {
     ) -> AllViewsHypothesis {
         exchanged[0] = false;
         AllViewsHypothesis {
+            candidates: (0..poses.len()).map(|it| it % 8).collect(),
             exchanged,
             estimate: AllViewsEstimate {
                 energy,

@@ -2,6 +2,7 @@
 
 use fmp::{Layout, LocalScore, Model, Placement, Pose};
 use messages::{LocalMessage, MAX_CANDIDATES, MAX_PARTS, PoseMessage, Status, ViewPose};
+use multiview::FrontEvidence;
 
 use crate::WireError;
 use crate::error::{count, equal, finite, index};
@@ -114,6 +115,44 @@ pub fn candidates_from_message(
         .iter()
         .map(|it| pose_from_message(it, model, layout))
         .collect()
+}
+
+/// Adds what the picture says about the direction in which the person of every candidate faces.
+///
+/// # Errors
+///
+/// [`WireError`] if there is more evidence than candidates fit, or a number is not finite.
+pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Result<(), WireError> {
+    count("front", front.len(), MAX_CANDIDATES)?;
+    for (candidate, (slot, evidence)) in message.front.iter_mut().zip(front).enumerate() {
+        *slot = checked_front(candidate, *evidence)?;
+    }
+    Ok(())
+}
+
+/// Reads what the picture says about the direction in which the person of every candidate faces.
+///
+/// * `n_candidates`: of the message.
+///
+/// # Errors
+///
+/// [`WireError`] if there are more than [`MAX_CANDIDATES`], or a number is not finite.
+pub fn front_from_message(
+    message: &ViewPose,
+    n_candidates: usize,
+) -> Result<Vec<FrontEvidence>, WireError> {
+    let n = count("front", n_candidates, MAX_CANDIDATES)?;
+    let of_candidates = message.front[..n].iter().enumerate();
+    of_candidates
+        .map(|(candidate, it)| checked_front(candidate, *it))
+        .collect()
+}
+
+fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvidence, WireError> {
+    for number in evidence {
+        finite("front", candidate, f64::from(number))?;
+    }
+    Ok(evidence)
 }
 
 /// Adds the local scores of the parts of the first candidate.

@@ -2,7 +2,8 @@
 
 use geometry::{TriangulateError, Triangulated};
 use messages::{
-    FusedView, Joint3d, MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Pose3d, Stamp, Status, Timing,
+    FusedView, Joint3d, Kept, MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Pose3d, Sides, Stamp, Status,
+    Timing,
 };
 use pipeline::Skeleton;
 
@@ -25,6 +26,15 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     message.n_views = n_views as u32;
     message.n_pairs = skeleton.n_pairs as u32;
     message.facing_margin = skeleton.facing_margin;
+    (message.sides, message.sides_margin) = match skeleton.sides {
+        None => (Sides::AS_SEEN, 0.0),
+        Some(it) if it.unsure => (Sides::UNSURE, it.margin),
+        Some(it) => (Sides::SURE, it.margin),
+    };
+    message.kept = match skeleton.kept {
+        pipeline::Kept::Solved => Kept::SOLVED,
+        pipeline::Kept::Start => Kept::START,
+    };
     for (slot, joint) in message.joints.iter_mut().zip(&skeleton.joints) {
         *slot = joint_to_message(joint);
         message.views_used |= slot.views_used;
@@ -92,6 +102,13 @@ fn empty() -> Pose3d {
         views_used: 0,
         n_pairs: 0,
         facing_margin: 0.0,
+        sides_margin: 0.0,
+        stature_m: 0.0,
+        body_deviation: 0.0,
+        sides: Sides::AS_SEEN,
+        kept: Kept::SOLVED,
+        n_people: 0,
+        reserved: 0,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
     }
@@ -183,6 +200,12 @@ mod tests {
             views: vec![Some(view), None],
             n_pairs: 1,
             facing_margin: 0.25,
+            sides: Some(multiview::Sides {
+                exchange: true,
+                margin: 1.5,
+                unsure: true,
+            }),
+            kept: pipeline::Kept::Start,
         }
     }
 
@@ -192,6 +215,8 @@ mod tests {
         assert_eq!((got.n_joints, got.n_views, got.n_pairs), (2, 2, 1));
         assert_eq!((got.views_present, got.views_used), (0b11, 0b101));
         assert_eq!(got.status, Status::OK);
+        assert_eq!((got.sides, got.sides_margin), (Sides::UNSURE, 1.5));
+        assert_eq!(got.kept, Kept::START);
         assert_eq!(got.joints[0].in_world, [0.1, 0.2, 0.3]);
         assert_eq!(got.joints[0].covariance, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(got.joints[0].reprojection_px, 1.25);

@@ -9,8 +9,8 @@ use fmp::{
 use geometry::{Camera, Intrinsics, Lens};
 use kernels::Rgb8View;
 use messages::{
-    EvidenceHeader, FrameHeader, FusedView, Joint3d, MAX_CANDIDATES, MAX_JOINTS, MAX_LEVELS,
-    MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Stamp, Status, Timing, ViewPose,
+    EvidenceHeader, FrameHeader, FusedView, Joint3d, Kept, MAX_CANDIDATES, MAX_JOINTS, MAX_LEVELS,
+    MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Sides, Stamp, Status, Timing, ViewPose,
     ViewQuality,
 };
 use multiview::{Settings, ViewPlan};
@@ -229,13 +229,14 @@ fn view_pose(input: &[u8]) -> ViewPose {
     for it in Change::all(input) {
         let candidate = it.value.to_le_bytes()[7];
         let candidate = &mut message.candidates[usize::from(candidate) % MAX_CANDIDATES];
-        match it.field % 12 {
+        match it.field % 13 {
             field @ 0..6 => change_pose(candidate, field, it),
             6 => message.status = Status(it.value as u32),
             7 => message.n_candidates = it.value as u32,
             8 => message.width = it.value as u32,
             9 => message.height = it.value as u32,
             10 => message.local[it.of(MAX_PARTS)].margin = it.float(),
+            11 => message.front[it.of(MAX_CANDIDATES)][1] = it.float(),
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
     }
@@ -250,6 +251,9 @@ fn candidates(input: &[u8]) {
             .iter()
             .flat_map(|it| it.centres(model, plans[0].layout()));
         assert!(centres.flatten().all(f64::is_finite));
+    }
+    if let Ok(front) = wire::front_from_message(&message, message.n_candidates as usize) {
+        assert!(front.as_flattened().iter().all(|it| it.is_finite()));
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
         assert!(scores.iter().all(|it| it.margin.is_finite()));
@@ -349,6 +353,13 @@ fn result(input: &[u8]) {
         views_used: 3,
         n_pairs: 1,
         facing_margin: 0.0,
+        sides_margin: 0.0,
+        stature_m: 0.0,
+        body_deviation: 0.0,
+        sides: Sides::SURE,
+        kept: Kept::SOLVED,
+        n_people: 1,
+        reserved: 0,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
     };
@@ -383,14 +394,17 @@ pub fn wire_fusion(input: &[u8]) {
     }
     let quality = view_quality(input);
     let sigma = wire::sigma_from_message(&quality, model.n_parts());
+    let front = wire::front_from_message(&message, candidates.len());
     let changed = ViewResult {
         candidates,
+        front: front.unwrap_or_default(),
         sigma_px: sigma.ok().flatten(),
         tau_px: None,
     };
     let expected = wire::sigma_from_pair(&pair_pose(pairs), 1, model.n_parts());
     let whole = ViewResult {
         candidates: vec![pose()],
+        front: vec![[0.5, -2.0]],
         sigma_px: expected.ok().flatten().map(|(_, sigma)| sigma),
         tau_px: None,
     };

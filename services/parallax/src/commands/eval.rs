@@ -86,6 +86,10 @@ pub(crate) struct Arguments {
     /// Learned consistency (`train consistency`), instead of that of --fuse; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
+    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
+    /// ships; "none": nothing.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    orientation: PathBuf,
     /// Table of expected errors, in the authors' format.
     #[arg(long, value_name = "FILE", conflicts_with = "oracle")]
     sigma: Option<PathBuf>,
@@ -197,6 +201,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             upright: !arguments.no_upright,
         },
         n_candidates: arguments.candidates,
+        orientation: inputs::orientation(&arguments.orientation, &model)?,
         oracle: arguments.oracle,
         resume: arguments.resume,
         fusion: &fusion,
@@ -397,6 +402,12 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         .map(|it| of(Shipped::Network, it))
         .transpose()?;
     let network = network.map_or_else(String::new, |it| format!("network {it:016x}, "));
+    let orientation = if deployment::is_none(&arguments.orientation) {
+        String::new()
+    } else {
+        let file = of(Shipped::Orientation, &arguments.orientation)?;
+        format!("orientation {file:016x}, ")
+    };
     let mut tables = Vec::new();
     let files = config.compatibility.iter().flat_map(|it| &it.files);
     for file in files {
@@ -413,7 +424,7 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         arguments.oracle,
     );
     Ok(format!(
-        "{network}model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
+        "{network}{orientation}model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
          scale {scale}, upright {upright}, candidates {n}\n{fuse}"
     ))
 }

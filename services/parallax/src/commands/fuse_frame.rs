@@ -51,6 +51,10 @@ pub(crate) struct Arguments {
     /// Learned consistency: part-type tables, weights, thresholds, joints; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
+    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
+    /// ships; "none": nothing.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    orientation: PathBuf,
     /// Weight of the geometric term; if not given, the learned one, or the default of the energy.
     #[arg(long)]
     alpha: Option<f64>,
@@ -292,6 +296,7 @@ fn settings(
         fuse: fuse::settings(&config, n_candidates, scale as f32, learned.as_ref()),
         view: ViewSettings {
             n_candidates,
+            orientation: inputs::orientation(&arguments.orientation, model)?,
             ..view
         },
         tables,

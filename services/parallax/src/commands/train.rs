@@ -1,6 +1,7 @@
 //! `parallax train`: trains models, networks and multi-view consistency.
 
 mod consistency;
+mod orientation;
 mod people;
 mod quality;
 
@@ -66,6 +67,8 @@ pub(crate) enum Command {
     Fmp(Box<Arguments>),
     /// Learn the consistency of several views of a person: part types, weights, thresholds, joints.
     Consistency(Box<consistency::Arguments>),
+    /// Train the network that tells from the picture in which direction a person faces, for left and right.
+    Orientation(Box<orientation::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and write the samples for training the quality network.
@@ -110,6 +113,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
     let arguments = match command {
         Command::Fmp(it) => it,
         Command::Consistency(it) => return consistency::run(&it, globals),
+        Command::Orientation(arguments) => return orientation::run(&arguments, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };
@@ -188,4 +192,27 @@ fn work(arguments: &Arguments, settings: &Settings, shared: &Shared) -> Result<E
         output::line(report.text())?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Parses `FROM-TO`.
+fn subjects(text: &str) -> Result<[u64; 2], String> {
+    let ends = text.split_once('-').unwrap_or((text, text));
+    match (ends.0.trim().parse(), ends.1.trim().parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
+        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_subjects_is_parsed() {
+        assert_eq!(subjects("3-7"), Ok([3, 7]));
+        assert_eq!(subjects("5"), Ok([5, 5]));
+        for wrong in ["", "7-3", "a-b", "-1"] {
+            assert!(subjects(wrong).is_err(), "{wrong}");
+        }
+    }
 }

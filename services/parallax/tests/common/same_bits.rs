@@ -1,5 +1,7 @@
 //! Compares the results of a run with those of the same computation in one process, bit for bit.
 
+use std::path::Path;
+
 use fmp::Layout;
 use footage::{Canvas, Fill, Size, Warp};
 use geometry::files::ReadOptions;
@@ -35,7 +37,10 @@ impl OneProcess {
             .collect();
         let cameras: Vec<Camera> = views.iter().map(|it| it.framing.camera().clone()).collect();
         let (model, up) = (planted::model(), rig.up_in_world());
-        let mut estimator = Estimator::new(&model, &cameras, up, &self.settings).unwrap();
+        let mut settings = self.settings.clone();
+        let shipped = Path::new(deployment::SHIPPED);
+        settings.view.orientation = launch::inputs::orientation(shipped, &model).unwrap();
+        let mut estimator = Estimator::new(&model, &cameras, up, &settings).unwrap();
         let (pose3d, pose2d) = (case.lines("pose3d.jsonl"), case.lines("pose2d.jsonl"));
         assert_eq!((pose3d.len(), pose2d.len()), (n_frames, n_frames * n_views));
         let mut n_placed = 0;

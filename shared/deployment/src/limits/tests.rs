@@ -370,6 +370,7 @@ const OTHERS: &[&str] = &[
     "fuse.energy",
     "fuse.views",
     "fuse.consistency",
+    "pose.orientation",
     "fuse.consistency_rig",
     "fuse.compatibility",
     "fuse.switch",

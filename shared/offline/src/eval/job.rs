@@ -11,6 +11,7 @@ use experiment::{
     Version, parse14, part_errors, projected, read_records, tenth_of,
 };
 use fmp::Model;
+use orientation::Detector;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
@@ -43,6 +44,8 @@ pub struct Job<'a> {
     pub film: FilmSettings,
     /// Most candidates of a view.
     pub n_candidates: usize,
+    /// What tells in which direction a person faces.
+    pub orientation: Option<Arc<Detector>>,
     /// Expected errors, pixels of the footage.
     pub sigma: Option<Table>,
     /// Thresholds of the settings, pixels of the footage; empty without any.
@@ -273,6 +276,7 @@ impl Job<'_> {
             model: Arc::clone(&self.model),
             view: ViewSettings {
                 n_candidates: self.n_candidates,
+                orientation: self.orientation.clone(),
                 ..ViewSettings::default()
             },
             trials: self.versions.iter().map(trial).collect(),

@@ -1,25 +1,22 @@
 //! Pictures with known joints, searched as the pipeline does.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use datasets::SkeletonTable;
-use fmp::{Layout, Model, Responses, Scope, local_scores};
+use fmp::{Model, Responses, Scope, local_scores};
 use kernels::Rgb8View;
-use pipeline::{ViewSettings, ViewStep};
 use qualitytraining::sample::{Sample, part_errors, picture_size};
 use skeleton::N_PARTS;
 use viewquality::{EvidenceError, Normalisation, Sampler, Tile, TileShape, evidence};
 
+use crate::searches::{NoSearch, Searches};
+
 /// Why a picture makes no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NoSample {
-    /// The picture is too small for the model.
+    /// The picture cannot be searched.
     #[error(transparent)]
-    Small(#[from] fmp::ImageTooSmall),
-    /// The machine lacks what the search needs.
-    #[error(transparent)]
-    Machine(#[from] kernels::NoAmx),
+    Search(#[from] NoSearch),
     /// The search found nobody.
     #[error("nobody was found")]
     Nobody,
@@ -40,18 +37,17 @@ pub(super) struct Observer {
     model: Arc<Model>,
     table: SkeletonTable,
     shape: TileShape,
-    /// Prepared searches by width and height.
-    steps: Mutex<BTreeMap<[usize; 2], Arc<ViewStep>>>,
+    searches: Searches,
 }
 
 impl Observer {
     /// Prepares for tiles of a shape.
     pub(super) fn new(model: Arc<Model>, shape: TileShape) -> Self {
         Self {
+            searches: Searches::new(Arc::clone(&model)),
             model,
             table: SkeletonTable::published(),
             shape,
-            steps: Mutex::default(),
         }
     }
 
@@ -74,7 +70,7 @@ impl Observer {
         {
             return Err(NoSample::Unknown);
         }
-        let step = self.step([picture.width(), picture.height()])?;
+        let step = self.searches.of_size([picture.width(), picture.height()])?;
         let layout = step.layout();
         let mut values = vec![0.0; layout.n_responses()];
         let found = step.run(picture, Scope::whole(layout), &mut values);
@@ -99,22 +95,6 @@ impl Observer {
             height_px: tile.height_px() as f32,
             errors_px: errors.into_iter().map(|it| it as f32).collect(),
         })
-    }
-
-    fn step(&self, size: [usize; 2]) -> Result<Arc<ViewStep>, NoSample> {
-        let mut steps = self.steps.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(step) = steps.get(&size) {
-            return Ok(Arc::clone(step));
-        }
-        let layout = Layout::new(&self.model, size[0], size[1])?;
-        let settings = ViewSettings::default();
-        let step = ViewStep::new(Arc::clone(&self.model), Arc::new(layout), settings)?;
-        let step = Arc::new(step);
-        // Pictures of a data set are of many sizes: those searches are not kept.
-        if steps.len() < 8 {
-            steps.insert(size, Arc::clone(&step));
-        }
-        Ok(step)
     }
 }
 

@@ -13,11 +13,11 @@ use viewquality::TileShape;
 
 use super::observer::Observer;
 use super::replace::replace;
-use super::scenes::{self, Scenes};
 use super::work::Work;
 use crate::console::Console;
 use crate::failures::dataset_failure;
 use crate::person::deal;
+use crate::scenes::{Scenes, of_pictures};
 
 /// Which pictures.
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ pub fn make(
     (stop, console): (Stop, &dyn Console),
 ) -> Result<Made, Failure> {
     let work = Work::new(Observer::new(model, job.tile), stop, console);
-    let mut all = scenes::samples(&job.scenes, &work)?;
+    let mut all = scenes(job, &work)?;
     all.extend(people(job, &work)?);
     let n = all.len();
     if n == 0 {
@@ -73,6 +73,20 @@ pub fn make(
     replace(out, &bytes)?;
     let n_lost = work.n_lost();
     Ok(Made { n, n_lost })
+}
+
+/// The samples of scenes.
+fn scenes(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
+    of_pictures(
+        &job.scenes,
+        |shown| {
+            work.go_on()?;
+            let named = (shown.group.to_owned(), shown.source.clone());
+            let found = work.observer.observe(shown.picture, &shown.joints, named);
+            Ok(found.ok())
+        },
+        |n, n_lost| work.done(n, n_lost),
+    )
 }
 
 /// The samples of data sets.

@@ -45,6 +45,7 @@ impl Scene {
             let (candidates, _) = solver.distinct_and_bounds(&evidence, 4, 1.0);
             Some(ViewResult {
                 candidates,
+                front: Vec::new(),
                 sigma_px: Some(vec![5.0; N_PARTS]),
                 tau_px: Some(vec![8.0; N_PARTS]),
             })

@@ -8,6 +8,7 @@ use offline::quality::{Scenes, samples};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use viewquality::TileShape;
 
+use crate::commands::train::subjects;
 use crate::globals::Globals;
 use crate::terminal::Terminal;
 use launch::{inputs, output};
@@ -124,27 +125,4 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         ));
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Parses `FROM-TO`.
-fn subjects(text: &str) -> Result<[u64; 2], String> {
-    let ends = text.split_once('-').unwrap_or((text, text));
-    match (ends.0.trim().parse(), ends.1.trim().parse()) {
-        (Ok(from), Ok(to)) if from <= to => Ok([from, to]),
-        _ => Err("expected numbers of subjects, FROM-TO".to_owned()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_range_of_subjects_is_parsed() {
-        assert_eq!(subjects("3-7"), Ok([3, 7]));
-        assert_eq!(subjects("5"), Ok([5, 5]));
-        for wrong in ["", "7-3", "a-b", "-1"] {
-            assert!(subjects(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -1,15 +1,12 @@
-//! Samples of people who do not exist.
+//! Pictures of people who do not exist.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use kernels::Rgb8View;
-use qualitytraining::sample::Sample;
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use scene::{Action, Flaws, RigChoice, Scene, Settings, View};
-
-use super::work::Work;
 
 /// Which scenes.
 #[derive(Debug, Clone)]
@@ -26,13 +23,36 @@ pub struct Scenes {
     pub seed: u64,
 }
 
-/// The samples of all scenes, in the order of the scenes, whatever the threads.
-pub(super) fn samples(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
-    let found: Result<Vec<_>, Failure> = (0..scenes.n)
+/// One picture of a scene.
+pub(crate) struct Shown<'a> {
+    /// The subject, as a name.
+    pub(crate) group: &'a str,
+    /// What it shows, as a name.
+    pub(crate) source: String,
+    /// The picture.
+    pub(crate) picture: Rgb8View<'a>,
+    /// The joints in it, `skeleton::PARSE14`, pixels; not finite where they are not seen.
+    pub(crate) joints: Vec<[f64; 2]>,
+    /// The joints in the world, metres.
+    pub(crate) in_world: Vec<[f64; 3]>,
+    /// The camera.
+    pub(crate) camera: &'a geometry::Camera,
+}
+
+/// Makes something of every picture of all scenes, in the order of the scenes, whatever the threads.
+///
+/// * `make`: of one picture; nothing if it is of no use.
+/// * `watch`: told of the pictures of a camera: how many there are, and how many were of no use.
+pub(crate) fn of_pictures<T: Send>(
+    scenes: &Scenes,
+    make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,
+    watch: impl Fn(usize, usize) + Sync,
+) -> Result<Vec<T>, Failure> {
+    let made: Result<Vec<_>, Failure> = (0..scenes.n)
         .into_par_iter()
-        .map(|nth| of_scene(scenes, &settings(scenes, nth), work))
+        .map(|nth| of_scene(scenes, &settings(scenes, nth), &make, &watch))
         .collect();
-    Ok(found?.into_iter().flatten().collect())
+    Ok(made?.into_iter().flatten().collect())
 }
 
 /// What a scene is, by its number: actions and subjects in turn, all else by chance.
@@ -70,31 +90,40 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
     }
 }
 
-fn of_scene(scenes: &Scenes, settings: &Settings, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
+fn of_scene<T>(
+    scenes: &Scenes,
+    settings: &Settings,
+    make: &impl Fn(&Shown<'_>) -> Result<Option<T>, Failure>,
+    watch: &impl Fn(usize, usize),
+) -> Result<Vec<T>, Failure> {
     let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Input)?);
     let group = format!("subject {}", settings.subject);
-    let mut samples = Vec::new();
-    for camera in 0..scene.rig().cameras().len() {
-        let mut view = View::new(&scene, camera).or_fail(ExitKind::Input)?;
+    let mut all = Vec::new();
+    for (nth, camera) in scene.rig().cameras().iter().enumerate() {
+        let mut view = View::new(&scene, nth).or_fail(ExitKind::Input)?;
         let size = view.size();
         let mut rgb = vec![0; size.rgb_bytes()];
-        let before = samples.len();
+        let before = all.len();
         for frame in 0..u64::from(scenes.frames) {
-            work.go_on()?;
             let truth = view.picture(frame, &mut rgb);
             let joints = truth.pixels.map(|it| it.unwrap_or([f64::NAN; 2]));
-            let picture = Rgb8View::new(size.width, size.height, &rgb).or_fail(ExitKind::Run)?;
-            let source = format!(
-                "{group} {} seed {} camera {} frame {frame}",
-                settings.action.name(),
-                settings.seed,
-                truth.camera
-            );
-            let named = (group.clone(), source);
-            samples.extend(work.observer.observe(picture, &joints, named).ok());
+            let shown = Shown {
+                group: &group,
+                source: format!(
+                    "{group} {} seed {} camera {} frame {frame}",
+                    settings.action.name(),
+                    settings.seed,
+                    truth.camera
+                ),
+                picture: Rgb8View::new(size.width, size.height, &rgb).or_fail(ExitKind::Run)?,
+                joints: joints.to_vec(),
+                in_world: scene.joints(truth.seconds).to_vec(),
+                camera,
+            };
+            all.extend(make(&shown)?);
         }
         let n = usize::from(scenes.frames);
-        work.done(n, n - (samples.len() - before));
+        watch(n, n - (all.len() - before));
     }
-    Ok(samples)
+    Ok(all)
 }

@@ -1,0 +1,116 @@
+//! The direction in which a person faces: what a skeleton says, and what every view says of it.
+
+use geometry::Camera;
+use nalgebra::{Point3, Vector3};
+
+/// Indices of the PARSE joints of the trunk.
+pub(crate) const R_HIP: usize = 2;
+pub(crate) const L_HIP: usize = 3;
+pub(crate) const R_SHOULDER: usize = 8;
+pub(crate) const L_SHOULDER: usize = 9;
+pub(crate) const NECK: usize = 12;
+
+/// What the picture of one view says about the direction in which the person faces.
+///
+/// `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two
+/// components, `2 e n` is the logarithm of the likelihood of facing `n` over that of facing `-n`: the
+/// natural parameter of a von Mises distribution. Zeros say nothing. Evidence of independent views adds
+/// up. Any detector can give it.
+pub type FrontEvidence = [f32; 2];
+
+/// The direction in which a labelled skeleton faces, of length 1, in the frame of its joints.
+///
+/// `l x u` with `l` from its right to its left and `u` from its pelvis to its neck. If left and right are
+/// exchanged it is the opposite direction.
+///
+/// * `joints`: the 14 joints of `skeleton::PARSE14`.
+/// * Returns `None` without a trunk, or without either pair of shoulders and hips.
+pub fn front(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
+    let at = |joint: usize| joints.get(joint).copied().flatten();
+    let across = |right: usize, left: usize| Some(at(left)? - at(right)?);
+    let sides = [across(R_SHOULDER, L_SHOULDER), across(R_HIP, L_HIP)];
+    let left: Vector3<f64> = sides.into_iter().flatten().sum();
+    left.cross(&trunk(joints)?).try_normalize(1e-9)
+}
+
+/// From the pelvis to the neck.
+pub(crate) fn trunk(joints: &[Option<Point3<f64>>]) -> Option<Vector3<f64>> {
+    let at = |joint: usize| joints.get(joint).copied().flatten();
+    Some(at(NECK)? - nalgebra::center(&at(R_HIP)?, &at(L_HIP)?))
+}
+
+/// The components of a direction in the world that [`FrontEvidence`] is about, for a person at a place:
+/// towards the right of the picture, and towards the camera.
+///
+/// The right is perpendicular to the ray from the camera to the place.
+pub fn front_in_view(camera: &Camera, place: &Point3<f64>, front: &Vector3<f64>) -> [f64; 2] {
+    let in_camera = camera.camera_from_world * place;
+    let Some(ray) = in_camera.coords.try_normalize(1e-9) else {
+        return [0.0; 2];
+    };
+    let right = Vector3::x() - ray * ray.x;
+    let front = camera.camera_from_world.rotation * front;
+    let right = right.try_normalize(1e-9).map_or(0.0, |it| it.dot(&front));
+    [right, -ray.dot(&front)]
+}
+
+/// Logarithm of the likelihood ratio of a direction over its opposite, by the evidence of one view, nats.
+pub fn front_log_ratio(in_view: [f64; 2], evidence: FrontEvidence) -> f64 {
+    let [right, towards] = evidence.map(f64::from);
+    2.0 * (right * in_view[0] + towards * in_view[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use geometry::{Intrinsics, Lens, LensModel};
+    use nalgebra::Isometry3;
+
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera {
+            name: "c".to_owned(),
+            intrinsics: Intrinsics {
+                size: [640, 480],
+                fx: 500.0,
+                fy: 500.0,
+                cx: 320.0,
+                cy: 240.0,
+                lens: Lens::new(LensModel::Pinhole),
+            },
+            camera_from_world: Isometry3::identity(),
+        }
+    }
+
+    #[test]
+    fn who_looks_into_the_camera_faces_it() {
+        let place = Point3::new(0.0, 0.0, 3.0);
+        let [right, towards] = front_in_view(&camera(), &place, &-Vector3::z());
+        assert!(right.abs() < 1e-12 && (towards - 1.0).abs() < 1e-12);
+        assert!(front_log_ratio([right, towards], [0.3, 0.5]) > 0.9);
+        assert!(front_log_ratio([right, towards], [0.3, -0.5]) < -0.9);
+    }
+
+    #[test]
+    fn the_right_is_that_of_the_picture_wherever_the_person_stands() {
+        let place = Point3::new(1.0, 0.5, 2.0);
+        let camera = camera();
+        let right = camera.project(&(place + Vector3::x() * 0.1)).unwrap();
+        assert!(right.x > camera.project(&place).unwrap().x);
+        let [across, towards] = front_in_view(&camera, &place, &Vector3::x());
+        assert!(across > 0.8 && towards < 0.0, "{across} {towards}");
+    }
+
+    #[test]
+    fn exchanging_left_and_right_turns_the_front_around() {
+        let mut joints = vec![None; 14];
+        joints[R_HIP] = Some(Point3::new(0.0, -0.1, 0.9));
+        joints[L_HIP] = Some(Point3::new(0.0, 0.1, 0.9));
+        joints[NECK] = Some(Point3::new(0.0, 0.0, 1.4));
+        assert_eq!(front(&joints), Some(Vector3::x()));
+        joints.swap(R_HIP, L_HIP);
+        assert_eq!(front(&joints), Some(-Vector3::x()));
+        joints[NECK] = None;
+        assert_eq!(front(&joints), None);
+    }
+}

@@ -1,0 +1,156 @@
+//! Decides which side of the body is the right one, for all views together, over time.
+//!
+//! Exchanging left and right in all views changes no energy: it must be decided by what is seen
+//! ([`front`](crate::front())) and by how bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
+
+use nalgebra::Vector3;
+
+/// How the sides are decided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SidesSettings {
+    /// Log-likelihood ratio per nat of the views' evidence about the front. Below 1: what views take for
+    /// the front of a person is wrong in several at once more often than if they were independent.
+    pub front_weight: f64,
+    /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), nats.
+    pub anatomy_weight: f64,
+    /// Probability that somebody turns around from one frame to the next. It limits how much the earlier
+    /// frames weigh.
+    pub turn: f64,
+    /// Log-odds below which a decision is unsure, nats.
+    pub unsure: f64,
+}
+
+impl Default for SidesSettings {
+    fn default() -> Self {
+        Self {
+            front_weight: 0.6,
+            anatomy_weight: 1.0,
+            turn: 0.02,
+            unsure: 1.5,
+        }
+    }
+}
+
+/// The decision of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sides {
+    /// Whether left and right are to be exchanged in all views.
+    pub exchange: bool,
+    /// Log-odds of the decision, nats; not negative.
+    pub margin: f64,
+    /// Whether the margin is too small to rely on.
+    pub unsure: bool,
+}
+
+/// Follows over time which side is the right one: a Bayes filter of one bit.
+///
+/// The bit is carried from frame to frame by the direction in which the person faces, so it does not
+/// matter how the frames were labelled.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SidesFilter {
+    /// The last direction, and the log-odds that it is right.
+    last: Option<(Vector3<f64>, f64)>,
+}
+
+impl SidesFilter {
+    /// Decides a frame.
+    ///
+    /// * `front`: the direction in which the skeleton faces as it is labelled, of length 1; `None` if it
+    ///   has none.
+    /// * `evidence`: log-likelihood ratio of the labels over the exchanged ones, nats, of this frame alone.
+    pub fn decide(
+        &mut self,
+        settings: &SidesSettings,
+        front: Option<Vector3<f64>>,
+        evidence: f64,
+    ) -> Sides {
+        let evidence = if evidence.is_finite() { evidence } else { 0.0 };
+        let earlier = match (front, self.last) {
+            (Some(front), Some(last)) => carried(settings, front.dot(&last.0), last.1),
+            _ => 0.0,
+        };
+        let log_odds = earlier + evidence;
+        if let Some(front) = front {
+            self.last = Some((front, log_odds));
+        }
+        Sides {
+            exchange: log_odds < 0.0,
+            margin: log_odds.abs(),
+            unsure: log_odds.abs() < settings.unsure,
+        }
+    }
+}
+
+/// What the log-odds of the last frame's labels say of this frame's.
+///
+/// * `cosine`: of the angle between the two directions. Someone who seems to have turned by a right
+///   angle may have turned either way.
+fn carried(settings: &SidesSettings, cosine: f64, log_odds: f64) -> f64 {
+    let cosine = cosine.clamp(-1.0, 1.0);
+    let turned = settings.turn + (0.5 - settings.turn) * (1.0 - cosine.abs());
+    let odds = log_odds.clamp(-50.0, 50.0).exp();
+    let carried = (((1.0 - turned) * odds + turned) / (turned * odds + 1.0 - turned)).ln();
+    if cosine < 0.0 { -carried } else { carried }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decide(filter: &mut SidesFilter, front: Vector3<f64>, evidence: f64) -> Sides {
+        filter.decide(&SidesSettings::default(), Some(front), evidence)
+    }
+
+    #[test]
+    fn a_frame_alone_is_decided_by_its_evidence() {
+        let got = decide(&mut SidesFilter::default(), Vector3::x(), -4.0);
+        assert!(got.exchange && !got.unsure);
+        assert_eq!(got.margin, 4.0);
+        assert!(decide(&mut SidesFilter::default(), Vector3::x(), 0.5).unsure);
+    }
+
+    #[test]
+    fn earlier_frames_outvote_one_that_says_little() {
+        let mut filter = SidesFilter::default();
+        for _ in 0..5 {
+            decide(&mut filter, Vector3::x(), 2.0);
+        }
+        assert!(!decide(&mut filter, Vector3::x(), -1.0).exchange);
+    }
+
+    #[test]
+    fn labels_that_are_exchanged_from_frame_to_frame_are_followed() {
+        let mut filter = SidesFilter::default();
+        for frame in 0..10 {
+            let sign = if frame % 2 == 0 { 1.0 } else { -1.0 };
+            let got = decide(&mut filter, Vector3::x() * sign, 0.8 * sign);
+            assert_eq!(got.exchange, sign < 0.0, "frame {frame}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_beginning_is_put_right_by_strong_evidence() {
+        let mut filter = SidesFilter::default();
+        for _ in 0..100 {
+            decide(&mut filter, Vector3::x(), -1.0);
+        }
+        for _ in 0..3 {
+            decide(&mut filter, Vector3::x(), 4.0);
+        }
+        assert!(!decide(&mut filter, Vector3::x(), 4.0).exchange);
+    }
+
+    #[test]
+    fn a_turn_by_a_right_angle_is_decided_anew() {
+        let mut filter = SidesFilter::default();
+        decide(&mut filter, Vector3::x(), 5.0);
+        let got = decide(&mut filter, Vector3::y(), -0.5);
+        assert!(got.exchange && got.unsure);
+    }
+
+    #[test]
+    fn numbers_that_are_none_change_nothing() {
+        let got = decide(&mut SidesFilter::default(), Vector3::x(), f64::NAN);
+        assert_eq!((got.exchange, got.margin, got.unsure), (false, 0.0, true));
+    }
+}

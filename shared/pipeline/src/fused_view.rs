@@ -1,0 +1,118 @@
+//! The poses of one view after fusion.
+
+use fmp::Pose;
+use multiview::{Exchanges, FusedPose, ViewPlan, average, is_exchanged};
+
+/// One view after fusion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FusedView {
+    /// The pose combined from its pairs; parts are named by the side of the body.
+    pub pose: FusedPose,
+    /// Whether the view sees the person from behind.
+    pub exchanged: bool,
+    /// Mean cell size of the levels on which it was fused, pixels of the frame.
+    pub cell_px: f64,
+    /// Score of the view's own best candidate.
+    pub single_score: f64,
+}
+
+/// A pose of one view; parts are named by the side of the body.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) energy: f64,
+    pub(crate) cell_px: f64,
+    pub(crate) centres_px: Vec<[f64; 2]>,
+}
+
+impl Candidate {
+    /// A pose of a view.
+    ///
+    /// * `mirror`: the permutation of its parts where the view sees the person from behind.
+    pub(crate) fn of_pose(
+        pose: &Pose,
+        energy: f64,
+        plan: &ViewPlan,
+        mirror: Option<&[usize]>,
+    ) -> Self {
+        Self {
+            energy,
+            cell_px: plan.scale(usize::from(pose.level)),
+            centres_px: (0..pose.parts.len())
+                .map(|part| plan.centre(pose, mirror.map_or(part, |mirror| mirror[part])))
+                .collect(),
+        }
+    }
+
+    /// The view with this pose, which no pair changed.
+    pub(crate) fn alone(&self, exchanged: bool) -> FusedView {
+        FusedView {
+            pose: FusedPose {
+                centres_px: self.centres_px.clone(),
+                n_pairs: 0,
+                energy: self.energy,
+            },
+            exchanged,
+            cell_px: self.cell_px,
+            single_score: self.energy,
+        }
+    }
+}
+
+/// The poses of one view's pairs, its own single-view pose, and the one that fusion started from.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidates {
+    pub(crate) of_pairs: Vec<Candidate>,
+    pub(crate) own: Candidate,
+    pub(crate) start: Option<Candidate>,
+}
+impl Candidates {
+    /// The pairs' poses, or the view's own if it is in no pair.
+    pub(crate) fn all(&self) -> &[Candidate] {
+        if self.of_pairs.is_empty() {
+            std::slice::from_ref(&self.own)
+        } else {
+            &self.of_pairs
+        }
+    }
+}
+
+/// The poses that fusion started from; `None` for a view that was not fused.
+pub(crate) fn starts(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
+    let start_of = |(view, candidates): (usize, &Option<Candidates>)| {
+        let candidates = candidates.as_ref()?;
+        let start = candidates.start.as_ref()?;
+        Some(FusedView {
+            single_score: candidates.own.energy,
+            ..start.alone(is_exchanged(exchanged, view))
+        })
+    };
+    views.iter().enumerate().map(start_of).collect()
+}
+
+/// The mean pose of every view.
+pub(crate) fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
+    let fuse_view = |(view, candidates): (usize, &Option<Candidates>)| {
+        let candidates = candidates.as_ref()?;
+        let poses: Vec<_> = candidates
+            .all()
+            .iter()
+            .map(|pose| (pose.energy, pose.centres_px.as_slice()))
+            .collect();
+        let n = poses.len() as f64;
+        Some(FusedView {
+            pose: FusedPose {
+                n_pairs: candidates.of_pairs.len(),
+                ..average(&poses)?
+            },
+            exchanged: is_exchanged(exchanged, view),
+            cell_px: candidates
+                .all()
+                .iter()
+                .map(|pose| pose.cell_px)
+                .sum::<f64>()
+                / n,
+            single_score: candidates.own.energy,
+        })
+    };
+    views.iter().enumerate().map(fuse_view).collect()
+}
