@@ -17,7 +17,7 @@
 //! | composition | [`pipeline`](../pipeline/index.html): all steps in one process; [`evaluation`](../evaluation/index.html), [`datasets`](../datasets/index.html), [`consistency`](../consistency/index.html) |
 //! | method | [`orientation`](../orientation/index.html): which way a person faces; [`multiview`](../multiview/index.html), [`viewquality`](../viewquality/index.html), [`fmp`](../fmp/index.html): the paper |
 //! | transport | [`runtime`](../runtime/index.html), [`join`](../join/index.html) |
-//! | tools | [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
+//! | tools | [`body`](../body/index.html), [`geometry`](../geometry/index.html), [`kernels`](../kernels/index.html), [`footage`](../footage/index.html), [`scene`](../scene/index.html), [`messages`](../messages/index.html), [`metrics`](../metrics/index.html), [`recording`](../recording/index.html), [`runfiles`](../runfiles/index.html), [`trc`](../trc/index.html), [`mat5`](../mat5/index.html), [`c3d`](../c3d/index.html) |
 //! | ground | [`skeleton`](../skeleton/index.html), [`wording`](../wording/index.html), [`statistics`](../statistics/index.html), [`checksum`](../checksum/index.html), [`causes`](../causes/index.html), [`files`](../files/index.html), [`onnx`](../onnx/index.html); for tests only: [`testkit`](../testkit/index.html) |
 //!
 //! Start with [`pipeline`](../pipeline/index.html) for the path of a frame, [`multiview`](../multiview/index.html) for the

@@ -1,0 +1,325 @@
+//! Whether a skeleton can be a person, and which of its joints cannot.
+
+use core::fmt;
+
+use crate::bone::{self, BONES, SIDES, clean, joints_of};
+use crate::lengths::Lengths;
+use crate::proportion::{Kind, MEASUREMENT_SD};
+use crate::reach::{self, RANK};
+use crate::stature::{MIN_BONES, STATURES, Stature, of_lengths};
+use crate::{Covariances, Joints, N_BONES, N_JOINTS};
+
+/// A bone is impossible if its length is this many standard deviations from the expected one.
+///
+/// Our own choice. With a standard deviation of at least [`MEASUREMENT_SD`], 17.5 cm are always allowed: for a man of
+/// 1.75 m a lower arm of 7 to 44 cm, an upper leg of 23 to 63 cm.
+pub const LIMIT: f64 = 3.5;
+
+/// How much longer one side is than the other, as a share of the length: standard deviation, our own choice.
+const SIDES_DIFFER: f64 = 0.02;
+
+/// Standard deviation of a reach, as a share of it: people and places, our own choice.
+const REACH_SPREAD: f64 = 0.06;
+
+/// A single bone counts at most this many standard deviations in [`Verdict::deviation`].
+const MOST: f64 = 10.0;
+
+/// Why a skeleton is nobody.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reason {
+    /// There is too little of it.
+    TooFewBones {
+        /// Bones whose joints are there and possible.
+        bones: usize,
+        /// Bones needed.
+        needed: usize,
+    },
+    /// Nobody is that tall, or that small.
+    Stature {
+        /// The stature that its bones agree on, metres.
+        metres: f64,
+        /// The statures that people have, metres.
+        limits: [f64; 2],
+    },
+    /// More than half of its bones have lengths that no person of its stature has.
+    Impossible {
+        /// Impossible bones.
+        impossible: usize,
+        /// All bones whose joints are there.
+        bones: usize,
+    },
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFewBones { bones, needed } => {
+                write!(f, "only {bones} bones are possible, {needed} are needed")
+            }
+            Self::Stature { metres, limits } => {
+                let [low, high] = limits;
+                write!(
+                    f,
+                    "it would be {metres:.2} m tall, people are {low:.2} to {high:.2} m"
+                )
+            }
+            Self::Impossible { impossible, bones } => {
+                write!(f, "{impossible} of {bones} bones have impossible lengths")
+            }
+        }
+    }
+}
+
+/// What can be said of a skeleton.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// The standing height, from the joints that are kept; from all if it is nobody. `None` with too few bones.
+    pub stature: Option<Stature>,
+    /// Root mean square of the deviations of the bones' lengths from the expected ones, in standard deviations: 0 to 1 is
+    /// ordinary. Of the joints that are kept; of all if it is nobody; 0 without bones.
+    pub deviation: f64,
+    /// The joints that must not be reported: those of impossible bones. A missing joint is not dropped.
+    pub dropped: [bool; N_JOINTS],
+    /// Why it is nobody; then no joint is to be reported.
+    pub nobody: Option<Reason>,
+}
+
+impl Verdict {
+    /// The joints that may be reported.
+    #[must_use]
+    pub fn keep(&self, joints: &Joints) -> Joints {
+        let joints = clean(joints);
+        core::array::from_fn(|i| joints[i].filter(|_| !self.dropped[i] && self.nobody.is_none()))
+    }
+}
+
+/// Judges a skeleton.
+///
+/// A skeleton is nobody if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`], or if more than half
+/// of its bones are impossible. Otherwise an impossible bone loses its worst joint: the one that also spoils other bones, else the
+/// one farther from the trunk, else the one with the larger covariance; and so on until what is left is possible. Impossible are
+///
+/// * a bone whose length is more than [`LIMIT`] standard deviations from what the stature lets expect, or the
+///   learned length;
+/// * the bones of the two sides, if one is more than [`LIMIT`] standard deviations longer than the other;
+/// * two joints that hang together by missing joints only, if they are farther apart than the bones between them reach.
+///
+/// * `lengths`: the person's own, where they are known.
+pub fn check(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Verdict {
+    let mut joints = clean(joints);
+    let whole = Judgement::new(&joints, lengths);
+    let nobody = |reason| Verdict {
+        stature: whole.stature,
+        deviation: whole.deviation(),
+        dropped: [false; N_JOINTS],
+        nobody: Some(reason),
+    };
+    if let Some(reason) = whole.reason() {
+        return nobody(reason);
+    }
+    let bones = whole.n_bones();
+    let impossible = whole.z.iter().flatten().filter(|z| z.abs() > LIMIT).count();
+    if 2 * impossible > bones {
+        return nobody(Reason::Impossible { impossible, bones });
+    }
+    let mut dropped = [false; N_JOINTS];
+    let mut kept = Judgement::new(&joints, lengths);
+    while let Some(joint) = kept.worst_joint(&joints, covariances) {
+        dropped[joint] = true;
+        joints[joint] = None;
+        kept = Judgement::new(&joints, lengths);
+    }
+    if let Some(reason) = kept.reason() {
+        return nobody(reason);
+    }
+    Verdict {
+        stature: kept.stature,
+        deviation: kept.deviation(),
+        dropped,
+        nobody: None,
+    }
+}
+
+/// What is expected of a bone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Expected {
+    pub(crate) metres: f64,
+    /// Standard deviation, metres.
+    pub(crate) spread: f64,
+    /// Derivative of the length by the stature.
+    pub(crate) by_stature: f64,
+}
+
+/// The length of a kind of bone, learned or else of people with this stature.
+pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
+    if let Some(learned) = lengths.and_then(|it| it.of_kind(kind)) {
+        return Expected {
+            metres: learned.metres,
+            spread: learned.sd,
+            by_stature: 0.0,
+        };
+    }
+    let proportion = kind.proportion();
+    let metres = proportion.length(stature);
+    Expected {
+        metres,
+        spread: proportion.spread() * metres,
+        by_stature: proportion.length_by_stature(stature),
+    }
+}
+
+/// The bones of a skeleton against what is expected of them.
+struct Judgement<'a> {
+    stature: Option<Stature>,
+    lengths: [Option<f64>; N_BONES],
+    /// Deviation of every bone's length from the expected one, standard deviations.
+    z: [Option<f64>; N_BONES],
+    learned: Option<&'a Lengths>,
+    /// The stature that lengths are expected of, metres: one that people have.
+    expected_of: f64,
+}
+
+impl<'a> Judgement<'a> {
+    fn new(joints: &Joints, learned: Option<&'a Lengths>) -> Self {
+        let lengths = bone::lengths(joints);
+        let stature = of_lengths(&lengths);
+        let [low, high] = STATURES;
+        let expected_of = stature.map_or(1.7, |it| it.metres.clamp(low, high));
+        let z = core::array::from_fn(|i| {
+            let it = expected(BONES[i].kind, expected_of, learned);
+            let sd = it.spread.hypot(MEASUREMENT_SD);
+            lengths[i].map(|length| (length - it.metres) / sd)
+        });
+        Self {
+            stature,
+            lengths,
+            z,
+            learned,
+            expected_of,
+        }
+    }
+
+    fn n_bones(&self) -> usize {
+        self.z.iter().flatten().count()
+    }
+
+    fn deviation(&self) -> f64 {
+        let n = self.n_bones().max(1);
+        let capped = |z: &f64| z.clamp(-MOST, MOST).powi(2);
+        (self.z.iter().flatten().map(capped).sum::<f64>() / n as f64).sqrt()
+    }
+
+    /// Why it is nobody, whatever its proportions.
+    fn reason(&self) -> Option<Reason> {
+        let Some(stature) = self.stature else {
+            return Some(Reason::TooFewBones {
+                bones: self.n_bones(),
+                needed: MIN_BONES,
+            });
+        };
+        let [low, high] = STATURES;
+        (!(low..=high).contains(&stature.metres)).then_some(Reason::Stature {
+            metres: stature.metres,
+            limits: STATURES,
+        })
+    }
+
+    /// The joint to drop; `None` if all that is there is possible.
+    fn worst_joint(&self, joints: &Joints, covariances: &Covariances) -> Option<usize> {
+        let mut worst: Option<Conflict> = None;
+        let mut spoilt = [0_u32; N_JOINTS];
+        self.conflicts(joints, |conflict| {
+            for joint in joints_of(conflict.joints) {
+                spoilt[joint] += 1;
+            }
+            if worst.is_none_or(|it| conflict.z > it.z) {
+                worst = Some(conflict);
+            }
+        });
+        let variance = |joint: usize| {
+            let trace = covariances[joint].map_or(0.0, |it| it.trace());
+            if trace.is_finite() { trace } else { f64::MAX }
+        };
+        let order = |a: &usize, b: &usize| {
+            (spoilt[*a].cmp(&spoilt[*b]))
+                .then(RANK[*a].cmp(&RANK[*b]))
+                .then(variance(*a).total_cmp(&variance(*b)))
+                .then(self.strain(*a).total_cmp(&self.strain(*b)))
+        };
+        joints_of(worst?.joints).max_by(order)
+    }
+
+    /// Sum of the deviations of a joint's bones.
+    fn strain(&self, joint: usize) -> f64 {
+        let of_joint = BONES
+            .iter()
+            .zip(&self.z)
+            .filter(|it| it.0.mask() >> joint & 1 == 1);
+        of_joint.filter_map(|it| *it.1).map(f64::abs).sum()
+    }
+
+    /// Calls `found` for everything that is impossible.
+    fn conflicts(&self, joints: &Joints, mut found: impl FnMut(Conflict)) {
+        for (bone, z) in BONES.iter().zip(&self.z) {
+            if let Some(z) = z.map(f64::abs).filter(|z| *z > LIMIT) {
+                found(Conflict {
+                    joints: bone.mask(),
+                    z,
+                });
+            }
+        }
+        for [right, left] in SIDES {
+            let (Some(a), Some(b)) = (self.lengths[right], self.lengths[left]) else {
+                continue;
+            };
+            let sd =
+                (core::f64::consts::SQRT_2 * MEASUREMENT_SD).hypot(SIDES_DIFFER * 0.5 * (a + b));
+            let z = (a - b).abs() / sd;
+            if z > LIMIT {
+                let of = |bone: usize| self.z[bone].map_or(0.0, f64::abs);
+                let bone = if of(right) > of(left) { right } else { left };
+                found(Conflict {
+                    joints: BONES[bone].mask(),
+                    z,
+                });
+            }
+        }
+        self.reaches(joints, found);
+    }
+
+    /// Calls `found` for joints that are too far apart for the missing bones between them.
+    fn reaches(&self, joints: &Joints, mut found: impl FnMut(Conflict)) {
+        let pieces = reach::pieces(joints);
+        let length = |kind| expected(kind, self.expected_of, self.learned).metres;
+        for (a, piece) in pieces.iter().enumerate() {
+            for b in a + 1..N_JOINTS {
+                let (Some(from), Some(to)) = (joints[a], joints[b]) else {
+                    continue;
+                };
+                if piece >> b & 1 == 1 {
+                    continue;
+                }
+                let reach = reach::between(a, b, length);
+                let z = ((to - from).norm() - reach) / MEASUREMENT_SD.hypot(REACH_SPREAD * reach);
+                if z > LIMIT {
+                    found(Conflict {
+                        joints: 1 << a | 1 << b,
+                        z,
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// Something impossible.
+#[derive(Clone, Copy)]
+struct Conflict {
+    /// Bit `i` is set if joint `i` takes part.
+    joints: u32,
+    /// How impossible, standard deviations.
+    z: f64,
+}
+
+#[cfg(test)]
+mod tests;
