@@ -24,7 +24,8 @@ const LAYERS: &[&[&str]] = &[
         "wording",
     ],
     &[
-        "body", "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles", "trc",
+        "body", "geometry", "kernels", "messages", "footage", "join", "mat5", "c3d", "runfiles",
+        "trc",
     ],
     &["metrics", "recording", "fmp", "scene", "deployment"],
     &["runtime"],

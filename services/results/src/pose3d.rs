@@ -36,7 +36,9 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
     let pose = &record.pose3d;
     let joints = joints(scene, pose);
     let missing = missing(scene, record).into_iter();
+    let has_body = pose.stature_m > 0.0;
     FrameLine {
+        body_deviation: finite(pose.body_deviation).filter(|_| has_body),
         facing_margin: finite(pose.facing_margin),
         frame: pose.stamp.frame,
         joints: joints
@@ -54,6 +56,7 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
             _ => Sides::AsSeen,
         }),
         sides_margin: finite(pose.sides_margin),
+        stature_m: finite(pose.stature_m).filter(|_| has_body),
         status: pose.status.reason().to_owned(),
         time_s: scene.time_s(pose.stamp.frame),
         views_missing: missing
@@ -73,6 +76,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
             .map_or(it.reason.as_str(), |it| it.reason())
     };
     FrameLine {
+        body_deviation: None,
         facing_margin: None,
         frame: it.frame,
         joints: BTreeMap::new(),
@@ -81,6 +85,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         reason: Some(it.reason.clone()),
         sides: None,
         sides_margin: None,
+        stature_m: None,
         status: FrameLine::NO_RESULT.to_owned(),
         time_s: scene.time_s(it.frame),
         views_missing: views

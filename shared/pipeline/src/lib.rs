@@ -4,6 +4,7 @@
 //! compare the processes with it: the same input gives the same bits.
 #![forbid(unsafe_code)]
 
+mod bodies;
 mod fuse_step;
 mod fused;
 mod fused_view;
@@ -14,12 +15,13 @@ mod view_step;
 
 mod estimate;
 
+pub use bodies::{Body, NoJoint};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, ViewResult,
     Views, all_pairs,
 };
 pub use fused_view::FusedView;
-pub use skeleton_settings::{Combine, SkeletonSettings};
+pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -15,6 +15,31 @@ pub enum Combine {
     Consensus,
 }
 
+/// What is known of bodies, and what it is used for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySettings {
+    /// Leave out joints, and skeletons, that no body has.
+    pub check: bool,
+    /// Move joints to where the bones have the lengths of people: a prior in triangulation.
+    pub prior: bool,
+    /// The prior knows the lengths that this person's bones had in the frames before.
+    pub learn: bool,
+    /// Weight of how unlike a person a skeleton is, in the choice among assumptions: score per squared standard
+    /// deviation ([`body::deviation`]).
+    pub score: f64,
+}
+
+impl Default for BodySettings {
+    fn default() -> Self {
+        Self {
+            check: true,
+            prior: true,
+            learn: true,
+            score: 0.02,
+        }
+    }
+}
+
 /// Settings of the skeleton step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkeletonSettings {
@@ -34,6 +59,8 @@ pub struct SkeletonSettings {
     /// How the views agree on a part. The decision about facing always uses the consensus: a mean
     /// of poses with different limbs is consistent under no assumption about left and right.
     pub consensus: ConsensusSettings,
+    /// What bodies are like.
+    pub body: BodySettings,
     /// Decide which views see the person from behind.
     pub facing: bool,
     /// How it is tracked over time which views see the person from the same side.
@@ -60,6 +87,7 @@ impl Default for SkeletonSettings {
             error_weight: 1.0,
             combine: Combine::default(),
             consensus: ConsensusSettings::default(),
+            body: BodySettings::default(),
             facing: true,
             facing_filter: FacingSettings::default(),
             sides: SidesSettings::default(),

@@ -10,7 +10,9 @@ use multiview::{
     ViewPlan, anatomical,
 };
 use nalgebra::UnitVector3;
+use skeleton::PARSE14;
 
+use crate::bodies::{Bodies, Body, NoJoint};
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse, starts};
 use crate::skeleton_settings::{Combine, SkeletonSettings};
@@ -31,7 +33,9 @@ pub enum Kept {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skeleton {
     /// The joints of the joint set, each with its position or the reason why there is none.
-    pub joints: Vec<Result<Triangulated, TriangulateError>>,
+    pub joints: Vec<Result<Triangulated, NoJoint>>,
+    /// What they are as a body; `None` where that was not asked, or nothing was found.
+    pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
     /// How many pairs were averaged.
@@ -49,6 +53,7 @@ pub struct Skeleton {
 #[derive(Debug)]
 pub struct SkeletonStep {
     space: Space,
+    bodies: Bodies,
     filter: FacingFilter,
     sides: SidesFilter,
 }
@@ -66,6 +71,7 @@ impl SkeletonStep {
                 up_in_world,
                 settings,
             },
+            bodies: Bodies::default(),
             filter: FacingFilter::default(),
             sides: SidesFilter::default(),
         }
@@ -115,14 +121,39 @@ impl SkeletonStep {
         let joints = self
             .space
             .triangulate(&views, n_joints, points, &expected_px);
+        let (joints, body) = self.as_body(joints, &views);
         Skeleton {
             joints,
+            body,
             views,
             n_pairs: fused.n_pairs(),
             facing_margin,
             sides,
             kept,
         }
+    }
+
+    /// The joints as a body.
+    fn as_body(
+        &mut self,
+        joints: Vec<Result<Triangulated, TriangulateError>>,
+        views: &[Option<FusedView>],
+    ) -> (Vec<Result<Triangulated, NoJoint>>, Option<Body>) {
+        let settings = &self.space.settings;
+        let set = settings.joints;
+        if !self.space.can_exchange() {
+            // The parts are not those of the 14 joints.
+            let joints = joints.into_iter().map(|it| it.map_err(NoJoint::from));
+            return (joints.collect(), None);
+        }
+        let of_body = if set == &PARSE14 {
+            joints.clone()
+        } else {
+            let points = |centres: &[[f64; 2]]| PARSE14.from_parts(centres);
+            self.space
+                .triangulate(views, PARSE14.joints.len(), points, &[])
+        };
+        self.bodies.settle(&settings.body, &of_body, (set, joints))
     }
 
     /// The weighted expected errors of the joints of every view, pixels of the frame; empty where

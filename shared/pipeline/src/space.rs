@@ -39,8 +39,10 @@ impl Space {
         let seen = self.seen(answers, views, &joints);
         // Half of the log-ratio is how much likelier the evidence is than if the views said nothing.
         let evidence = self.settings.front_score * seen.log_ratio.abs() / 2.0;
+        let places = core::array::from_fn(|joint| joints.get(joint).copied().flatten());
+        let unlike = self.settings.body.score * body::deviation(&places);
         Judged {
-            score: self.agreement(views, &parts) + evidence,
+            score: self.agreement(views, &parts) + evidence - unlike,
             seen,
         }
     }

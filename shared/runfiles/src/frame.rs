@@ -10,6 +10,9 @@ use crate::nullable::{nullable, numbers};
 /// A line of `pose3d.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameLine {
+    /// How much the lengths of the bones differ from those of people, standard deviations; none where there is no body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_deviation: Option<f64>,
     /// By how much the decision which views see the person from the same side was won; none where it was
     /// not made.
     #[serde(deserialize_with = "nullable")]
@@ -33,6 +36,9 @@ pub struct FrameLine {
     /// Log-odds that left and right are not exchanged in all views, nats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides_margin: Option<f64>,
+    /// Height of the person standing upright, by the lengths of the bones, metres; none where too few are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stature_m: Option<f64>,
     /// [`FrameLine::OK`], [`FrameLine::NO_RESULT`], or why the result has no skeleton.
     pub status: String,
     /// When the frame was taken, seconds after frame 0 of the footage, where its rate is known.

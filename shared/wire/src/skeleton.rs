@@ -1,11 +1,11 @@
 //! The result: joints in the world and the views that were used.
 
-use geometry::{TriangulateError, Triangulated};
+use geometry::Triangulated;
 use messages::{
     FusedView, Joint3d, Kept, MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Pose3d, Sides, Stamp, Status,
     Timing,
 };
-use pipeline::Skeleton;
+use pipeline::{NoJoint, Skeleton};
 
 use crate::WireError;
 use crate::error::{count, equal, finite};
@@ -41,6 +41,13 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     }
     for (slot, view) in message.views.iter_mut().zip(&skeleton.views) {
         *slot = view.as_ref().map_or(Ok(absent()), view_to_message)?;
+    }
+    if let Some(body) = &skeleton.body {
+        message.stature_m = body.stature_m.unwrap_or(0.0);
+        message.body_deviation = body.deviation;
+        if body.nobody.is_some() {
+            message.status = Status::IMPLAUSIBLE;
+        }
     }
     if skeleton.joints.iter().any(Result::is_ok) {
         message.status = Status::OK;
@@ -121,7 +128,7 @@ fn absent() -> FusedView {
     }
 }
 
-fn joint_to_message(joint: &Result<Triangulated, TriangulateError>) -> Joint3d {
+fn joint_to_message(joint: &Result<Triangulated, NoJoint>) -> Joint3d {
     match joint {
         Ok(it) => {
             let c = &it.covariance;
@@ -140,6 +147,10 @@ fn joint_to_message(joint: &Result<Triangulated, TriangulateError>) -> Joint3d {
                 status: Status::OK,
             }
         }
+        Err(NoJoint::Implausible) => Joint3d {
+            status: Status::IMPLAUSIBLE,
+            ..Joint3d::default()
+        },
         // All other errors mean that too few views could be used.
         Err(_) => Joint3d {
             status: Status::TOO_FEW_VIEWS,
@@ -192,11 +203,19 @@ mod tests {
         Skeleton {
             joints: vec![
                 Ok(found),
-                Err(TriangulateError::TooFewViews {
-                    views: 1,
-                    needed: 2,
-                }),
+                Err(NoJoint::Triangulation(
+                    geometry::TriangulateError::TooFewViews {
+                        views: 1,
+                        needed: 2,
+                    },
+                )),
+                Err(NoJoint::Implausible),
             ],
+            body: Some(pipeline::Body {
+                stature_m: Some(1.75),
+                deviation: 0.5,
+                nobody: None,
+            }),
             views: vec![Some(view), None],
             n_pairs: 1,
             facing_margin: 0.25,
@@ -212,7 +231,8 @@ mod tests {
     #[test]
     fn every_field_survives_a_round_trip() {
         let got = skeleton_to_message(&skeleton(), 0b11).unwrap();
-        assert_eq!((got.n_joints, got.n_views, got.n_pairs), (2, 2, 1));
+        assert_eq!((got.n_joints, got.n_views, got.n_pairs), (3, 2, 1));
+        assert_eq!((got.stature_m, got.body_deviation), (1.75, 0.5));
         assert_eq!((got.views_present, got.views_used), (0b11, 0b101));
         assert_eq!(got.status, Status::OK);
         assert_eq!((got.sides, got.sides_margin), (Sides::UNSURE, 1.5));
@@ -221,10 +241,11 @@ mod tests {
         assert_eq!(got.joints[0].covariance, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(got.joints[0].reprojection_px, 1.25);
         assert_eq!(got.joints[1].status, Status::TOO_FEW_VIEWS);
+        assert_eq!(got.joints[2].status, Status::IMPLAUSIBLE);
         assert_eq!(got.views[0].centres_px[..2], [[3.0, 4.0], [5.0, 6.0]]);
         assert_eq!((got.views[0].exchanged, got.views[0].n_pairs), (1, 2));
         assert_eq!(got.views[1].status, Status::NO_DETECTION);
-        check_pose3d(&got, 2, 2).unwrap();
+        check_pose3d(&got, 2, 3).unwrap();
     }
 
     #[test]

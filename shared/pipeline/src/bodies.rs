@@ -1,0 +1,119 @@
+//! The found joints as a body: what is impossible is left out, bones keep their lengths.
+
+use body::{Covariances, Joints, Lengths, N_JOINTS, Reason};
+use geometry::{TriangulateError, Triangulated};
+use nalgebra::{Matrix3, Point3, Vector3};
+use skeleton::{Joint, JointSet, PARSE14};
+
+use crate::skeleton_settings::BodySettings;
+
+/// Why a joint has no position.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NoJoint {
+    /// It cannot be triangulated.
+    #[error(transparent)]
+    Triangulation(#[from] TriangulateError),
+    /// Where it was found no body can have it.
+    #[error("no body has the joint there")]
+    Implausible,
+}
+
+/// What a skeleton is as a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body {
+    /// Standing height by the lengths of the bones, metres; `None` with too few bones.
+    pub stature_m: Option<f64>,
+    /// Root mean square deviation of the bones' lengths from those of people, standard deviations.
+    pub deviation: f64,
+    /// Why the whole is no person; then no joint has a position.
+    pub nobody: Option<Reason>,
+}
+
+/// The bodies of a run: learns how long the bones of the person are.
+#[derive(Debug, Default)]
+pub(crate) struct Bodies {
+    lengths: Lengths,
+}
+
+/// What becomes of each of the 14 joints.
+struct Change {
+    is_dropped: bool,
+    /// How far it moves, and its covariance then.
+    moved: Option<(Vector3<f64>, Matrix3<f64>)>,
+}
+
+impl Bodies {
+    /// Leaves out what no body has, and moves the others to where bones keep their lengths.
+    ///
+    /// * `of_body`: the joints of `skeleton::PARSE14`.
+    /// * `joints`: those of the set.
+    pub(crate) fn settle(
+        &mut self,
+        settings: &BodySettings,
+        of_body: &[Result<Triangulated, TriangulateError>],
+        (set, joints): (&JointSet, Vec<Result<Triangulated, TriangulateError>>),
+    ) -> (Vec<Result<Triangulated, NoJoint>>, Option<Body>) {
+        let known = joints.into_iter().map(|it| it.map_err(NoJoint::from));
+        let mut joints: Vec<Result<Triangulated, NoJoint>> = known.collect();
+        if !settings.check || of_body.len() != N_JOINTS {
+            return (joints, None);
+        }
+        let (places, covariances) = places(of_body);
+        let verdict = body::check(&places, &covariances, None);
+        if places.iter().flatten().count() == 0 {
+            return (joints, None);
+        }
+        self.lengths.add(&places, &verdict);
+        let kept = verdict.keep(&places);
+        let lengths = Some(&self.lengths).filter(|_| settings.learn);
+        let refined = settings
+            .prior
+            .then(|| body::refine(&kept, &covariances, lengths));
+        let change = |joint: usize| Change {
+            is_dropped: verdict.nobody.is_some() || verdict.dropped[joint],
+            moved: refined.as_ref().and_then(|refined| {
+                let by = refined.joints[joint]? - kept[joint]?;
+                Some((by, refined.covariances[joint]?))
+            }),
+        };
+        let changes: [Change; N_JOINTS] = core::array::from_fn(change);
+        for (joint, place) in set.joints.iter().zip(&mut joints) {
+            let of_joint: Vec<&Change> = same_parts(joint).map(|it| &changes[it]).collect();
+            if of_joint.iter().any(|it| it.is_dropped) {
+                *place = Err(NoJoint::Implausible);
+            } else if let Ok(place) = place {
+                let moved: Vec<_> = of_joint.iter().filter_map(|it| it.moved.as_ref()).collect();
+                if !moved.is_empty() {
+                    let sum: Vector3<f64> = moved.iter().map(|it| it.0).sum();
+                    place.in_world += sum / moved.len() as f64;
+                }
+                if let [(_, covariance)] = moved[..] {
+                    place.covariance = *covariance;
+                }
+            }
+        }
+        let body = Body {
+            stature_m: verdict.stature.map(|it| it.metres),
+            deviation: verdict.deviation,
+            nobody: verdict.nobody,
+        };
+        (joints, Some(body))
+    }
+}
+
+/// The joints of `skeleton::PARSE14` that are made of the same parts as a joint of a set.
+fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
+    let of_body = PARSE14.joints.iter().enumerate();
+    let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));
+    same.map(|it| it.0)
+}
+
+fn places(joints: &[Result<Triangulated, TriangulateError>]) -> (Joints, Covariances) {
+    let found = |joint: usize| joints.get(joint)?.as_ref().ok();
+    let place = |joint: usize| -> Option<Point3<f64>> { Some(found(joint)?.in_world) };
+    let covariance = |joint: usize| Some(found(joint)?.covariance);
+    (
+        core::array::from_fn(place),
+        core::array::from_fn(covariance),
+    )
+}
