@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::Joints;
 use crate::proportion::Kind;
-use crate::{Joints, N_JOINTS};
 
 /// Number of bones.
 pub const N_BONES: usize = 14;
@@ -112,14 +112,19 @@ pub(crate) fn clean(joints: &Joints) -> Joints {
     joints.map(|joint| joint.filter(is_near))
 }
 
-/// The joints of a mask.
-pub(crate) fn joints_of(mask: u32) -> impl Iterator<Item = usize> {
-    (0..N_JOINTS).filter(move |joint| mask >> joint & 1 == 1)
+/// The joints of a mask, ascending.
+pub(crate) fn joints_of(mut mask: u32) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let joint = mask.trailing_zeros();
+        mask &= mask.wrapping_sub(1);
+        (joint < u32::BITS).then_some(joint as usize)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::N_JOINTS;
 
     #[test]
     fn the_joints_of_the_bones_are_those_of_their_names() {

@@ -1,12 +1,11 @@
 //! Whether a skeleton can be a person, and which of its joints cannot.
 
-use core::fmt;
-
 use crate::bone::{self, BONES, SIDES, clean, joints_of};
-use crate::lengths::Lengths;
+use crate::lengths::{Learned, Lengths};
 use crate::proportion::{Kind, MEASUREMENT_SD};
 use crate::reach::{self, RANK};
 use crate::stature::{MIN_BONES, STATURES, Stature, of_lengths};
+use crate::verdict::{Reason, Verdict};
 use crate::{Covariances, Joints, N_BONES, N_JOINTS};
 
 /// A bone is impossible if its length is this many standard deviations from the expected one.
@@ -18,86 +17,22 @@ pub const LIMIT: f64 = 3.5;
 /// How much longer one side is than the other, as a share of the length: standard deviation, our own choice.
 const SIDES_DIFFER: f64 = 0.02;
 
+/// How differently a person's stature is found from frame to frame, as a share: standard deviation, our own choice. Not
+/// what the frame says of itself: the bones of a wrong skeleton disagree, and would excuse it.
+const STATURE_SPREAD: f64 = 0.08;
+
 /// Standard deviation of a reach, as a share of it: people and places, our own choice.
 const REACH_SPREAD: f64 = 0.06;
 
 /// A single bone counts at most this many standard deviations in [`Verdict::deviation`].
 const MOST: f64 = 10.0;
 
-/// Why a skeleton is nobody.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reason {
-    /// There is too little of it.
-    TooFewBones {
-        /// Bones whose joints are there and possible.
-        bones: usize,
-        /// Bones needed.
-        needed: usize,
-    },
-    /// Nobody is that tall, or that small.
-    Stature {
-        /// The stature that its bones agree on, metres.
-        metres: f64,
-        /// The statures that people have, metres.
-        limits: [f64; 2],
-    },
-    /// More than half of its bones have lengths that no person of its stature has.
-    Impossible {
-        /// Impossible bones.
-        impossible: usize,
-        /// All bones whose joints are there.
-        bones: usize,
-    },
-}
-
-impl fmt::Display for Reason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::TooFewBones { bones, needed } => {
-                write!(f, "only {bones} bones are possible, {needed} are needed")
-            }
-            Self::Stature { metres, limits } => {
-                let [low, high] = limits;
-                write!(
-                    f,
-                    "it would be {metres:.2} m tall, people are {low:.2} to {high:.2} m"
-                )
-            }
-            Self::Impossible { impossible, bones } => {
-                write!(f, "{impossible} of {bones} bones have impossible lengths")
-            }
-        }
-    }
-}
-
-/// What can be said of a skeleton.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Verdict {
-    /// The standing height, from the joints that are kept; from all if it is nobody. `None` with too few bones.
-    pub stature: Option<Stature>,
-    /// Root mean square of the deviations of the bones' lengths from the expected ones, in standard deviations: 0 to 1 is
-    /// ordinary. Of the joints that are kept; of all if it is nobody; 0 without bones.
-    pub deviation: f64,
-    /// The joints that must not be reported: those of impossible bones. A missing joint is not dropped.
-    pub dropped: [bool; N_JOINTS],
-    /// Why it is nobody; then no joint is to be reported.
-    pub nobody: Option<Reason>,
-}
-
-impl Verdict {
-    /// The joints that may be reported.
-    #[must_use]
-    pub fn keep(&self, joints: &Joints) -> Joints {
-        let joints = clean(joints);
-        core::array::from_fn(|i| joints[i].filter(|_| !self.dropped[i] && self.nobody.is_none()))
-    }
-}
-
 /// Judges a skeleton.
 ///
-/// A skeleton is nobody if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`], or if more than half
-/// of its bones are impossible. Otherwise an impossible bone loses its worst joint: the one that also spoils other bones, else the
-/// one farther from the trunk, else the one with the larger covariance; and so on until what is left is possible. Impossible are
+/// A skeleton is nobody if it has fewer than [`MIN_BONES`] bones, a stature beyond [`STATURES`] or more than
+/// 28 % from that of the learned lengths, or if more than half of its bones are impossible. Otherwise an impossible
+/// bone loses its worst joint: the one that also spoils other bones, else the one farther from the trunk, else the one
+/// with the larger covariance; and so on until what is left is possible. Impossible are
 ///
 /// * a bone whose length is more than [`LIMIT`] standard deviations from what the stature lets expect, or the
 ///   learned length;
@@ -146,25 +81,19 @@ pub(crate) struct Expected {
     pub(crate) metres: f64,
     /// Standard deviation, metres.
     pub(crate) spread: f64,
-    /// Derivative of the length by the stature.
-    pub(crate) by_stature: f64,
 }
 
 /// The length of a kind of bone, learned or else of people with this stature.
 pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> Expected {
-    if let Some(learned) = lengths.and_then(|it| it.of_kind(kind)) {
-        return Expected {
-            metres: learned.metres,
-            spread: learned.sd,
-            by_stature: 0.0,
-        };
-    }
     let proportion = kind.proportion();
+    if let Some(Learned { metres, sd }) = lengths.and_then(|it| it.of_kind(kind)) {
+        let spread = sd.hypot(proportion.posture * metres);
+        return Expected { metres, spread };
+    }
     let metres = proportion.length(stature);
     Expected {
         metres,
         spread: proportion.spread() * metres,
-        by_stature: proportion.length_by_stature(stature),
     }
 }
 
@@ -217,10 +146,23 @@ impl<'a> Judgement<'a> {
                 needed: MIN_BONES,
             });
         };
-        let [low, high] = STATURES;
+        let limits = self.statures();
+        let [low, high] = limits;
         (!(low..=high).contains(&stature.metres)).then_some(Reason::Stature {
             metres: stature.metres,
-            limits: STATURES,
+            limits,
+        })
+    }
+
+    /// The statures that are possible, metres: those of people, about that of the learned lengths of the bones that
+    /// are there.
+    fn statures(&self) -> [f64; 2] {
+        let learned = |bone: usize| self.learned.and_then(|it| it.bone(bone));
+        let lengths = core::array::from_fn(|i| self.lengths[i].and(learned(i)).map(|it| it.metres));
+        let [low, high] = STATURES;
+        of_lengths(&lengths).map_or(STATURES, |own| {
+            let wide = LIMIT * STATURE_SPREAD * own.metres;
+            [low.max(own.metres - wide), high.min(own.metres + wide)]
         })
     }
 

@@ -5,7 +5,8 @@ use crate::proportion::MEASUREMENT_SD;
 use crate::stature::median_of_lengths;
 use crate::{Joints, N_BONES};
 
-/// No bone adds more than this many squared standard deviations to [`deviation`], and the stature no more than four times as many.
+/// No bone adds more than this many squared standard deviations to [`deviation`], and the stature no more than four times
+/// as many.
 pub const DEVIATION_CAP: f64 = 9.0;
 
 /// Statures that cost nothing, metres: from a child of three years to a man of whom there are few taller.
@@ -20,8 +21,8 @@ const UNUSUAL_CAP: f64 = 4.0 * DEVIATION_CAP;
 /// [`DEVIATION_CAP`]; the stature is the one that the bones agree on best, and costs nothing between 0.95 and 2.0 m. A
 /// missing bone counts 1, as much as an ordinary one, so that skeletons with different joints missing can be compared.
 ///
-/// * Returns a number without unit, 0 to 18 times the cap: up to 14 is ordinary. Half of it is a robust negative logarithm
-///   of a likelihood. The largest number if there are too few bones for a stature.
+/// * Returns a number without unit, 0 to 18 times the cap: up to 14 is ordinary. Half of it is a robust
+///   negative log-likelihood. The largest number if there are too few bones for a stature.
 pub fn deviation(joints: &Joints) -> f64 {
     let lengths = bone::lengths(&bone::clean(joints));
     let Some(stature) = median_of_lengths(&lengths) else {
@@ -36,8 +37,7 @@ pub fn deviation(joints: &Joints) -> f64 {
             let proportion = bone.kind.proportion();
             let expected = proportion.length(stature);
             let measured = MEASUREMENT_SD / expected;
-            let [people, place] = [proportion.people, proportion.place];
-            let variance = people * people + place * place + measured * measured;
+            let variance = proportion.variance() + measured * measured;
             let log = (length.max(1e-9) / expected).ln();
             (log * log / variance).min(DEVIATION_CAP)
         });

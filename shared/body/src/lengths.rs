@@ -1,8 +1,8 @@
 //! The lengths of one person's own bones, learned over a run.
 
 use crate::bone::{self, BONES};
-use crate::check::Verdict;
 use crate::proportion::Kind;
+use crate::verdict::Verdict;
 use crate::{Joints, N_BONES};
 
 /// Number of frames whose lengths are kept, the last ones.
@@ -19,15 +19,15 @@ const ALIKE: f64 = 15.0;
 pub struct Learned {
     /// The length, metres: a median.
     pub metres: f64,
-    /// Standard deviation of that median, metres: of single frames (from the median absolute deviation) over the square root
-    /// of their number, [`MAX_FRAMES`] of them counting as 16.
+    /// Standard deviation of that median, metres: of single frames (from the median absolute deviation) over the
+    /// square root of their number, [`MAX_FRAMES`] of them counting as 16.
     pub sd: f64,
 }
 
 /// Bone lengths of one person, learned over a run; left and right bones share theirs.
 ///
-/// Holds the lengths of the last [`MAX_FRAMES`] good frames of every kind of bone. The same frames in the same order give the
-/// same lengths.
+/// Holds the lengths of the last [`MAX_FRAMES`] good frames of every kind of bone. The same frames in the same
+/// order give the same lengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lengths {
     frames: Vec<Vec<f64>>,

@@ -20,7 +20,8 @@
 //!
 //! Published: the shares of the stature and their spread among adults, statures of adults and children. Our own:
 //! the shares of a small child (composed from what is published, see [`Kind::proportion`]), how differently detectors
-//! and data sets place the same joint ([`Proportion::place`]), and the error of a measured length ([`MEASUREMENT_SD`]).
+//! and data sets place the same joint ([`Proportion::place`]), what postures change ([`Proportion::posture`]), and the
+//! error of a measured length ([`MEASUREMENT_SD`]).
 //! The limits are wide on purpose: the detector errs by 5 to 15 cm, and what is called impossible is taken away.
 #![forbid(unsafe_code)]
 
@@ -34,16 +35,18 @@ mod refine;
 mod stature;
 #[cfg(test)]
 mod testing;
+mod verdict;
 
 use nalgebra::{Matrix3, Point3};
 
 pub use bone::{BONES, Bone, N_BONES};
-pub use check::{LIMIT, Reason, Verdict, check};
+pub use check::{LIMIT, check};
 pub use deviation::{DEVIATION_CAP, deviation};
 pub use lengths::{Learned, Lengths, MAX_FRAMES, MIN_FRAMES};
 pub use proportion::{CHILD_AND_ADULT, Kind, MEASUREMENT_SD, Proportion};
 pub use refine::{Refined, refine};
 pub use stature::{MIN_BONES, STATURES, Stature, stature};
+pub use verdict::{Reason, Verdict};
 
 /// Number of joints, those of `skeleton::PARSE14`.
 pub const N_JOINTS: usize = 14;

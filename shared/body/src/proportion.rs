@@ -8,7 +8,7 @@ pub const MEASUREMENT_SD: f64 = 0.05;
 /// The statures for which [`Proportion::child`] and [`Proportion::adult`] hold, metres; between them the shares
 /// change linearly with the stature, beyond them not at all.
 ///
-/// 0.95 m is the median of both sexes at three years (WHO Child Growth Standards 2006: girls 95.1 cm, boys 96.1 cm). 1.65 m is
+/// 0.95 m is about the median at three years (WHO Child Growth Standards 2006: girls 95.1 cm, boys 96.1 cm). 1.65 m is
 /// between the mean women (1.629 m) and men (1.756 m) of ANSUR II, our choice of where growth has ended.
 pub const CHILD_AND_ADULT: [f64; 2] = [0.95, 1.65];
 
@@ -44,15 +44,22 @@ pub struct Proportion {
     pub child: f64,
     /// Standard deviation among people, as a share of the length.
     pub people: f64,
-    /// How differently detectors, data sets and postures place the joints, as a share of the length.
+    /// How differently detectors and data sets place the joints, as a share of the length.
     pub place: f64,
+    /// How much the distance changes with the posture, as a share of the length.
+    pub posture: f64,
 }
 
 impl Proportion {
-    /// Standard deviation of the length about what the stature lets expect, as a share of the length: people and
-    /// places together.
+    /// Standard deviation of the length about what the stature lets expect, as a share of the length: people,
+    /// places and postures together.
     pub fn spread(&self) -> f64 {
-        self.people.hypot(self.place)
+        self.variance().sqrt()
+    }
+
+    /// The square of [`spread`](Self::spread).
+    pub(crate) fn variance(&self) -> f64 {
+        self.people * self.people + self.place * self.place + self.posture * self.posture
     }
 
     /// Length at a stature, metres.
@@ -120,45 +127,46 @@ impl Kind {
     ///
     /// * *D&C*: Drillis & Contini (1966), Body segment parameters, as in figure 4.1 of Winter, *Biomechanics and Motor
     ///   Control of Human Movement*: between joints.
-    /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: 4082 men,
-    ///   1986 women, between landmarks on the skin. `people` is the standard deviation of the share over its mean:
-    ///   acromion-radiale 0.1909 ± 0.0062, radiale-stylion 0.1511 ± 0.0067, trochanterion to lateral epicondyle
-    ///   0.2476 ± 0.0113, down to the malleolus ± 0.0088 of 0.2267, acromial less trochanterion height 0.3052 ± 0.0154,
-    ///   biacromial breadth 0.2328 ± 0.0114, hip breadth 0.2036 ± 0.0167.
+    /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: 4082
+    ///   men, 1986 women, between landmarks on the skin. `people` is the standard deviation of the share over its mean,
+    ///   of the shares of single people in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh
+    ///   0.2476 ± 0.0113, shank 0.2267 ± 0.0088, trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth
+    ///   0.2036 ± 0.0167. Of the head there is none; it has the spread of the trunk.
     ///
     /// | kind | adult |
     /// |---|---|
     /// | upper and lower arm, upper and lower leg | D&C: 0.186, 0.146, 0.245, 0.246 |
-    /// | trunk | D&C: shoulders at 0.818, hips at 0.530 of the stature: 0.288; the base of the neck is about 0.012 higher |
+    /// | trunk | D&C: shoulders at 0.818 of the stature, hips at 0.530; the base of the neck 0.012 higher (our choice) |
     /// | head | what is left to 1 above hips and trunk: 0.170 |
-    /// | shoulder width | ANSUR II: 0.2328 between the acromia, less 0.01 on either side to the centre of the joint (our choice). D&C's 0.259 is the breadth across the flesh |
-    /// | hip width | 0.100: the centres are 72 % of the iliac spines' distance apart (Bell, Pedersen & Brand 1990), some 24 cm |
+    /// | shoulder width | ANSUR II: 0.2328, less 0.01 on either side to the centre of the joint (our choice) |
+    /// | hip width | centres 72 % of the iliac spines' distance apart (Bell, Pedersen & Brand 1990), of some 24 cm: 0.100 |
     /// | shoulder to neck | half the width, and 0.02 higher: 0.110 |
     ///
-    /// The children's column is our own, made to add up to 1 from ankle (0.045 above the floor) to vertex: a head of about
-    /// a fifth of the stature, where adults have 0.13 (D&C), and a neck; sitting height about 0.57 of the stature at
-    /// three years, 0.52 for adults (Fredriks et al. 2005), which leaves legs shorter by a ninth; arms shorter by a
+    /// The children's column is our own, made to add up to 1 from ankle (0.045 above the floor) to vertex: a head of
+    /// about a fifth of the stature, where adults have 0.13 (D&C), and a neck; sitting height about 0.57 of the stature
+    /// at three years, 0.52 for adults (Fredriks et al. 2005), which leaves legs shorter by a ninth; arms shorter by a
     /// twentieth.
     ///
-    /// `place` is our own: least for limbs, most where data sets mean different points (hips, neck, top of the head) and
-    /// where the shoulder girdle moves.
+    /// `place` and `posture` are our own. Data sets mean different points by hips, neck and top of the head most of all;
+    /// backs bend, heads nod and shoulders are shrugged, while limbs keep their lengths but for the skin under markers.
     pub const fn proportion(self) -> Proportion {
-        let [adult, child, people, place] = match self {
-            Self::UpperArm => [0.186, 0.178, 0.032, 0.05],
-            Self::LowerArm => [0.146, 0.140, 0.044, 0.05],
-            Self::UpperLeg => [0.245, 0.220, 0.046, 0.05],
-            Self::LowerLeg => [0.246, 0.215, 0.039, 0.05],
-            Self::Trunk => [0.300, 0.300, 0.050, 0.08],
-            Self::ShoulderWidth => [0.213, 0.215, 0.049, 0.12],
-            Self::HipWidth => [0.100, 0.100, 0.082, 0.25],
-            Self::ShoulderToNeck => [0.110, 0.112, 0.049, 0.18],
-            Self::Head => [0.170, 0.220, 0.050, 0.12],
+        let [adult, child, people, place, posture] = match self {
+            Self::UpperArm => [0.186, 0.178, 0.032, 0.045, 0.02],
+            Self::LowerArm => [0.146, 0.140, 0.044, 0.045, 0.02],
+            Self::UpperLeg => [0.245, 0.220, 0.046, 0.045, 0.02],
+            Self::LowerLeg => [0.246, 0.215, 0.039, 0.045, 0.02],
+            Self::Trunk => [0.300, 0.300, 0.050, 0.06, 0.06],
+            Self::ShoulderWidth => [0.213, 0.215, 0.049, 0.10, 0.07],
+            Self::HipWidth => [0.100, 0.100, 0.082, 0.25, 0.05],
+            Self::ShoulderToNeck => [0.110, 0.112, 0.049, 0.14, 0.12],
+            Self::Head => [0.170, 0.220, 0.050, 0.09, 0.08],
         };
         Proportion {
             adult,
             child,
             people,
             place,
+            posture,
         }
     }
 }

@@ -4,7 +4,7 @@ mod rows;
 
 use nalgebra::{Cholesky, Const, Matrix3, Point3, SMatrix, SVector, Vector3};
 
-use crate::bone::clean;
+use crate::bone::{clean, joints_of};
 use crate::lengths::Lengths;
 use crate::stature::{STATURES, stature};
 use crate::{Covariances, Joints, N_JOINTS};
@@ -23,7 +23,7 @@ const ANY_STATURE: f64 = 1.65;
 const LOSS: f64 = 3.5;
 const MAX_ITERATIONS: usize = 10;
 /// The iteration ends where no joint moves by more, metres.
-const STILL: f64 = 1e-5;
+const STILL: f64 = 1e-4;
 
 /// A skeleton with a prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,17 +39,19 @@ pub struct Refined {
 /// Moves joints to where bones have the lengths that are expected, as far as the joints are uncertain.
 ///
 /// Minimises the squared Mahalanobis distances of the joints from where they were triangulated, plus, for every
-/// bone, `ρ(((|a - b| - expected) / spread)²)`. Expected is the learned length, its spread what is left uncertain of it
-/// and at least 1.5 cm; where nothing was learned, the share of the stature and the spread of people, and the stature
-/// is found along with the joints. The bones of the two sides are equal within 1.5 cm. The loss `ρ(s) = s / (1 + s / c²)` lets go of a
-/// bone that neither its spread nor the covariances of its joints explain, so that it does not drag its neighbours.
+/// bone, `ρ(((|a - b| - expected) / spread)²)`. Expected is the learned length, its spread what is left uncertain of
+/// it and what postures change, at least 1.5 cm. Where nothing was learned, it is the share of the stature with the
+/// spread of people, and the stature is found along with the joints. The bones of the two sides are equal within 1.5 cm.
+/// The loss `ρ(s) = s / (1 + s / c²)` lets go of a bone that neither its spread nor the covariances of its joints
+/// explain, so that it does not drag its neighbours.
 ///
 /// Gauss & Newton with step halving. The normal equations are solved in the space of the bones, 19 rows for up to 42
 /// coordinates. The covariances of the result are blocks of the inverse of the normal matrix, and as good as those
 /// given: with covariances that promise too much, little moves.
 ///
 /// * `covariances`: a joint without a positive definite one is taken as known to 5 cm.
-/// * Returns the joints as they are, with the covariances as they were used, if there is no bone or numbers get out of hand.
+/// * Returns the joints as they are, with the covariances as they were used, if there is no bone or numbers get
+///   out of hand.
 pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Refined {
     let joints = clean(joints);
     let problem = Problem::new(&joints, covariances, lengths);
@@ -116,8 +118,11 @@ impl Problem {
         let loss = |row: Option<Row>| {
             row.map_or(1.0, |row| {
                 let linear = row.linear(&measured);
-                let by_joints = linear.by_joint.iter().zip(&covariances);
-                let own: f64 = by_joints.map(|(by, c)| by.dot(&(c * by))).sum();
+                let own = |joint: usize| {
+                    let by = linear.by_joint[joint];
+                    by.dot(&(covariances[joint] * by))
+                };
+                let own: f64 = joints_of(linear.mask).map(own).sum();
                 LOSS * LOSS * (row.variance + own)
             })
         };
@@ -152,8 +157,13 @@ impl Problem {
     fn about(&self, state: &State) -> Option<About> {
         let rows = self.rows.map(|row| row.map(|row| row.linear(state)));
         let follow = rows.map(|row| {
-            let by_joint = row.map_or([Vector3::zeros(); N_JOINTS], |it| it.by_joint);
-            core::array::from_fn(|i| self.covariances[i] * by_joint[i])
+            let mut follow = [Vector3::zeros(); N_JOINTS];
+            if let Some(row) = row {
+                for joint in joints_of(row.mask) {
+                    follow[joint] = self.covariances[joint] * row.by_joint[joint];
+                }
+            }
+            follow
         });
         let mut normal = SMatrix::<f64, N_ROWS, N_ROWS>::identity();
         for (a, row) in rows.iter().enumerate() {
@@ -162,8 +172,8 @@ impl Problem {
             };
             for b in 0..=a {
                 let Some(other) = &rows[b] else { continue };
-                let joints = row.by_joint.iter().zip(&follow[b]);
-                let joints: f64 = joints.map(|(by, follow)| by.dot(follow)).sum();
+                let both = joints_of(row.mask & other.mask);
+                let joints: f64 = both.map(|i| row.by_joint[i].dot(&follow[b][i])).sum();
                 let stature = row.by_stature * other.by_stature * STATURE_VARIANCE;
                 normal[(a, b)] = joints + stature;
                 normal[(b, a)] = joints + stature;
@@ -186,10 +196,9 @@ impl Problem {
         let mut gaps = SVector::<f64, N_ROWS>::zeros();
         for (gap, row) in gaps.iter_mut().zip(&about.linear) {
             let Some(row) = row else { continue };
-            let back = row.by_joint.iter().zip(&self.measured.joints);
-            let back = back
-                .zip(&state.joints)
-                .map(|((by, from), at)| by.dot(&(from - at)));
+            let back = joints_of(row.mask).map(|joint| {
+                row.by_joint[joint].dot(&(self.measured.joints[joint] - state.joints[joint]))
+            });
             let stature = row.by_stature * (self.measured.stature - state.stature);
             *gap = -(row.residual + back.sum::<f64>() + stature);
         }
@@ -197,8 +206,8 @@ impl Problem {
         let mut target = self.measured;
         for (a, row) in about.linear.iter().enumerate() {
             let Some(row) = row else { continue };
-            for (joint, follow) in target.joints.iter_mut().zip(&about.follow[a]) {
-                *joint += pulls[a] * follow;
+            for joint in joints_of(row.mask) {
+                target.joints[joint] += pulls[a] * about.follow[a][joint];
             }
             target.stature += pulls[a] * row.by_stature * STATURE_VARIANCE;
         }

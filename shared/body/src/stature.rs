@@ -6,8 +6,8 @@ use crate::proportion::{Kind, MEASUREMENT_SD};
 
 /// The statures that a person can have, metres.
 ///
-/// Our own choice: below, a child of one or two years, which hardly stands (WHO Child Growth Standards 2006: median of
-/// two years 0.87 m, third percentile about 0.81 m); above, men taller than all but a handful alive (ANSUR II: men
+/// Our own choice: below, a child of one or two years, which hardly stands (WHO Child Growth Standards 2006: at
+/// two years the median is about 0.86 m); above, men taller than all but a handful alive (ANSUR II: men
 /// 1.756 ± 0.069 m, women 1.629 ± 0.064 m).
 pub const STATURES: [f64; 2] = [0.80, 2.30];
 
@@ -120,7 +120,7 @@ impl Votes {
 fn weight(kind: Kind) -> f64 {
     let it = kind.proportion();
     let measured = MEASUREMENT_SD / (it.adult * 1.7);
-    1.0 / (it.people * it.people + it.place * it.place + measured * measured).sqrt()
+    1.0 / (it.variance() + measured * measured).sqrt()
 }
 
 #[cfg(test)]

@@ -205,9 +205,25 @@ fn learned_lengths_narrow_the_limits() {
     let mut lengths = Lengths::default();
     testing::learn(&mut lengths, &person);
     // A shorter trunk than this person's, but not than people's.
-    let short = moved(&person, 12, [0.0, 0.0, -0.2]);
+    let short = moved(&person, 12, [0.0, 0.0, -0.225]);
     let trunk = |lengths| Judgement::new(&short, lengths).z[12].unwrap().abs();
     assert!(trunk(None) < LIMIT && trunk(Some(&lengths)) > LIMIT);
+}
+
+#[test]
+fn the_person_that_was_learned_does_not_shrink() {
+    let mut lengths = Lengths::default();
+    testing::learn(&mut lengths, &testing::walking(1.65));
+    let child = testing::sitting(1.1);
+    assert_eq!(verdict(&child).nobody, None);
+    let reason = check(&child, &NO_COVARIANCES, Some(&lengths)).nobody;
+    assert!(matches!(reason, Some(Reason::Stature { .. })), "{reason:?}");
+    // In another posture, and half of it hidden, it is the same person.
+    let mut person = testing::reaching(1.65);
+    for joint in [0, 1, 4, 5, 10, 11] {
+        person[joint] = None;
+    }
+    assert_eq!(check(&person, &NO_COVARIANCES, Some(&lengths)).nobody, None);
 }
 
 #[test]

@@ -72,6 +72,8 @@ pub(super) struct Linear {
     pub(super) residual: f64,
     pub(super) by_joint: [Vector3<f64>; N_JOINTS],
     pub(super) by_stature: f64,
+    /// Bit `i` is set if it depends on joint `i`.
+    pub(super) mask: u32,
 }
 
 impl Row {
@@ -127,10 +129,12 @@ impl Row {
             residual: self.residual(state),
             by_joint: [Vector3::zeros(); N_JOINTS],
             by_stature: 0.0,
+            mask: 0,
         };
         let mut add = |bone: usize, sign: f64| {
             let direction = state.bone(bone).try_normalize(1e-9);
             let direction = sign * direction.unwrap_or_default();
+            it.mask |= BONES[bone].mask();
             it.by_joint[BONES[bone].to] += direction;
             for joint in BONES[bone].from {
                 it.by_joint[joint] -= 0.5 * direction;
