@@ -137,8 +137,10 @@ fn errors(
     truth: &[Vec<Point3<f64>>],
     switches: Switches,
 ) -> [Errors; 2] {
-    let mut settings = EstimatorSettings::default();
-    settings.views = Views::Pairs;
+    let mut settings = EstimatorSettings {
+        views: Views::Pairs,
+        ..EstimatorSettings::default()
+    };
     settings.fuse.facing = switches.facing;
     settings.skeleton.facing = switches.facing;
     settings.skeleton.combine = switches.combine;

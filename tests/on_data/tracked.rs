@@ -158,8 +158,10 @@ fn fused(
     clip: &Clip,
     (truth, track): (&[Vec<Point3<f64>>], Option<TrackSettings>),
 ) -> [f64; 2] {
-    let mut settings = EstimatorSettings::default();
-    settings.views = Views::Pairs;
+    let mut settings = EstimatorSettings {
+        views: Views::Pairs,
+        ..EstimatorSettings::default()
+    };
     settings.view.track = track;
     settings.fuse.facing = true;
     settings.skeleton.facing = true;

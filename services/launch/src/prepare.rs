@@ -8,7 +8,7 @@ use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
-use pipeline::{EstimatorSettings, SkeletonSettings, ViewSettings};
+use pipeline::{BodySettings, EstimatorSettings, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::JointSet;
 use viewquality::Predictor;
@@ -254,6 +254,11 @@ fn settings(
             },
             error_weight: deployment.triangulate.error_weight,
             combine: triangulate::combine(deployment.triangulate.combine),
+            body: if deployment.triangulate.bodies {
+                defaults.body
+            } else {
+                BodySettings::NONE
+            },
             facing: deployment.fuse.facing,
             ..defaults
         },

@@ -3,6 +3,7 @@
 mod cameras;
 mod people;
 mod recorded;
+mod trust;
 
 use core::fmt::Write as _;
 use core::time::Duration;
@@ -12,7 +13,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use messages::Refusal;
 use metrics::Reading;
-use runfiles::{CameraFit, LatencyReport, Summary};
+use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
 use runtime::ExitKind;
 use serde_json::{Value, json};
 use supervise::{Event, Outcome};
@@ -267,7 +268,14 @@ impl Report {
                 || !self.given_up.is_empty()
                 || !self.restarts.is_empty()
                 || self.recorded.summary().is_none_or(|it| self.is_lossy(it))
+                || !self.doubts().is_empty()
                 || self.views.iter().any(|it| it.is_lost(self.is_lossless)))
+    }
+
+    /// Why the results should not be trusted, by themselves.
+    fn doubts(&self) -> Vec<Doubt> {
+        let summary = self.recorded.summary();
+        summary.map_or_else(Vec::new, |it| it.trust.doubts())
     }
 
     /// Whether frames were lost or the cameras contradict each other.
@@ -297,6 +305,7 @@ impl Report {
             "interrupted": self.interrupted,
             "degraded": self.is_degraded(),
             "no_results": self.no_results_reason(),
+            "doubts": self.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),
@@ -340,9 +349,7 @@ impl Report {
                 "  3D            {} of {} frames",
                 it.frames_with_pose, self.n_frames
             )?;
-            if let Some(px) = it.reprojection_px {
-                writeln!(text, "  reprojection  {px:.2} px (rms over all joints)")?;
-            }
+            text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;
         }

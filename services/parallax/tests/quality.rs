@@ -11,7 +11,7 @@ use kernels::Rgb8View;
 use multiview::ViewPlan;
 use nalgebra::Point3;
 use onnx::{Network, Side};
-use pipeline::{SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
+use pipeline::{BodySettings, SkeletonSettings, SkeletonStep, ViewResult, ViewSettings, ViewStep};
 use serde_json::{Value, json};
 use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
 
@@ -134,6 +134,7 @@ fn a_joint_follows_the_views_with_small_expected_errors() {
     let joints = |answers: &[Option<ViewResult>], error_weight: f64| -> Vec<Point3<f64>> {
         let settings = SkeletonSettings {
             error_weight,
+            body: BodySettings::NONE,
             facing: false,
             ..SkeletonSettings::default()
         };

@@ -373,16 +373,9 @@ fn invalid_pairs_are_refused() {
     assert_all(&refused, &["triangulate"], &["index", "sender", "size"]);
 }
 
-#[test]
-fn invalid_results_and_heartbeats_are_refused() {
-    let (case, mut started, rogue) = start("results", PACED);
-    let results: Publisher<Pose3d> = rogue.replace(&mut started, "triangulate", |bus| {
-        bus.publisher(&topic::pose3d())
-    });
-    let heartbeats: Option<Publisher<Health>> =
-        rogue.bus.publisher(&topic::health("triangulate")).ok();
-    let (stamp, timing) = rogue.stamp(0, 20);
-    let good = Pose3d {
+/// A result that is accepted, with numbers that no sender of ours writes.
+fn odd_result(stamp: Stamp, timing: Timing) -> Pose3d {
+    Pose3d {
         stamp,
         timing,
         status: Status::OK,
@@ -401,7 +394,19 @@ fn invalid_results_and_heartbeats_are_refused() {
         reserved: 0,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
-    };
+    }
+}
+
+#[test]
+fn invalid_results_and_heartbeats_are_refused() {
+    let (case, mut started, rogue) = start("results", PACED);
+    let results: Publisher<Pose3d> = rogue.replace(&mut started, "triangulate", |bus| {
+        bus.publisher(&topic::pose3d())
+    });
+    let heartbeats: Option<Publisher<Health>> =
+        rogue.bus.publisher(&topic::health("triangulate")).ok();
+    let (stamp, timing) = rogue.stamp(0, 20);
+    let good = odd_result(stamp, timing);
     assert_eq!(results.wait_for_subscribers(1, WATCHDOG), 1);
     for (stamp, timing) in rogue.wrong_stamps(0) {
         results

@@ -74,7 +74,7 @@ impl Heights {
 }
 
 /// The longer side of the rectangle around the centres of the parts, pixels of the frame.
-fn height_px(fused: &FusedView) -> Option<f64> {
+pub(crate) fn height_px(fused: &FusedView) -> Option<f64> {
     let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
     geometry::longer_side(parts.iter().copied()).filter(|px| px.is_finite())
 }

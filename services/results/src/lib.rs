@@ -21,6 +21,7 @@ mod lines;
 
 mod calibration;
 mod summary;
+mod trust;
 
 mod output;
 

@@ -10,6 +10,7 @@ use runfiles::{FrameLine, Missing, Summary};
 use crate::calibration::Calibration;
 use crate::height::Heights;
 use crate::pose3d::{is_placed, joints, missing};
+use crate::trust::Trusted;
 use crate::{FrameRecord, Scene};
 
 /// Counts frame by frame.
@@ -25,6 +26,7 @@ pub(crate) struct Tally {
     evidence: Vec<[u64; 2]>,
     calibration: Calibration,
     heights: Heights,
+    trusted: Trusted,
 }
 
 impl Tally {
@@ -46,6 +48,7 @@ impl Tally {
             evidence: vec![[0; 2]; scene.views.len()],
             calibration: Calibration::new(scene),
             heights: Heights::new(scene.views.len()),
+            trusted: Trusted::default(),
         }
     }
 
@@ -91,6 +94,7 @@ impl Tally {
         self.searches(scene, record);
         self.calibration.add(scene, record);
         self.heights.add(scene, pose);
+        self.trusted.add(pose);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
         }
@@ -195,6 +199,7 @@ impl Tally {
             exchanged: self.calibration.exchanged().cloned(),
             person_px: self.heights.medians(names.clone().cloned()),
             contradicted: self.calibration.contradicted(names.cloned()),
+            trust: self.trusted.trust(),
             ..self.summary.clone()
         }
     }

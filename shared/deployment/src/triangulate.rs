@@ -12,6 +12,9 @@ pub struct Config {
     pub joints: String,
     /// One pose per view out of its pairs': `mean`, as in the paper, or `consensus`.
     pub combine: Combine,
+    /// Whether skeletons are human bodies: what no body has is left out, and bones keep their lengths. `false` for a model of
+    /// something else.
+    pub bodies: bool,
     /// Reprojection error at which an observation begins to count less, pixels.
     pub loss_px: f64,
     /// How much of its expected error makes a view uncertain about a joint, where a network predicts it; 0: not at all.
@@ -34,6 +37,7 @@ impl Default for Config {
         Self {
             joints: "parse14".to_owned(),
             combine: Combine::default(),
+            bodies: true,
             loss_px: geometry::Settings::default().loss_px,
             error_weight: 1.0,
         }

@@ -71,7 +71,7 @@ impl Detector {
         let [plain, mirrored] = [look(false), look(true)];
         [
             (plain[0] - mirrored[0]) / 2.0,
-            (plain[1] + mirrored[1]) / 2.0,
+            f32::midpoint(plain[1], mirrored[1]),
         ]
     }
 }

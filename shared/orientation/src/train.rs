@@ -216,7 +216,7 @@ impl Trainer {
         let mut loss = 0.0;
         for (((sample, crop, seed), sums), of_sums) in batch.iter().zip(&sums).zip(&mut of_sums) {
             let mut kept = vec![1.0; hidden];
-            leave_out(&mut kept, UNITS_OUT, seed ^ 55);
+            leave_out(&mut kept, UNITS_OUT, seed ^ 0x37);
             let units: Vec<f32> = sums
                 .iter()
                 .zip(&kept)
@@ -227,9 +227,10 @@ impl Trainer {
             let front = [if crop.mirrored { -right } else { right }, towards];
             let ratio = 2.0 * (evidence[0] * front[0] + evidence[1] * front[1]);
             loss += f64::from((-ratio).exp().ln_1p());
-            let weight = match sample.is_photograph && towards < 0.0 {
-                true => self.weight_behind,
-                false => 1.0,
+            let weight = if sample.is_photograph && towards < 0.0 {
+                self.weight_behind
+            } else {
+                1.0
             };
             let slope = -weight / self.settings.batch as f32 / (1.0 + ratio.exp());
             for (output, front) in front.iter().enumerate() {

@@ -3,40 +3,17 @@
 
 use std::sync::Arc;
 
-use fmp::{Model, Pose, Responses, Solver};
+use fmp::{Model, Responses, Solver};
 use multiview::{
-    AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, Exchanges,
-    FrontEvidence, PairEstimate, PairInput, PairStart, Settings, Start, TypeTables, ViewInput,
-    ViewPlan, angle_between, choose_start, estimate_all_views, estimate_pair, is_exchanged,
-    rank_starts,
+    AllViewsEstimate, AllViewsInput, AllViewsStart, AngleTables, Epipolar, Exchanges, PairEstimate,
+    PairInput, PairStart, Settings, Start, TypeTables, ViewInput, ViewPlan, angle_between,
+    choose_start, estimate_all_views, estimate_pair, is_exchanged, rank_starts,
 };
 
 use crate::fused_view::{Candidate, FusedView};
 use crate::skeleton_settings::SkeletonSettings;
 use crate::space::Space;
-
-/// The single-view result of one frame, besides its evidence.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ViewResult {
-    /// Distinct poses, best first; never empty.
-    pub candidates: Vec<Pose>,
-    /// What the picture says about the direction in which the person of every candidate faces; empty
-    /// without a detector of it.
-    pub front: Vec<FrontEvidence>,
-    /// Expected error of every part, pixels of the frame, if there is a prediction.
-    pub sigma_px: Option<Vec<f32>>,
-    /// Thresholds that came with the prediction, pixels of the frame; used where the settings have
-    /// none.
-    pub tau_px: Option<Vec<f32>>,
-}
-
-impl ViewResult {
-    /// Whether all its poses lie where there is evidence. They may not: a restarted process can
-    /// repeat a frame with another search window than the process whose evidence arrived before.
-    pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
-        self.candidates.iter().all(|pose| evidence.covers(pose))
-    }
-}
+use crate::view_result::ViewResult;
 
 /// The part-type tables of a rig.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -11,6 +11,7 @@ mod fused_view;
 mod skeleton_settings;
 mod skeleton_step;
 mod space;
+mod view_result;
 mod view_step;
 
 mod estimate;
@@ -18,10 +19,10 @@ mod estimate;
 pub use bodies::{Body, NoJoint};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use fuse_step::{
-    AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, ViewResult,
-    Views, all_pairs,
+    AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
+pub use view_result::ViewResult;
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -29,6 +29,16 @@ pub struct BodySettings {
     pub score: f64,
 }
 
+impl BodySettings {
+    /// Nothing is known: for models of something else than people.
+    pub const NONE: Self = Self {
+        check: false,
+        prior: false,
+        learn: false,
+        score: 0.0,
+    };
+}
+
 impl Default for BodySettings {
     fn default() -> Self {
         Self {

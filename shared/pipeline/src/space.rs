@@ -11,9 +11,9 @@ use multiview::{
 use nalgebra::{Point2, Point3, UnitVector3, Vector3};
 use skeleton::PARSE14;
 
-use crate::ViewResult;
 use crate::fused_view::FusedView;
 use crate::skeleton_settings::SkeletonSettings;
+use crate::view_result::ViewResult;
 
 /// The cameras of a rig, and how poses in them are judged.
 #[derive(Debug, Clone)]

@@ -9,7 +9,7 @@
 //! | `summary.json` | [`RunSummary`] | run; holds the version of all files |
 //!
 //! Text in, types out: this crate opens no file. A field that is missing, unknown in its type or out of range is a
-//! [`ReadError`] that names the line and the field; no field has a default. Unknown fields are passed over, so that a
+//! [`ReadError`] that names the line and the field; only fields that were added later may be absent. Unknown fields are passed over, so that a
 //! program reads what a later one has written as long as [`VERSION`] is the same.
 //!
 //! Fields are written in alphabetical order, so they are declared in that order.
@@ -22,6 +22,7 @@ mod nullable;
 mod read;
 mod summary;
 mod times;
+mod trust;
 mod view;
 
 pub use frame::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
@@ -30,6 +31,7 @@ pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
 pub use summary::{CameraFit, Contradicted, Exchanged, RunSummary, Summary, ViewSummary};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
+pub use trust::{Doubt, Trust};
 pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 
 /// Version of all files of a run; it rises when a field changes its meaning or is removed.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 use crate::read::{parse, to_text};
-use crate::{LatencyReport, Missing, ReadError, VERSION};
+use crate::{LatencyReport, Missing, ReadError, Trust, VERSION};
 
 /// The file `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,6 +79,8 @@ pub struct Summary {
     /// How many frames of every view were searched in full and how many near the last pose only, by
     /// name; since the process was started last.
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
+    /// How far the results can be trusted; since the process was started last.
+    pub trust: Trust,
     /// Of how many results every view is missing, by name, for every reason.
     pub views_missing: BTreeMap<String, BTreeMap<Missing, u64>>,
     /// How many results every view has a part in, by name.

@@ -267,10 +267,10 @@ mod tests {
     fn refuses_counts_beyond_their_arrays() {
         let mut got = skeleton_to_message(&skeleton(), 0b11).unwrap();
         got.views[1].n_parts = 33;
-        assert!(check_pose3d(&got, 2, 2).is_err());
+        assert!(check_pose3d(&got, 2, 3).is_err());
         got.views[1].n_parts = 0;
         got.n_views = u32::MAX;
-        assert!(check_pose3d(&got, 2, 2).is_err());
+        assert!(check_pose3d(&got, 2, 3).is_err());
     }
 
     #[test]
@@ -279,7 +279,7 @@ mod tests {
         let refused = |change: fn(&mut Pose3d)| {
             let mut message = good;
             change(&mut message);
-            check_pose3d(&message, 2, 2).is_err()
+            check_pose3d(&message, 2, 3).is_err()
         };
         assert!(refused(|message| message.joints[0].in_world[2] = f64::NAN));
         assert!(refused(

@@ -1,6 +1,8 @@
 //! `parallax fuse-frame`: fuses one synchronised set of still images, in this process.
 
-use std::path::{Path, PathBuf};
+mod expected;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -18,6 +20,7 @@ use serde_json::{Value, json};
 use skeleton::JointSet;
 
 use crate::describe::{self, Placed};
+use expected::sigma;
 
 /// The energy of fusion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -51,8 +54,7 @@ pub(crate) struct Arguments {
     /// Learned consistency: part-type tables, weights, thresholds, joints; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
-    /// What tells in which direction a person faces, for left and right (`train orientation`); "shipped": the one that
-    /// ships; "none": nothing.
+    /// What tells in which direction a person faces (`train orientation`); "shipped"; "none".
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
     /// Weight of the geometric term; if not given, the learned one, or the default of the energy.
@@ -312,46 +314,6 @@ fn settings(
             ..SkeletonSettings::default()
         },
     })
-}
-
-/// Reads the expected errors of every view, and scales them to pixels of the frames.
-fn sigma(
-    file: Option<&Path>,
-    scales: &[f32],
-    n_parts: usize,
-) -> Result<Vec<Option<Vec<f32>>>, Failure> {
-    let Some(file) = file else {
-        return Ok(vec![None; scales.len()]);
-    };
-    let text = runtime::read_text(file)?;
-    let lines: Vec<&str> = text.lines().filter(|it| !it.trim().is_empty()).collect();
-    let wrong =
-        |message: String| Failure::new(ExitKind::Input, format!("{}: {message}", file.display()));
-    if lines.len() != scales.len() {
-        return Err(wrong(format!(
-            "{} lines, expected one for each of {} views",
-            lines.len(),
-            scales.len()
-        )));
-    }
-    let views = lines.iter().zip(scales).enumerate();
-    views
-        .map(|(index, (line, scale))| {
-            let words = line.split(|it: char| it == ',' || it.is_whitespace());
-            let words: Vec<&str> = words.filter(|it| !it.is_empty()).collect();
-            let numbers: Vec<f32> = words
-                .iter()
-                .filter_map(|it| it.parse::<f32>().ok())
-                .filter(|it| it.is_finite() && *it >= 0.0)
-                .map(|it| it * scale)
-                .collect();
-            if numbers.len() != n_parts || words.len() != n_parts {
-                let message = format!("line {}: expected {n_parts} errors in pixels", index + 1);
-                return Err(wrong(message));
-            }
-            Ok(Some(numbers))
-        })
-        .collect()
 }
 
 /// The report on an estimate.

@@ -69,6 +69,13 @@ impl Case {
             let name = &camera.name;
             writeln!(text, "\n[[camera]]\nname = {name:?}\nsource = {name:?}").unwrap();
         }
+        // The planted figure has the bones of nobody.
+        let own = "[triangulate]\nbodies = false";
+        let more = if more.contains("[triangulate]") {
+            more.replace("[triangulate]", own)
+        } else {
+            format!("{more}\n{own}")
+        };
         case.write("deployment.toml", format!("{text}\n{more}\n"));
         case
     }

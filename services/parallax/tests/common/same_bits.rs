@@ -7,7 +7,7 @@ use footage::{Canvas, Fill, Size, Warp};
 use geometry::files::ReadOptions;
 use geometry::{Camera, Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
-use pipeline::{Estimate, Estimator, EstimatorSettings};
+use pipeline::{BodySettings, Estimate, Estimator, EstimatorSettings};
 use serde_json::{Value, json};
 use skeleton::PARSE14;
 
@@ -39,6 +39,7 @@ impl OneProcess {
         let (model, up) = (planted::model(), rig.up_in_world());
         let mut settings = self.settings.clone();
         let shipped = Path::new(deployment::SHIPPED);
+        settings.skeleton.body = BodySettings::NONE;
         settings.view.orientation = launch::inputs::orientation(shipped, &model).unwrap();
         let mut estimator = Estimator::new(&model, &cameras, up, &settings).unwrap();
         let (pose3d, pose2d) = (case.lines("pose3d.jsonl"), case.lines("pose2d.jsonl"));

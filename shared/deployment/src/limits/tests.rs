@@ -378,6 +378,7 @@ const OTHERS: &[&str] = &[
     "fuse.pairs",
     "triangulate.joints",
     "triangulate.combine",
+    "triangulate.bodies",
     "results.trc",
     "runtime.spin",
     "runtime.policy",

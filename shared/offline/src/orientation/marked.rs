@@ -41,11 +41,11 @@ const HIPS: f64 = 0.38;
 /// Sum of the bends of knees and elbows and of the head's lean, trunk lengths, of a person seen from the side.
 const BEND: f64 = 0.35;
 
+/// A data set and its samples.
+type Named = (String, Vec<Sample>);
+
 /// The samples to learn from, and those of every data set to judge on.
-pub(super) fn samples(
-    job: &Job,
-    work: &Work,
-) -> Result<(Vec<Sample>, Vec<(String, Vec<Sample>)>), Failure> {
+pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>), Failure> {
     let all = &job.datasets;
     let only = deal(all, "--only", &job.only, false)?;
     let judged = deal(all, "--judge", &job.judge, false)?;
@@ -93,7 +93,8 @@ fn selection(values: &[&str]) -> Result<Option<Selection>, Failure> {
 /// The sample of a person, turned upright; nothing if the trunk is too short.
 fn of_person(person: &Person) -> Result<Option<Sample>, Failure> {
     let [x, y] = trunk(&person.joints);
-    if !(x.hypot(y) >= MIN_TRUNK_PX) {
+    let length = x.hypot(y);
+    if length.is_nan() || length < MIN_TRUNK_PX {
         return Ok(None);
     }
     let mut sample = datasets::Sample::read(person).or_fail(ExitKind::Input)?;

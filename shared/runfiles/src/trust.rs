@@ -1,0 +1,192 @@
+//! How far the results of a run can be trusted, as far as they themselves tell.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::nullable::nullable;
+
+/// What the results say about their own quality. Shares are from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Trust {
+    /// Median over the skeletons: root mean square deviation of the bones' lengths from those of people, standard deviations.
+    #[serde(deserialize_with = "nullable")]
+    pub body_deviation: Option<f64>,
+    /// Results in which somebody was found, whether as a body that people have or not.
+    pub frames: u64,
+    /// Share of these results whose body is none that people have.
+    pub implausible: f64,
+    /// Share of the joints of the skeletons that were left out, since no body has them there.
+    pub joints_implausible: f64,
+    /// Distance of the joints' reprojections from what the views found, as a share of the person's height in the frames: root
+    /// mean square over all joints.
+    #[serde(deserialize_with = "nullable")]
+    pub reprojection: Option<f64>,
+    /// Share of the skeletons whose left and right are not certain.
+    pub sides_unsure: f64,
+}
+
+/// One reason not to trust the results.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Doubt {
+    kind: Kind,
+    value: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Reprojection,
+    Implausible,
+    Joints,
+    Bones,
+    Sides,
+}
+
+impl Kind {
+    const ALL: [Self; 5] = [
+        Self::Reprojection,
+        Self::Implausible,
+        Self::Joints,
+        Self::Bones,
+        Self::Sides,
+    ];
+
+    /// What is tolerated. Chosen so that single persons who are seen whole by calibrated cameras stay below: balancing and
+    /// synthetic people reach two thirds of each at most.
+    fn limit(self) -> f64 {
+        match self {
+            Self::Reprojection => 0.1,
+            Self::Implausible | Self::Joints => 0.15,
+            Self::Bones => 2.0,
+            Self::Sides => 0.3,
+        }
+    }
+
+    fn value(self, trust: &Trust) -> Option<f64> {
+        match self {
+            Self::Reprojection => trust.reprojection,
+            Self::Implausible => Some(trust.implausible),
+            Self::Joints => Some(trust.joints_implausible),
+            Self::Bones => trust.body_deviation,
+            Self::Sides => Some(trust.sides_unsure),
+        }
+    }
+}
+
+impl Trust {
+    /// Fewest results that are judged.
+    pub const MIN_FRAMES: u64 = 30;
+
+    /// Why the results should not be trusted; empty where nothing speaks against them, or too few are there to judge.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        if self.frames < Self::MIN_FRAMES {
+            return Vec::new();
+        }
+        let doubt = |kind: Kind| {
+            let value = kind.value(self)?;
+            (value > kind.limit()).then_some(Doubt { kind, value })
+        };
+        Kind::ALL.into_iter().filter_map(doubt).collect()
+    }
+
+    /// The numbers for people, in one line.
+    pub fn text(&self) -> String {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let reprojection = self.reprojection.map_or_else(String::new, |it| {
+            format!("reprojection {} of the person's height, ", percent(it))
+        });
+        let bones = self.body_deviation.map_or_else(String::new, |it| {
+            format!("bones {it:.1} sd from people's, ")
+        });
+        format!(
+            "{reprojection}{bones}{} of bodies and {} of joints left out, sides unsure in {}",
+            percent(self.implausible),
+            percent(self.joints_implausible),
+            percent(self.sides_unsure)
+        )
+    }
+}
+
+impl Doubt {
+    /// Whether it is the same reason, whatever the numbers.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.kind == other.kind
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (value, limit) = (100.0 * self.value, 100.0 * self.kind.limit());
+        match self.kind {
+            Kind::Reprojection => write!(
+                f,
+                "joints are {value:.0} % of the person's height from where the views see them (more than {limit:.0} %): see `parallax \
+                 calib check`, and whether the footage is of one moment"
+            ),
+            Kind::Implausible => write!(
+                f,
+                "{value:.0} % of what was found is no body that people have (more than {limit:.0} %): is one person seen whole, in the right size?"
+            ),
+            Kind::Joints => write!(
+                f,
+                "{value:.0} % of the joints are where no body has them (more than {limit:.0} %): is one person seen whole by every camera?"
+            ),
+            Kind::Bones => write!(
+                f,
+                "bones are {:.1} standard deviations from those of people (more than {:.1}): is the unit of the calibration right?",
+                self.value,
+                self.kind.limit()
+            ),
+            Kind::Sides => write!(
+                f,
+                "left and right are unsure in {value:.0} % of the frames (more than {limit:.0} %): cameras that see the face help"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Spoil = fn(&mut Trust);
+
+    fn good() -> Trust {
+        Trust {
+            body_deviation: Some(0.8),
+            frames: 100,
+            implausible: 0.01,
+            joints_implausible: 0.02,
+            reprojection: Some(0.02),
+            sides_unsure: 0.05,
+        }
+    }
+
+    #[test]
+    fn good_results_raise_no_doubt_and_each_limit_raises_one() {
+        assert_eq!(good().doubts(), []);
+        let cases: [(Spoil, &str); 5] = [
+            (|it| it.reprojection = Some(0.2), "joints are 20 %"),
+            (|it| it.implausible = 0.4, "40 % of what was found"),
+            (|it| it.joints_implausible = 0.3, "30 % of the joints"),
+            (|it| it.body_deviation = Some(3.0), "bones are 3.0"),
+            (|it| it.sides_unsure = 0.5, "unsure in 50 %"),
+        ];
+        for (spoil, said) in cases {
+            let mut trust = good();
+            spoil(&mut trust);
+            let doubts: Vec<String> = trust.doubts().iter().map(ToString::to_string).collect();
+            assert!(doubts.len() == 1 && doubts[0].contains(said), "{doubts:?}");
+        }
+    }
+
+    #[test]
+    fn few_results_are_not_judged() {
+        let few = Trust {
+            frames: Trust::MIN_FRAMES - 1,
+            sides_unsure: 1.0,
+            ..good()
+        };
+        assert_eq!(few.doubts(), []);
+    }
+}
