@@ -33,7 +33,12 @@ pub struct Body {
 #[derive(Debug, Default)]
 pub(crate) struct Bodies {
     lengths: Lengths,
+    /// Frames since the last one with a body.
+    n_without: u32,
 }
+
+/// After so many frames without a body, the next one is somebody else's.
+const FORGET_AFTER: u32 = 30;
 
 /// What becomes of each of the 14 joints.
 struct Change {
@@ -61,7 +66,16 @@ impl Bodies {
         let (places, covariances) = places(of_body);
         let verdict = body::check(&places, &covariances, None);
         if places.iter().flatten().count() == 0 {
+            self.n_without += 1;
             return (joints, None);
+        }
+        if verdict.nobody.is_some() {
+            self.n_without += 1;
+        } else {
+            if self.n_without >= FORGET_AFTER {
+                self.lengths.reset();
+            }
+            self.n_without = 0;
         }
         self.lengths.add(&places, &verdict);
         let kept = verdict.keep(&places);
