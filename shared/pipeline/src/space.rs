@@ -84,7 +84,8 @@ impl Space {
                 };
                 if let Some(evidence) = self.front_evidence(view, answer, fused) {
                     let in_view = front_in_view(self.plans[view].camera(), &place, &front);
-                    log_ratio += settings.front_weight * front_log_ratio(in_view, evidence);
+                    let weight = settings.front_weight * upright(&fused.pose.centres_px);
+                    log_ratio += weight * front_log_ratio(in_view, evidence);
                 }
             }
         }
@@ -184,6 +185,21 @@ impl Space {
         };
         (0..n_points).map(triangulate).collect()
     }
+}
+
+/// How much what a view sees of the front counts: the squared cosine of the angle between the trunk in the picture and the
+/// vertical, 0 upside down. Heads of people who bend were not learned.
+fn upright(centres_px: &[[f64; 2]]) -> f64 {
+    const NECK: usize = 1;
+    const HIPS: [usize; 2] = [9, 21];
+    let [Some(neck), Some(right), Some(left)] =
+        [NECK, HIPS[0], HIPS[1]].map(|part| centres_px.get(part))
+    else {
+        return 1.0;
+    };
+    let [x, y] = [0, 1].map(|axis| neck[axis] - f64::midpoint(right[axis], left[axis]));
+    let cosine = -y / x.hypot(y);
+    if cosine > 0.0 { cosine * cosine } else { 0.0 }
 }
 
 /// How good an assumption about the sides of the views is.
