@@ -44,10 +44,10 @@ impl Candidate {
     }
 
     /// The view with this pose, which no pair changed.
-    pub(crate) fn alone(&self, exchanged: bool) -> FusedView {
+    pub(crate) fn alone(self, exchanged: bool) -> FusedView {
         FusedView {
             pose: FusedPose {
-                centres_px: self.centres_px.clone(),
+                centres_px: self.centres_px,
                 n_pairs: 0,
                 energy: self.energy,
             },
@@ -58,13 +58,13 @@ impl Candidate {
     }
 }
 
-/// The poses of one view's pairs, its own single-view pose, and the one that fusion started from.
+/// The poses of one view's pairs, and its own single-view pose.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
     pub(crate) of_pairs: Vec<Candidate>,
     pub(crate) own: Candidate,
-    pub(crate) start: Option<Candidate>,
 }
+
 impl Candidates {
     /// The pairs' poses, or the view's own if it is in no pair.
     pub(crate) fn all(&self) -> &[Candidate] {
@@ -74,19 +74,6 @@ impl Candidates {
             &self.of_pairs
         }
     }
-}
-
-/// The poses that fusion started from; `None` for a view that was not fused.
-pub(crate) fn starts(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Option<FusedView>> {
-    let start_of = |(view, candidates): (usize, &Option<Candidates>)| {
-        let candidates = candidates.as_ref()?;
-        let start = candidates.start.as_ref()?;
-        Some(FusedView {
-            single_score: candidates.own.energy,
-            ..start.alone(is_exchanged(exchanged, view))
-        })
-    };
-    views.iter().enumerate().map(start_of).collect()
 }
 
 /// The mean pose of every view.

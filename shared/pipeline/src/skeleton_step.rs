@@ -7,14 +7,14 @@ use fmp::Pose;
 use geometry::{TriangulateError, Triangulated};
 use multiview::{
     ConsensusWorkspace, Exchanges, FacingFilter, FacingHypothesis, Sides, SidesFilter, Sightings,
-    ViewPlan, anatomical,
+    ViewPlan, anatomical, is_exchanged,
 };
 use nalgebra::UnitVector3;
 use skeleton::PARSE14;
 
 use crate::bodies::{Bodies, Body, NoJoint};
 use crate::fused::Fused;
-use crate::fused_view::{Candidate, Candidates, FusedView, fuse, starts};
+use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
 use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
@@ -111,7 +111,7 @@ impl SkeletonStep {
             Combine::Mean => fuse(&candidates, exchanged),
             Combine::Consensus => self.agreed(&candidates, exchanged),
         };
-        let (views, kept) = self.better(solved, &candidates, exchanged);
+        let (views, kept) = self.better(solved, self.starts(answers, fused, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
         let expected_px = self.expected_errors(answers, exchanged);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
@@ -232,10 +232,8 @@ impl SkeletonStep {
     fn better(
         &self,
         mut solved: Vec<Option<FusedView>>,
-        candidates: &[Option<Candidates>],
-        exchanged: Exchanges,
+        start: Vec<Option<FusedView>>,
     ) -> (Vec<Option<FusedView>>, Kept) {
-        let start = starts(candidates, exchanged);
         if start.iter().flatten().count() < 2 {
             return (solved, Kept::Solved);
         }
@@ -268,6 +266,27 @@ impl SkeletonStep {
         }
     }
 
+    /// The poses that fusion started from; `None` for a view that was not fused.
+    fn starts(
+        &self,
+        answers: &[Option<ViewResult>],
+        fused: &Fused<'_>,
+        exchanged: Exchanges,
+    ) -> Vec<Option<FusedView>> {
+        let of_view = |view: usize| {
+            let found = &answers[view].as_ref()?.candidates;
+            let pose = found.get(fused.start(view, exchanged)?)?;
+            let mirror = self.space.mirror(view, exchanged);
+            let start =
+                Candidate::of_pose(pose, f64::from(pose.score), &self.space.plans[view], mirror);
+            Some(FusedView {
+                single_score: f64::from(found.first()?.score),
+                ..start.alone(is_exchanged(exchanged, view))
+            })
+        };
+        (0..self.space.plans.len()).map(of_view).collect()
+    }
+
     /// The poses of every view, one per pair or that of all views, under a facing assignment.
     fn candidates(
         &self,
@@ -287,10 +306,6 @@ impl SkeletonStep {
                     .map(|(energy, pose)| candidate(energy, pose))
                     .collect(),
                 own: candidate(f64::from(best.score), best),
-                start: fused
-                    .start(view, exchanged)
-                    .and_then(|it| answers[view].as_ref()?.candidates.get(it))
-                    .map(|pose| candidate(f64::from(pose.score), pose)),
             })
         };
         (0..self.space.plans.len()).map(of_view).collect()
