@@ -71,6 +71,7 @@ impl Shot {
         ViewInput {
             plan: &self.plan,
             candidates: &self.candidates,
+            others: 0,
             sigma_px: None,
             tau_px: None,
         }

@@ -207,6 +207,7 @@ impl Pair {
             views: order.map(|view| ViewInput {
                 plan: &self.plans[view],
                 candidates: std::slice::from_ref(&self.solo[view]),
+                others: 0,
                 sigma_px: sigma_px[view],
                 tau_px: None,
             }),

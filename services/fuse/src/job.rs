@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use multiview::ViewPlan;
-use pipeline::{FuseStep, Views};
+use pipeline::{Follow, FuseStep, Views};
 
 /// What one worker's process has to do.
 #[derive(Debug)]
@@ -13,6 +13,8 @@ pub struct Job {
     pub worker: usize,
     /// Whether views are solved in pairs or all at once.
     pub views: Views,
+    /// Which of several people is followed.
+    pub follow: Follow,
     /// Its pairs: index in the deployment, and views. If all views are solved at once: the views of these pairs.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.

@@ -9,4 +9,4 @@ mod worker;
 
 pub use job::Job;
 pub use service::run;
-pub use settings::{settings, tau_px, views};
+pub use settings::{follow, settings, tau_px, views};

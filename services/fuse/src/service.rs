@@ -6,6 +6,7 @@ use crate::input::{Input, expected_errors};
 use crate::job::Job;
 use crate::worker::Worker;
 use messages::{ViewPose, topic};
+use pipeline::Following;
 use runtime::{Failure, Service};
 use stage::Stage;
 
@@ -47,5 +48,6 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     // A pair may need one solution or many, but the work per pyramid level is always similar.
     let step = Arc::clone(&job.step);
     service.progress().follow(move || step.n_sweeps());
-    stage.run(|frame| worker.fuse(frame))
+    let mut following = Following::new(job.follow);
+    stage.run(|frame| worker.fuse(frame, &mut following))
 }

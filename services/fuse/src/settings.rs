@@ -2,6 +2,7 @@
 
 use consistency::Learned;
 use deployment::fuse::{Config, Energy, Switch, Tau, TauName, Views};
+use deployment::person::Follow;
 use multiview::{EnergyKind, Settings, SwitchBy};
 use viewquality::TrainingErrors;
 
@@ -103,6 +104,15 @@ fn rescue_px(tau: &Tau) -> Vec<f32> {
     training(tau).map_or_else(Vec::new, |it| it.median_px.to_vec())
 }
 
+/// Which of several people is followed.
+pub fn follow(from: Follow) -> pipeline::Follow {
+    match from {
+        Follow::Last => pipeline::Follow::Last,
+        Follow::Largest => pipeline::Follow::Largest,
+        Follow::Clearest => pipeline::Follow::Clearest,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,6 +124,11 @@ mod tests {
             settings(&Config::default(), expected.n_candidates, 1.0, None),
             expected
         );
+    }
+
+    #[test]
+    fn the_default_follows_as_the_step_does() {
+        assert_eq!(follow(Follow::default()), pipeline::Follow::default());
     }
 
     #[test]

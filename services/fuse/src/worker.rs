@@ -4,7 +4,7 @@ use std::cell::Ref;
 
 use fmp::Responses;
 use messages::{EvidenceHeader, PairPose, Span, Status};
-use pipeline::{Support, ViewResult, Views};
+use pipeline::{Following, Others, Support, ViewResult, Views};
 use runtime::{ExitKind, Failure, OrFail as _, Sample, Service, now_nanos};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
@@ -16,6 +16,8 @@ use crate::job::Job;
 struct FrameViews<'a> {
     turn: &'a Turn,
     answers: Vec<Option<ViewResult>>,
+    /// The candidates that are other people.
+    others: Others,
     /// How many frames old the expected errors of every view are.
     sigma_ages: Vec<u64>,
     evidence: Vec<Option<EvidenceView<'a>>>,
@@ -40,8 +42,15 @@ pub(crate) struct Worker<'a> {
 
 impl Worker<'_> {
     /// Solves one frame.
-    pub(crate) fn fuse(&self, frame: &mut Frame<'_, Input>) -> Result<(), Failure> {
+    ///
+    /// * `following`: who was followed in the frames before.
+    pub(crate) fn fuse(
+        &self,
+        frame: &mut Frame<'_, Input>,
+        following: &mut Following,
+    ) -> Result<(), Failure> {
         let (answers, sigma_ages) = self.answers(frame);
+        let others = following.others(&self.job.plans, &answers);
         let samples: Vec<Option<Ref<'_, Sample<f32, EvidenceHeader>>>> = self
             .evidence
             .iter()
@@ -54,6 +63,7 @@ impl Worker<'_> {
             turn: frame.turn(),
             evidence: evidence.collect(),
             answers,
+            others,
             sigma_ages,
         };
         match self.job.views {
@@ -129,7 +139,7 @@ impl Worker<'_> {
 
     /// Solves this worker's pairs, one after the other.
     fn pairs(&self, frame: &FrameViews<'_>) -> Result<(), Failure> {
-        let start = self.job.step.start(&frame.answers);
+        let start = self.job.step.start(&frame.answers, &frame.others);
         for &(index, views) in &self.job.pairs {
             frame.turn.restart(now_nanos());
             self.service.progress().tick();
@@ -159,7 +169,7 @@ impl Worker<'_> {
         let evidence = evidence.map(|view| view.as_ref().map(EvidenceView::responses));
         let evidence: Vec<Option<Responses<'_>>> = evidence.collect();
         let step = &self.job.step;
-        let answer = step.all_views(&frame.answers, &evidence, Support::Mean);
+        let answer = step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean);
         let (n_views, present) = (frame.answers.len(), frame.present());
         let messages = wire::all_views_to_messages(n_views, answer.as_ref(), present);
         let messages = self.or_bad_input(messages, || {

@@ -245,6 +245,7 @@ fn settings(
         ),
         tables,
         views: fuse::views(deployment.views()),
+        follow: fuse::follow(deployment.person.follow),
         skeleton: SkeletonSettings {
             joints,
             joint_map: learned.and_then(|it| it.joint_map(joints)),

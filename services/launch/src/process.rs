@@ -215,6 +215,7 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
     let job = fuse::Job {
         worker,
         views: prepared.settings.views,
+        follow: prepared.settings.follow,
         pairs: topology.pairs_of(worker),
         step: Arc::new(FuseStep::new(
             prepared.model,
@@ -269,6 +270,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         joints: prepared.settings.skeleton.joints,
         frame_rate_hz: resolved.frame_rate_hz(),
         frame_step: deployment.capture.frame_step,
+        follow: deployment.person.follow,
         up_in_world: prepared.up_in_world,
     };
     let job = results::Job {

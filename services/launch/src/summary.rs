@@ -349,6 +349,7 @@ impl Report {
                 "  3D            {} of {} frames",
                 it.frames_with_pose, self.n_frames
             )?;
+            writeln!(text, "  people        {}", it.people.text())?;
             text.push_str(&trust::text(it, &self.doubts()));
             self.write_views(text, it)?;
             self.write_misplaced(text, it)?;

@@ -20,6 +20,7 @@ mod folder;
 mod lines;
 
 mod calibration;
+mod people;
 mod summary;
 mod trust;
 

@@ -49,6 +49,7 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
             _ => Kept::Solved,
         }),
         pairs: pose.n_pairs,
+        people: Some(pose.n_people),
         reason: None,
         sides: Some(match pose.sides {
             messages::Sides::SURE => Sides::Sure,
@@ -82,6 +83,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         joints: BTreeMap::new(),
         kept: None,
         pairs: 0,
+        people: None,
         reason: Some(it.reason.clone()),
         sides: None,
         sides_margin: None,

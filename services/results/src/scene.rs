@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use deployment::person::Follow;
 use fmp::{Layout, Model};
 use geometry::Framing;
 use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
@@ -31,6 +32,8 @@ pub struct Scene {
     pub frame_rate_hz: Option<f64>,
     /// Distance between the frames used.
     pub frame_step: u64,
+    /// Which of several people is followed.
+    pub follow: Follow,
     /// Against gravity, where the rig knows.
     pub up_in_world: Option<UnitVector3<f64>>,
 }

@@ -9,6 +9,7 @@ use runfiles::{FrameLine, Missing, Summary};
 
 use crate::calibration::Calibration;
 use crate::height::Heights;
+use crate::people::Counted;
 use crate::pose3d::{is_placed, joints, missing};
 use crate::trust::Trusted;
 use crate::{FrameRecord, Scene};
@@ -27,6 +28,7 @@ pub(crate) struct Tally {
     calibration: Calibration,
     heights: Heights,
     trusted: Trusted,
+    people: Counted,
 }
 
 impl Tally {
@@ -49,6 +51,7 @@ impl Tally {
             calibration: Calibration::new(scene),
             heights: Heights::new(scene.views.len()),
             trusted: Trusted::default(),
+            people: Counted::new(scene.follow),
         }
     }
 
@@ -95,6 +98,7 @@ impl Tally {
         self.calibration.add(scene, record);
         self.heights.add(scene, pose);
         self.trusted.add(pose);
+        self.people.add(pose);
         for (count, it) in self.dropped.iter_mut().zip(&record.views) {
             *count = it.frame.as_ref().map_or(*count, |it| it.n_dropped);
         }
@@ -200,6 +204,7 @@ impl Tally {
             person_px: self.heights.medians(names.clone().cloned()),
             contradicted: self.calibration.contradicted(names.cloned()),
             trust: self.trusted.trust(),
+            people: self.people.people(),
             ..self.summary.clone()
         }
     }

@@ -61,6 +61,8 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let present = (0..n_views).filter(|view| views[*view].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
+        let n_people = skeleton.people.len() as u32;
+        service.health().counted_people(n_people);
         let message = wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
         skeletons.send_and_account(frame.turn(), 0, message)
     })

@@ -3,13 +3,16 @@
 use crate::fields::fields_of;
 use crate::older::OLDER;
 use crate::schema::{Key, Shapes, schema};
-use crate::{Deployment, Runtime, Supervision, capture, fuse, pose, quality, results, triangulate};
+use crate::{
+    Deployment, Runtime, Supervision, capture, fuse, person, pose, quality, results, triangulate,
+};
 
 /// A section, and its keys in order.
 type Section = (&'static str, fn() -> &'static [&'static str]);
 
-const SECTIONS: [Section; 8] = [
+const SECTIONS: [Section; 9] = [
     ("capture", fields_of::<capture::Config>),
+    ("person", fields_of::<person::Config>),
     ("pose", fields_of::<pose::Config>),
     ("quality", fields_of::<quality::Config>),
     ("fuse", fields_of::<fuse::Config>),

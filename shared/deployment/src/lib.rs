@@ -8,6 +8,7 @@
 
 pub mod capture;
 pub mod fuse;
+pub mod person;
 pub mod pose;
 pub mod quality;
 pub mod results;
@@ -80,6 +81,9 @@ pub struct Deployment {
     /// How pixels get in.
     #[serde(default)]
     pub capture: capture::Config,
+    /// Who is followed.
+    #[serde(default)]
+    pub person: person::Config,
     /// The single-view solver.
     #[serde(default)]
     pub pose: pose::Config,

@@ -10,9 +10,9 @@ use kernels::Rgb8View;
 use multiview::{PairEstimate, ViewPlan};
 use nalgebra::UnitVector3;
 use pipeline::{
-    AllViewsResult, Combine, EstimatorError, FuseStep, PairResult, PairTables, Skeleton,
-    SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings, ViewStep,
-    all_pairs, plan,
+    AllViewsResult, Combine, EstimatorError, Following, FuseStep, Others, PairResult, PairTables,
+    Skeleton, SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings,
+    ViewStep, all_pairs, plan,
 };
 use rayon::prelude::*;
 use skeleton::{JointMap, PARSE14};
@@ -239,6 +239,8 @@ impl Bench {
                 Some(it)
             })
             .collect();
+        // Frames are independent: nobody was followed before.
+        let others = Following::default().others(&self.plans, &answers);
         let combine = match version.combining {
             Combining::Consensus => Combine::Consensus,
             _ => Combine::Mean,
@@ -252,7 +254,7 @@ impl Bench {
         let skeleton = match (version.terms, version.combining) {
             (Terms::Single, _) => last.run(&answers, &[]),
             (_, Combining::Pairs | Combining::Consensus) => {
-                let pairs = self.pairs(step, &answers, evidence);
+                let pairs = self.pairs(step, &answers, evidence, &others);
                 let skeleton = last.run(&answers, &pairs);
                 effort.of_pairs(&pairs, &skeleton);
                 skeleton
@@ -262,7 +264,7 @@ impl Bench {
                     Combining::AllViewsMean => Support::Mean,
                     _ => Support::Sum,
                 };
-                match step.all_views(&answers, &evidence.evidence, support) {
+                match step.all_views(&answers, &evidence.evidence, &others, support) {
                     Some(all) => {
                         effort.of_all_views(&all);
                         last.run_all_views(&answers, &all)
@@ -279,8 +281,9 @@ impl Bench {
         step: &FuseStep,
         answers: &[Option<ViewResult>],
         evidence: &Evidence<'_>,
+        others: &Others,
     ) -> Vec<PairResult> {
-        let start = step.start(answers);
+        let start = step.start(answers, others);
         let solve = |pair: [usize; 2]| {
             let [first, second] = pair.map(|it| evidence.evidence[it].as_ref());
             step.pair(pair, answers, [first?, second?], &start)

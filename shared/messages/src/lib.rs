@@ -22,7 +22,7 @@ pub use evidence::EvidenceHeader;
 pub use frame::FrameHeader;
 pub use health::Health;
 pub use metrics::{
-    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
+    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE, NO_VIEW, Span,
 };
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};

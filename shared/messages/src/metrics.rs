@@ -13,12 +13,14 @@ pub const N_CAUSES: usize = 5;
 pub const NO_VIEW: u32 = u32::MAX;
 /// Replaces the queue length of a process without a queue.
 pub const NO_QUEUE: u32 = u32::MAX;
+/// Replaces the number of people of a process that does not count them.
+pub const NO_PEOPLE: u32 = u32::MAX;
 
 /// The metrics of a process since its last start. Every process sends them about once a second,
 /// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
 /// histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Metrics.v1")]
+#[type_name("Metrics.v2")]
 #[repr(C)]
 pub struct Metrics {
     /// Run of the deployment.
@@ -58,8 +60,8 @@ pub struct Metrics {
     pub name: [u8; MAX_NAME],
     /// Number of valid rows.
     pub n_rows: u32,
-    /// Explicit padding.
-    pub reserved: u32,
+    /// Number of people in the last result, or [`NO_PEOPLE`].
+    pub n_people: u32,
     /// Durations, at most one row for each span and view.
     pub rows: [MetricsRow; MAX_ROWS],
 }
@@ -85,7 +87,7 @@ impl Default for Metrics {
             finished: 0,
             name: [0; MAX_NAME],
             n_rows: 0,
-            reserved: 0,
+            n_people: NO_PEOPLE,
             rows: [MetricsRow::default(); MAX_ROWS],
         }
     }

@@ -1,7 +1,9 @@
 //! Collects durations and counts of one process.
 
 use hdrhistogram::Histogram;
-use messages::{Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span};
+use messages::{
+    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE, NO_VIEW, Span,
+};
 
 /// Longest measurable duration, nanoseconds: an hour.
 const LONGEST_NANOS: u64 = 3_600_000_000_000;
@@ -29,6 +31,7 @@ pub struct Meter {
     n_dropped: [u64; N_CAUSES],
     evidence_bytes: u64,
     queue: Option<[u32; 2]>,
+    n_people: u32,
     view: u32,
     name: [u8; MAX_NAME],
 }
@@ -47,6 +50,7 @@ impl Default for Meter {
             n_dropped: [0; N_CAUSES],
             evidence_bytes: 0,
             queue: None,
+            n_people: NO_PEOPLE,
             view: NO_VIEW,
             name: [0; MAX_NAME],
         }
@@ -115,6 +119,11 @@ impl Meter {
         self.queue = Some([n, longest.max(n)]);
     }
 
+    /// Records how many people there are in a result.
+    pub fn counted_people(&mut self, n: u32) {
+        self.n_people = n;
+    }
+
     /// Counts evidence that was sent.
     pub fn sent_evidence(&mut self, bytes: u64) {
         self.evidence_bytes += bytes;
@@ -154,6 +163,7 @@ impl Meter {
             evidence_bytes: self.evidence_bytes,
             queue,
             longest_queue,
+            n_people: self.n_people,
             view: self.view,
             name: self.name,
             ..Metrics::default()

@@ -1,7 +1,8 @@
 //! The checked content of another process's metrics message.
 
 use messages::{
-    Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_QUEUE, NO_VIEW, Span,
+    Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
+    NO_VIEW, Span,
 };
 
 /// A malformed metrics message.
@@ -89,6 +90,8 @@ pub struct Reading {
     pub peak_memory_bytes: u64,
     /// Current and longest queue of frames or results, if there is a queue.
     pub queue: Option<[u32; 2]>,
+    /// Number of people in the last result, if it counts them.
+    pub n_people: Option<u32>,
     /// Its view, if it works for one.
     pub view: Option<ViewName>,
     /// Whether it has received the end of stream and sent it on.
@@ -172,6 +175,7 @@ impl Reading {
             memory_bytes: message.memory_bytes,
             peak_memory_bytes: message.peak_memory_bytes,
             queue: queue_of(message)?,
+            n_people: Some(message.n_people).filter(|it| *it != NO_PEOPLE),
             view: view.map(|index| ViewName { index, name }),
             is_finished: message.finished == 1,
             times,
@@ -218,7 +222,7 @@ impl Reading {
             finished: u32::from(self.is_finished),
             name,
             n_rows: self.times.len().min(MAX_ROWS) as u32,
-            reserved: 0,
+            n_people: self.n_people.unwrap_or(NO_PEOPLE),
             rows,
         }
     }
@@ -326,6 +330,7 @@ mod tests {
             counts in any::<[u64; 12]>(),
             ids in any::<[u32; 2]>(),
             queue in proptest::option::of((0_u32..1000, 0_u32..1000)),
+            n_people in proptest::option::of(0_u32..1000),
             view in any_view(),
             is_finished in any::<bool>(),
             times in any_times(),
@@ -344,6 +349,7 @@ mod tests {
                 memory_bytes: counts[8],
                 peak_memory_bytes: counts[9],
                 queue: queue.map(|(now, more)| [now, now + more]),
+                n_people,
                 view,
                 is_finished,
                 times,

@@ -67,7 +67,7 @@ fn up(view: &ViewInput<'_>) -> Vector3<f64> {
 
 /// Direction from the camera to the person, in the world.
 fn ray(view: &ViewInput<'_>) -> Option<Vector3<f64>> {
-    let centres = view.plan.centres(view.candidates.first()?);
+    let centres = view.plan.centres(view.best()?);
     let n = centres.len().max(1) as f64;
     let mean = [0, 1].map(|axis| centres.iter().map(|centre| centre[axis]).sum::<f64>() / n);
     let ray = view.plan.camera().ray(&Point2::from(mean))?;

@@ -62,16 +62,12 @@ pub fn rank_starts<'a>(
     };
     let start = |pattern: usize| {
         let states = views.iter().enumerate().map(|(view, view_input)| {
-            let n = view_input
-                .candidates
-                .len()
-                .min(settings.n_candidates.max(1));
             let exchanged = view > 0 && pattern >> (view - 1) & 1 == 1;
             let state = |candidate| State {
                 candidate,
                 exchanged,
             };
-            (0..n).map(state).collect()
+            tried(settings, view_input).map(state).collect()
         });
         best_of(settings, views, tables, &states.collect::<Vec<_>>())
     };
@@ -131,20 +127,23 @@ struct State {
 fn states(settings: &Settings, view_input: &ViewInput<'_>, view: usize) -> Vec<State> {
     let can_exchange =
         settings.facing && view_input.plan.model().spec().mirror.is_some() && view > 0;
-    let n = view_input
-        .candidates
-        .len()
-        .min(settings.n_candidates.max(1));
     [false, true]
         .into_iter()
         .take(1 + usize::from(can_exchange))
         .flat_map(|exchanged| {
-            (0..n).map(move |candidate| State {
+            tried(settings, view_input).map(move |candidate| State {
                 candidate,
                 exchanged,
             })
         })
         .collect()
+}
+
+/// The candidates of a view that may be the start: the best ones that are not somebody else.
+fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item = usize> {
+    let all = 0..view_input.candidates.len();
+    let own = all.filter(|it| !view_input.is_other(*it));
+    own.take(settings.n_candidates.max(1))
 }
 
 /// `[first][second - first - 1][state of first][state of second]`.

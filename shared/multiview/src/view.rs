@@ -141,6 +141,8 @@ pub struct ViewInput<'a> {
     pub plan: &'a ViewPlan,
     /// Its distinct candidates, best first; not empty.
     pub candidates: &'a [Pose],
+    /// Bit `c` is set if candidate `c` is somebody else than the person of the other views: it is no start. Never all.
+    pub others: u64,
     /// Expected error of every part, pixels; `None` where there is no prediction.
     pub sigma_px: Option<&'a [f32]>,
     /// Thresholds that came with the prediction, pixels; used if [`Settings::tau_px`] and
@@ -149,13 +151,24 @@ pub struct ViewInput<'a> {
 }
 
 impl ViewInput<'_> {
+    /// Whether a candidate is somebody else.
+    pub(crate) fn is_other(&self, candidate: usize) -> bool {
+        candidate < u64::BITS as usize && self.others >> candidate & 1 == 1
+    }
+
+    /// The best candidate that is not somebody else.
+    pub(crate) fn best(&self) -> Option<&Pose> {
+        let mut each = self.candidates.iter().enumerate();
+        each.find(|it| !self.is_other(it.0)).map(|it| it.1)
+    }
+
     /// Expected error and threshold of a part, if it has both.
     pub(crate) fn expectation(&self, settings: &Settings, part: usize) -> Option<[f32; 2]> {
         let sigma = *self.sigma_px?.get(part)?;
         let tau = if !settings.tau_px.is_empty() {
             *settings.tau_px.get(part)?
         } else if !settings.tau_tenths.is_empty() {
-            let tenth = self.plan.size(self.candidates.first()?) / 10.0;
+            let tenth = self.plan.size(self.best()?) / 10.0;
             *settings.tau_tenths.get(part)? * tenth as f32
         } else {
             *self.tau_px?.get(part)?

@@ -10,8 +10,9 @@ use nalgebra::UnitVector3;
 use rayon::prelude::*;
 
 use crate::{
-    AllViewsResult, FuseStep, PairResult, PairTables, Skeleton, SkeletonSettings, SkeletonStep,
-    Support, ViewEstimate, ViewResult, ViewSettings, ViewStep, Views, all_pairs,
+    AllViewsResult, Follow, Following, FuseStep, PairResult, PairTables, Skeleton,
+    SkeletonSettings, SkeletonStep, Support, ViewEstimate, ViewResult, ViewSettings, ViewStep,
+    Views, all_pairs,
 };
 
 /// Why an estimator could not be created.
@@ -52,6 +53,7 @@ pub struct Estimate {
 pub struct Estimator {
     views: Vec<ViewStep>,
     solved_in: Views,
+    following: Following,
     fuse: FuseStep,
     skeleton: SkeletonStep,
     plans: Vec<Arc<ViewPlan>>,
@@ -94,6 +96,7 @@ impl Estimator {
             n_frames: 0,
             views: steps,
             solved_in: settings.views,
+            following: Following::new(settings.follow),
             fuse: FuseStep::new(
                 Arc::clone(model),
                 settings.fuse.clone(),
@@ -138,12 +141,7 @@ impl Estimator {
                 let Some(image) = images[view] else {
                     return (None, None);
                 };
-                responses.resize(step.layout().n_responses(), 0.0);
-                let mut estimate = step.run(image, tracker.scope(step.layout(), frame), responses);
-                if step.needs_full_search(tracker, &estimate) {
-                    estimate = step.run(image, Scope::whole(step.layout()), responses);
-                }
-                step.update(tracker, frame, &estimate);
+                let estimate = search(step, tracker, (frame, image), responses);
                 let answer = (!estimate.candidates.is_empty()).then(|| ViewResult {
                     candidates: estimate.candidates.clone(),
                     front: estimate.front.clone(),
@@ -154,7 +152,8 @@ impl Estimator {
             })
             .collect();
         let (answers, estimates): (Vec<_>, Vec<_>) = viewed.into_iter().unzip();
-        let start = self.fuse.start(&answers);
+        let others = self.following.others(&self.plans, &answers);
+        let start = self.fuse.start(&answers, &others);
         let evidence = |view: usize| {
             let (layout, estimate) = (self.plans[view].layout(), estimates[view].as_ref()?);
             let values = &self.responses[view];
@@ -162,17 +161,16 @@ impl Estimator {
             Some(evidence.with_bounds(&estimate.bounds))
         };
         let evidence: Vec<Option<Responses<'_>>> = (0..estimates.len()).map(evidence).collect();
-        let (pairs, all_views) = match self.solved_in {
-            Views::Pairs => (self.pairs(&answers, &evidence, &start), None),
-            Views::All => {
-                let result = self.fuse.all_views(&answers, &evidence, Support::Mean);
-                (Vec::new(), result)
-            }
+        let all_views = (self.solved_in == Views::All)
+            .then(|| {
+                self.fuse
+                    .all_views(&answers, &evidence, &others, Support::Mean)
+            })
+            .flatten();
+        let pairs = match self.solved_in {
+            Views::Pairs => self.pairs(&answers, &evidence, &start),
+            Views::All => Vec::new(),
         };
-        let scopes = estimates
-            .iter()
-            .map(|estimate| estimate.as_ref().map(|estimate| estimate.scope))
-            .collect();
         let skeleton = match &all_views {
             Some(result) => self.skeleton.run_all_views(&answers, result),
             None => self.skeleton.run(&answers, &pairs),
@@ -180,7 +178,10 @@ impl Estimator {
         Estimate {
             answers,
             start,
-            scopes,
+            scopes: estimates
+                .iter()
+                .map(|it| Some(it.as_ref()?.scope))
+                .collect(),
             pairs,
             all_views,
             skeleton,
@@ -203,6 +204,22 @@ impl Estimator {
     }
 }
 
+/// Searches a view near the last pose, or in full where that is not enough.
+fn search(
+    step: &ViewStep,
+    tracker: &mut Tracker,
+    (frame, image): (u64, Rgb8View<'_>),
+    responses: &mut Vec<f32>,
+) -> ViewEstimate {
+    responses.resize(step.layout().n_responses(), 0.0);
+    let mut estimate = step.run(image, tracker.scope(step.layout(), frame), responses);
+    if step.needs_full_search(tracker, &estimate) {
+        estimate = step.run(image, Scope::whole(step.layout()), responses);
+    }
+    step.update(tracker, frame, &estimate);
+    estimate
+}
+
 /// Settings of all steps.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EstimatorSettings {
@@ -210,6 +227,8 @@ pub struct EstimatorSettings {
     pub view: ViewSettings,
     /// Whether views are solved in pairs or all at once.
     pub views: Views,
+    /// Which of several people is followed.
+    pub follow: Follow,
     /// Of the fusion step.
     pub fuse: Settings,
     /// Part-type tables.

@@ -10,6 +10,7 @@ use multiview::{
     choose_start, estimate_all_views, estimate_pair, is_exchanged, rank_starts,
 };
 
+use crate::following::Others;
 use crate::fused_view::{Candidate, FusedView};
 use crate::skeleton_settings::SkeletonSettings;
 use crate::space::Space;
@@ -144,7 +145,13 @@ impl FuseStep {
     ///
     /// Every fusion worker computes it for all views, from their (small) single-view results alone,
     /// so that all pairs start from the same person.
-    pub fn start(&self, answers: &[Option<ViewResult>]) -> Vec<Option<(usize, bool)>> {
+    ///
+    /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
+    pub fn start(
+        &self,
+        answers: &[Option<ViewResult>],
+        others: &Others,
+    ) -> Vec<Option<(usize, bool)>> {
         let present: Vec<usize> = (0..answers.len())
             .filter(|view| answers[*view].is_some())
             .collect();
@@ -153,7 +160,7 @@ impl FuseStep {
         }
         let views: Vec<ViewInput<'_>> = present
             .iter()
-            .filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)))
+            .filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?, others)))
             .collect();
         let tables = |first: usize, second: usize| {
             let pair = [present[first], present[second]];
@@ -188,9 +195,11 @@ impl FuseStep {
                 return None;
             }
         }
+        // The start has been chosen.
+        let others = Others::default();
         let each = [
-            self.view_answer(first, answers[first].as_ref()?),
-            self.view_answer(second, answers[second].as_ref()?),
+            self.view_answer(first, answers[first].as_ref()?, &others),
+            self.view_answer(second, answers[second].as_ref()?, &others),
         ];
         let input = PairInput {
             views: each,
@@ -233,12 +242,14 @@ impl FuseStep {
     /// see the person from behind.
     ///
     /// * `evidence`: of the views with a result; should carry its bounds.
+    /// * `others`: candidates that are somebody else ([`Following::others`](crate::Following::others)).
     /// * Returns `None` if fewer than two views have a result whose poses their evidence
     ///   [covers](Responses::covers).
     pub fn all_views(
         &self,
         answers: &[Option<ViewResult>],
         evidence: &[Option<Responses<'_>>],
+        others: &Others,
         support: Support,
     ) -> Option<AllViewsResult> {
         let present = |view: &usize| {
@@ -250,7 +261,8 @@ impl FuseStep {
             return None;
         }
         let views = present.iter();
-        let views = views.filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?)));
+        let views =
+            views.filter_map(|&view| Some(self.view_answer(view, answers[view].as_ref()?, others)));
         let views: Vec<ViewInput<'_>> = views.collect();
         let evidence = present.iter().filter_map(|&view| evidence[view].as_ref());
         let evidence: Vec<&Responses<'_>> = evidence.collect();
@@ -334,10 +346,16 @@ impl FuseStep {
         views
     }
 
-    fn view_answer<'a>(&'a self, view: usize, answer: &'a ViewResult) -> ViewInput<'a> {
+    fn view_answer<'a>(
+        &'a self,
+        view: usize,
+        answer: &'a ViewResult,
+        others: &Others,
+    ) -> ViewInput<'a> {
         ViewInput {
             plan: &self.plans[view],
             candidates: &answer.candidates,
+            others: others.of_view(view),
             sigma_px: answer.sigma_px.as_deref(),
             tau_px: answer.tau_px.as_deref(),
         }

@@ -5,9 +5,11 @@
 #![forbid(unsafe_code)]
 
 mod bodies;
+mod following;
 mod fuse_step;
 mod fused;
 mod fused_view;
+mod people;
 mod skeleton_settings;
 mod skeleton_step;
 mod space;
@@ -18,10 +20,12 @@ mod estimate;
 
 pub use bodies::{Body, NoJoint};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
+pub use following::{Follow, Following, Others};
 pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
+pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use view_result::ViewResult;

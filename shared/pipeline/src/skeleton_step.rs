@@ -15,6 +15,7 @@ use skeleton::PARSE14;
 use crate::bodies::{Bodies, Body, NoJoint};
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
+use crate::people::{Person, people};
 use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
@@ -38,6 +39,8 @@ pub struct Skeleton {
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
+    /// The people that the views could mean, the clearest first.
+    pub people: Vec<Person>,
     /// How many pairs were averaged.
     pub n_pairs: usize,
     /// Energy of the chosen assumption about which views see the person from the same side minus that of
@@ -126,6 +129,7 @@ impl SkeletonStep {
             joints,
             body,
             views,
+            people: people(&self.space.plans, answers),
             n_pairs: fused.n_pairs(),
             facing_margin,
             sides,

@@ -27,6 +27,10 @@ pub struct FrameLine {
     pub kept: Option<Kept>,
     /// Pairs of views that have a part in the result.
     pub pairs: u32,
+    /// How many people the views agree on, of whom one is followed; none in a line without a result, and where the model is
+    /// not of people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub people: Option<u32>,
     /// Why there is no result; only in a line without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,

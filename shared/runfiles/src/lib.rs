@@ -29,7 +29,7 @@ pub use frame::{FrameLine, JointLine, Kept, PlacedJoint, Sides};
 pub use latency::{LatencyReport, Percentiles};
 pub use missing::Missing;
 pub use read::{Line, ReadError, lines, to_line};
-pub use summary::{CameraFit, Contradicted, Exchanged, RunSummary, Summary, ViewSummary};
+pub use summary::{CameraFit, Contradicted, Exchanged, People, RunSummary, Summary, ViewSummary};
 pub use times::{CameraTimes, PoseTimes, TimesLine, ViewTimes};
 pub use trust::{Doubt, Trust};
 pub use view::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};

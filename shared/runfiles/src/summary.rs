@@ -70,6 +70,8 @@ pub struct Summary {
     pub frames_with_pose: u64,
     /// Results without every view of the rig.
     pub frames_with_views_missing: u64,
+    /// Who is followed, and how many others are in view; since the process was started last.
+    pub people: People,
     /// How high people are in the frames that were searched, pixels, by name: the median over the results that used the view, of
     /// the longer side of the rectangle around a pose's parts; null without any. Since the process was started last.
     pub person_px: BTreeMap<String, Option<f64>>,
@@ -89,6 +91,34 @@ pub struct Summary {
     pub views_used: Vec<(String, u64)>,
     /// Writes that failed.
     pub writes_failed: u64,
+}
+
+/// The people in view.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct People {
+    /// Which of several is followed: `last`, `largest` or `clearest`.
+    pub follow: String,
+    /// Results with more than one.
+    pub frames_with_others: u64,
+    /// The most in one result.
+    pub most: u32,
+}
+
+impl People {
+    /// For people, in one line.
+    pub fn text(&self) -> String {
+        let Self {
+            follow,
+            frames_with_others,
+            most,
+        } = self;
+        if *frames_with_others == 0 {
+            return "no others in view".to_owned();
+        }
+        format!(
+            "up to {most} in view, more than one in {frames_with_others} frames; person.follow = \"{follow}\" chooses"
+        )
+    }
 }
 
 /// How well a camera fits the others, over the last frames.

@@ -173,6 +173,11 @@ impl Health {
         self.counts.meter(|meter| meter.queued(n));
     }
 
+    /// Records how many people there are in a result.
+    pub fn counted_people(&self, n: u32) {
+        self.counts.meter(|meter| meter.counted_people(n));
+    }
+
     /// Counts evidence that was sent.
     pub fn sent_evidence(&self, bytes: u64) {
         self.counts.meter(|meter| meter.sent_evidence(bytes));

@@ -15,7 +15,7 @@ use messages::{
 };
 use multiview::{Settings, ViewPlan};
 use nalgebra::Isometry3;
-use pipeline::{FuseStep, PairTables, SkeletonSettings, SkeletonStep, ViewResult};
+use pipeline::{Following, FuseStep, PairTables, SkeletonSettings, SkeletonStep, ViewResult};
 use wire::Expected;
 
 const SIZE: [usize; 2] = [80, 60];
@@ -415,7 +415,8 @@ pub fn wire_fusion(input: &[u8]) {
     let read = wire::evidence_from_message(&header, &values, plans[0].layout());
     let other = wire::evidence_from_message(&whole_header, &whole_values, plans[1].layout());
     if let (Ok(first), Ok(second)) = (read, other) {
-        let start = fuse.start(&answers);
+        let others = Following::default().others(plans, &answers);
+        let start = fuse.start(&answers, &others);
         let evidence = [&first.responses(), &second.responses()];
         let answer = fuse.pair([0, 1], &answers, evidence, &start);
         let sent = wire::pair_to_message([0, 1], answer.as_ref(), 3);

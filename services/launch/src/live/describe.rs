@@ -54,6 +54,7 @@ pub fn measured(reading: &Reading) -> Value {
         "memory_bytes": reading.memory_bytes,
         "peak_memory_bytes": reading.peak_memory_bytes,
         "evidence_bytes": reading.evidence_bytes,
+        "people": reading.n_people,
         "times": times,
     })
 }

@@ -34,6 +34,11 @@ pub fn table(snapshot: &Snapshot) -> String {
     });
     text.extend(problems);
     text.push('\n');
+    let counted = snapshot.processes.iter().filter_map(|process| {
+        let n = process.reading.as_ref()?.n_people?;
+        Some(format!("people in view, of whom one is followed: {n}\n\n"))
+    });
+    text.extend(counted);
     let rows = snapshot
         .processes
         .iter()
@@ -222,6 +227,18 @@ pose-0   waiting     left      100   20.0   0.060   0.060     0.060   0.060
 results  waiting     all       100   20.0  ";
         let text = table(&snapshot());
         assert!(text.starts_with(expected), "{text}");
+    }
+
+    #[test]
+    fn the_number_of_people_is_shown_where_it_is_counted() {
+        let mut snapshot = snapshot();
+        assert!(!table(&snapshot).contains("people"));
+        snapshot.processes[3].reading.as_mut().unwrap().n_people = Some(3);
+        let text = table(&snapshot);
+        assert!(
+            text.contains("people in view, of whom one is followed: 3\n"),
+            "{text}"
+        );
     }
 
     #[test]

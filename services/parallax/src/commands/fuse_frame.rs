@@ -303,6 +303,7 @@ fn settings(
         },
         tables,
         views: pipeline::Views::Pairs,
+        follow: pipeline::Follow::default(),
         skeleton: SkeletonSettings {
             joints: arguments.joints,
             joint_map: learned.and_then(|it| it.joint_map(arguments.joints)),
@@ -359,6 +360,12 @@ impl Report<'_> {
             "views": views,
             "pairs": pairs,
             "facing_margin": self.estimate.skeleton.facing_margin,
+            "people": self.estimate.skeleton.people.iter().map(|it| json!({
+                "candidates": it.candidates,
+                "place_m": <[f64; 3]>::from(it.place.coords),
+                "strength": it.strength,
+                "size_px": it.size_px,
+            })).collect::<Vec<_>>(),
             "joints": joints,
         })
     }

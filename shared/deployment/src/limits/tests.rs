@@ -376,6 +376,7 @@ const OTHERS: &[&str] = &[
     "fuse.switch",
     "fuse.facing",
     "fuse.pairs",
+    "person.follow",
     "triangulate.joints",
     "triangulate.combine",
     "triangulate.bodies",

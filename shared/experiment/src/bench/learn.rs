@@ -35,6 +35,7 @@ impl Bench {
             (!found.candidates.is_empty()).then_some(ViewInput {
                 plan: &self.plans[view],
                 candidates: &found.candidates,
+                others: 0,
                 sigma_px: None,
                 tau_px: None,
             })

@@ -163,6 +163,7 @@ impl View {
         ViewInput {
             plan: &self.plan,
             candidates: &self.candidates,
+            others: 0,
             sigma_px: self.sigma_px.as_deref(),
             tau_px: self.tau_px.as_deref(),
         }

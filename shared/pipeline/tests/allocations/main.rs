@@ -14,7 +14,7 @@ mod scene;
 use std::alloc::System;
 use std::sync::Arc;
 
-use pipeline::{Combine, FuseStep, PairTables, SkeletonSettings, SkeletonStep};
+use pipeline::{Combine, FuseStep, Others, PairTables, SkeletonSettings, SkeletonStep};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 
 use scene::Scene;
@@ -84,7 +84,7 @@ fn of_frame(rows: usize, combine: Combine) -> [Count; 2] {
     let mut last = None;
     // The first frames make the buffers.
     for _ in 0..3 {
-        let start = fuse.start(&scene.answers);
+        let start = fuse.start(&scene.answers, &Others::default());
         let (pairs, of_pairs) = count(|| {
             let pairs = pipeline::all_pairs(N_VIEWS).into_iter();
             let solved = pairs.map(|views| {

@@ -1,0 +1,164 @@
+//! Which of several people is followed.
+
+use std::sync::Arc;
+
+use multiview::ViewPlan;
+use nalgebra::Point3;
+
+use crate::ViewResult;
+use crate::people::{Found, find};
+
+/// Which of several people is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Follow {
+    /// The one nearest to where the person was in the frame before; at first the clearest.
+    #[default]
+    Last,
+    /// The one that is largest in the pictures.
+    Largest,
+    /// The one that most views see most clearly.
+    Clearest,
+}
+
+/// Farther away than this from where the person was it is somebody else, metres.
+const REACH_M: f64 = 1.0;
+/// After so many frames without the person another one is followed.
+const FORGET_AFTER: u32 = 30;
+
+/// Follows one person from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Following {
+    follow: Follow,
+    last: Option<Point3<f64>>,
+    n_without: u32,
+}
+
+/// The candidates of a frame that are other people than the one who is followed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Others {
+    of_views: Vec<u64>,
+}
+
+impl Others {
+    /// Bit `c` is set if candidate `c` of a view is somebody else.
+    pub fn of_view(&self, view: usize) -> u64 {
+        self.of_views.get(view).copied().unwrap_or(0)
+    }
+}
+
+impl Following {
+    /// Nobody has been followed so far.
+    pub fn new(follow: Follow) -> Self {
+        Self {
+            follow,
+            ..Self::default()
+        }
+    }
+
+    /// Chooses the person of the next frame, and says which candidates are others.
+    ///
+    /// Of a single person nothing is left out.
+    pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
+        let found = find(plans, answers);
+        let followed = self.choose(&found);
+        match followed {
+            Some(followed) if found.people.len() > 1 => Others {
+                of_views: found.others(followed),
+            },
+            _ => Others::default(),
+        }
+    }
+
+    fn choose(&mut self, found: &Found) -> Option<usize> {
+        let people = || found.people.iter().enumerate();
+        let first = people().next().map(|it| it.0);
+        match self.follow {
+            Follow::Clearest => first,
+            Follow::Largest => people()
+                .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
+                .map(|it| it.0),
+            Follow::Last => {
+                let chosen = match self.last {
+                    None => first,
+                    Some(last) => people()
+                        .map(|(index, it)| (index, (it.place - last).norm()))
+                        .filter(|it| it.1 <= REACH_M)
+                        .min_by(|a, b| a.1.total_cmp(&b.1))
+                        .map(|it| it.0),
+                };
+                if let Some(chosen) = chosen {
+                    self.last = Some(found.people[chosen].place);
+                    self.n_without = 0;
+                } else {
+                    self.n_without += 1;
+                    if self.n_without >= FORGET_AFTER {
+                        self.last = None;
+                    }
+                }
+                chosen.or(first)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::people::tests::{camera, found};
+
+    /// Where the one who is chosen stands, frame by frame.
+    fn chosen(follow: Follow, frames: &[&[([f64; 2], f64)]]) -> Vec<Option<f64>> {
+        let cameras: Vec<_> = (0..4).map(camera).collect();
+        let mut following = Following::new(follow);
+        let frames = frames.iter().map(|people| {
+            let found = found(&cameras, people);
+            let index = following.choose(&found)?;
+            Some((found.people[index].place.x * 1e3).round() / 1e3)
+        });
+        frames.collect()
+    }
+
+    #[test]
+    fn the_person_of_the_last_frame_is_followed_even_where_another_is_clearer() {
+        let frames: [&[([f64; 2], f64)]; 4] = [
+            &[([-0.5, 0.0], 1.0), ([1.0, 0.5], 0.8)],
+            &[([-0.3, 0.0], 0.6), ([1.0, 0.5], 1.0)],
+            // For one frame the person is not found.
+            &[([1.0, 0.5], 1.0)],
+            &[([-0.1, 0.0], 0.6), ([1.0, 0.5], 1.0)],
+        ];
+        let last = [Some(-0.5), Some(-0.3), Some(1.0), Some(-0.1)];
+        assert_eq!(chosen(Follow::Last, &frames), last);
+        let clearest = [Some(-0.5), Some(1.0), Some(1.0), Some(1.0)];
+        assert_eq!(chosen(Follow::Clearest, &frames), clearest);
+    }
+
+    #[test]
+    fn somebody_else_is_followed_once_the_person_has_been_away_for_long() {
+        let both: &[([f64; 2], f64)] = &[([-1.0, 0.0], 1.0), ([1.0, 0.0], 0.6)];
+        let one: &[([f64; 2], f64)] = &[([1.0, 0.0], 0.6)];
+        let mut frames = vec![one; FORGET_AFTER as usize + 2];
+        frames[0] = both;
+        frames.push(both);
+        let got = chosen(Follow::Last, &frames);
+        assert_eq!(got[0], Some(-1.0));
+        assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
+    }
+
+    #[test]
+    fn the_largest_is_the_one_that_is_large_in_the_pictures() {
+        // The first camera stands at x = 5 m, the others all around.
+        let near_and_far: &[([f64; 2], f64)] = &[([0.0, 0.0], 1.0), ([1.2, 1.2], 0.7)];
+        let cameras: Vec<_> = (0..3).map(camera).collect();
+        let found = found(&cameras, near_and_far);
+        let sizes: Vec<f64> = found.people.iter().map(|it| it.size_px).collect();
+        let index = Following::new(Follow::Largest).choose(&found).unwrap();
+        assert!(sizes.iter().all(|it| *it <= sizes[index]), "{sizes:?}");
+        assert_ne!(sizes[0], sizes[1]);
+    }
+
+    #[test]
+    fn nobody_is_followed_where_nobody_is() {
+        assert_eq!(chosen(Follow::Last, &[&[], &[]]), [None, None]);
+    }
+}

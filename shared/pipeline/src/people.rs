@@ -1,0 +1,341 @@
+//! The people that the views of a frame could mean: candidates of different views that are one person in space.
+
+use std::sync::Arc;
+
+use geometry::{Camera, Ray};
+use multiview::ViewPlan;
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+use crate::ViewResult;
+
+/// The parts whose mean is a point of the middle line of the body: head, neck, hips, knees, ankles. Where these lie does
+/// not depend on which side is called left.
+const LINE: [[usize; 2]; N_POINTS] = [[0, 0], [1, 1], [9, 21], [11, 23], [13, 25]];
+const N_POINTS: usize = 5;
+/// Of the neck and of the hips in `LINE`.
+const NECK: usize = 1;
+const HIPS: usize = 2;
+/// Shortest and longest distance of successive points, metres: wide enough for a child of three years and a tall man. The
+/// middle between two knees may be anywhere between the legs.
+const LENGTHS: [[f64; 2]; N_POINTS - 1] = [[0.05, 0.5], [0.2, 0.8], [0.0, 0.7], [0.0, 0.7]];
+
+/// Largest mean distance of a candidate's points from where the person is projected, as a share of its size in the picture.
+const TOLERANCE: f64 = 0.15;
+/// A candidate whose trunk is nearer than this share of its size to the middle line of a person is that person in the
+/// picture.
+const SAME: f64 = 0.15;
+/// People whose trunks are nearer are the same person, metres.
+const APART_M: f64 = 0.5;
+/// Rounds of looking for more views.
+const MAX_ROUNDS: usize = 3;
+/// Least determinant of the normal matrix of rays: two that are 3 degrees apart have 0.005.
+const MIN_SPREAD: f64 = 0.002;
+/// Views that must agree; all of a smaller rig.
+const MIN_VIEWS: usize = 3;
+/// Weakest person, as a share of the strength of the strongest one.
+const MIN_STRENGTH: f64 = 0.28;
+
+/// A person that several views could mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Person {
+    /// The candidate of every view; `None` for a view without one.
+    pub candidates: Vec<Option<usize>>,
+    /// The middle line of the body in every picture that shows all of it, head, neck, hips, knees and ankles, pixels of the
+    /// frame.
+    pub lines_px: Vec<Option<Line>>,
+    /// Middle of the trunk, metres in the world.
+    pub place: Point3<f64>,
+    /// How clearly the views see the person: by how much its candidates score above the weakest third of their views, less the
+    /// farther they are from where the person is projected. Sum over the views.
+    pub strength: f64,
+    /// Size in the pictures: the longer side of the rectangle around the parts, mean over the views that see it, pixels of
+    /// the frame.
+    pub size_px: f64,
+}
+
+impl Person {
+    /// Number of views that see the person.
+    pub fn n_views(&self) -> usize {
+        self.candidates.iter().flatten().count()
+    }
+}
+
+/// The middle line of a body in a picture, pixels of the frame.
+type Line = [[f64; 2]; N_POINTS];
+
+/// A candidate of a view.
+struct Sighting {
+    points_px: Line,
+    rays: [Option<Ray>; N_POINTS],
+    size_px: f64,
+    strength: f64,
+}
+
+impl Sighting {
+    fn middle(&self) -> [f64; 2] {
+        let [neck, hips] = [self.points_px[NECK], self.points_px[HIPS]];
+        [0, 1].map(|axis| f64::midpoint(neck[axis], hips[axis]))
+    }
+
+    /// Whether it lies on the middle line of a person in the picture.
+    fn is_on(&self, line: &Line) -> bool {
+        let middle = self.middle();
+        let mut bones = line.array_windows();
+        bones.any(|[a, b]| distance_to_segment(middle, *a, *b) < SAME * self.size_px)
+    }
+
+    /// Mean distance of the points from where those of a person are projected, as a share of the size.
+    fn distance(&self, projected: &Line) -> f64 {
+        let each = self.points_px.iter().zip(projected);
+        let sum: f64 = each.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
+        sum / (N_POINTS as f64 * self.size_px)
+    }
+}
+
+/// A frame's candidates, and the people that they could mean.
+pub(crate) struct Found {
+    views: Vec<Vec<Sighting>>,
+    pub(crate) people: Vec<Person>,
+}
+
+impl Found {
+    /// The candidates of every view that are another person than one of the people, as bits.
+    ///
+    /// In a view that sees nobody but others nothing is left out: there the person may be hidden, or badly found.
+    pub(crate) fn others(&self, followed: usize) -> Vec<u64> {
+        let people = || self.people.iter().enumerate();
+        let of_view = |(view, sightings): (usize, &Vec<Sighting>)| {
+            let is_of = |person: &Person, it: &Sighting| {
+                person.lines_px[view]
+                    .as_ref()
+                    .is_some_and(|line| it.is_on(line))
+            };
+            let is_other = |it: &Sighting| {
+                let mut others = people().filter(|(index, _)| *index != followed);
+                !is_of(&self.people[followed], it) && others.any(|(_, other)| is_of(other, it))
+            };
+            let each = sightings.iter().enumerate().take(u64::BITS as usize);
+            let others = each.filter(|(_, it)| is_other(it));
+            let others: Vec<usize> = others.map(|it| it.0).collect();
+            if others.len() == sightings.len() {
+                return 0;
+            }
+            others.iter().fold(0, |mask, it| mask | 1_u64 << it)
+        };
+        self.views.iter().enumerate().map(of_view).collect()
+    }
+}
+
+/// Finds the people of a frame, the one that most views see most clearly first.
+///
+/// Every two candidates of two views are put in space by their middle lines; what could be a person there is looked for in
+/// the other views. The best is taken with its candidates and what overlaps them, and so on. A person is seen by three
+/// views, or by both of two; the others have to be about as clear as the first. People who stand so close that their
+/// trunks touch count as one.
+///
+/// * `plans`: of the views; nothing is found with models that do not have the 26 parts of the published ones.
+pub fn people(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Vec<Person> {
+    find(plans, answers).people
+}
+
+/// The same, with the candidates.
+pub(crate) fn find(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Found {
+    let is_body = |plan: &Arc<ViewPlan>| plan.model().n_parts() == skeleton::N_PARTS;
+    let views: Vec<Vec<Sighting>> = if plans.iter().all(is_body) {
+        let views = plans.iter().zip(answers);
+        views
+            .map(|(plan, it)| sightings(plan, it.as_ref()))
+            .collect()
+    } else {
+        Vec::new()
+    };
+    let cameras: Vec<&Camera> = plans.iter().map(|it| it.camera()).collect();
+    let people = distinct(&views, groups(&cameras, &views));
+    Found { views, people }
+}
+
+/// Everything that enough views agree on; the same person many times.
+fn groups(cameras: &[&Camera], views: &[Vec<Sighting>]) -> Vec<Person> {
+    let n_present = views.iter().filter(|it| !it.is_empty()).count();
+    let needed = MIN_VIEWS.min(n_present).max(2);
+    let mut found = Vec::new();
+    for first in 0..views.len() {
+        for second in first + 1..views.len() {
+            for a in 0..views[first].len() {
+                for b in 0..views[second].len() {
+                    let group = person(cameras, views, [(first, a), (second, b)]);
+                    found.extend(group.filter(|it| it.n_views() >= needed));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The best of the groups, and of the others those that are somebody else.
+fn distinct(views: &[Vec<Sighting>], mut found: Vec<Person>) -> Vec<Person> {
+    found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+    let mut kept: Vec<Person> = Vec::new();
+    for person in found {
+        let best = kept.first().map_or(0.0, |it| it.strength);
+        if person.strength >= MIN_STRENGTH * best
+            && kept.iter().all(|it| differ(views, it, &person))
+        {
+            kept.push(person);
+        }
+    }
+    kept
+}
+
+/// Whether two are different people: apart in space, and sharing a place in at most one picture.
+fn differ(views: &[Vec<Sighting>], one: &Person, other: &Person) -> bool {
+    let shared = views.iter().enumerate().filter(|(view, sightings)| {
+        let line = one.lines_px[*view].as_ref();
+        line.zip(other.candidates[*view])
+            .is_some_and(|(line, it)| sightings[it].is_on(line))
+    });
+    let n_shared = shared.count();
+    let own = other.n_views() - n_shared;
+    (one.place - other.place).norm() >= APART_M && n_shared <= 1 && own >= 2
+}
+
+/// The person that two candidates would be, with those of the other views that see it there.
+fn person(
+    cameras: &[&Camera],
+    views: &[Vec<Sighting>],
+    pair: [(usize, usize); 2],
+) -> Option<Person> {
+    let mut candidates = vec![None; views.len()];
+    for (view, candidate) in pair {
+        candidates[view] = Some(candidate);
+    }
+    let mut seen = placed(cameras, views, &candidates)?;
+    // The views that were found later move the person, which may then be seen by more of them.
+    for _ in 0..MAX_ROUNDS {
+        if seen.candidates == candidates {
+            return Some(seen);
+        }
+        candidates.clone_from(&seen.candidates);
+        seen = placed(cameras, views, &candidates)?;
+    }
+    Some(seen)
+}
+
+/// The person of these candidates, and the candidates that see it there.
+fn placed(
+    cameras: &[&Camera],
+    views: &[Vec<Sighting>],
+    candidates: &[Option<usize>],
+) -> Option<Person> {
+    let points = line_in_world(views, candidates)?;
+    let is_body = points.windows(2).zip(LENGTHS).all(|(ends, [least, most])| {
+        let length = (ends[0] - ends[1]).norm();
+        (least..=most).contains(&length)
+    });
+    if !is_body {
+        return None;
+    }
+    let mut person = Person {
+        candidates: vec![None; views.len()],
+        lines_px: vec![None; views.len()],
+        place: nalgebra::center(&points[NECK], &points[HIPS]),
+        strength: 0.0,
+        size_px: 0.0,
+    };
+    for (view, sightings) in views.iter().enumerate() {
+        let Some(projected) = project(cameras[view], &points) else {
+            continue;
+        };
+        person.lines_px[view] = Some(projected);
+        let each = sightings.iter().enumerate();
+        let nearest = each
+            .map(|(candidate, it)| (candidate, it.distance(&projected)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((candidate, distance)) = nearest.filter(|it| it.1 <= TOLERANCE) {
+            person.candidates[view] = Some(candidate);
+            let it = &sightings[candidate];
+            person.strength += it.strength * (1.0 - distance / TOLERANCE);
+            person.size_px += it.size_px;
+        }
+    }
+    person.size_px /= person.n_views().max(1) as f64;
+    Some(person)
+}
+
+/// The points nearest to the rays of some candidates; `None` if they are parallel or meet behind a camera.
+fn line_in_world(
+    views: &[Vec<Sighting>],
+    candidates: &[Option<usize>],
+) -> Option<[Point3<f64>; N_POINTS]> {
+    let mut points = [Point3::origin(); N_POINTS];
+    let mut rays: Vec<&Ray> = Vec::with_capacity(views.len());
+    for (index, point) in points.iter_mut().enumerate() {
+        let seen = views.iter().zip(candidates);
+        rays.clear();
+        rays.extend(seen.filter_map(|(sightings, it)| sightings[(*it)?].rays[index].as_ref()));
+        *point = meeting(&rays)?;
+    }
+    Some(points)
+}
+
+fn project(camera: &Camera, points: &[Point3<f64>; N_POINTS]) -> Option<Line> {
+    let mut projected = [[0.0; 2]; N_POINTS];
+    for (to, point) in projected.iter_mut().zip(points) {
+        *to = camera.project(point)?.into();
+    }
+    Some(projected)
+}
+
+/// The point whose squared distances from rays are least in sum.
+fn meeting(rays: &[&Ray]) -> Option<Point3<f64>> {
+    let mut normal = Matrix3::zeros();
+    let mut target = Vector3::zeros();
+    for ray in rays {
+        let across = Matrix3::identity() - ray.direction.as_ref() * ray.direction.transpose();
+        normal += across;
+        target += across * ray.origin.coords;
+    }
+    // With unit directions the smallest eigenvalue is of the order of the squared sine of the angle between the rays.
+    if normal.determinant().abs() < MIN_SPREAD {
+        return None;
+    }
+    let point = Point3::from(normal.cholesky()?.solve(&target));
+    let is_before = rays
+        .iter()
+        .all(|it| (point - it.origin).dot(&it.direction) > 0.0);
+    is_before.then_some(point)
+}
+
+fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let [point, a, b] = [point, a, b].map(Point2::from);
+    let along = b - a;
+    let share = (point - a).dot(&along) / along.norm_squared().max(1e-12);
+    (point - (a + along * share.clamp(0.0, 1.0))).norm()
+}
+
+/// The candidates of a view.
+fn sightings(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<Sighting> {
+    let Some(answer) = answer else {
+        return Vec::new();
+    };
+    let scores = answer.candidates.iter().map(|it| f64::from(it.score));
+    let mut scores: Vec<f64> = scores.collect();
+    scores.sort_by(|a, b| b.total_cmp(a));
+    let usual = scores.get(scores.len() * 2 / 3).copied().unwrap_or(0.0);
+    let sighting = |pose: &fmp::Pose| {
+        let points_px = LINE.map(|parts| {
+            let [a, b] = parts.map(|part| plan.centre(pose, part));
+            [0, 1].map(|axis| f64::midpoint(a[axis], b[axis]))
+        });
+        Sighting {
+            points_px,
+            rays: points_px.map(|[x, y]| plan.camera().ray(&Point2::new(x, y))),
+            size_px: plan.size(pose).max(1.0),
+            strength: (f64::from(pose.score) - usual).max(0.0),
+        }
+    };
+    answer.candidates.iter().map(sighting).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

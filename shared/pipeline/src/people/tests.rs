@@ -1,0 +1,167 @@
+//! Planted people before cameras on a circle.
+
+use geometry::{Intrinsics, Lens, LensModel};
+use nalgebra::Isometry3;
+use proptest::prelude::*;
+
+use super::*;
+
+const SIZE: f64 = 640.0;
+
+pub(crate) fn camera(view: usize) -> Camera {
+    let bearing = 1.2 * view as f64;
+    let eye = Point3::new(5.0 * bearing.cos(), 5.0 * bearing.sin(), 1.5);
+    let upright = Isometry3::look_at_rh(&eye, &Point3::new(0.0, 0.0, 1.0), &Vector3::z());
+    // `look_at_rh` is x right, y up, z backward: half a turn about x makes it OpenCV's.
+    let opencv = Isometry3::rotation(Vector3::x() * core::f64::consts::PI);
+    Camera {
+        name: format!("camera {view}"),
+        intrinsics: Intrinsics {
+            fx: SIZE,
+            fy: SIZE,
+            cx: SIZE / 2.0,
+            cy: SIZE / 2.0,
+            size: [SIZE as u32; 2],
+            lens: Lens::new(LensModel::Pinhole),
+        },
+        camera_from_world: opencv * upright,
+    }
+}
+
+/// What a view sees of a person who stands at a place.
+fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> Sighting {
+    let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
+    let points_px = line.map(|it| <[f64; 2]>::from(camera.project(&it).unwrap()));
+    Sighting {
+        points_px,
+        rays: points_px.map(|[x, y]| camera.ray(&Point2::new(x, y))),
+        size_px: points_px[4][1] - points_px[0][1],
+        strength,
+    }
+}
+
+/// The sightings of people in all views, in an order that differs from view to view.
+fn seen(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Vec<Vec<Sighting>> {
+    let of_view = |(view, camera): (usize, &Camera)| {
+        let mut all: Vec<Sighting> = people
+            .iter()
+            .map(|(place, strength)| sighting(camera, *place, *strength))
+            .collect();
+        let n = all.len().max(1);
+        all.rotate_left(view % n);
+        all
+    };
+    cameras.iter().enumerate().map(of_view).collect()
+}
+
+pub(crate) fn found(cameras: &[Camera], people: &[([f64; 2], f64)]) -> Found {
+    of_views(cameras, seen(cameras, people))
+}
+
+fn of_views(cameras: &[Camera], views: Vec<Vec<Sighting>>) -> Found {
+    let cameras: Vec<&Camera> = cameras.iter().collect();
+    let people = distinct(&views, groups(&cameras, &views));
+    Found { views, people }
+}
+
+fn cameras(n: usize) -> Vec<Camera> {
+    (0..n).map(camera).collect()
+}
+
+#[test]
+fn three_people_are_found_where_they_stand_the_clearest_first() {
+    let cameras = cameras(4);
+    let people = [([-1.0, 0.4], 0.6), ([0.9, 0.8], 1.0), ([0.2, -1.1], 0.8)];
+    let found = found(&cameras, &people).people;
+    let places: Vec<[f64; 2]> = found.iter().map(|it| [it.place.x, it.place.y]).collect();
+    assert_eq!(places.len(), 3, "{places:?}");
+    for (got, index) in places.iter().zip([1, 2, 0]) {
+        let [x, y] = people[index].0;
+        assert!((got[0] - x).hypot(got[1] - y) < 1e-6, "{places:?}");
+    }
+    assert!(found.iter().all(|it| it.n_views() == 4));
+}
+
+#[test]
+fn what_only_two_of_four_views_see_is_nobody_but_of_two_views_it_is() {
+    let people = [([0.0, 0.0], 1.0), ([0.3, 1.4], 1.0)];
+    let four = cameras(4);
+    let mut views = seen(&four, &people);
+    for view in [2, 3] {
+        views[view] = vec![sighting(&four[view], [0.0, 0.0], 1.0)];
+    }
+    assert_eq!(of_views(&four, views).people.len(), 1);
+    assert_eq!(found(&cameras(2), &people).people.len(), 2);
+}
+
+#[test]
+fn somebody_much_less_clear_than_the_first_is_nobody() {
+    let people = |strength| found(&cameras(4), &[([0.0, 0.0], 1.0), ([1.0, 0.5], strength)]).people;
+    assert_eq!(people(MIN_STRENGTH + 0.01).len(), 2);
+    assert_eq!(people(MIN_STRENGTH - 0.01).len(), 1);
+}
+
+#[test]
+fn a_second_candidate_on_the_same_person_is_no_second_person() {
+    let cameras = cameras(4);
+    let people = [([0.0, 0.0], 1.0), ([0.08, 0.05], 0.9)];
+    assert_eq!(found(&cameras, &people).people.len(), 1);
+}
+
+#[test]
+fn something_that_is_no_body_in_space_is_nobody() {
+    let cameras = cameras(4);
+    let doll = |camera: &Camera| {
+        let mut it = sighting(camera, [0.0, 0.0], 1.0);
+        let line = [0.35, 0.3, 0.2, 0.1, 0.02].map(|z| Point3::new(0.0, 0.0, z));
+        it.points_px = line.map(|it| <[f64; 2]>::from(camera.project(&it).unwrap()));
+        it.rays = it.points_px.map(|[x, y]| camera.ray(&Point2::new(x, y)));
+        it
+    };
+    let views = cameras.iter().map(|it| vec![doll(it)]).collect();
+    assert_eq!(of_views(&cameras, views).people, []);
+}
+
+#[test]
+fn the_others_of_a_view_are_left_out_but_never_all() {
+    let cameras = cameras(3);
+    let mut found = found(&cameras, &[([0.0, 0.0], 1.0), ([1.2, 0.5], 0.8)]);
+    // In view v the person number p is candidate (p - v) mod 2.
+    assert_eq!(found.others(0), [0b10, 0b01, 0b10]);
+    assert_eq!(found.others(1), [0b01, 0b10, 0b01]);
+    // The first is hidden in the last view: the other one is all that it has.
+    found.views[2].remove(0);
+    found.people[0].candidates[2] = None;
+    found.people[1].candidates[2] = Some(0);
+    assert_eq!(found.others(0), [0b10, 0b01, 0]);
+}
+
+#[test]
+fn views_without_candidates_or_with_points_that_are_no_numbers_find_nobody() {
+    let cameras = cameras(3);
+    assert_eq!(found(&cameras, &[]).people, []);
+    let mut views = seen(&cameras, &[([0.0, 0.0], 1.0)]);
+    for it in views.iter_mut().flatten() {
+        it.points_px = [[f64::NAN; 2]; N_POINTS];
+        it.rays = [None; N_POINTS];
+    }
+    assert_eq!(of_views(&cameras, views).people, []);
+}
+
+proptest! {
+    #[test]
+    fn people_stand_apart_and_their_candidates_exist(
+        people in proptest::collection::vec(([-1.5..1.5_f64, -1.5..1.5], 0.1..1.0_f64), 0..5),
+    ) {
+        let cameras = cameras(4);
+        let found = found(&cameras, &people);
+        for (index, it) in found.people.iter().enumerate() {
+            for (view, candidate) in it.candidates.iter().enumerate() {
+                prop_assert!(candidate.is_none_or(|it| it < found.views[view].len()));
+            }
+            for other in &found.people[..index] {
+                prop_assert!((it.place - other.place).norm() >= APART_M);
+            }
+        }
+    }
+}
