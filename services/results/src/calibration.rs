@@ -32,8 +32,12 @@ impl Calibration {
         }
     }
 
-    /// Takes in what the views found in a frame, each on its own.
+    /// Takes in what the views found in a frame, each on its own. Where there are several people, each view may have found
+    /// another one: such a frame says nothing.
     pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
+        if record.pose3d.n_people > 1 {
+            return;
+        }
         let points: Vec<_> = (0..scene.views.len())
             .map(|view| parts(scene, record, view))
             .collect();

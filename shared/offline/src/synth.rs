@@ -27,6 +27,8 @@ pub struct Job {
     pub rig: RigChoice,
     /// Numbers of the subjects.
     pub subjects: Vec<u64>,
+    /// How many other people stand around.
+    pub others: u64,
     /// What they do, one after the other; of no meaning with `recording`.
     pub actions: Vec<Action>,
     /// What was recorded and is done in the place of an action.
@@ -161,6 +163,7 @@ impl Job {
         Settings {
             rig: absolute(&self.rig),
             subject,
+            others: self.others,
             action,
             seed: self.seed,
             rate_hz: self.rate_hz,

@@ -20,8 +20,10 @@ pub enum Follow {
     Clearest,
 }
 
-/// Farther away than this from where the person was it is somebody else, metres.
+/// Farther away than this from where the person was in the frame before it is somebody else, metres; and how much more for
+/// every frame without the person.
 const REACH_M: f64 = 1.0;
+const REACH_PER_FRAME_M: f64 = 0.1;
 /// After so many frames without the person another one is followed.
 const FORGET_AFTER: u32 = 30;
 
@@ -56,19 +58,15 @@ impl Following {
     }
 
     /// Chooses the person of the next frame, and says which candidates are others.
-    ///
-    /// Of a single person nothing is left out.
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
         let found = find(plans, answers);
         let followed = self.choose(&found);
-        match followed {
-            Some(followed) if found.people.len() > 1 => Others {
-                of_views: found.others(followed),
-            },
-            _ => Others::default(),
+        Others {
+            of_views: found.others(followed),
         }
     }
 
+    /// The one who is followed; `None` if that is none of those who were found.
     fn choose(&mut self, found: &Found) -> Option<usize> {
         let people = || found.people.iter().enumerate();
         let first = people().next().map(|it| it.0);
@@ -80,11 +78,14 @@ impl Following {
             Follow::Last => {
                 let chosen = match self.last {
                     None => first,
-                    Some(last) => people()
-                        .map(|(index, it)| (index, (it.place - last).norm()))
-                        .filter(|it| it.1 <= REACH_M)
-                        .min_by(|a, b| a.1.total_cmp(&b.1))
-                        .map(|it| it.0),
+                    Some(last) => {
+                        let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
+                        people()
+                            .map(|(index, it)| (index, (it.place - last).norm()))
+                            .filter(|it| it.1 <= reach)
+                            .min_by(|a, b| a.1.total_cmp(&b.1))
+                            .map(|it| it.0)
+                    }
                 };
                 if let Some(chosen) = chosen {
                     self.last = Some(found.people[chosen].place);
@@ -95,7 +96,7 @@ impl Following {
                         self.last = None;
                     }
                 }
-                chosen.or(first)
+                chosen
             }
         }
     }
@@ -127,7 +128,7 @@ mod tests {
             &[([1.0, 0.5], 1.0)],
             &[([-0.1, 0.0], 0.6), ([1.0, 0.5], 1.0)],
         ];
-        let last = [Some(-0.5), Some(-0.3), Some(1.0), Some(-0.1)];
+        let last = [Some(-0.5), Some(-0.3), None, Some(-0.1)];
         assert_eq!(chosen(Follow::Last, &frames), last);
         let clearest = [Some(-0.5), Some(1.0), Some(1.0), Some(1.0)];
         assert_eq!(chosen(Follow::Clearest, &frames), clearest);
@@ -141,7 +142,7 @@ mod tests {
         frames[0] = both;
         frames.push(both);
         let got = chosen(Follow::Last, &frames);
-        assert_eq!(got[0], Some(-1.0));
+        assert_eq!(got[..2], [Some(-1.0), None]);
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
     }
 

@@ -102,7 +102,8 @@ impl Found {
     /// The candidates of every view that are another person than one of the people, as bits.
     ///
     /// In a view that sees nobody but others nothing is left out: there the person may be hidden, or badly found.
-    pub(crate) fn others(&self, followed: usize) -> Vec<u64> {
+    /// * `followed`: who is followed; `None` if it is none of them.
+    pub(crate) fn others(&self, followed: Option<usize>) -> Vec<u64> {
         let people = || self.people.iter().enumerate();
         let of_view = |(view, sightings): (usize, &Vec<Sighting>)| {
             let is_of = |person: &Person, it: &Sighting| {
@@ -111,8 +112,9 @@ impl Found {
                     .is_some_and(|line| it.is_on(line))
             };
             let is_other = |it: &Sighting| {
-                let mut others = people().filter(|(index, _)| *index != followed);
-                !is_of(&self.people[followed], it) && others.any(|(_, other)| is_of(other, it))
+                let mut others = people().filter(|(index, _)| Some(*index) != followed);
+                !followed.is_some_and(|it_is| is_of(&self.people[it_is], it))
+                    && others.any(|(_, other)| is_of(other, it))
             };
             let each = sightings.iter().enumerate().take(u64::BITS as usize);
             let others = each.filter(|(_, it)| is_other(it));

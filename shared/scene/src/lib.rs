@@ -36,6 +36,8 @@ mod room;
 
 mod backdrop;
 mod painter;
+
+mod bystander;
 mod raster;
 mod shadow;
 

@@ -23,21 +23,48 @@ pub(crate) struct Figure {
 /// The renderer; its buffers are reused from picture to picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Painter {
-    posed: Posed,
+    /// The bodies of the picture, the subject's first.
+    bodies: Vec<Body>,
     corners: Vec<Corner>,
     pub(crate) samples: Samples,
     shadow: Shadow,
     curve: Curve,
+    eye: Vector3<f32>,
+}
+
+/// A posed body. Triangles and corners of all bodies are numbered through.
+#[derive(Debug, Clone)]
+struct Body {
+    posed: Posed,
     /// By bone, the rotation of directions at rest.
     turns: [Matrix3<f32>; N_BONES],
-    eye: Vector3<f32>,
+    first_triangle: usize,
+    first_corner: usize,
+}
+
+impl Default for Body {
+    fn default() -> Self {
+        Self {
+            posed: Posed::default(),
+            turns: [Matrix3::identity(); N_BONES],
+            first_triangle: 0,
+            first_corner: 0,
+        }
+    }
+}
+
+/// A person of a picture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Person<'a> {
+    pub(crate) figure: &'a Figure,
+    pub(crate) frames: &'a [Isometry3<f64>; N_BONES],
 }
 
 /// The input of a picture, all in the frame of the stage.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Subject<'a> {
-    pub(crate) figure: &'a Figure,
-    pub(crate) frames: &'a [Isometry3<f64>; N_BONES],
+pub(crate) struct Input<'a> {
+    /// The subject, then others.
+    pub(crate) people: &'a [Person<'a>],
     pub(crate) camera: &'a Camera,
     pub(crate) backdrop: &'a Backdrop,
     pub(crate) light: &'a Light,
@@ -46,46 +73,53 @@ pub(crate) struct Subject<'a> {
 impl Painter {
     pub(crate) fn new() -> Self {
         Self {
-            posed: Posed::default(),
+            bodies: Vec::new(),
             corners: Vec::new(),
             samples: Samples::default(),
             shadow: Shadow::default(),
             curve: Curve::new(),
-            turns: [Matrix3::identity(); N_BONES],
             eye: Vector3::zeros(),
         }
     }
 
-    /// Determines which samples see the person.
-    pub(crate) fn draw(&mut self, of: &Subject<'_>) {
-        let mesh = &of.figure.mesh;
-        mesh.pose(of.frames, &mut self.posed);
-        self.turns = mesh.turns(of.frames);
+    /// Determines which samples see a person, and which.
+    pub(crate) fn draw(&mut self, of: &Input<'_>) {
         let camera = of.camera;
         self.eye = camera.centre_in_world().coords.cast();
-        self.corners.clear();
-        self.corners.extend(self.posed.points.iter().map(|point| {
-            let at: Point3<f64> = point.cast();
-            let depth = (camera.camera_from_world * at).z;
-            camera.project(&at).map_or_else(Corner::zeros, |pixel| {
-                Corner::new(pixel.x as f32, pixel.y as f32, (1.0 / depth) as f32)
-            })
-        }));
         let size = of.backdrop.size;
         self.samples
             .begin(size.width * SUB, size.height * SUB, &of.backdrop.near);
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
-            let corners = triangle.map(|it| &self.corners[it as usize]);
-            self.samples.draw(index as u32, corners);
+        self.corners.clear();
+        self.bodies.resize_with(of.people.len(), Body::default);
+        let mut n_triangles = 0;
+        for (body, person) in self.bodies.iter_mut().zip(of.people) {
+            let mesh = &person.figure.mesh;
+            mesh.pose(person.frames, &mut body.posed);
+            body.turns = mesh.turns(person.frames);
+            body.first_triangle = n_triangles;
+            body.first_corner = self.corners.len();
+            self.corners.extend(body.posed.points.iter().map(|point| {
+                let at: Point3<f64> = point.cast();
+                let depth = (camera.camera_from_world * at).z;
+                camera.project(&at).map_or_else(Corner::zeros, |pixel| {
+                    Corner::new(pixel.x as f32, pixel.y as f32, (1.0 / depth) as f32)
+                })
+            }));
+            for triangle in &mesh.triangles {
+                let corners = triangle.map(|it| &self.corners[body.first_corner + it as usize]);
+                self.samples.draw(n_triangles as u32, corners);
+                n_triangles += 1;
+            }
         }
     }
 
     /// Writes the picture, after [`draw`](Self::draw): RGB, row major.
-    pub(crate) fn paint(&mut self, of: &Subject<'_>, rgb: &mut [u8]) {
+    pub(crate) fn paint(&mut self, of: &Input<'_>, rgb: &mut [u8]) {
         rgb.copy_from_slice(&of.backdrop.bytes);
-        let mesh = &of.figure.mesh;
-        self.shadow
-            .cast(of.light, &self.posed.points, &mesh.triangles);
+        let bodies = self.bodies.iter().zip(of.people);
+        let bodies =
+            bodies.map(|(body, it)| (&body.posed.points[..], &it.figure.mesh.triangles[..]));
+        self.shadow.cast(of.light, &bodies.collect::<Vec<_>>());
         for (pixel, bytes) in of.backdrop.pixels.iter().zip(rgb.as_chunks_mut::<3>().0) {
             let dark = self.shadow.share(pixel.across, pixel.to_lamp, 4, 0.03);
             if dark > 0.0 {
@@ -103,7 +137,17 @@ impl Painter {
         }
     }
 
-    /// Writes how much of every pixel the person covers, after [`draw`](Self::draw): 0 to 255.
+    /// Whether a sample sees the subject.
+    pub(crate) fn sees_subject(&self, sample: usize) -> bool {
+        let end = self
+            .bodies
+            .get(1)
+            .map_or(usize::MAX, |it| it.first_triangle);
+        let triangle = self.samples.triangle[sample];
+        triangle != NOTHING && (triangle as usize) < end
+    }
+
+    /// Writes how much of every pixel the subject covers, after [`draw`](Self::draw): 0 to 255.
     pub(crate) fn mask(&self, mask: &mut [u8]) {
         mask.fill(0);
         let [x1, y1, x2, y2] = self.samples.touched;
@@ -112,7 +156,7 @@ impl Painter {
             for x in x1 / SUB..x2.div_ceil(SUB) {
                 let n = self
                     .of_pixel(x, y)
-                    .filter(|it| self.samples.triangle[*it] != NOTHING)
+                    .filter(|it| self.sees_subject(*it))
                     .count();
                 mask[y * width + x] = (n * 255 / (SUB * SUB)) as u8;
             }
@@ -124,8 +168,8 @@ impl Painter {
         (0..SUB * SUB).map(move |sub| (y * SUB + sub / SUB) * width + x * SUB + sub % SUB)
     }
 
-    /// The mean of the samples of a pixel, where any of them sees the person.
-    fn pixel(&self, of: &Subject<'_>, x: usize, y: usize) -> Option<Linear> {
+    /// The mean of the samples of a pixel, where any of them sees a person.
+    fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
         let n = self
             .of_pixel(x, y)
             .filter(|it| self.samples.triangle[*it] != NOTHING)
@@ -149,16 +193,21 @@ impl Painter {
     }
 
     /// The light reflected to the camera by a place of the body.
-    fn shade(&self, of: &Subject<'_>, triangle: usize, place: Point2<f32>) -> Linear {
-        let Figure { mesh, wear } = of.figure;
-        let corners = mesh.triangles[triangle].map(|it| it as usize);
-        let shares = shares(corners.map(|it| &self.corners[it]), place);
-        let at = point_between(corners.map(|it| &self.posed.points[it]), shares);
-        let smooth = between(corners.map(|it| &self.posed.normals[it]), shares);
+    fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
+        let after = self
+            .bodies
+            .partition_point(|it| it.first_triangle <= triangle);
+        let body = &self.bodies[after - 1];
+        let Figure { mesh, wear } = of.people[after - 1].figure;
+        let corners = mesh.triangles[triangle - body.first_triangle].map(|it| it as usize);
+        let on_picture = corners.map(|it| &self.corners[body.first_corner + it]);
+        let shares = shares(on_picture, place);
+        let at = point_between(corners.map(|it| &body.posed.points[it]), shares);
+        let smooth = between(corners.map(|it| &body.posed.normals[it]), shares);
         let rest = point_between(corners.map(|it| &mesh.points[it]), shares);
         let bone = mesh.bone(corners[0]);
         let finish = wear.finish(&rest, bone);
-        let turned = smooth + self.turns[bone] * finish.bump;
+        let turned = smooth + body.turns[bone] * finish.bump;
         let normal = turned.try_normalize(1e-6).unwrap_or(smooth);
         let (across, near) = of.light.beam(&at.coords);
         let direct = of.light.direct(&normal);

@@ -8,14 +8,14 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::backdrop::Backdrop;
 use crate::body::{Bones, CHEST, N_BONES, PELVIS};
-use crate::light::Light;
+use crate::bystander::Bystander;
 use crate::mesh;
 use crate::motion::Motion;
-use crate::painter::{self, Figure, Painter};
+use crate::painter::{self, Figure, Painter, Person};
 use crate::performance::{Course, Performance};
 use crate::photo::{Photo, photos_in};
 use crate::random::Random;
-use crate::raster::{NOTHING, SUB};
+use crate::raster::SUB;
 use crate::recorded::{Recorded, Recording};
 use crate::rigs::{self, RigChoiceError};
 use crate::room::Room;
@@ -54,6 +54,7 @@ pub struct Scene {
     world_from_stage: Isometry3<f64>,
     performance: Performance,
     figure: Figure,
+    others: Vec<Bystander>,
     room: Room,
     random: Random,
 }
@@ -119,6 +120,7 @@ impl Scene {
             .fork("scene")
             .nth(settings.subject)
             .fork(&performance.name);
+        let others = (0..settings.others).map(|it| Bystander::new(settings, it));
         let stage_from_world = world_from_stage.inverse();
         let eyes = rig
             .cameras()
@@ -132,6 +134,7 @@ impl Scene {
             world_from_stage,
             performance,
             figure: Figure { mesh, wear },
+            others: others.collect(),
             room,
             random,
         })
@@ -291,16 +294,7 @@ impl View {
             self.size()
         );
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
-        let frames = self.draw(seconds);
-        let light: &Light = &self.scene.room.light;
-        let subject = painter::Subject {
-            figure: &self.scene.figure,
-            frames: &frames,
-            camera: &self.on_stage,
-            backdrop: &self.backdrop,
-            light,
-        };
-        self.painter.paint(&subject, rgb);
+        let frames = self.draw(seconds, Some(rgb));
         let random = self
             .scene
             .random
@@ -317,7 +311,7 @@ impl View {
     /// The ground truth of the picture of a frame, without the picture.
     pub fn truth(&mut self, frame: u64) -> ViewTruth {
         let (seconds, repeated) = self.scene.taken(self.camera, frame);
-        let frames = self.draw(seconds);
+        let frames = self.draw(seconds, None);
         self.ground_truth(&frames, seconds, repeated)
     }
 
@@ -329,16 +323,31 @@ impl View {
         mask
     }
 
-    fn draw(&mut self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
+    /// Determines what is seen of the people, and writes the picture if it is wanted; returns the bones of the subject.
+    fn draw(&mut self, seconds: f64, rgb: Option<&mut [u8]>) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;
         let frames = scene.performance.frames(seconds);
-        self.painter.draw(&painter::Subject {
+        let others = scene.others.iter().map(|it| (it, it.frames(seconds)));
+        let others: Vec<(&Bystander, [Isometry3<f64>; N_BONES])> = others.collect();
+        let subject = Person {
             figure: &scene.figure,
             frames: &frames,
+        };
+        let others = others.iter().map(|(it, frames)| Person {
+            figure: &it.figure,
+            frames,
+        });
+        let people: Vec<Person<'_>> = core::iter::once(subject).chain(others).collect();
+        let input = painter::Input {
+            people: &people,
             camera: &self.on_stage,
             backdrop: &self.backdrop,
             light: &scene.room.light,
-        });
+        };
+        self.painter.draw(&input);
+        if let Some(rgb) = rgb {
+            self.painter.paint(&input, rgb);
+        }
         frames
     }
 
@@ -396,7 +405,7 @@ impl View {
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
         for row in y1..y2 {
             for column in x1..x2 {
-                if samples.triangle[row * samples.width + column] != NOTHING {
+                if self.painter.sees_subject(row * samples.width + column) {
                     low = [low[0].min(column), low[1].min(row)];
                     high = [high[0].max(column), high[1].max(row)];
                 }

@@ -15,6 +15,8 @@ pub struct Settings {
     pub subject: u64,
     /// What the subject does.
     pub action: Action,
+    /// How many other people stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    pub others: u64,
     /// Seed of the random choices: the performance, the room, the lamps.
     pub seed: u64,
     /// Frames a second.
@@ -25,12 +27,18 @@ pub struct Settings {
     pub flaws: Flaws,
 }
 
+impl Settings {
+    /// Most other people.
+    pub const MOST_OTHERS: u64 = 4;
+}
+
 impl Default for Settings {
     /// Subject 1 walks in front of the cameras of HumanEva, 30 frames a second, no flaws.
     fn default() -> Self {
         Self {
             rig: RigChoice::HumanEva,
             subject: 1,
+            others: 0,
             action: Action::Walking,
             seed: 1,
             rate_hz: 30.0,
@@ -101,10 +109,11 @@ const SCHEME: &str = "synth://";
 
 impl Address {
     /// Keys of an address, those of the flaws last; `camera` is required.
-    pub const KEYS: [&'static str; 14] = [
+    pub const KEYS: [&'static str; 15] = [
         "camera",
         "action",
         "subject",
+        "others",
         "seed",
         "rate",
         "frames",
@@ -192,6 +201,10 @@ impl Address {
                 settings.action = Action::by_name(value).ok_or_else(|| wrong(&names))?;
             }
             "subject" => settings.subject = count()?,
+            "others" => {
+                let others = Some(count()?).filter(|it| *it <= Settings::MOST_OTHERS);
+                settings.others = others.ok_or_else(|| wrong("0 to 4"))?;
+            }
             "seed" => settings.seed = count()?,
             "frames" => self.n_frames = count()?.max(1),
             "backdrop" => settings.backdrop = Some(value.into()),
@@ -218,6 +231,7 @@ impl std::fmt::Display for Address {
         let Settings {
             rig,
             subject,
+            others,
             action,
             seed,
             rate_hz,
@@ -230,6 +244,9 @@ impl std::fmt::Display for Address {
             "{SCHEME}{rig}?camera={camera}&action={action}&subject={subject}&seed={seed}"
         )?;
         write!(out, "&rate={rate_hz}&frames={n_frames}")?;
+        if others > 0 {
+            write!(out, "&others={others}")?;
+        }
         if let Some(folder) = backdrop {
             write!(out, "&backdrop={}", folder.display())?;
         }
@@ -257,6 +274,7 @@ mod tests {
             ("synth://umpm?camera=l&camera=r", "each key once"),
             ("synth://umpm?camera=l&colour", "key=value"),
             ("synth://umpm?camera=l&actoin=walking", "unknown key"),
+            ("synth://umpm?camera=l&others=5", "0 to 4"),
             ("synth://umpm?camera=l&action=flying", "walking, jogging"),
             ("synth://umpm?camera=l&seed=-1", "whole number"),
             ("synth://umpm?camera=l&rate=0", "frames a second"),
@@ -315,12 +333,13 @@ mod tests {
         #[test]
         fn a_written_address_is_read_back(
             subject: u64, seed: u64, action in 0..10_usize, n_frames in 1..u64::MAX,
-            noise in 0.0..50.0, desync in 0.0..1.0, n in 1_usize..60, radius in 2.0..50.0,
+            noise in 0.0..50.0, desync in 0.0..1.0, others in 0..5_u64, n in 1_usize..60, radius in 2.0..50.0,
         ) {
             let it = Address {
                 settings: Settings {
                     rig: RigChoice::Ring { n, radius, height: 1.5 },
                     subject,
+                    others,
                     action: Action::ALL[action],
                     seed,
                     rate_hz: 29.97,

@@ -19,9 +19,9 @@ pub(crate) struct Shadow {
 
 impl Shadow {
     /// Draws the body.
-    pub(crate) fn cast(&mut self, light: &Light, points: &[Point3<f32>], triangles: &[[u32; 3]]) {
-        let beams: Vec<(Vector2<f32>, f32)> =
-            points.iter().map(|it| light.beam(&it.coords)).collect();
+    pub(crate) fn cast(&mut self, light: &Light, bodies: &[(&[Point3<f32>], &[[u32; 3]])]) {
+        let points = bodies.iter().flat_map(|it| it.0);
+        let beams: Vec<(Vector2<f32>, f32)> = points.map(|it| light.beam(&it.coords)).collect();
         let (mut low, mut high) = (Vector2::repeat(f32::MAX), Vector2::repeat(f32::MIN));
         for (across, _) in &beams {
             low = low.inf(across);
@@ -33,12 +33,16 @@ impl Shadow {
         self.near.clear();
         self.near
             .resize(self.width * self.height, f32::NEG_INFINITY);
-        for triangle in triangles {
-            self.draw(triangle.map(|it| {
-                let (across, near) = beams[it as usize];
-                let at = (across - low) / CELL;
-                Vector3::new(at.x, at.y, near)
-            }));
+        let mut first = 0;
+        for (points, triangles) in bodies {
+            for triangle in *triangles {
+                self.draw(triangle.map(|it| {
+                    let (across, near) = beams[first + it as usize];
+                    let at = (across - low) / CELL;
+                    Vector3::new(at.x, at.y, near)
+                }));
+            }
+            first += points.len();
         }
     }
 
@@ -130,7 +134,7 @@ mod tests {
             corner(-0.3, 0.3),
         ];
         let mut shadow = Shadow::default();
-        shadow.cast(&light, &points, &[[0, 1, 2], [0, 2, 3]]);
+        shadow.cast(&light, &[(&points, &[[0, 1, 2], [0, 2, 3]])]);
         let at = |place: Vector3<f32>| {
             let (across, near) = light.beam(&place);
             shadow.share(across, near, 2, 0.02)

@@ -127,13 +127,14 @@ fn the_others_of_a_view_are_left_out_but_never_all() {
     let cameras = cameras(3);
     let mut found = found(&cameras, &[([0.0, 0.0], 1.0), ([1.2, 0.5], 0.8)]);
     // In view v the person number p is candidate (p - v) mod 2.
-    assert_eq!(found.others(0), [0b10, 0b01, 0b10]);
-    assert_eq!(found.others(1), [0b01, 0b10, 0b01]);
+    assert_eq!(found.others(Some(0)), [0b10, 0b01, 0b10]);
+    assert_eq!(found.others(Some(1)), [0b01, 0b10, 0b01]);
+    assert_eq!(found.others(None), [0, 0, 0], "nothing would be left");
     // The first is hidden in the last view: the other one is all that it has.
     found.views[2].remove(0);
     found.people[0].candidates[2] = None;
     found.people[1].candidates[2] = Some(0);
-    assert_eq!(found.others(0), [0b10, 0b01, 0]);
+    assert_eq!(found.others(Some(0)), [0b10, 0b01, 0]);
 }
 
 #[test]

@@ -204,3 +204,54 @@ fn a_camera_is_found_by_name_and_by_number() {
     let error = scene.camera("3").unwrap_err().to_string();
     assert!(error.contains("C1, C2, C3"), "{error}");
 }
+
+/// A scene with others, and the same without.
+fn crowd(others: u64) -> Arc<Scene> {
+    let settings = Settings {
+        rig: RigChoice::parse("ring:3:6:1.6").unwrap(),
+        others,
+        ..Settings::default()
+    };
+    Arc::new(Scene::new(&settings).unwrap())
+}
+
+#[test]
+fn the_truth_and_the_mask_are_the_subjects_alone() {
+    let (alone, among) = (crowd(0), crowd(4));
+    let mut n_hidden = 0;
+    for (camera, frame) in (0..3).flat_map(|camera| [0, 40, 80].map(|frame| (camera, frame))) {
+        let view = |scene| View::new(scene, camera).unwrap();
+        let (mut alone, mut among) = (view(&alone), view(&among));
+        let ((first, seen), (second, among_others)) =
+            (picture(&mut alone, frame), picture(&mut among, frame));
+        assert_eq!(seen.pixels, among_others.pixels);
+        let changed = first.iter().zip(&second);
+        let changed = changed.filter(|(a, b)| a.abs_diff(**b) > 20).count();
+        assert!(changed > 3000, "camera {camera} sees the others: {changed}");
+        // Others may hide the subject, but are not it.
+        let (mask, mask_among) = (alone.mask(), among.mask());
+        let less = mask_among.iter().zip(&mask);
+        assert!(less.clone().all(|(among, alone)| among <= alone));
+        n_hidden += less.filter(|(among, alone)| among < alone).count();
+        let visible = among_others.visible.iter().zip(seen.visible);
+        assert!(visible.into_iter().all(|(among, alone)| !among || alone));
+    }
+    assert!(n_hidden > 0, "somebody stands before the subject");
+}
+
+#[test]
+fn others_stand_around_and_are_not_the_subject() {
+    let scene = crowd(4);
+    let places: Vec<Vector3<f64>> = scene
+        .others
+        .iter()
+        .map(|it| it.frames(1.0)[PELVIS].translation.vector)
+        .collect();
+    assert_eq!(places.len(), 4);
+    for (nth, place) in places.iter().enumerate() {
+        assert!((1.4..2.4).contains(&place.xy().norm()), "{place}");
+        assert!(place.z > 0.5, "{place}");
+        let far = |other: &Vector3<f64>| (other - place).norm() > 0.8;
+        assert!(places[..nth].iter().all(far), "{places:?}");
+    }
+}
