@@ -104,6 +104,55 @@ fn the_default_model_finds_the_person() {
     assert!(n_found >= 2, "{n_found} of 3 necks: {}", ended.stdout);
 }
 
+#[test]
+fn a_run_among_others_follows_one_person_and_counts_all() {
+    let case = case("synth-others");
+    let crowd = ["--rig", "ring:3:5", "--subjects", "907", "--others", "1"];
+    let motion = ["--actions", "boxing", "--frames", "5", "--rate", "10"];
+    let ended = synth(&case, &[&["crowd"], &crowd[..], &motion[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let file = "crowd/deployment.toml";
+    case.edit(file, "synth-s907-boxing-1", &case.name);
+    let sets = [
+        "capture.size=[320,240]",
+        "results.overlay_every=0",
+        "supervise.deadline_ms=20000",
+    ];
+    let sets = sets.iter().flat_map(|it| ["--set", it]);
+    let arguments: Vec<&str> = ["run", file].into_iter().chain(sets).collect();
+    let ended = case.start(&arguments).wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stdout);
+    case.assert_nothing_left();
+    let summary: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(case.path("crowd/out/summary.json")).unwrap())
+            .unwrap();
+    let people = &summary["summary"]["people"];
+    assert_eq!(people["follow"], "last");
+    assert!(people["most"].as_u64().unwrap() >= 2, "{people}");
+    let text = fs::read_to_string(case.path("crowd/out/pose3d.jsonl")).unwrap();
+    let mut last: Option<[f64; 3]> = None;
+    let mut n_with_others = 0;
+    for line in text.lines() {
+        let line: serde_json::Value = serde_json::from_str(line).unwrap();
+        n_with_others += usize::from(line["people"].as_u64() > Some(1));
+        let neck = &line["joints"]["neck"]["position_m"];
+        let place = [0, 1, 2].map(|axis| neck[axis].as_f64().unwrap_or(f64::NAN));
+        if let Some(before) = last.replace(place) {
+            let moved: f64 = before.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum();
+            // The two stand two metres apart.
+            assert!(
+                moved.sqrt() < 1.0,
+                "frame {}: {before:?} {place:?}",
+                line["frame"]
+            );
+        }
+    }
+    assert!(
+        n_with_others >= 3,
+        "{n_with_others} of 5 frames with others"
+    );
+}
+
 /// On any machine: no picture is taken before its time, and pictures without enough time are skipped.
 #[test]
 fn a_live_scene_keeps_up_with_the_clock() {

@@ -26,6 +26,8 @@ const TOLERANCE: f64 = 0.15;
 const SAME: f64 = 0.15;
 /// People whose trunks are nearer are the same person, metres.
 const APART_M: f64 = 0.5;
+/// Rays that pass each other farther away are not to the same point, metres: twice what a body's size tolerates.
+const MAX_GAP_M: f64 = 0.5;
 /// Rounds of looking for more views.
 const MAX_ROUNDS: usize = 3;
 /// Least determinant of the normal matrix of rays: two that are 3 degrees apart have 0.005.
@@ -163,10 +165,12 @@ fn groups(cameras: &[&Camera], views: &[Vec<Sighting>]) -> Vec<Person> {
     let mut found = Vec::new();
     for first in 0..views.len() {
         for second in first + 1..views.len() {
-            for a in 0..views[first].len() {
-                for b in 0..views[second].len() {
-                    let group = person(cameras, views, [(first, a), (second, b)]);
-                    found.extend(group.filter(|it| it.n_views() >= needed));
+            for (a, one) in views[first].iter().enumerate() {
+                for (b, other) in views[second].iter().enumerate() {
+                    if may_meet(one, other) {
+                        let group = person(cameras, views, [(first, a), (second, b)]);
+                        found.extend(group.filter(|it| it.n_views() >= needed));
+                    }
                 }
             }
         }
@@ -199,6 +203,17 @@ fn differ(views: &[Vec<Sighting>], one: &Person, other: &Person) -> bool {
     let n_shared = shared.count();
     let own = other.n_views() - n_shared;
     (one.place - other.place).norm() >= APART_M && n_shared <= 1 && own >= 2
+}
+
+/// Whether the rays to the necks pass each other so near, and those to the hips, that the two may be one person.
+fn may_meet(one: &Sighting, other: &Sighting) -> bool {
+    [NECK, HIPS].into_iter().all(|point| {
+        let (Some(a), Some(b)) = (&one.rays[point], &other.rays[point]) else {
+            return false;
+        };
+        let across = a.direction.cross(&b.direction);
+        (b.origin - a.origin).dot(&across).abs() <= MAX_GAP_M * across.norm()
+    })
 }
 
 /// The person that two candidates would be, with those of the other views that see it there.

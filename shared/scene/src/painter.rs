@@ -10,7 +10,7 @@ use crate::colour::{Curve, Linear};
 use crate::light::Light;
 use crate::mesh::{Mesh, Posed};
 use crate::raster::{Corner, NOTHING, SUB, Samples, between, point_between, shares};
-use crate::shadow::Shadow;
+use crate::shadow::{Shadow, Surface};
 use crate::wear::Wear;
 
 /// A person as a surface with clothes.
@@ -117,8 +117,10 @@ impl Painter {
     pub(crate) fn paint(&mut self, of: &Input<'_>, rgb: &mut [u8]) {
         rgb.copy_from_slice(&of.backdrop.bytes);
         let bodies = self.bodies.iter().zip(of.people);
-        let bodies =
-            bodies.map(|(body, it)| (&body.posed.points[..], &it.figure.mesh.triangles[..]));
+        let bodies = bodies.map(|(body, it)| Surface {
+            points: &body.posed.points,
+            triangles: &it.figure.mesh.triangles,
+        });
         self.shadow.cast(of.light, &bodies.collect::<Vec<_>>());
         for (pixel, bytes) in of.backdrop.pixels.iter().zip(rgb.as_chunks_mut::<3>().0) {
             let dark = self.shadow.share(pixel.across, pixel.to_lamp, 4, 0.03);

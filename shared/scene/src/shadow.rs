@@ -7,7 +7,14 @@ use crate::light::Light;
 /// Width of a cell, metres.
 const CELL: f32 = 0.011;
 
-/// The shadow map of the body.
+/// The surface of a body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surface<'a> {
+    pub(crate) points: &'a [Point3<f32>],
+    pub(crate) triangles: &'a [[u32; 3]],
+}
+
+/// The shadow map of all bodies.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shadow {
     low: Vector2<f32>,
@@ -18,9 +25,9 @@ pub(crate) struct Shadow {
 }
 
 impl Shadow {
-    /// Draws the body.
-    pub(crate) fn cast(&mut self, light: &Light, bodies: &[(&[Point3<f32>], &[[u32; 3]])]) {
-        let points = bodies.iter().flat_map(|it| it.0);
+    /// Draws the bodies.
+    pub(crate) fn cast(&mut self, light: &Light, bodies: &[Surface<'_>]) {
+        let points = bodies.iter().flat_map(|it| it.points);
         let beams: Vec<(Vector2<f32>, f32)> = points.map(|it| light.beam(&it.coords)).collect();
         let (mut low, mut high) = (Vector2::repeat(f32::MAX), Vector2::repeat(f32::MIN));
         for (across, _) in &beams {
@@ -34,7 +41,7 @@ impl Shadow {
         self.near
             .resize(self.width * self.height, f32::NEG_INFINITY);
         let mut first = 0;
-        for (points, triangles) in bodies {
+        for Surface { points, triangles } in bodies {
             for triangle in *triangles {
                 self.draw(triangle.map(|it| {
                     let (across, near) = beams[first + it as usize];
@@ -134,7 +141,11 @@ mod tests {
             corner(-0.3, 0.3),
         ];
         let mut shadow = Shadow::default();
-        shadow.cast(&light, &[(&points, &[[0, 1, 2], [0, 2, 3]])]);
+        let surface = Surface {
+            points: &points,
+            triangles: &[[0, 1, 2], [0, 2, 3]],
+        };
+        shadow.cast(&light, &[surface]);
         let at = |place: Vector3<f32>| {
             let (across, near) = light.beam(&place);
             shadow.share(across, near, 2, 0.02)
