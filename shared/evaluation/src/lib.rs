@@ -5,6 +5,7 @@
 //! any of them.
 #![forbid(unsafe_code)]
 
+mod offsets;
 mod pck;
 mod pcp;
 mod report;
@@ -19,6 +20,7 @@ mod ranks;
 pub use bootstrap::{Bootstrap, Share};
 pub use changes::Changes;
 pub use joints3d::{aligned, joint_errors};
+pub use offsets::{FOUND_WITHIN, Offset, height, offsets};
 pub use pck::{PCK_GROUPS, best_covering, joints_found};
 pub use pcp::{PARSE_STICKS, Pcp, PcpRule, pcp, sticks_found};
 pub use pcp3d::{SEGMENT_NAMES, Segment, segment_errors, segments};

@@ -1,6 +1,8 @@
 //! Evaluation on single pictures of annotated people (PARSE, LSP).
 
-use evaluation::{Bootstrap, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate};
+use evaluation::{
+    Bootstrap, Offset, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, Share, evaluate, offsets,
+};
 
 use crate::Joints;
 
@@ -71,6 +73,11 @@ impl Pictures {
             pcp: RULES.map(|(rule, _)| over(&|it| it.pcp(rule))),
             pck: [0, 1].map(|share| over(&|it| it.pck(share))),
         }
+    }
+
+    /// The mean offset of every joint of the best detection on the person, along and across its bone.
+    pub fn offsets(&self, bootstrap: &Bootstrap) -> Vec<Offset> {
+        offsets(self.pairs(Judged::OnPerson), bootstrap)
     }
 
     /// The tables of the data set: PCP and PCK of either kind of detection, percent.
