@@ -1,6 +1,7 @@
 //! The input files of a deployment, read before any process is started.
 
 mod advice;
+mod joints;
 
 use std::borrow::Cow;
 use std::fs;
@@ -26,6 +27,7 @@ use crate::output;
 use crate::shipped::Shipped;
 use runtime::no_text;
 
+pub use joints::Joints;
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.

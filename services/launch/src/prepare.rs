@@ -232,6 +232,8 @@ fn settings(
     }
     let defaults = SkeletonSettings::default();
     let joints = JointSet::by_name(&deployment.triangulate.joints).unwrap_or(defaults.joints);
+    let joint_map = &deployment.triangulate.joint_map;
+    let joint_map = inputs::Joints::of(joint_map, deployment.model.as_deref())?;
     Ok(EstimatorSettings {
         view: ViewSettings {
             orientation: inputs::orientation(&deployment.pose.orientation, model)?,
@@ -248,7 +250,7 @@ fn settings(
         follow: fuse::follow(deployment.person.follow),
         skeleton: SkeletonSettings {
             joints,
-            joint_map: learned.and_then(|it| it.joint_map(joints)),
+            joint_map: joint_map.map(learned.as_ref(), joints),
             triangulation: geometry::Settings {
                 loss_px: deployment.triangulate.loss_px,
                 ..defaults.triangulation

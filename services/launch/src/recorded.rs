@@ -66,11 +66,14 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     }
     let orientation = &deployment.pose.orientation;
     let orientation = (!deployment::is_none(orientation)).then(|| orientation.clone());
+    let joint_map = &deployment.triangulate.joint_map;
+    let joint_map = (!deployment::is_none(joint_map)).then(|| joint_map.clone());
     for (kind, file) in [
         (Shipped::Model, &deployment.model),
         (Shipped::Network, &deployment.quality.network),
         (Shipped::Consistency, &deployment.fuse.consistency),
         (Shipped::Orientation, &orientation),
+        (Shipped::Joints, &joint_map),
     ] {
         let Some(file) = file else { continue };
         // The deployment calls all shipped files "shipped".

@@ -21,15 +21,18 @@ pub enum Shipped {
     Consistency,
     /// The network that tells in which direction a person faces.
     Orientation,
+    /// Where joints lie among the parts of the model.
+    Joints,
 }
 
 impl Shipped {
     /// All of them.
-    const ALL: [Self; 4] = [
+    const ALL: [Self; 5] = [
         Self::Model,
         Self::Network,
         Self::Consistency,
         Self::Orientation,
+        Self::Joints,
     ];
 
     /// The content of the file.
@@ -39,6 +42,7 @@ impl Shipped {
             Self::Network => include_bytes!("../../../configs/models/person.quality.onnx"),
             Self::Consistency => include_bytes!("../../../configs/models/person.consistency"),
             Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
+            Self::Joints => include_bytes!("../../../configs/models/person.joints"),
         }
     }
 
@@ -49,6 +53,7 @@ impl Shipped {
             Self::Network => "network",
             Self::Consistency => "consistency",
             Self::Orientation => "orientation",
+            Self::Joints => "joints",
         };
         format!("{SHIPPED}:{kind}").into()
     }
@@ -90,6 +95,7 @@ impl Shipped {
             Self::Network => ["quality.network", "train quality"],
             Self::Consistency => ["fuse.consistency", "train consistency"],
             Self::Orientation => ["pose.orientation", "train orientation"],
+            Self::Joints => ["triangulate.joint_map", "train joints"],
         };
         format!(
             "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
@@ -109,5 +115,13 @@ mod tests {
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
         consistency::Learned::parse(text).unwrap();
         orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
+    }
+
+    #[test]
+    fn the_joints_that_ship_belong_to_the_model_that_ships() {
+        let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
+        let file = consistency::JointFile::parse(text).unwrap();
+        let model = checksum::fnv1a(Shipped::Model.bytes());
+        assert_eq!(file.model, format!("{model:016x}"));
     }
 }

@@ -1,9 +1,20 @@
 //! Poses as JSON for the user: pixels count from 0, types and levels from 1.
 
+use std::sync::Arc;
+
 use fmp::{Layout, Model, Pose};
 use geometry::Framing;
 use serde_json::{Map, Value, json};
-use skeleton::JointSet;
+use skeleton::{JointMap, JointSet};
+
+/// The joints that are reported.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedJoints {
+    /// Their names.
+    pub(crate) set: &'static JointSet,
+    /// From parts to them; a choice of parts without it.
+    pub(crate) map: Option<Arc<JointMap>>,
+}
 
 /// A pose with the layout of its pyramid, and the mapping to the pixels that are reported.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +58,7 @@ impl<'a> Placed<'a> {
     }
 
     /// Score, level, scale and parts as JSON; also the joints of the set, null if the model lacks parts for them.
-    pub(crate) fn json(&self, joints: Option<&JointSet>) -> Value {
+    pub(crate) fn json(&self, joints: Option<&NamedJoints>) -> Value {
         let centres: Vec<[f64; 2]> = self
             .pose
             .centres(self.model, self.layout)
@@ -99,8 +110,9 @@ impl<'a> Placed<'a> {
 }
 
 /// The joints of a pose by name; null if the model lacks parts that the set needs.
-fn joints_of(centres: &[[f64; 2]], joints: &JointSet) -> Value {
-    let needed = joints
+fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
+    let set = joints.set;
+    let needed = set
         .joints
         .iter()
         .flat_map(|it| it.parts)
@@ -109,8 +121,11 @@ fn joints_of(centres: &[[f64; 2]], joints: &JointSet) -> Value {
     if centres.len() < needed {
         return Value::Null;
     }
-    let found = joints.from_parts(centres);
-    let named = joints.joints.iter().zip(found);
+    let found = match &joints.map {
+        Some(map) => map.from_parts(centres),
+        None => set.from_parts(centres),
+    };
+    let named = set.joints.iter().zip(found);
     Value::Object(
         named
             .map(|(joint, it)| (joint.name.to_owned(), json!(it)))

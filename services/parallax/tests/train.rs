@@ -1,6 +1,8 @@
 //! `parallax train fmp` as real processes, on figures that are drawn here.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod joints;
+
 use crate::common;
 
 use std::fmt::Write as _;

@@ -215,6 +215,10 @@ impl Deployment {
         if !is_none(&self.pose.orientation) {
             self.pose.orientation = relative_to(&self.pose.orientation, base);
         }
+        let joint_map = &mut self.triangulate.joint_map;
+        if !is_none(joint_map) {
+            *joint_map = relative_to(joint_map, base);
+        }
         if let fuse::Tau::File(tau) = &mut self.fuse.tau {
             tau.file = base.join(&tau.file);
         }

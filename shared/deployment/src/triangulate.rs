@@ -1,7 +1,11 @@
 //! Section `[triangulate]` of a deployment file.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::shipped::SHIPPED;
 
 /// How joints in the world are made of poses in the views.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -10,6 +14,9 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// The set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,
+    /// Where joints lie among the parts: what `parallax train joints` learned with this model; `"shipped"`: the one for the
+    /// model that ships; `"none"`: a joint is the centre of its part, as for other models.
+    pub joint_map: PathBuf,
     /// One pose per view out of its pairs': `mean`, as in the paper, or `consensus`.
     pub combine: Combine,
     /// Whether skeletons are human bodies: what no body has is left out, and bones keep their lengths. `false` for a model of
@@ -36,6 +43,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             joints: "parse14".to_owned(),
+            joint_map: PathBuf::from(SHIPPED),
             combine: Combine::default(),
             bodies: true,
             loss_px: geometry::Settings::default().loss_px,

@@ -1,19 +1,43 @@
 //! A model on pictures of people whose joints are known.
 
+use std::fmt::Write as _;
+use std::sync::Arc;
+
 use datasets::{People, Person, Picture};
-use evaluation::{PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering};
+use evaluation::{
+    Offset, PARSE_STICKS, PCK_GROUPS, PCK_SHARES, Pcp, PcpRule, Report, best_covering,
+};
 use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
-use skeleton::{N_PARTS, PARSE14};
+use skeleton::{JointMap, N_PARTS, PARSE14};
 
 /// Most detections that are looked through for the one that lies on the person.
 const MOST: usize = 10_000;
 
 /// Least share of a person's box that a detection on the person covers.
 const COVERED: f64 = 0.3;
+
+/// A model, and where joints lie among its parts.
+#[derive(Debug)]
+pub struct Reader {
+    /// Searches with the model.
+    pub search: Search,
+    /// From parts to the joints of `skeleton::PARSE14`; a choice of parts without it.
+    pub joint_map: Option<Arc<JointMap>>,
+}
+
+impl Reader {
+    fn joints(&self, centres: &[[f64; 2]]) -> Option<Joints> {
+        let joints = match &self.joint_map {
+            Some(map) => map.from_parts(centres),
+            None => PARSE14.from_parts(centres),
+        };
+        Joints::try_from(joints).ok()
+    }
+}
 
 /// Tries a model on people, on rayon's current pool.
 ///
@@ -25,7 +49,7 @@ const COVERED: f64 = 0.3;
 ///
 /// An image cannot be read; it was given up ([`ExitKind::Interrupted`]).
 pub fn judged(
-    search: &Search,
+    reader: &Reader,
     name: &str,
     people: &People,
     is_over: impl Fn() -> bool + Sync,
@@ -38,7 +62,8 @@ pub fn judged(
         if is_over() {
             return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
         }
-        find(search, person)
+        let found = find(&reader.search, person)?;
+        Ok(found.map(|it| it.and_then(|it| reader.joints(&it))))
     };
     let found: Result<Vec<_>, Failure> = people.people.par_iter().map(find).collect();
     Ok(Pictures {
@@ -64,12 +89,15 @@ pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
 }
 
 /// The joints of a person; there are 14, or the data set would have been refused.
-fn truth(person: &Person) -> Joints {
+pub(crate) fn truth(person: &Person) -> Joints {
     core::array::from_fn(|it| person.joints.get(it).copied().unwrap_or([f64::NAN; 2]))
 }
 
-/// Joints of the best detection, and of the best one on the person.
-fn find(search: &Search, person: &Person) -> Result<[Option<Joints>; 2], Failure> {
+/// The centres of the parts of a detection.
+pub(crate) type Centres = Vec<[f64; 2]>;
+
+/// The best detection, and the best one on the person.
+pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>; 2], Failure> {
     let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
     let size = picture.size();
     let Search { model, solver, .. } = search;
@@ -89,12 +117,9 @@ fn find(search: &Search, person: &Person) -> Result<[Option<Joints>; 2], Failure
         })
     });
     let covering = best_covering(&boxes, [x[0], y[0], x[1], y[1]], COVERED);
-    let joints = |pose: &Pose| {
-        let joints = PARSE14.from_parts(&pose.centres(model, &layout));
-        Joints::try_from(joints).ok()
-    };
+    let centres = |pose: &Pose| pose.centres(model, &layout);
     let covering = covering.and_then(|it| found.get(it));
-    Ok([best.as_ref().and_then(joints), covering.and_then(joints)])
+    Ok([best.as_ref().map(centres), covering.map(centres)])
 }
 
 /// Score of a pose, and the box around all its parts.
@@ -142,4 +167,43 @@ pub fn numbers(report: &Report) -> Value {
         },
         "pck": pck,
     })
+}
+
+/// The mean offsets of joints for programs.
+pub fn offset_numbers(offsets: &[Offset]) -> Value {
+    let each = offsets.iter().map(|it| {
+        json!({
+            "joint": it.joint,
+            "found": it.n_found,
+            "of": it.n,
+            "along": it.mean[0],
+            "along_interval": it.interval[0],
+            "across": it.mean[1],
+            "across_interval": it.interval[1],
+        })
+    });
+    each.collect()
+}
+
+/// The mean offsets of joints as a table.
+pub fn offset_table(offsets: &[Offset]) -> String {
+    let mut text =
+        "mean offset, % of the height     found    along the bone          across it".to_owned();
+    for it in offsets {
+        let number = |axis: usize| {
+            let [low, high] = it.interval[axis];
+            format!("{:6.2} ({low:5.2} to {high:5.2})", it.mean[axis])
+        };
+        // Writing to a string cannot fail.
+        let _infallible = write!(
+            text,
+            "\n{:<24} {:>5} of {:>5}  {}  {}",
+            it.joint,
+            it.n_found,
+            it.n,
+            number(0),
+            number(1)
+        );
+    }
+    text
 }

@@ -9,6 +9,7 @@
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
 //! * [`orientation`]: the network that tells the direction in which a person faces.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
+//! * [`joints`]: where joints lie among the parts of a model, from annotated people.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`examples`]: what a model takes for each type of its parts.
 //! * [`pictures`]: pictures and videos that are searched; [`sheet`]: thumbnails with what was found.
@@ -27,6 +28,7 @@ pub mod images;
 pub mod consistency;
 pub mod eval;
 pub mod examples;
+pub mod joints;
 pub mod judged;
 pub mod orientation;
 pub mod person;

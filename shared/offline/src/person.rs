@@ -10,6 +10,7 @@ mod store;
 mod train;
 
 pub use data::{Chosen, parse_skeleton};
+pub(crate) use data::{read_options, sides_of};
 pub(crate) use per_dataset::deal;
 pub use progress::Progress;
 pub use report::Report;

@@ -1,7 +1,7 @@
 //! What must hold of every reader of files, whatever is in them.
 
 use c3d::C3d;
-use consistency::{Appearance, Learned};
+use consistency::{Appearance, JointFile, Learned};
 use datasets::{SkeletonTable, parse_joints, parse_labels, parse_line, to_line};
 use deployment::{AnyMachine, Loaded, Stage, Topology};
 use fmp::Model;
@@ -149,6 +149,25 @@ pub fn consistency(input: &[u8]) {
         }
         for rig in &learned.rigs {
             let _tables = learned.of_rig(&rig.name, &["c1", "c2"], appearance);
+        }
+    }
+}
+
+/// Where joints lie among the parts: the file, and the map to every set of joints; the parts of a point are that point.
+pub fn joint_file(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let Ok(file) = JointFile::parse(input) else {
+        return;
+    };
+    let again = file.write().expect("its numbers are finite");
+    assert_eq!(JointFile::parse(&again).expect("it was written"), file);
+    let centres = [[3.0, -5.0]; skeleton::N_PARTS];
+    for set in [&skeleton::PARSE14, &skeleton::UMPM15, &skeleton::HUMANEVA20] {
+        let map = file.map(set).expect("sets are made of these joints");
+        for [x, y] in map.from_parts(&centres) {
+            assert!((x - 3.0).abs() < 1e-3 && (y + 5.0).abs() < 1e-3);
         }
     }
 }

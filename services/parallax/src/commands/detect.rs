@@ -7,14 +7,15 @@ use clap::Args;
 use fmp::{CandidateSettings, Layout, Pose, Precision, Search};
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
-use launch::{inputs, output};
+use launch::inputs::{self, Joints};
+use launch::output;
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::JointSet;
 
-use crate::describe::{self, Placed};
+use crate::describe::{self, NamedJoints, Placed};
 
 /// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;
@@ -90,6 +91,10 @@ pub(crate) struct Arguments {
     /// Joints: parse14, umpm15 or humaneva20.
     #[arg(long, value_name = "NAME", default_value = "parse14", value_parser = describe::joint_set)]
     joints: &'static JointSet,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
     /// Precision of the filter responses: f32, or bf16, which is faster, changes scores by some thousandths and needs a
     /// processor with AMX.
     #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
@@ -131,8 +136,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         None => SHIPPED_THRESHOLD,
         Some(_) => model.detection_threshold(),
     };
+    let joints = Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
     let detector = Detector {
         arguments,
+        joints: NamedJoints {
+            set: arguments.joints,
+            map: joints.map(None, arguments.joints),
+        },
         settings: CandidateSettings {
             threshold: arguments.threshold.unwrap_or(default) as f32,
             overlap: arguments.overlap,
@@ -184,6 +194,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
 
 struct Detector<'a> {
     arguments: &'a Arguments,
+    joints: NamedJoints,
     search: Search,
     settings: CandidateSettings,
 }
@@ -237,9 +248,7 @@ impl Detector<'_> {
         if self.arguments.json {
             let placed = |it| Placed::new(it, model, layout).scaled(searched.per_pixel());
             let detections = found.iter().map(placed);
-            let detections: Vec<_> = detections
-                .map(|it| it.json(Some(self.arguments.joints)))
-                .collect();
+            let detections: Vec<_> = detections.map(|it| it.json(Some(&self.joints))).collect();
             let mut line = json!({
                 "image": picture.path,
                 "width": picture.size.width,

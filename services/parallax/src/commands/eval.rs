@@ -19,6 +19,7 @@ use launch::{Claim, Shipped, inputs, no_results};
 use offline::eval::{Done, Fusion, Job};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Alignment, Sequence};
+use skeleton::JointSet;
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
@@ -96,6 +97,10 @@ pub(crate) struct Arguments {
     /// Network that predicts the expected errors, an ONNX file; "shipped": the one that ships.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["sigma", "oracle"])]
     network: Option<PathBuf>,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
     /// Use the true errors: a part is switched off if its error exceeds a tenth of the person's size.
     #[arg(long)]
     oracle: bool,
@@ -192,9 +197,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             scale,
         )
     };
+    let joints = inputs::Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
+    let joint_map = |set: &JointSet| joints.map(learned.as_ref(), set);
     let job = Job {
+        joint_map: &joint_map,
         versions: versions(arguments, &config)?,
-        settings: settings_text(arguments, &config)?,
+        settings: settings_text(arguments, &config, &joints)?,
         film: FilmSettings {
             size: arguments.size,
             scale: arguments.scale,
@@ -388,7 +396,11 @@ fn versions(arguments: &Arguments, config: &Config) -> Result<Vec<Version>, Fail
 }
 
 /// A text with all settings that the poses depend on, besides the sequence and its frames.
-fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failure> {
+fn settings_text(
+    arguments: &Arguments,
+    config: &Config,
+    joints: &inputs::Joints,
+) -> Result<String, Failure> {
     let digest = |file: &PathBuf| {
         let bytes = fs::read(file).map_err(|error| runtime::in_file(file, &error))?;
         Ok::<_, Failure>(checksum::fnv1a(&bytes))
@@ -408,6 +420,7 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         let file = of(Shipped::Orientation, &arguments.orientation)?;
         format!("orientation {file:016x}, ")
     };
+    let joints = joints.fingerprint();
     let mut tables = Vec::new();
     let files = config.compatibility.iter().flat_map(|it| &it.files);
     for file in files {
@@ -424,7 +437,7 @@ fn settings_text(arguments: &Arguments, config: &Config) -> Result<String, Failu
         arguments.oracle,
     );
     Ok(format!(
-        "{network}{orientation}model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
+        "{network}{orientation}joints {joints}, model {model:016x}, sigma {sigma:x?}, oracle {oracle}, tables {tables:x?}, size {size:?}, \
          scale {scale}, upright {upright}, candidates {n}\n{fuse}"
     ))
 }

@@ -13,13 +13,14 @@ use footage::{Fill, Size, Source, SourceSpec, Warp};
 use geometry::files::ReadOptions;
 use geometry::{Framing, OutSize, Rig, upright_roll};
 use kernels::Rgb8View;
-use launch::{frame_scale, inputs, output};
+use launch::inputs::{self, Joints};
+use launch::{frame_scale, output};
 use pipeline::{Estimate, Estimator, EstimatorSettings, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 use skeleton::JointSet;
 
-use crate::describe::{self, Placed};
+use crate::describe::{self, NamedJoints, Placed};
 use expected::sigma;
 
 /// The energy of fusion.
@@ -54,6 +55,10 @@ pub(crate) struct Arguments {
     /// Learned consistency: part-type tables, weights, thresholds, joints; "shipped": the one that ships.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
     /// What tells in which direction a person faces (`train orientation`); "shipped"; "none".
     #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
     orientation: PathBuf,
@@ -143,6 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let views = views(arguments, &rig)?;
     let settings = settings(arguments, &model, &views)?;
     let cameras: Vec<_> = views.iter().map(|it| it.framing.camera().clone()).collect();
+    let joint_map = settings.skeleton.joint_map.clone();
     let estimator = Estimator::new(&model, &cameras, rig.up_in_world(), &settings);
     let mut estimator = estimator.or_fail(ExitKind::Input)?;
     let scales: Vec<f32> = views
@@ -163,7 +169,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         model: &model,
         estimator: &estimator,
         estimate: &estimate,
-        joints: arguments.joints,
+        joints: NamedJoints {
+            set: arguments.joints,
+            map: joint_map,
+        },
     };
     if arguments.json {
         output::json(&report.json())?;
@@ -294,6 +303,7 @@ fn settings(
         }
     }
     let scale = views.iter().map(|it| frame_scale(&it.framing)).sum::<f64>() / views.len() as f64;
+    let joints = Joints::of(&arguments.joint_map, arguments.model.as_deref())?;
     Ok(EstimatorSettings {
         fuse: fuse::settings(&config, n_candidates, scale as f32, learned.as_ref()),
         view: ViewSettings {
@@ -306,7 +316,7 @@ fn settings(
         follow: pipeline::Follow::default(),
         skeleton: SkeletonSettings {
             joints: arguments.joints,
-            joint_map: learned.and_then(|it| it.joint_map(arguments.joints)),
+            joint_map: joints.map(learned.as_ref(), arguments.joints),
             combine: match arguments.combine {
                 Combine::Mean => pipeline::Combine::Mean,
                 Combine::Consensus => pipeline::Combine::Consensus,
@@ -323,7 +333,7 @@ struct Report<'a> {
     model: &'a Arc<Model>,
     estimator: &'a Estimator,
     estimate: &'a Estimate,
-    joints: &'static JointSet,
+    joints: NamedJoints,
 }
 
 impl Report<'_> {
@@ -331,7 +341,7 @@ impl Report<'_> {
         let layout = self.estimator.plans()[view].layout();
         Placed::new(pose, self.model, layout)
             .in_footage(&self.views[view].framing)
-            .json(Some(self.joints))
+            .json(Some(&self.joints))
     }
 
     fn json(&self) -> Value {
@@ -339,6 +349,7 @@ impl Report<'_> {
         let pairs: Vec<Value> = self.estimate.pairs.iter().map(|it| self.pair(it)).collect();
         let joints = self
             .joints
+            .set
             .joints
             .iter()
             .zip(&self.estimate.skeleton.joints);
@@ -456,6 +467,7 @@ impl Report<'_> {
         }
         for (joint, it) in self
             .joints
+            .set
             .joints
             .iter()
             .zip(&self.estimate.skeleton.joints)

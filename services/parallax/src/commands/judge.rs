@@ -5,10 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use datasets::{ReadOptions, Selection, Sides, SkeletonTable};
+use evaluation::Bootstrap;
 use experiment::Judged;
 use fmp::Search;
-use launch::{inputs, output};
-use offline::judged;
+use launch::inputs::{self, Joints};
+use launch::output;
+use offline::judged::{self, Reader};
 use runtime::Failure;
 use serde_json::json;
 use skeleton::PARSE14;
@@ -24,6 +26,10 @@ With --json one object:
     {\"images\", \"left_out\", \"best\" | \"on_person\":
      {\"missed\", \"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}}
 Percentages, of every stick or joint and in \"total\".
+
+\"joints\" says where they lie among the parts. With --offsets also \"offsets\": of every joint of the best detection on the
+person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
+across it (positive outwards), percent of the height of the person, and their intervals.
 
 Example:
     parallax model judge person.fmp PARSE --only 101-200")]
@@ -41,6 +47,13 @@ pub(crate) struct Arguments {
     /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
+    /// Where joints lie among the parts: a file that `train joints` made; "shipped": the one for the model that ships;
+    /// "none": a joint is the centre of its part, as for other models.
+    #[arg(long, value_name = "FILE", default_value = deployment::SHIPPED)]
+    joint_map: PathBuf,
+    /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
+    #[arg(long)]
+    offsets: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -61,25 +74,34 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let sided = people.people.into_iter();
     let sided = sided.map(|it| arguments.sides.of(it, table.joint_mirror()));
     people.people = sided.collect();
-    let pictures = judged::judged(
-        &Search::new(model),
-        "",
-        &people,
-        || false,
-        |text| output::message(text),
-    )?;
+    let joints = Joints::of(&arguments.joint_map, Some(&arguments.model))?;
+    let reader = Reader {
+        search: Search::new(model),
+        joint_map: joints.map(None, &PARSE14),
+    };
+    let pictures = judged::judged(&reader, "", &people, || false, |text| output::message(text))?;
     let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
     if arguments.json {
-        output::json(&json!({
+        let mut report = json!({
             "schema_version": 1,
+            "joints": joints.to_string(),
             "images": best.n_images(),
             "left_out": pictures.n_left_out,
             "best": judged::numbers(&best),
             "on_person": judged::numbers(&on_person),
-        }))?;
+        });
+        if arguments.offsets {
+            report["offsets"] = judged::offset_numbers(&pictures.offsets(&Bootstrap::default()));
+        }
+        output::json(&report)?;
     } else {
+        output::line(format_args!("joints: {joints}"))?;
         output::line(format_args!("{}: {best}", Judged::Best.title()))?;
         output::line(format_args!("\n{}: {on_person}", Judged::OnPerson.title()))?;
+        if arguments.offsets {
+            let offsets = pictures.offsets(&Bootstrap::default());
+            output::line(format_args!("\n{}", judged::offset_table(&offsets)))?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

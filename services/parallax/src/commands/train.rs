@@ -1,6 +1,7 @@
 //! `parallax train`: trains models, networks and multi-view consistency.
 
 mod consistency;
+mod joints;
 mod orientation;
 mod people;
 mod quality;
@@ -69,6 +70,8 @@ pub(crate) enum Command {
     Consistency(Box<consistency::Arguments>),
     /// Train the network that tells from the picture in which direction a person faces, for left and right.
     Orientation(Box<orientation::Arguments>),
+    /// Learn where joints lie among the parts of a model, on photographs of marked people.
+    Joints(Box<joints::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and write the samples for training the quality network.
@@ -114,6 +117,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         Command::Fmp(it) => it,
         Command::Consistency(it) => return consistency::run(&it, globals),
         Command::Orientation(arguments) => return orientation::run(&arguments, globals),
+        Command::Joints(it) => return joints::run(&it, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };

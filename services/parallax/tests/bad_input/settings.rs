@@ -305,6 +305,12 @@ const fn rig(
     }
 }
 
+/// Names a file of joints.
+fn joints(case: &Case, file: &str) {
+    let named = format!("bodies = false\njoint_map = {file:?}");
+    case.edit("deployment.toml", "bodies = false", &named);
+}
+
 const INPUTS: &[Mistake] = &[
     input(
         "absent model",
@@ -357,6 +363,28 @@ const INPUTS: &[Mistake] = &[
                 "workers = 2\nconsistency = \"rig.toml\"",
             );
         },
+        &["rig.toml"],
+        &["not JSON"],
+    ),
+    input(
+        "absent joints",
+        |it| joints(it, "person.joints"),
+        &["person.joints"],
+        &["`triangulate.joint_map`", "\"shipped\""],
+    ),
+    input(
+        "joints of another model",
+        |it| {
+            let file = include_str!("../../../../configs/models/person.joints");
+            it.write("person.joints", file);
+            joints(it, "person.joints");
+        },
+        &["person.joints", "learned with another model"],
+        &["`parallax train joints`"],
+    ),
+    input(
+        "rig for joints",
+        |it| joints(it, "rig.toml"),
         &["rig.toml"],
         &["not JSON"],
     ),

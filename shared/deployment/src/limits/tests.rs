@@ -378,6 +378,7 @@ const OTHERS: &[&str] = &[
     "fuse.pairs",
     "person.follow",
     "triangulate.joints",
+    "triangulate.joint_map",
     "triangulate.combine",
     "triangulate.bodies",
     "results.trc",

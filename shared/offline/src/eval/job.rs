@@ -15,7 +15,7 @@ use orientation::Detector;
 use pipeline::{PairTables, SkeletonSettings, ViewSettings};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use sequences::{Frame, Sequence};
-use skeleton::PARSE14;
+use skeleton::{JointMap, JointSet, PARSE14};
 use viewquality::{ForecastInput, Forecaster, Table};
 
 use super::progress::Progress;
@@ -34,6 +34,8 @@ pub struct Job<'a> {
     pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
     /// Whether it is decided for every view which way a person faces.
     pub facing: bool,
+    /// Gives the map from parts to the joints of a set; a joint is a choice of parts without it.
+    pub joint_map: &'a (dyn Fn(&JointSet) -> Option<Arc<JointMap>> + Sync),
     /// What was learned about several views.
     pub learned: Option<&'a Learned>,
     /// What is compared.
@@ -280,10 +282,10 @@ impl Job<'_> {
                 ..ViewSettings::default()
             },
             trials: self.versions.iter().map(trial).collect(),
-            joint_map: learned.and_then(|it| it.joint_map(&PARSE14)),
+            joint_map: (self.joint_map)(&PARSE14),
             skeleton: SkeletonSettings {
                 joints: sequence.joints,
-                joint_map: learned.and_then(|it| it.joint_map(sequence.joints)),
+                joint_map: (self.joint_map)(sequence.joints),
                 facing: fuse.facing,
                 // The true errors only switch: they are no lengths in the frame.
                 error_weight: f64::from(u8::from(!self.oracle)),

@@ -85,13 +85,13 @@ impl Data {
             negatives: Vec::new(),
             n_unreadable: 0,
         };
-        let options = options(arguments, table)?;
+        let options = read_options(arguments, table)?;
         let all = &arguments.datasets;
         let angles = deal(all, "--rotate", &arguments.rotate, true)?;
         let sides = deal(all, "--sides", &arguments.sides, true)?;
         for (((path, options), angles), sides) in all.iter().zip(&options).zip(angles).zip(sides) {
             let angles = degrees(&angles)?;
-            let sides = self::sides(&sides)?;
+            let sides = sides_of(&sides)?;
             let People { people, problems } =
                 datasets::read(path, options).map_err(dataset_failure)?;
             let people = people.into_iter();
@@ -149,7 +149,10 @@ pub(super) fn in_folders(folders: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// What of every data set is read.
-fn options(arguments: &Chosen, table: &SkeletonTable) -> Result<Vec<ReadOptions>, Failure> {
+pub(crate) fn read_options(
+    arguments: &Chosen,
+    table: &SkeletonTable,
+) -> Result<Vec<ReadOptions>, Failure> {
     let all = &arguments.datasets;
     if let Some((_, twice)) = (1..)
         .zip(all)
@@ -205,7 +208,7 @@ fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
 }
 
 /// Whose left and right the joints of a data set are called by: the last word counts.
-fn sides(values: &[&str]) -> Result<Sides, Failure> {
+pub(crate) fn sides_of(values: &[&str]) -> Result<Sides, Failure> {
     let Some(name) = values.last() else {
         return Ok(Sides::default());
     };
@@ -221,9 +224,9 @@ mod tests {
 
     #[test]
     fn sides_are_as_marked_unless_said() {
-        assert_eq!(sides(&[]).unwrap(), Sides::Marked);
-        assert_eq!(sides(&["marked", "seen"]).unwrap(), Sides::Seen);
-        assert_eq!(sides(&["left"]).unwrap_err().kind(), ExitKind::Usage);
+        assert_eq!(sides_of(&[]).unwrap(), Sides::Marked);
+        assert_eq!(sides_of(&["marked", "seen"]).unwrap(), Sides::Seen);
+        assert_eq!(sides_of(&["left"]).unwrap_err().kind(), ExitKind::Usage);
     }
 
     #[test]

@@ -8,8 +8,9 @@ use experiment::{Judged, Pictures};
 use fmp::Search;
 use launch::{inputs, output};
 use offline::eval::pictures;
-use offline::judged;
+use offline::judged::{self, Reader};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
+use skeleton::PARSE14;
 
 use super::Arguments;
 use crate::commands::judge;
@@ -38,12 +39,17 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
         .num_threads(arguments.threads.map_or(0, usize::from))
         .build()
         .or_fail(ExitKind::Run)?;
-    let search = Search::new(model);
+    let model_file = arguments.model.as_deref();
+    let joints = inputs::Joints::of(&arguments.joint_map, model_file)?;
+    let reader = Reader {
+        search: Search::new(model),
+        joint_map: joints.map(None, &PARSE14),
+    };
     let mut sets = Vec::new();
     for (name, people) in &all {
         let found = pool.install(|| {
             judged::judged(
-                &search,
+                &reader,
                 name,
                 people,
                 || stop.is_requested(),
@@ -54,7 +60,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
         pictures::write_found(&poses, people, &set)?;
         sets.push(set);
     }
-    write(arguments, &sets)?;
+    write(arguments, &sets, &joints)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -84,7 +90,7 @@ fn refuse_sequence_options(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn write(arguments: &Arguments, sets: &[Pictures]) -> Result<(), Failure> {
+fn write(arguments: &Arguments, sets: &[Pictures], joints: &inputs::Joints) -> Result<(), Failure> {
     let bootstrap = Bootstrap {
         block: arguments.block,
         ..Bootstrap::default()
@@ -97,6 +103,7 @@ fn write(arguments: &Arguments, sets: &[Pictures]) -> Result<(), Failure> {
     if arguments.json {
         return output::json(&numbers);
     }
+    output::line(format_args!("joints: {joints}"))?;
     for set in sets {
         for which in Judged::ALL {
             let (name, title, report) = (&set.name, which.title(), set.report(which));

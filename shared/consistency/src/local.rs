@@ -1,0 +1,274 @@
+//! Where a joint lies among the parts around it, learned from marked people of whom some are badly found.
+
+use nalgebra::{DMatrix, DVector};
+use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
+
+/// Joints of `skeleton::PARSE14`.
+const N_JOINTS: usize = 14;
+/// Parts of shoulders and hips: where one lies, the other one tells too.
+const ACROSS_TRUNK: [usize; 4] = [2, 9, 14, 21];
+/// An error counts at most so much, as a share of the person's size: beyond, the joint was not found at all.
+const LIMIT: f64 = 0.1;
+/// Most rounds of reweighting, and the change of weights at which there are no more.
+const MOST_ROUNDS: usize = 50;
+const SETTLED: f64 = 1e-9;
+/// Shares that people are dealt into for choosing the settings.
+const FOLDS: usize = 5;
+
+/// A person of whom parts were found and joints are marked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marked {
+    /// Centres of the 26 parts, pixels.
+    pub centres: [[f64; 2]; N_PARTS],
+    /// The joints of `skeleton::PARSE14`, pixels, left and right as seen.
+    pub joints: [[f64; 2]; N_JOINTS],
+}
+
+/// How joints are learned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Local {
+    /// Parts up to so many bones away from the joint's own tell where it lies.
+    pub reach: usize,
+    /// How much a weight off a joint's own part costs: squared, per person, in units of the person's size.
+    pub ridge: f64,
+}
+
+impl Local {
+    /// What is tried, the plainest first.
+    pub fn tried() -> Vec<Self> {
+        let with = |reach| [1e-2, 1e-3, 1e-4].map(|ridge| Self { reach, ridge });
+        [1, 2, 4].into_iter().flat_map(with).collect()
+    }
+
+    /// Learns a row of weights, one per part, for every joint of `skeleton::PARSE14`; rows sum to 1.
+    ///
+    /// A joint is its own part plus a weighted sum of those around it relative to it, so that the map is the same for
+    /// people who are moved, turned or larger. Every data set counts the same, as what one collection calls a joint
+    /// another does not; every person counts as its mirror image too, so that the map is symmetric. Errors beyond a
+    /// tenth of a person's size count nothing (Tukey's biweight): there the limb was not found.
+    pub fn learn(self, sets: &[Vec<&Marked>]) -> Vec<Vec<f64>> {
+        let mut rows = vec![Vec::new(); N_JOINTS];
+        for joint in 0..N_JOINTS {
+            let own = own(joint);
+            if MIRROR[own] < own {
+                continue;
+            }
+            let row = self.row(joint, sets);
+            let mirrored: Vec<f64> = MIRROR.iter().map(|&it| row[it]).collect();
+            if MIRROR[own] == own {
+                // Symmetric but for rounding.
+                let both = row.iter().zip(&mirrored);
+                rows[joint] = rounded(own, both.map(|(a, b)| f64::midpoint(*a, *b)));
+            } else {
+                rows[mirror_of(joint)] = rounded(MIRROR[own], mirrored.into_iter());
+                rows[joint] = rounded(own, row.into_iter());
+            }
+        }
+        rows
+    }
+
+    /// The weights of one joint.
+    fn row(self, joint: usize, sets: &[Vec<&Marked>]) -> Vec<f64> {
+        let own = own(joint);
+        let around = around(own, self.reach);
+        let samples = samples(joint, &around, sets);
+        let n = around.len();
+        let mut weights = DVector::zeros(n);
+        for _ in 0..MOST_ROUNDS {
+            let (mut products, mut targets) = (DMatrix::zeros(n, n), DVector::zeros(n));
+            let mut total = 0.0;
+            for sample in &samples {
+                let trust = sample.trust(&weights);
+                if trust <= 0.0 {
+                    continue;
+                }
+                total += trust;
+                for axis in 0..2 {
+                    products.ger(trust, &sample.around[axis], &sample.around[axis], 1.0);
+                    targets.axpy(trust * sample.joint[axis], &sample.around[axis], 1.0);
+                }
+            }
+            for it in 0..n {
+                products[(it, it)] += self.ridge * total;
+            }
+            let Some(solved) = products.cholesky().map(|it| it.solve(&targets)) else {
+                break;
+            };
+            let moved = (&solved - &weights).amax();
+            weights = solved;
+            if moved < SETTLED {
+                break;
+            }
+        }
+        let mut row = vec![0.0; N_PARTS];
+        for (part, weight) in around.iter().zip(&weights) {
+            row[*part] = *weight;
+        }
+        row[own] = 1.0 - weights.sum();
+        row
+    }
+}
+
+/// Mean distance of joints from their marks, percent of the person's size, each at most 10; `None` of nobody.
+///
+/// * `rows`: as of [`Local::learn`]; the parts themselves without them.
+pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> {
+    let of_person = |it: &&Marked| {
+        let size = size(&it.joints);
+        let joint = |joint: usize| {
+            let at = rows.map_or(it.centres[own(joint)], |rows| read(&rows[joint], it));
+            let [x, y] = [0, 1].map(|axis| at[axis] - it.joints[joint][axis]);
+            100.0 * (x.hypot(y) / size).min(LIMIT)
+        };
+        (0..N_JOINTS).map(joint).sum::<f64>() / N_JOINTS as f64
+    };
+    (!people.is_empty()).then(|| people.iter().map(of_person).sum::<f64>() / people.len() as f64)
+}
+
+/// One of [`Local::tried`] and the errors of every data set on people that it was not learned from.
+pub type Tried = (Local, Vec<f64>);
+
+/// Tries settings on people that are left out in turn, every fifth of each data set.
+pub fn try_all(sets: &[Vec<Marked>]) -> Vec<Tried> {
+    let tried = Local::tried().into_iter();
+    tried.map(|it| (it, left_out(it, sets))).collect()
+}
+
+/// The settings of the least error, every data set counting the same; of equal ones the first.
+pub fn best(tried: &[Tried]) -> Option<&Tried> {
+    let mean = |it: &&Tried| it.1.iter().sum::<f64>();
+    tried.iter().min_by(|a, b| mean(a).total_cmp(&mean(b)))
+}
+
+fn left_out(settings: Local, sets: &[Vec<Marked>]) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); sets.len()];
+    for fold in 0..FOLDS {
+        let deal = |is_in: bool| -> Vec<Vec<&Marked>> {
+            let of_set = |set: &Vec<Marked>| -> Vec<usize> {
+                (0..set.len())
+                    .filter(|it| (it % FOLDS == fold) == is_in)
+                    .collect()
+            };
+            let sets = sets.iter().map(|set| (set, of_set(set)));
+            sets.map(|(set, at)| at.into_iter().map(|it| &set[it]).collect())
+                .collect()
+        };
+        let rows = settings.learn(&deal(false));
+        for (people, (sum, n)) in deal(true).iter().zip(&mut sums) {
+            let error = mean_error(Some(&rows), people).unwrap_or(0.0);
+            *sum += error * people.len() as f64;
+            *n += people.len() as f64;
+        }
+    }
+    sums.iter()
+        .map(|(sum, n)| sum / f64::max(*n, 1.0))
+        .collect()
+}
+
+/// A joint of one person, everything relative to its own part, in units of the person's size.
+struct Sample {
+    around: [DVector<f64>; 2],
+    joint: [f64; 2],
+    share: f64,
+}
+
+impl Sample {
+    /// How much it counts: Tukey's biweight of its distance.
+    fn trust(&self, weights: &DVector<f64>) -> f64 {
+        let [x, y] = [0, 1].map(|axis| self.joint[axis] - self.around[axis].dot(weights));
+        let square = (x * x + y * y) / (LIMIT * LIMIT);
+        self.share * (1.0 - square).max(0.0).powi(2)
+    }
+}
+
+fn samples(joint: usize, around: &[usize], sets: &[Vec<&Marked>]) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    for people in sets {
+        let share = 0.5 / people.len().max(1) as f64;
+        for person in people {
+            for is_mirrored in [false, true] {
+                samples.push(sample(person, joint, around, is_mirrored, share));
+            }
+        }
+    }
+    samples
+}
+
+fn sample(
+    person: &Marked,
+    joint: usize,
+    around: &[usize],
+    is_mirrored: bool,
+    share: f64,
+) -> Sample {
+    let side = if is_mirrored { -1.0 } else { 1.0 };
+    let turned = |[x, y]: [f64; 2]| [side * x, y];
+    let centre =
+        |part: usize| turned(person.centres[if is_mirrored { MIRROR[part] } else { part }]);
+    let mark = person.joints[if is_mirrored { mirror_of(joint) } else { joint }];
+    let (own, size) = (centre(own(joint)), size(&person.joints));
+    Sample {
+        around: [0, 1].map(|axis| {
+            let relative = around
+                .iter()
+                .map(|&it| (centre(it)[axis] - own[axis]) / size);
+            DVector::from_iterator(around.len(), relative)
+        }),
+        joint: [0, 1].map(|axis| (turned(mark)[axis] - own[axis]) / size),
+        share,
+    }
+}
+
+fn read(row: &[f64], person: &Marked) -> [f64; 2] {
+    [0, 1].map(|axis| {
+        let weighed = row.iter().zip(&person.centres);
+        weighed.map(|(weight, at)| weight * at[axis]).sum()
+    })
+}
+
+/// The part that a joint of `skeleton::PARSE14` is by default.
+pub(crate) fn own(joint: usize) -> usize {
+    PARSE14.joints[joint].parts[0]
+}
+
+/// The joint of `skeleton::PARSE14` on the other side.
+fn mirror_of(joint: usize) -> usize {
+    let other = MIRROR[own(joint)];
+    (0..N_JOINTS).find(|it| own(*it) == other).unwrap_or(joint)
+}
+
+/// The parts up to `reach` bones away from a part, without it, ascending; for shoulders and hips also the one across.
+fn around(own: usize, reach: usize) -> Vec<usize> {
+    let mut near = [false; N_PARTS];
+    near[own] = true;
+    for _ in 0..reach {
+        let before = near;
+        for (part, parent) in PARENT.iter().enumerate() {
+            if let Some(parent) = *parent {
+                near[part] |= before[parent];
+                near[parent] |= before[part];
+            }
+        }
+    }
+    if ACROSS_TRUNK.contains(&own) {
+        near[MIRROR[own]] = true;
+    }
+    (0..N_PARTS).filter(|&it| near[it] && it != own).collect()
+}
+
+/// The longer side of the box around the joints plus a pixel, as for PCK.
+fn size(joints: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let values = || joints.iter().map(move |it| it[axis]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    side(0).max(side(1)) + 1.0
+}
+
+/// Weights with six decimals that sum to 1: the joint's own part takes the rest.
+fn rounded(own: usize, row: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut millionths: Vec<i64> = row.map(|it| (it * 1e6).round() as i64).collect();
+    let sum: i64 = millionths.iter().sum();
+    millionths[own] += 1_000_000 - sum;
+    millionths.iter().map(|&it| it as f64 / 1e6).collect()
+}
