@@ -104,6 +104,7 @@ impl Found {
     /// The candidates of every view that are another person than one of the people, as bits.
     ///
     /// In a view that sees nobody but others nothing is left out: there the person may be hidden, or badly found.
+    ///
     /// * `followed`: who is followed; `None` if it is none of them.
     pub(crate) fn others(&self, followed: Option<usize>) -> Vec<u64> {
         let people = || self.people.iter().enumerate();
@@ -133,9 +134,9 @@ impl Found {
 /// Finds the people of a frame, the one that most views see most clearly first.
 ///
 /// Every two candidates of two views are put in space by their middle lines; what could be a person there is looked for in
-/// the other views. The best is taken with its candidates and what overlaps them, and so on. A person is seen by three
-/// views, or by both of two; the others have to be about as clear as the first. People who stand so close that their
-/// trunks touch count as one.
+/// the other views, until nothing changes. The strongest is a person, then every other that is apart from those before it in
+/// space and in all pictures but one. A person is seen by three views, or by both of two, and at least 0.28 times as strong as
+/// the first. People whose trunks are less than half a metre apart count as one. The paper knows one person; this is our own.
 ///
 /// * `plans`: of the views; nothing is found with models that do not have the 26 parts of the published ones.
 pub fn people(plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Vec<Person> {
