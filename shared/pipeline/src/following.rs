@@ -39,12 +39,19 @@ pub struct Following {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Others {
     of_views: Vec<u64>,
+    /// Bit `v` is set if view `v` sees others, but not the one who is followed.
+    without: u64,
 }
 
 impl Others {
     /// Bit `c` is set if candidate `c` of a view is somebody else.
     pub fn of_view(&self, view: usize) -> u64 {
         self.of_views.get(view).copied().unwrap_or(0)
+    }
+
+    /// Whether a view sees others, but not the one who is followed: it has no part in the frame.
+    pub fn only(&self, view: usize) -> bool {
+        self.without >> view & 1 == 1
     }
 }
 
@@ -63,6 +70,7 @@ impl Following {
         let followed = self.choose(&found);
         Others {
             of_views: found.others(followed),
+            without: followed.map_or(0, |it| found.without(it)),
         }
     }
 

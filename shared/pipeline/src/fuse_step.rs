@@ -153,7 +153,7 @@ impl FuseStep {
         others: &Others,
     ) -> Vec<Option<(usize, bool)>> {
         let present: Vec<usize> = (0..answers.len())
-            .filter(|view| answers[*view].is_some())
+            .filter(|view| answers[*view].is_some() && !others.only(*view))
             .collect();
         if present.is_empty() {
             return vec![None; answers.len()];
@@ -254,7 +254,7 @@ impl FuseStep {
     ) -> Option<AllViewsResult> {
         let present = |view: &usize| {
             let both = answers[*view].as_ref().zip(evidence[*view].as_ref());
-            both.is_some_and(|(answer, evidence)| answer.is_within(evidence))
+            both.is_some_and(|(answer, evidence)| answer.is_within(evidence)) && !others.only(*view)
         };
         let present: Vec<usize> = (0..answers.len()).filter(present).collect();
         if present.len() < 2 {

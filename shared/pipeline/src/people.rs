@@ -131,6 +131,18 @@ impl Found {
     }
 }
 
+impl Found {
+    /// The views that see others, but not this person, as bits.
+    pub(crate) fn without(&self, followed: usize) -> u64 {
+        let is_seen = |view: usize| self.people[followed].candidates[view].is_some();
+        let sees_others = |view: usize| self.people.iter().any(|it| it.candidates[view].is_some());
+        let views = 0..self.views.len().min(u64::BITS as usize);
+        views
+            .filter(|view| !is_seen(*view) && sees_others(*view))
+            .fold(0, |mask, view| mask | 1_u64 << view)
+    }
+}
+
 /// Finds the people of a frame, the one that most views see most clearly first.
 ///
 /// Every two candidates of two views are put in space by their middle lines; what could be a person there is looked for in
@@ -164,12 +176,17 @@ fn groups(cameras: &[&Camera], views: &[Vec<Sighting>]) -> Vec<Person> {
     let n_present = views.iter().filter(|it| !it.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
     let mut found = Vec::new();
+    let mut candidates = vec![None; views.len()];
+    let mut rays = Vec::with_capacity(views.len());
     for first in 0..views.len() {
         for second in first + 1..views.len() {
             for (a, one) in views[first].iter().enumerate() {
                 for (b, other) in views[second].iter().enumerate() {
                     if may_meet(one, other) {
-                        let group = person(cameras, views, [(first, a), (second, b)]);
+                        candidates.fill(None);
+                        candidates[first] = Some(a);
+                        candidates[second] = Some(b);
+                        let group = person(cameras, views, &mut candidates, &mut rays);
                         found.extend(group.filter(|it| it.n_views() >= needed));
                     }
                 }
@@ -218,34 +235,34 @@ fn may_meet(one: &Sighting, other: &Sighting) -> bool {
 }
 
 /// The person that two candidates would be, with those of the other views that see it there.
-fn person(
+///
+/// * `rays`: a buffer.
+fn person<'a>(
     cameras: &[&Camera],
-    views: &[Vec<Sighting>],
-    pair: [(usize, usize); 2],
+    views: &'a [Vec<Sighting>],
+    candidates: &mut [Option<usize>],
+    rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
-    let mut candidates = vec![None; views.len()];
-    for (view, candidate) in pair {
-        candidates[view] = Some(candidate);
-    }
-    let mut seen = placed(cameras, views, &candidates)?;
+    let mut seen = placed(cameras, views, candidates, rays)?;
     // The views that were found later move the person, which may then be seen by more of them.
     for _ in 0..MAX_ROUNDS {
-        if seen.candidates == candidates {
+        if seen.candidates == *candidates {
             return Some(seen);
         }
-        candidates.clone_from(&seen.candidates);
-        seen = placed(cameras, views, &candidates)?;
+        candidates.copy_from_slice(&seen.candidates);
+        seen = placed(cameras, views, candidates, rays)?;
     }
     Some(seen)
 }
 
 /// The person of these candidates, and the candidates that see it there.
-fn placed(
+fn placed<'a>(
     cameras: &[&Camera],
-    views: &[Vec<Sighting>],
+    views: &'a [Vec<Sighting>],
     candidates: &[Option<usize>],
+    rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
-    let points = line_in_world(views, candidates)?;
+    let points = line_in_world(views, candidates, rays)?;
     let is_body = points.windows(2).zip(LENGTHS).all(|(ends, [least, most])| {
         let length = (ends[0] - ends[1]).norm();
         (least..=most).contains(&length)
@@ -281,17 +298,17 @@ fn placed(
 }
 
 /// The points nearest to the rays of some candidates; `None` if they are parallel or meet behind a camera.
-fn line_in_world(
-    views: &[Vec<Sighting>],
+fn line_in_world<'a>(
+    views: &'a [Vec<Sighting>],
     candidates: &[Option<usize>],
+    rays: &mut Vec<&'a Ray>,
 ) -> Option<[Point3<f64>; N_POINTS]> {
     let mut points = [Point3::origin(); N_POINTS];
-    let mut rays: Vec<&Ray> = Vec::with_capacity(views.len());
     for (index, point) in points.iter_mut().enumerate() {
         let seen = views.iter().zip(candidates);
         rays.clear();
         rays.extend(seen.filter_map(|(sightings, it)| sightings[(*it)?].rays[index].as_ref()));
-        *point = meeting(&rays)?;
+        *point = meeting(rays)?;
     }
     Some(points)
 }

@@ -1,6 +1,7 @@
 //! The skeleton step: combines the pairs' poses into one pose per view, decides left and right, and
 //! triangulates the joints.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use fmp::Pose;
@@ -50,6 +51,15 @@ pub struct Skeleton {
     pub sides: Option<Sides>,
     /// Which poses the joints were triangulated from.
     pub kept: Kept,
+}
+
+/// What a skeleton is made of.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    answers: &'a [Option<ViewResult>],
+    fused: &'a Fused<'a>,
+    /// Whether the person is the only one that the views could mean.
+    is_alone: bool,
 }
 
 /// The skeleton step for a rig; keeps the facing of the frame before.
@@ -102,24 +112,30 @@ impl SkeletonStep {
     }
 
     fn settle(&mut self, answers: &[Option<ViewResult>], fused: &Fused<'_>) -> Skeleton {
+        let people = people(&self.space.plans, answers);
+        let frame = Frame {
+            answers,
+            fused,
+            is_alone: people.len() < 2,
+        };
         let (exchanged, facing_margin, sides) =
             if self.space.settings.facing && self.space.can_exchange() {
-                let (exchanged, margin, sides) = self.decide_facing(answers, fused);
+                let (exchanged, margin, sides) = self.decide_facing(&frame);
                 (exchanged, margin, Some(sides))
             } else {
                 (0, f64::INFINITY, None)
             };
-        let candidates = self.candidates(answers, fused, exchanged);
+        let candidates = self.candidates(&frame, exchanged);
         let solved = match self.space.settings.combine {
             Combine::Mean => fuse(&candidates, exchanged),
             Combine::Consensus => self.agreed(&candidates, exchanged),
         };
-        let (views, kept) = self.better(solved, self.starts(answers, fused, exchanged));
+        let (views, kept) = self.better(solved, self.starts(&frame, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
         let expected_px = self.expected_errors(answers, exchanged);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
-            Some(map) => map.from_parts(centres),
-            None => self.space.settings.joints.from_parts(centres),
+            Some(map) => Cow::from(map.from_parts(centres)),
+            None => self.space.settings.joints.from_parts(centres).into(),
         };
         let joints = self
             .space
@@ -129,7 +145,7 @@ impl SkeletonStep {
             joints,
             body,
             views,
-            people: people(&self.space.plans, answers),
+            people,
             n_pairs: fused.n_pairs(),
             facing_margin,
             sides,
@@ -153,7 +169,7 @@ impl SkeletonStep {
         let of_body = if set == &PARSE14 {
             joints.clone()
         } else {
-            let points = |centres: &[[f64; 2]]| PARSE14.from_parts(centres);
+            let points = |centres: &[[f64; 2]]| Cow::from(PARSE14.from_parts(centres));
             self.space
                 .triangulate(views, PARSE14.joints.len(), points, &[])
         };
@@ -193,11 +209,8 @@ impl SkeletonStep {
 
     /// The views that see the person from behind, the margin of the decision about which views see the
     /// same side, and the one about all views.
-    fn decide_facing(
-        &mut self,
-        answers: &[Option<ViewResult>],
-        fused: &Fused<'_>,
-    ) -> (Exchanges, f64, Sides) {
+    fn decide_facing(&mut self, frame: &Frame<'_>) -> (Exchanges, f64, Sides) {
+        let Frame { answers, fused, .. } = *frame;
         let present = answers.iter().enumerate().fold(0, |mask, (view, answer)| {
             mask | Exchanges::from(answer.is_some()) << view
         });
@@ -205,7 +218,7 @@ impl SkeletonStep {
             .facing(present)
             .into_iter()
             .map(|(exchanges, energy)| {
-                let views = self.agreed(&self.candidates(answers, fused, exchanges), exchanges);
+                let views = self.agreed(&self.candidates(frame, exchanges), exchanges);
                 let judged = self.space.judge(answers, &views);
                 let hypothesis = FacingHypothesis {
                     exchanges,
@@ -247,7 +260,7 @@ impl SkeletonStep {
                 .plans
                 .first()
                 .map_or(0, |it| it.model().n_parts());
-            let parts = self.space.triangulate(views, n_parts, <[_]>::to_vec, &[]);
+            let parts = self.space.triangulate(views, n_parts, Cow::from, &[]);
             self.space.agreement(views, &parts)
         };
         let cells: Vec<Option<f64>> = solved.iter().map(|it| Some(it.as_ref()?.cell_px)).collect();
@@ -271,12 +284,8 @@ impl SkeletonStep {
     }
 
     /// The poses that fusion started from; `None` for a view that was not fused.
-    fn starts(
-        &self,
-        answers: &[Option<ViewResult>],
-        fused: &Fused<'_>,
-        exchanged: Exchanges,
-    ) -> Vec<Option<FusedView>> {
+    fn starts(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<FusedView>> {
+        let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
             let found = &answers[view].as_ref()?.candidates;
             let pose = found.get(fused.start(view, exchanged)?)?;
@@ -292,12 +301,10 @@ impl SkeletonStep {
     }
 
     /// The poses of every view, one per pair or that of all views, under a facing assignment.
-    fn candidates(
-        &self,
-        answers: &[Option<ViewResult>],
-        fused: &Fused<'_>,
-        exchanged: Exchanges,
-    ) -> Vec<Option<Candidates>> {
+    ///
+    /// A view that was not fused keeps its own best pose, unless that may be somebody else's.
+    fn candidates(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<Candidates>> {
+        let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
             let best = answers[view].as_ref()?.candidates.first()?;
             let plan = &self.space.plans[view];
@@ -305,10 +312,14 @@ impl SkeletonStep {
             let candidate =
                 |energy: f64, pose: &Pose| Candidate::of_pose(pose, energy, plan, mirror);
             let poses = fused.poses(view, exchanged).into_iter();
+            let of_pairs: Vec<Candidate> = poses
+                .map(|(energy, pose)| candidate(energy, pose))
+                .collect();
+            if of_pairs.is_empty() && !frame.is_alone {
+                return None;
+            }
             Some(Candidates {
-                of_pairs: poses
-                    .map(|(energy, pose)| candidate(energy, pose))
-                    .collect(),
+                of_pairs,
                 own: candidate(f64::from(best.score), best),
             })
         };

@@ -1,5 +1,6 @@
 //! The poses of all views under one assumption about their sides, judged in space.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use fmp::Pose;
@@ -14,6 +15,9 @@ use skeleton::PARSE14;
 use crate::fused_view::FusedView;
 use crate::skeleton_settings::SkeletonSettings;
 use crate::view_result::ViewResult;
+
+/// Points of a view, pixels of the frame.
+type Points<'a> = Cow<'a, [[f64; 2]]>;
 
 /// The cameras of a rig, and how poses in them are judged.
 #[derive(Debug, Clone)]
@@ -30,7 +34,7 @@ impl Space {
         answers: &[Option<ViewResult>],
         views: &[Option<FusedView>],
     ) -> Judged {
-        let parts = self.triangulate(views, skeleton::N_PARTS, <[_]>::to_vec, &[]);
+        let parts = self.triangulate(views, skeleton::N_PARTS, Cow::from, &[]);
         let joints = PARSE14.joints.iter().map(|joint| {
             let part = parts[joint.parts[0]].as_ref().ok();
             part.map(|point| point.in_world)
@@ -72,12 +76,10 @@ impl Space {
         let anatomy = anatomical_evidence(joints, self.up_in_world);
         let mut log_ratio = settings.anatomy_weight * anatomy;
         let front = multiview::front(joints);
-        let known: Vec<Point3<f64>> = joints.iter().flatten().copied().collect();
+        let known = || joints.iter().flatten();
         if let Some(front) = front {
-            let place = known
-                .iter()
-                .fold(Vector3::zeros(), |sum, it| sum + it.coords);
-            let place = Point3::from(place / known.len().max(1) as f64);
+            let place = known().fold(Vector3::zeros(), |sum, it| sum + it.coords);
+            let place = Point3::from(place / known().count().max(1) as f64);
             for (view, (answer, fused)) in answers.iter().zip(views).enumerate() {
                 let (Some(answer), Some(fused)) = (answer, fused) else {
                     continue;
@@ -150,15 +152,15 @@ impl Space {
     ///
     /// * `points`: computes the `n_points` wanted points from the part centres of a view.
     /// * `expected_px`: expected errors of these points, for the views that have them.
-    pub(crate) fn triangulate(
+    pub(crate) fn triangulate<'a>(
         &self,
-        views: &[Option<FusedView>],
+        views: &'a [Option<FusedView>],
         n_points: usize,
-        points: impl Fn(&[[f64; 2]]) -> Vec<[f64; 2]>,
+        points: impl Fn(&'a [[f64; 2]]) -> Points<'a>,
         expected_px: &[Vec<f64>],
     ) -> Vec<Result<Triangulated, TriangulateError>> {
         let present = views.iter().enumerate();
-        let present: Vec<(usize, &FusedView, Vec<[f64; 2]>)> = present
+        let present: Vec<(usize, &FusedView, Points<'_>)> = present
             .filter_map(|(view, fused)| {
                 let fused = fused.as_ref()?;
                 Some((view, fused, points(&fused.pose.centres_px)))
