@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use consistency::Learned;
 use deployment::Deployment;
 use fmp::Model;
 use geometry::{Framing, OutSize, Rig, upright_roll};
@@ -230,10 +231,6 @@ fn settings(
         );
         return Err(Failure::new(ExitKind::Config, message));
     }
-    let defaults = SkeletonSettings::default();
-    let joints = JointSet::by_name(&deployment.triangulate.joints).unwrap_or(defaults.joints);
-    let joint_map = &deployment.triangulate.joint_map;
-    let joint_map = inputs::Joints::of(joint_map, deployment.model.as_deref())?;
     Ok(EstimatorSettings {
         view: ViewSettings {
             orientation: inputs::orientation(&deployment.pose.orientation, model)?,
@@ -248,23 +245,34 @@ fn settings(
         tables,
         views: fuse::views(deployment.views()),
         follow: fuse::follow(deployment.person.follow),
-        skeleton: SkeletonSettings {
-            joints,
-            joint_map: joint_map.map(learned.as_ref(), joints),
-            triangulation: geometry::Settings {
-                loss_px: deployment.triangulate.loss_px,
-                ..defaults.triangulation
-            },
-            error_weight: deployment.triangulate.error_weight,
-            combine: triangulate::combine(deployment.triangulate.combine),
-            body: if deployment.triangulate.bodies {
-                defaults.body
-            } else {
-                BodySettings::NONE
-            },
-            facing: deployment.fuse.facing,
-            ..defaults
+        skeleton: skeleton_settings(deployment, learned.as_ref())?,
+    })
+}
+
+fn skeleton_settings(
+    deployment: &Deployment,
+    learned: Option<&Learned>,
+) -> Result<SkeletonSettings, Failure> {
+    let defaults = SkeletonSettings::default();
+    let config = &deployment.triangulate;
+    let joints = JointSet::by_name(&config.joints).unwrap_or(defaults.joints);
+    let joint_map = inputs::Joints::of(&config.joint_map, deployment.model.as_deref())?;
+    Ok(SkeletonSettings {
+        joints,
+        joint_map: joint_map.map(learned, joints),
+        triangulation: geometry::Settings {
+            loss_px: config.loss_px,
+            ..defaults.triangulation
         },
+        error_weight: config.error_weight,
+        combine: triangulate::combine(config.combine),
+        body: if config.bodies {
+            defaults.body
+        } else {
+            BodySettings::NONE
+        },
+        facing: deployment.fuse.facing,
+        ..defaults
     })
 }
 
