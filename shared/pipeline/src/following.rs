@@ -6,7 +6,7 @@ use multiview::ViewPlan;
 use nalgebra::Point3;
 
 use crate::ViewResult;
-use crate::people::{Found, find};
+use crate::people::{Found, Person, find};
 
 /// Which of several people is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -24,14 +24,16 @@ pub enum Follow {
 /// every frame without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;
-/// After so many frames without the person another one is followed.
-const FORGET_AFTER: u32 = 30;
+/// Another one is followed after as many frames without the person as there were with it, at most so many.
+const MOST_PATIENCE: u32 = 30;
 
 /// Follows one person from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Following {
     follow: Follow,
     last: Option<Point3<f64>>,
+    /// Frames without the person that are left.
+    patience: u32,
     n_without: u32,
 }
 
@@ -83,30 +85,33 @@ impl Following {
             Follow::Largest => people()
                 .max_by(|a, b| a.1.size_px.total_cmp(&b.1.size_px))
                 .map(|it| it.0),
-            Follow::Last => {
-                let chosen = match self.last {
-                    None => first,
-                    Some(last) => {
-                        let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
-                        people()
-                            .map(|(index, it)| (index, (it.place - last).norm()))
-                            .filter(|it| it.1 <= reach)
-                            .min_by(|a, b| a.1.total_cmp(&b.1))
-                            .map(|it| it.0)
-                    }
-                };
-                if let Some(chosen) = chosen {
-                    self.last = Some(found.people[chosen].place);
-                    self.n_without = 0;
-                } else {
-                    self.n_without += 1;
-                    if self.n_without >= FORGET_AFTER {
-                        self.last = None;
-                    }
-                }
-                chosen
-            }
+            Follow::Last => self.nearest(&found.people),
         }
+    }
+
+    /// The one nearest to the last; the first once the last has been away for too long.
+    fn nearest(&mut self, people: &[Person]) -> Option<usize> {
+        let near = self.last.and_then(|last| {
+            let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
+            let each = people.iter().map(|it| (it.place - last).norm()).enumerate();
+            each.filter(|it| it.1 <= reach)
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+        });
+        if let Some((chosen, _)) = near {
+            self.patience = (self.patience + 1).min(MOST_PATIENCE);
+            self.n_without = 0;
+            self.last = Some(people[chosen].place);
+            return Some(chosen);
+        }
+        self.patience = self.patience.saturating_sub(1);
+        self.n_without += 1;
+        if self.patience > 0 {
+            return None;
+        }
+        // Somebody new.
+        let first = people.first()?;
+        (self.last, self.patience, self.n_without) = (Some(first.place), 1, 0);
+        Some(0)
     }
 }
 
@@ -146,12 +151,19 @@ mod tests {
     fn somebody_else_is_followed_once_the_person_has_been_away_for_long() {
         let both: &[([f64; 2], f64)] = &[([-1.0, 0.0], 1.0), ([1.0, 0.0], 0.6)];
         let one: &[([f64; 2], f64)] = &[([1.0, 0.0], 0.6)];
-        let mut frames = vec![one; FORGET_AFTER as usize + 2];
-        frames[0] = both;
-        frames.push(both);
+        let n = MOST_PATIENCE as usize;
+        let frames = [vec![both; n + 10], vec![one; n], vec![both; 2]].concat();
         let got = chosen(Follow::Last, &frames);
-        assert_eq!(got[..2], [Some(-1.0), None]);
+        assert!(got[..n + 10].iter().all(|it| *it == Some(-1.0)));
+        // The other one, two metres away, is out of reach for ten frames.
+        assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
+    }
+
+    #[test]
+    fn something_that_was_seen_once_holds_nobody_up() {
+        let frames: [&[([f64; 2], f64)]; 2] = [&[([-1.0, 0.0], 0.3)], &[([1.0, 0.0], 1.0)]];
+        assert_eq!(chosen(Follow::Last, &frames), [Some(-1.0), Some(1.0)]);
     }
 
     #[test]
