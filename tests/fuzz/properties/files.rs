@@ -153,6 +153,25 @@ pub fn consistency(input: &[u8]) {
     }
 }
 
+/// The card of a network: what is read holds numbers that can be used, and its window shows a box.
+pub fn network_card(input: &[u8]) {
+    let Ok(input) = core::str::from_utf8(input) else {
+        return;
+    };
+    let Ok(card) = keypoints::Card::parse(input) else {
+        return;
+    };
+    let names = card.names();
+    assert!(!names.is_empty());
+    for row in keypoints::joint_rows(&names).into_iter().flatten() {
+        assert!((row.iter().map(|it| it.1).sum::<f64>() - 1.0).abs() < 1e-9);
+    }
+    let window = keypoints::Window::new(&card, [2.0, 1.0, 9.0, 12.0]).expect("a box");
+    let mut values = vec![f32::NAN; 3 * card.input.width * card.input.height];
+    window.fill(&card, &[200; 3 * 7 * 5], [7, 5], &mut values);
+    assert!(values.iter().all(|it| !it.is_nan()));
+}
+
 /// Where joints lie among the parts: the file, and the map to every set of joints; the parts of a point are that point.
 pub fn joint_file(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {

@@ -6,8 +6,8 @@ mod messages;
 
 pub use files::{
     calibration, consistency, deployment_text, joint_file, model_mat, model_own, model_text,
-    motion_c3d, people_lines, people_mat, quality_network, quality_table, run_files, scene_text,
-    training_checkpoint, type_table,
+    motion_c3d, network_card, people_lines, people_mat, quality_network, quality_table, run_files,
+    scene_text, training_checkpoint, type_table,
 };
 pub use messages::{wire_fusion, wire_messages};
 
@@ -15,11 +15,12 @@ pub use messages::{wire_fusion, wire_messages};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 18] = [
+pub const TARGETS: [Target; 19] = [
     ("calibration", calibration),
     ("consistency", consistency),
     ("deployment_text", deployment_text),
     ("joint_file", joint_file),
+    ("network_card", network_card),
     ("model_mat", model_mat),
     ("model_own", model_own),
     ("model_text", model_text),

@@ -1,0 +1,450 @@
+//! What a network takes and gives, as a TOML file says it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::names::SETS;
+
+/// The format name of a card.
+const FORMAT: &str = "parallax-keypoint-network";
+/// The version that is read.
+const VERSION: u32 = 1;
+/// Longest side of an input, pixels.
+const MAX_SIDE: usize = 2048;
+/// Most keypoints.
+const MAX_KEYPOINTS: usize = 256;
+
+/// The card of a network that finds keypoints.
+///
+/// Every key is checked; unknown ones are refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Card {
+    /// `parallax-keypoint-network`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// What the network is called.
+    pub name: String,
+    /// Where its weights come from.
+    #[serde(default)]
+    pub weights: String,
+    /// The licence of the weights.
+    #[serde(default)]
+    pub licence: String,
+    /// What it takes.
+    pub input: Input,
+    /// How the box around a person becomes its input.
+    #[serde(default)]
+    pub crop: Crop,
+    /// What it gives.
+    pub output: Codec,
+    /// What its keypoints are.
+    pub keypoints: KeypointNames,
+}
+
+/// What a network takes: one picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Input {
+    /// Its name; left out: the only input.
+    pub name: Option<String>,
+    /// Width, pixels.
+    pub width: usize,
+    /// Height, pixels.
+    pub height: usize,
+    /// Order of its axes.
+    #[serde(default)]
+    pub layout: Layout,
+    /// Order of the colours.
+    #[serde(default)]
+    pub colour: Colour,
+    /// Type of its numbers.
+    #[serde(default)]
+    pub numbers: Numbers,
+    /// A colour from 0 to 255 is multiplied with it first.
+    #[serde(default = "one")]
+    pub scale: f32,
+    /// Then this is subtracted, one number for each colour in the network's order.
+    #[serde(default)]
+    pub mean: [f32; 3],
+    /// Then it is divided by this.
+    #[serde(default = "ones")]
+    pub std: [f32; 3],
+}
+
+/// Order of the axes of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// One plane for each colour: `[1, 3, height, width]`.
+    #[default]
+    Planes,
+    /// The colours of a pixel beside each other: `[1, height, width, 3]`.
+    Pixels,
+}
+
+/// Order of the colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Colour {
+    /// Red first.
+    #[default]
+    Rgb,
+    /// Blue first.
+    Bgr,
+}
+
+/// Type of the numbers that a network takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Numbers {
+    /// Single precision.
+    #[default]
+    F32,
+    /// Bytes.
+    U8,
+    /// Whole numbers of 32 bits.
+    I32,
+}
+
+/// How the box around a person becomes the input.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Crop {
+    /// The box is enlarged by it about its middle.
+    pub margin: f64,
+    /// How it gets the shape of the input.
+    pub fit: Fit,
+    /// The colour beyond the picture, 0 to 255.
+    pub fill: u8,
+}
+
+impl Default for Crop {
+    fn default() -> Self {
+        Self {
+            margin: 1.25,
+            fit: Fit::default(),
+            fill: 0,
+        }
+    }
+}
+
+/// How a box gets the shape of the input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fit {
+    /// Its shorter side is widened.
+    #[default]
+    Widen,
+    /// It is stretched.
+    Stretch,
+}
+
+/// What a network gives, and how it is read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Codec {
+    /// A map for every keypoint.
+    HeatMap {
+        /// The output; left out: the only one.
+        maps: Option<String>,
+        /// Order of its axes: `[1, keypoints, rows, columns]`, or keypoints last.
+        #[serde(default)]
+        layout: Layout,
+        /// Whether the corner cells lie on the corner pixels (UDP: Huang et al. 2020); else a cell covers a whole number of
+        /// pixels from the corner of the input on.
+        #[serde(default)]
+        udp: bool,
+        /// How a maximum is refined.
+        #[serde(default)]
+        refine: Refine,
+        /// What a score is.
+        #[serde(default)]
+        score: Score,
+    },
+    /// A distribution over columns and one over rows for every keypoint.
+    Simcc {
+        /// The output of columns.
+        x: String,
+        /// The output of rows.
+        y: String,
+        /// Bins for a pixel of the input.
+        bins_per_pixel: f64,
+        /// Natural logarithm of a likelihood for 1 of the output; it makes scores comparable.
+        #[serde(default = "ten")]
+        nats: f64,
+    },
+    /// Positions and scores.
+    Keypoints {
+        /// The output; left out: the only one.
+        list: Option<String>,
+        /// What the numbers of a keypoint are, in order.
+        fields: Vec<ListField>,
+        /// Unit of positions.
+        #[serde(default)]
+        unit: ListUnit,
+        /// What a score is.
+        #[serde(default)]
+        score: Score,
+    },
+}
+
+/// How a maximum of a map is refined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refine {
+    /// Not at all.
+    None,
+    /// By a quarter of a cell towards the higher neighbour.
+    #[default]
+    Quarter,
+    /// To the maximum of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
+    Parabola,
+}
+
+/// What a score is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Score {
+    /// A number from 0 to 1.
+    #[default]
+    Share,
+    /// Log-odds: its logistic function is the score.
+    LogOdds,
+}
+
+/// One number of a listed keypoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ListField {
+    /// Column.
+    X,
+    /// Row.
+    Y,
+    /// Its score.
+    Score,
+    /// Something else.
+    Skip,
+}
+
+/// Unit of listed positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ListUnit {
+    /// Pixels of the input.
+    #[default]
+    Pixel,
+    /// Shares of the input's width and height.
+    Share,
+}
+
+/// What the keypoints of a network are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeypointNames {
+    /// A known set: `coco-17`, `halpe-26`, `body-25`, `mpii-16`, `lsp-14`.
+    pub set: Option<String>,
+    /// Their names, in the order of the output, in place of a set.
+    pub names: Option<Vec<String>>,
+    /// What left and right mean.
+    #[serde(default)]
+    pub sides: Sides,
+}
+
+/// What left and right mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sides {
+    /// The sides of the body.
+    #[default]
+    Anatomical,
+    /// Exchanged for people who are seen from behind.
+    Seen,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn ones() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn ten() -> f64 {
+    10.0
+}
+
+/// Why a text is not a card.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CardError {
+    /// It is not TOML of this layout.
+    #[error(transparent)]
+    Toml(#[from] toml::de::Error),
+    /// It is something else, or of another version.
+    #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
+    Version {
+        /// Its format name.
+        format: String,
+        /// Its version.
+        version: u32,
+    },
+    /// A value is out of range.
+    #[error("`{key}` is {got}, expected {expected}")]
+    Value {
+        /// The key with its section.
+        key: &'static str,
+        /// The value.
+        got: String,
+        /// What is accepted.
+        expected: String,
+    },
+}
+
+impl Card {
+    /// Reads a card.
+    ///
+    /// # Errors
+    ///
+    /// [`CardError`], naming the key.
+    pub fn parse(text: &str) -> Result<Self, CardError> {
+        let card: Self = toml::from_str(text)?;
+        if card.format != FORMAT || card.version != VERSION {
+            return Err(CardError::Version {
+                format: card.format.chars().take(32).collect(),
+                version: card.version,
+            });
+        }
+        card.check()?;
+        Ok(card)
+    }
+
+    /// The names of its keypoints, in the order of the output.
+    pub fn names(&self) -> Vec<String> {
+        let of_set = |set: &String| {
+            let known = SETS.iter().find(|it| it.0 == set)?;
+            Some(known.1.iter().map(|&it| it.to_owned()).collect())
+        };
+        let named = self.keypoints.names.clone();
+        named
+            .or_else(|| self.keypoints.set.as_ref().and_then(of_set))
+            .unwrap_or_default()
+    }
+
+    fn check(&self) -> Result<(), CardError> {
+        for (key, side) in [
+            ("input.width", self.input.width),
+            ("input.height", self.input.height),
+        ] {
+            let fits = (8..=MAX_SIDE).contains(&side);
+            demand(fits, key, &side, || format!("8 to {MAX_SIDE} pixels"))?;
+        }
+        let Input {
+            scale, mean, std, ..
+        } = &self.input;
+        demand(
+            *scale > 0.0 && scale.is_finite(),
+            "input.scale",
+            scale,
+            || "more than 0".to_owned(),
+        )?;
+        let is_finite = mean.iter().all(|it| it.is_finite());
+        demand(is_finite, "input.mean", &format!("{mean:?}"), || {
+            "three finite numbers".to_owned()
+        })?;
+        let divides = std.iter().all(|it| it.is_finite() && *it > 0.0);
+        demand(divides, "input.std", &format!("{std:?}"), || {
+            "three numbers above 0".to_owned()
+        })?;
+        let margin = self.crop.margin;
+        demand(
+            (0.5..=4.0).contains(&margin),
+            "crop.margin",
+            &margin,
+            || "0.5 to 4".to_owned(),
+        )?;
+        self.check_output()?;
+        self.check_names()
+    }
+
+    fn check_output(&self) -> Result<(), CardError> {
+        match &self.output {
+            Codec::HeatMap { .. } => Ok(()),
+            Codec::Simcc {
+                bins_per_pixel,
+                nats,
+                ..
+            } => {
+                let fits = (0.25..=16.0).contains(bins_per_pixel);
+                demand(fits, "output.bins_per_pixel", bins_per_pixel, || {
+                    "0.25 to 16".to_owned()
+                })?;
+                let fits = (0.01..=1000.0).contains(nats);
+                demand(fits, "output.nats", nats, || "0.01 to 1000".to_owned())
+            }
+            Codec::Keypoints { fields, .. } => {
+                let count = |wanted: ListField| fields.iter().filter(|it| **it == wanted).count();
+                let fits = count(ListField::X) == 1
+                    && count(ListField::Y) == 1
+                    && count(ListField::Score) <= 1
+                    && fields.len() <= 16;
+                demand(fits, "output.fields", &format!("{fields:?}"), || {
+                    "\"x\" and \"y\" once, \"score\" at most once, others \"skip\"".to_owned()
+                })
+            }
+        }
+    }
+
+    fn check_names(&self) -> Result<(), CardError> {
+        let KeypointNames { set, names, .. } = &self.keypoints;
+        if set.is_some() == names.is_some() {
+            let got = if set.is_some() { "both" } else { "neither" };
+            return demand(false, "keypoints", &got, || {
+                "either `set` or `names`".to_owned()
+            });
+        }
+        if let Some(set) = set {
+            let known = SETS.map(|it| it.0);
+            let is_known = known.contains(&set.as_str());
+            return demand(is_known, "keypoints.set", &format!("{set:?}"), || {
+                format!("one of {}", known.join(", "))
+            });
+        }
+        let names = self.names();
+        let n = names.len();
+        demand(
+            (1..=MAX_KEYPOINTS).contains(&n),
+            "keypoints.names",
+            &n,
+            || format!("1 to {MAX_KEYPOINTS} names"),
+        )?;
+        let twice = names
+            .iter()
+            .enumerate()
+            .find(|(nth, it)| names[..*nth].contains(it));
+        demand(
+            twice.is_none(),
+            "keypoints.names",
+            &twice.map_or("", |it| it.1),
+            || "every name once".to_owned(),
+        )
+    }
+}
+
+fn demand(
+    holds: bool,
+    key: &'static str,
+    got: &dyn core::fmt::Display,
+    expected: impl FnOnce() -> String,
+) -> Result<(), CardError> {
+    if holds {
+        return Ok(());
+    }
+    Err(CardError::Value {
+        key,
+        got: got.to_string(),
+        expected: expected(),
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

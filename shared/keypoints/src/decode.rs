@@ -1,0 +1,465 @@
+//! What the output of a network means.
+
+use crate::card::{Layout, ListField, ListUnit, Refine, Score};
+
+/// A keypoint that a network found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keypoint {
+    /// Column and row, pixels of the network's input.
+    pub at: [f64; 2],
+    /// How sure the network is. From 0 to 1 where it gives a share or log-odds; else in its own unit.
+    pub score: f64,
+}
+
+/// Why an output cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutputError {
+    /// It has another shape.
+    #[error("the output is {got:?}, expected {expected}")]
+    Shape {
+        /// The shape.
+        got: Vec<usize>,
+        /// What the card asks for.
+        expected: String,
+    },
+    /// A value is not a finite number.
+    #[error("value {index} of the output is {value}")]
+    NotANumber {
+        /// Which.
+        index: usize,
+        /// What it is.
+        value: f32,
+    },
+}
+
+/// A map for every keypoint.
+#[derive(Debug, Clone, Copy)]
+pub struct HeatMaps<'a> {
+    values: &'a [f32],
+    layout: Layout,
+    n: usize,
+    rows: usize,
+    columns: usize,
+}
+
+impl<'a> HeatMaps<'a> {
+    /// Takes an output.
+    ///
+    /// * `shape`: of the output, one picture.
+    /// * `n`: number of keypoints of the card.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`].
+    pub fn new(
+        values: &'a [f32],
+        shape: &[usize],
+        layout: Layout,
+        n: usize,
+    ) -> Result<Self, OutputError> {
+        let sides = match (layout, shape) {
+            (Layout::Planes, &[1, keypoints, rows, columns])
+            | (Layout::Pixels, &[1, rows, columns, keypoints]) => Some([keypoints, rows, columns]),
+            _ => None,
+        };
+        let fits = |[keypoints, rows, columns]: &[usize; 3]| {
+            *keypoints == n && *rows > 0 && *columns > 0 && values.len() == n * rows * columns
+        };
+        let expected = || match layout {
+            Layout::Planes => format!("[1, {n}, rows, columns]"),
+            Layout::Pixels => format!("[1, rows, columns, {n}]"),
+        };
+        let Some([_, rows, columns]) = sides.filter(fits) else {
+            return Err(OutputError::Shape {
+                got: shape.to_vec(),
+                expected: expected(),
+            });
+        };
+        finite(values)?;
+        Ok(Self {
+            values,
+            layout,
+            n,
+            rows,
+            columns,
+        })
+    }
+
+    /// Rows and columns of a map.
+    pub fn size(&self) -> [usize; 2] {
+        [self.rows, self.columns]
+    }
+
+    /// A value as it is.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the maps.
+    pub fn value(&self, keypoint: usize, row: usize, column: usize) -> f32 {
+        assert!(row < self.rows && column < self.columns && keypoint < self.n);
+        let cell = row * self.columns + column;
+        self.values[match self.layout {
+            Layout::Planes => keypoint * self.rows * self.columns + cell,
+            Layout::Pixels => cell * self.n + keypoint,
+        }]
+    }
+
+    /// The maximum of every map.
+    ///
+    /// * `input`: width and height of the network's input, pixels.
+    /// * `udp`: whether corner cells lie on corner pixels; else the first cell lies on the first pixel, and as many pixels as
+    ///   cells fit into the input lie between two.
+    pub fn keypoints(
+        &self,
+        input: [usize; 2],
+        udp: bool,
+        refine: Refine,
+        score: Score,
+    ) -> Vec<Keypoint> {
+        let cells = [self.columns, self.rows];
+        let step = [0, 1].map(|axis| {
+            let (pixels, cells) = (input[axis] as f64, cells[axis] as f64);
+            if udp && cells > 1.0 {
+                (pixels - 1.0) / (cells - 1.0)
+            } else {
+                pixels / cells
+            }
+        });
+        let keypoint = |keypoint: usize| {
+            let [row, column] = self.maximum(keypoint);
+            let across = self.refined(keypoint, [row, column], [0, 1], (refine, score));
+            let down = self.refined(keypoint, [row, column], [1, 0], (refine, score));
+            Keypoint {
+                at: [
+                    (column as f64 + across) * step[0],
+                    (row as f64 + down) * step[1],
+                ],
+                score: share(f64::from(self.value(keypoint, row, column)), score),
+            }
+        };
+        (0..self.n).map(keypoint).collect()
+    }
+
+    fn maximum(&self, keypoint: usize) -> [usize; 2] {
+        let mut best = ([0, 0], f32::NEG_INFINITY);
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let value = self.value(keypoint, row, column);
+                if value > best.1 {
+                    best = ([row, column], value);
+                }
+            }
+        }
+        best.0
+    }
+
+    /// By how many cells a maximum is moved along one axis; 0 at the edge.
+    fn refined(
+        &self,
+        keypoint: usize,
+        [row, column]: [usize; 2],
+        [down, across]: [usize; 2],
+        (refine, score): (Refine, Score),
+    ) -> f64 {
+        let is_inside = row >= down
+            && column >= across
+            && row + down < self.rows
+            && column + across < self.columns;
+        if !is_inside {
+            return 0.0;
+        }
+        let at = |row, column| share(f64::from(self.value(keypoint, row, column)), score);
+        let before = at(row - down, column - across);
+        let (here, after) = (at(row, column), at(row + down, column + across));
+        match refine {
+            Refine::None => 0.0,
+            Refine::Quarter => {
+                if before == after {
+                    0.0
+                } else {
+                    0.25_f64.copysign(after - before)
+                }
+            }
+            Refine::Parabola => {
+                let [before, here, after] = [before, here, after].map(|it| it.max(1e-6).ln());
+                let curve = before - 2.0 * here + after;
+                if curve < 0.0 {
+                    (0.5 * (before - after) / curve).clamp(-0.5, 0.5)
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
+}
+
+/// Distributions over columns and over rows for every keypoint.
+#[derive(Debug, Clone, Copy)]
+pub struct SimCc<'a> {
+    axes: [&'a [f32]; 2],
+    bins: [usize; 2],
+    n: usize,
+}
+
+impl<'a> SimCc<'a> {
+    /// Takes the outputs of columns and of rows.
+    ///
+    /// * `shapes`: of the two.
+    /// * `bins`: of columns and of rows: the sides of the input times the card's bins for a pixel.
+    /// * `n`: number of keypoints of the card.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`].
+    pub fn new(
+        axes: [&'a [f32]; 2],
+        shapes: [&[usize]; 2],
+        bins: [usize; 2],
+        n: usize,
+    ) -> Result<Self, OutputError> {
+        for axis in 0..2 {
+            let expected = [1, n, bins[axis]];
+            let fits = shapes[axis] == expected && axes[axis].len() == n * bins[axis];
+            if !fits || bins[axis] == 0 {
+                return Err(OutputError::Shape {
+                    got: shapes[axis].to_vec(),
+                    expected: format!("{expected:?}"),
+                });
+            }
+            finite(axes[axis])?;
+        }
+        Ok(Self { axes, bins, n })
+    }
+
+    /// The values of a keypoint along an axis, columns first.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the keypoints.
+    pub fn axis(&self, keypoint: usize, axis: usize) -> &'a [f32] {
+        let n = self.bins[axis];
+        &self.axes[axis][keypoint * n..(keypoint + 1) * n]
+    }
+
+    /// The maximum of every keypoint; its score is the smaller one of its two axes, as the network gives it.
+    pub fn keypoints(&self, bins_per_pixel: f64) -> Vec<Keypoint> {
+        let keypoint = |keypoint: usize| {
+            let best = [0, 1].map(|axis| {
+                let values = self.axis(keypoint, axis).iter().enumerate();
+                let first = (0, f32::NEG_INFINITY);
+                values.fold(
+                    first,
+                    |best, (bin, it)| if *it > best.1 { (bin, *it) } else { best },
+                )
+            });
+            Keypoint {
+                at: best.map(|it| it.0 as f64 / bins_per_pixel),
+                score: f64::from(best[0].1.min(best[1].1)),
+            }
+        };
+        (0..self.n).map(keypoint).collect()
+    }
+}
+
+/// Listed keypoints.
+#[derive(Debug, Clone, Copy)]
+pub struct List<'a> {
+    values: &'a [f32],
+    fields: &'a [ListField],
+}
+
+impl<'a> List<'a> {
+    /// Takes an output of any shape.
+    ///
+    /// * `n`: number of keypoints of the card.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`].
+    pub fn new(
+        values: &'a [f32],
+        shape: &[usize],
+        fields: &'a [ListField],
+        n: usize,
+    ) -> Result<Self, OutputError> {
+        if values.len() != n * fields.len() || shape.iter().product::<usize>() != values.len() {
+            return Err(OutputError::Shape {
+                got: shape.to_vec(),
+                expected: format!("{n} keypoints of {} numbers", fields.len()),
+            });
+        }
+        finite(values)?;
+        Ok(Self { values, fields })
+    }
+
+    /// The keypoints; a list without scores gives 1.
+    ///
+    /// * `input`: width and height of the network's input, pixels.
+    pub fn keypoints(&self, input: [usize; 2], unit: ListUnit, score: Score) -> Vec<Keypoint> {
+        let scale = match unit {
+            ListUnit::Pixel => [1.0; 2],
+            ListUnit::Share => input.map(|it| it as f64),
+        };
+        let keypoint = |values: &[f32]| {
+            let get = |wanted: ListField| {
+                let place = self.fields.iter().position(|it| *it == wanted)?;
+                Some(f64::from(values[place]))
+            };
+            let [x, y] = [ListField::X, ListField::Y].map(|it| get(it).unwrap_or(0.0));
+            Keypoint {
+                at: [x * scale[0], y * scale[1]],
+                score: get(ListField::Score).map_or(1.0, |it| share(it, score)),
+            }
+        };
+        let each = self.values.chunks_exact(self.fields.len().max(1));
+        each.map(keypoint).collect()
+    }
+}
+
+fn share(value: f64, score: Score) -> f64 {
+    match score {
+        Score::Share => value,
+        Score::LogOdds => 1.0 / (1.0 + (-value).exp()),
+    }
+}
+
+fn finite(values: &[f32]) -> Result<(), OutputError> {
+    match values.iter().position(|it| !it.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(OutputError::NotANumber {
+            index,
+            value: values[index],
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A bump around a place of a map of 12 by 16 cells, and a flat map.
+    fn bump([x, y]: [f64; 2], layout: Layout) -> Vec<f32> {
+        let mut values = vec![0.0; 2 * 16 * 12];
+        for row in 0..16 {
+            for column in 0..12 {
+                let squared = (column as f64 - x).powi(2) + (row as f64 - y).powi(2);
+                let cell = row * 12 + column;
+                let place = match layout {
+                    Layout::Planes => cell,
+                    Layout::Pixels => 2 * cell,
+                };
+                values[place] = (0.9 * (-squared / 2.0).exp()) as f32;
+            }
+        }
+        values
+    }
+
+    fn shape(layout: Layout) -> [usize; 4] {
+        match layout {
+            Layout::Planes => [1, 2, 16, 12],
+            Layout::Pixels => [1, 16, 12, 2],
+        }
+    }
+
+    #[test]
+    fn a_maximum_is_found_in_either_layout_and_refined_towards_the_truth() {
+        let truth = [5.3, 9.8];
+        for layout in [Layout::Planes, Layout::Pixels] {
+            let values = bump(truth, layout);
+            let maps = HeatMaps::new(&values, &shape(layout), layout, 2).unwrap();
+            let found = |refine| maps.keypoints([48, 64], false, refine, Score::Share)[0];
+            assert_eq!(found(Refine::None).at, [20.0, 40.0]);
+            assert_eq!(found(Refine::Quarter).at, [21.0, 39.0]);
+            let [x, y] = found(Refine::Parabola).at;
+            // A parabola through logarithms is exact for a bump.
+            assert!(
+                (x - 21.2).abs() < 1e-4 && (y - 39.2).abs() < 1e-4,
+                "{x} {y}"
+            );
+            assert!((found(Refine::None).score - 0.9 * (-0.065_f64).exp()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn corner_cells_lie_on_corner_pixels_where_the_card_says_so() {
+        let values = bump([11.0, 15.0], Layout::Planes);
+        let maps = HeatMaps::new(&values, &[1, 2, 16, 12], Layout::Planes, 2).unwrap();
+        let found = |udp| maps.keypoints([48, 64], udp, Refine::Quarter, Score::Share)[0].at;
+        assert_eq!(found(false), [44.0, 60.0]);
+        assert_eq!(found(true), [47.0, 63.0]);
+    }
+
+    #[test]
+    fn log_odds_become_shares() {
+        let maps = HeatMaps::new(&[0.0, 2.0], &[1, 1, 1, 2], Layout::Planes, 1).unwrap();
+        let found = maps.keypoints([2, 1], false, Refine::None, Score::LogOdds)[0];
+        assert!((found.score - 0.880_797).abs() < 1e-6);
+    }
+
+    #[test]
+    fn bins_of_columns_and_rows_give_a_place() {
+        let mut axes = [vec![0.0_f32; 2 * 8], vec![0.0; 2 * 12]];
+        axes[0][8 + 5] = 0.7;
+        axes[1][12 + 9] = 0.4;
+        let [x, y] = [&axes[0][..], &axes[1][..]];
+        let maps = SimCc::new([x, y], [&[1, 2, 8], &[1, 2, 12]], [8, 12], 2).unwrap();
+        let found = maps.keypoints(2.0)[1];
+        assert_eq!(found.at, [2.5, 4.5]);
+        assert!((found.score - 0.4).abs() < 1e-6, "the smaller one");
+        assert_eq!(maps.axis(1, 0)[5], 0.7);
+    }
+
+    #[test]
+    fn a_list_is_read_by_its_fields() {
+        let fields = [
+            ListField::Y,
+            ListField::X,
+            ListField::Skip,
+            ListField::Score,
+        ];
+        let values = [0.5, 0.25, 9.0, 0.0, 1.0, 0.75, 9.0, 40.0];
+        let list = List::new(&values, &[1, 1, 2, 4], &fields, 2).unwrap();
+        let found = list.keypoints([192, 256], ListUnit::Share, Score::LogOdds);
+        assert_eq!([found[0].at, found[1].at], [[48.0, 128.0], [144.0, 256.0]]);
+        assert_eq!([found[0].score, found[1].score], [0.5, 1.0]);
+        let bare = [ListField::X, ListField::Y];
+        let found = List::new(&values, &[8], &bare, 4).unwrap();
+        let found = found.keypoints([192, 256], ListUnit::Pixel, Score::Share);
+        assert_eq!((found[1].at, found[1].score), ([9.0, 0.0], 1.0));
+    }
+
+    #[test]
+    fn other_shapes_and_values_that_are_no_numbers_are_refused() {
+        let values = [0.0_f32; 24];
+        let wrong = [&[1, 3, 2, 4][..], &[1, 2, 3, 5], &[2, 3, 4], &[1, 2, 0, 4]];
+        for shape in wrong {
+            let refused = HeatMaps::new(&values, shape, Layout::Planes, 2).unwrap_err();
+            assert!(
+                refused
+                    .to_string()
+                    .contains("expected [1, 2, rows, columns]"),
+                "{refused}"
+            );
+        }
+        let right = HeatMaps::new(&values, &[1, 3, 4, 2], Layout::Pixels, 2);
+        assert_eq!(right.unwrap().size(), [3, 4]);
+        let refused = SimCc::new([&values; 2], [&[1, 2, 12], &[1, 2, 11]], [12, 12], 2);
+        assert!(
+            refused
+                .unwrap_err()
+                .to_string()
+                .contains("expected [1, 2, 12]")
+        );
+        let refused = List::new(&values, &[1, 24], &[ListField::X; 5], 5);
+        assert!(
+            refused
+                .unwrap_err()
+                .to_string()
+                .contains("5 keypoints of 5 numbers")
+        );
+        let mut odd = values;
+        odd[7] = f32::NAN;
+        let refused = HeatMaps::new(&odd, &[1, 2, 3, 4], Layout::Planes, 2).unwrap_err();
+        assert_eq!(refused.to_string(), "value 7 of the output is NaN");
+    }
+}

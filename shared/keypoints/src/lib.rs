@@ -1,0 +1,28 @@
+//! Networks that find the keypoints of one person in a box: what a card says of them, and what their output means.
+//!
+//! A [`Card`] is a TOML file beside an ONNX file. It says what the network takes ([`Input`]), how the box around a person
+//! becomes its input ([`Crop`]), what it gives ([`Codec`]), and what its keypoints are called ([`names`]). With it any network
+//! can be used: nothing here knows a particular one.
+//!
+//! | codec | the network gives | read by |
+//! |---|---|---|
+//! | `heat-map` | a map for every keypoint | [`HeatMaps`] |
+//! | `simcc` | a distribution over columns and one over rows for every keypoint (Li et al. 2022) | [`SimCc`] |
+//! | `keypoints` | positions and scores | [`List`] |
+//!
+//! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture.
+//! Nothing here reads a file or runs a network.
+#![forbid(unsafe_code)]
+
+mod card;
+mod decode;
+mod names;
+mod window;
+
+pub use card::{
+    Card, CardError, Codec, Colour, Crop, Fit, Input, KeypointNames, Layout, ListField, ListUnit,
+    Numbers, Refine, Score, Sides,
+};
+pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
+pub use names::{BODY_25, COCO_17, HALPE_26, LSP_14, MPII_16, SETS, joint_rows};
+pub use window::Window;
