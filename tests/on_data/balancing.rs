@@ -112,13 +112,13 @@ fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached()
     let [.., mean, consensus, at_once] = &reached[..] else {
         panic!("three rows with everything switched on")
     };
-    // Reached: 6.4 / 20.5 cm upright and 20.9 / 73.4 bent by the mean, 6.5 / 25.2 and 18.7 / 78.8 by consensus, 6.4 / 15.7 and
-    // 15.7 / 82.8 with all views at once. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised
+    // Reached: 6.4 / 20.5 cm upright and 15.0 / 85.9 bent by the mean, 6.5 / 25.2 and 12.8 / 83.7 by consensus, 6.4 / 15.7 and
+    // 11.0 / 95.4 with all views at once. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised
     // wrists in the upright frames, and to sides and poses unlike the training data in the bent ones.
     for ([upright, bent], [upright_cm, bent_cm]) in [
-        (mean, [7.5, 21.0]),
-        (consensus, [8.0, 20.0]),
-        (at_once, [7.0, 17.0]),
+        (mean, [7.5, 16.0]),
+        (consensus, [8.0, 14.0]),
+        (at_once, [7.0, 12.0]),
     ] {
         assert_eq!(
             upright.wrong_fused, 0,
@@ -231,9 +231,10 @@ pub(crate) fn compare(
         };
         let single = got.answers[view].as_ref().unwrap();
         let single = estimator.plans()[view].centres(&single.candidates[0]);
-        let fused = got.skeleton.views[view].as_ref().unwrap();
+        // A view that has no part in the frame is on no object.
+        let fused = got.skeleton.views[view].as_ref();
         errors.wrong_single += usize::from(off(&single));
-        errors.wrong_fused += usize::from(off(&fused.pose.centres_px));
+        errors.wrong_fused += usize::from(fused.is_some_and(|it| off(&it.pose.centres_px)));
     }
     errors
 }
