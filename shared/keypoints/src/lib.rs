@@ -1,7 +1,7 @@
 //! Networks that find the keypoints of one person in a box: what a card says of them, and what their output means.
 //!
 //! A [`Card`] is a TOML file beside an ONNX file. It says what the network takes ([`Input`]), how the box around a person
-//! becomes its input ([`Crop`]), what it gives ([`Codec`]), and what its keypoints are called ([`names`]). With it any network
+//! becomes its input ([`Crop`]), what it gives ([`Codec`]), and what its keypoints are called ([`KeypointNames`]). With it any network
 //! can be used: nothing here knows a particular one.
 //!
 //! | codec | the network gives | read by |
