@@ -58,22 +58,15 @@ impl Candidate {
     }
 }
 
-/// The poses of one view's pairs, and its own single-view pose.
+/// The poses of one view.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
-    pub(crate) of_pairs: Vec<Candidate>,
-    pub(crate) own: Candidate,
-}
-
-impl Candidates {
-    /// The pairs' poses, or the view's own if it is in no pair.
-    pub(crate) fn all(&self) -> &[Candidate] {
-        if self.of_pairs.is_empty() {
-            std::slice::from_ref(&self.own)
-        } else {
-            &self.of_pairs
-        }
-    }
+    /// Those of its pairs, or the view's own if it is in no pair; not empty.
+    pub(crate) poses: Vec<Candidate>,
+    /// How many of them are of pairs.
+    pub(crate) n_pairs: usize,
+    /// Score of the view's own best candidate.
+    pub(crate) single_score: f64,
 }
 
 /// The mean pose of every view.
@@ -81,24 +74,24 @@ pub(crate) fn fuse(views: &[Option<Candidates>], exchanged: Exchanges) -> Vec<Op
     let fuse_view = |(view, candidates): (usize, &Option<Candidates>)| {
         let candidates = candidates.as_ref()?;
         let poses: Vec<_> = candidates
-            .all()
+            .poses
             .iter()
             .map(|pose| (pose.energy, pose.centres_px.as_slice()))
             .collect();
         let n = poses.len() as f64;
         Some(FusedView {
             pose: FusedPose {
-                n_pairs: candidates.of_pairs.len(),
+                n_pairs: candidates.n_pairs,
                 ..average(&poses)?
             },
             exchanged: is_exchanged(exchanged, view),
             cell_px: candidates
-                .all()
+                .poses
                 .iter()
                 .map(|pose| pose.cell_px)
                 .sum::<f64>()
                 / n,
-            single_score: candidates.own.energy,
+            single_score: candidates.single_score,
         })
     };
     views.iter().enumerate().map(fuse_view).collect()

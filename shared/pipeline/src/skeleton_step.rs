@@ -128,7 +128,9 @@ impl SkeletonStep {
         let candidates = self.candidates(&frame, exchanged);
         let solved = match self.space.settings.combine {
             Combine::Mean => fuse(&candidates, exchanged),
-            Combine::Consensus => self.agreed(&candidates, exchanged),
+            Combine::Consensus => {
+                self.agreed(&candidates, exchanged, &mut ConsensusWorkspace::default())
+            }
         };
         let (views, kept) = self.better(solved, self.starts(&frame, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
@@ -214,11 +216,16 @@ impl SkeletonStep {
         let present = answers.iter().enumerate().fold(0, |mask, (view, answer)| {
             mask | Exchanges::from(answer.is_some()) << view
         });
+        let mut workspace = ConsensusWorkspace::default();
         let (hypotheses, seen): (Vec<FacingHypothesis>, Vec<Seen>) = fused
             .facing(present)
             .into_iter()
             .map(|(exchanges, energy)| {
-                let views = self.agreed(&self.candidates(frame, exchanges), exchanges);
+                let views = self.agreed(
+                    &self.candidates(frame, exchanges),
+                    exchanges,
+                    &mut workspace,
+                );
                 let judged = self.space.judge(answers, &views);
                 let hypothesis = FacingHypothesis {
                     exchanges,
@@ -312,15 +319,20 @@ impl SkeletonStep {
             let candidate =
                 |energy: f64, pose: &Pose| Candidate::of_pose(pose, energy, plan, mirror);
             let poses = fused.poses(view, exchanged).into_iter();
-            let of_pairs: Vec<Candidate> = poses
+            let mut poses: Vec<Candidate> = poses
                 .map(|(energy, pose)| candidate(energy, pose))
                 .collect();
-            if of_pairs.is_empty() && !frame.is_alone {
-                return None;
+            let (n_pairs, single_score) = (poses.len(), f64::from(best.score));
+            if poses.is_empty() {
+                if !frame.is_alone {
+                    return None;
+                }
+                poses.push(candidate(single_score, best));
             }
             Some(Candidates {
-                of_pairs,
-                own: candidate(f64::from(best.score), best),
+                poses,
+                n_pairs,
+                single_score,
             })
         };
         (0..self.space.plans.len()).map(of_view).collect()
@@ -331,6 +343,7 @@ impl SkeletonStep {
         &self,
         candidates: &[Option<Candidates>],
         exchanged: Exchanges,
+        workspace: &mut ConsensusWorkspace,
     ) -> Vec<Option<FusedView>> {
         let mut views = fuse(candidates, exchanged);
         let n_parts = self
@@ -343,10 +356,9 @@ impl SkeletonStep {
             .zip(&self.space.plans)
             .map(|(view, plan)| self.sightings(view.as_ref(), plan))
             .collect();
-        let mut workspace = ConsensusWorkspace::default();
         for part in 0..n_parts {
             for (sightings, candidates) in sightings.iter_mut().zip(candidates) {
-                let all = candidates.iter().flat_map(Candidates::all);
+                let all = candidates.iter().flat_map(|it| &it.poses);
                 sightings.points_px.clear();
                 sightings
                     .points_px

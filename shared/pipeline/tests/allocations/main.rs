@@ -33,8 +33,8 @@ const MOST_OF_SOLUTION: Count = Count {
 
 /// Of `triangulate`.
 const MOST_OF_SKELETON: Count = Count {
-    allocations: 660,
-    bytes: 300_000,
+    allocations: 580,
+    bytes: 250_000,
 };
 
 /// What a call allocates and reallocates, and how many bytes that are.
