@@ -336,7 +336,7 @@ fn by_onnx_runtime(
     n_parts: usize,
 ) -> Result<Network, Failure> {
     let runtime = viewquality::OnnxRuntime::load(library);
-    let runtime = runtime.map_err(|error| refused(library, &error))?;
+    let runtime = runtime.map_err(|error| refused(library, &NetworkError::Load(error)))?;
     let runtime = match device {
         deployment::quality::Device::Cpu => runtime,
         deployment::quality::Device::Cuda => runtime.on_cuda(),

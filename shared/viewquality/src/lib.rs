@@ -22,7 +22,7 @@ pub use evidence::{
 };
 pub use forecast::{Forecast, ForecastError, ForecastInput, Forecaster};
 #[cfg(feature = "ort")]
-pub use network::OnnxRuntime;
+pub use inference::OnnxRuntime;
 pub use network::{Network, NetworkError};
 pub use predictor::{NoPredictions, Predictor, Selection};
 pub use table::{Table, TableError};

@@ -1,17 +1,10 @@
 //! A network that predicts errors, read from an ONNX file and run by the `rten` library or by ONNX
 //! Runtime.
 
-mod nesting;
-
-mod engine;
 #[cfg(feature = "ort")]
-mod onnx_runtime;
-mod rten_engine;
+use inference::OnnxRuntime;
+use inference::{Input, LoadError, RunError, Session, Side, Values, written};
 
-use self::engine::{Description, Engine, Input, Side};
-#[cfg(feature = "ort")]
-pub use self::onnx_runtime::OnnxRuntime;
-use self::rten_engine::Rten;
 use crate::{Card, CardError, TileShape, n_evidence};
 
 /// Names of the inputs and of the output.
@@ -22,25 +15,20 @@ const SIGMA: &str = "sigma";
 /// A network with checked inputs and output.
 #[derive(Debug)]
 pub struct Network {
-    engine: Box<dyn Engine>,
+    session: Session,
     takes_tile: bool,
     takes_evidence: bool,
     card: Card,
     shape: TileShape,
     n_parts: usize,
-    fingerprint: u32,
 }
 
 /// Why a file was rejected as a network.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
-    /// The library cannot read it: not an ONNX file, truncated, or with unsupported operations.
-    #[error("the file is not a network that can be run")]
-    Load(#[source] Box<dyn std::error::Error + Send + Sync>),
-    /// The library that should run it cannot be used.
-    #[cfg(feature = "ort")]
-    #[error("ONNX Runtime cannot be used")]
-    Library(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// It cannot be loaded.
+    #[error(transparent)]
+    Load(#[from] LoadError),
     /// An entry of its card is invalid.
     #[error(transparent)]
     Card(#[from] CardError),
@@ -73,8 +61,8 @@ pub enum NetworkError {
         declares: &'static str,
     },
     /// The library could not run it.
-    #[error("the network cannot be run")]
-    Run(#[source] Box<dyn std::error::Error + Send + Sync>),
+    #[error(transparent)]
+    Run(#[from] RunError),
 }
 
 impl Network {
@@ -89,10 +77,7 @@ impl Network {
     ///
     /// [`NetworkError`], with the names and shapes found and expected.
     pub fn parse(file: Vec<u8>, n_parts: usize) -> Result<Self, NetworkError> {
-        let fingerprint = checksum::fnv1a_32(&file);
-        nesting::check(&file).map_err(|error| NetworkError::Load(Box::new(error)))?;
-        let (engine, description) = Rten::load(file)?;
-        Self::new(Box::new(engine), &description, fingerprint, n_parts)
+        Self::new(Session::parse(file)?, n_parts)
     }
 
     /// As [`Self::parse`], run by ONNX Runtime.
@@ -106,28 +91,15 @@ impl Network {
         file: &[u8],
         n_parts: usize,
     ) -> Result<Self, NetworkError> {
-        nesting::check(file).map_err(|error| NetworkError::Load(Box::new(error)))?;
-        let (engine, description) = runtime.load_network(file)?;
-        Self::new(
-            Box::new(engine),
-            &description,
-            checksum::fnv1a_32(file),
-            n_parts,
-        )
+        Self::new(Session::parse_with(runtime, file)?, n_parts)
     }
 
-    fn new(
-        engine: Box<dyn Engine>,
-        description: &Description,
-        fingerprint: u32,
-        n_parts: usize,
-    ) -> Result<Self, NetworkError> {
+    fn new(session: Session, n_parts: usize) -> Result<Self, NetworkError> {
+        let description = session.description();
         let entries = description.metadata.iter();
         let entries = entries.map(|(name, value)| (name.as_str(), value.as_str()));
         let card = Card::parse(entries, n_parts)?;
-        let Description {
-            inputs, outputs, ..
-        } = description;
+        let (inputs, outputs) = (&description.inputs, &description.outputs);
         let takes = |wanted: &str| inputs.iter().find(|input| input.name == wanted);
         let (tile, evidence) = (takes(TILE), takes(EVIDENCE));
         let n_known = [tile, evidence].into_iter().flatten().count();
@@ -135,8 +107,8 @@ impl Network {
             let found: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
             return Err(names("inputs", &found));
         }
-        if !outputs.iter().any(|it| it == SIGMA) {
-            let found: Vec<&str> = outputs.iter().map(String::as_str).collect();
+        if !outputs.iter().any(|it| it.name == SIGMA) {
+            let found: Vec<&str> = outputs.iter().map(|it| it.name.as_str()).collect();
             return Err(names("outputs", &found));
         }
         if evidence.is_some() != card.evidence.is_some() {
@@ -154,14 +126,14 @@ impl Network {
         if let Some(input) = evidence {
             check_evidence(&input.sides, n_parts)?;
         }
+        let (takes_tile, takes_evidence) = (tile.is_some(), evidence.is_some());
         let network = Self {
-            engine,
-            takes_tile: tile.is_some(),
-            takes_evidence: evidence.is_some(),
+            session,
+            takes_tile,
+            takes_evidence,
             card,
             shape,
             n_parts,
-            fingerprint,
         };
         let tile = vec![0.0; shape.n_values()];
         network.run(&tile, &vec![0.0; n_evidence(n_parts)])?;
@@ -175,7 +147,7 @@ impl Network {
 
     /// A fingerprint of the bytes of its file (FNV-1a, 32 bits).
     pub fn fingerprint(&self) -> u32 {
-        self.fingerprint
+        self.session.fingerprint()
     }
 
     /// The shape of its tile; for a network without a tile, the shape that relative errors refer
@@ -204,34 +176,36 @@ impl Network {
     /// [`NetworkError::Shape`] if a slice or the output has another length, [`NetworkError::Run`]
     /// if the library fails.
     pub fn run(&self, tile: &[f32], evidence: &[f32]) -> Result<Vec<f32>, NetworkError> {
+        let TileShape { height, width } = self.shape;
+        let n = n_evidence(self.n_parts);
+        let of_tile = [1, 3, height, width];
+        let of_evidence = [1, n];
         let mut inputs = Vec::with_capacity(2);
         if self.takes_tile {
-            let TileShape { height, width } = self.shape;
             length(TILE, tile, self.shape.n_values())?;
             inputs.push(Input {
                 name: TILE,
-                shape: vec![1, 3, height, width],
-                values: tile,
+                shape: &of_tile,
+                values: Values::F32(tile),
             });
         }
         if self.takes_evidence {
-            let n = n_evidence(self.n_parts);
             length(EVIDENCE, evidence, n)?;
             inputs.push(Input {
                 name: EVIDENCE,
-                shape: vec![1, n],
-                values: evidence,
+                shape: &of_evidence,
+                values: Values::F32(evidence),
             });
         }
-        let expected = || format!("f32 [1, {}]", self.n_parts);
-        let run = self.engine.run(&inputs, SIGMA).map_err(NetworkError::Run)?;
-        let Some((sides, sigma)) = run else {
-            return Err(shape(SIGMA, "of another type".to_owned(), expected()));
-        };
-        if sides != [1, self.n_parts] {
-            return Err(shape(SIGMA, format!("f32 {sides:?}"), expected()));
-        }
-        Ok(sigma)
+        let mut sigma = Err("of another type".to_owned());
+        self.session.run(&inputs, &[SIGMA], &mut |output| {
+            sigma = match output.values {
+                Some(values) if output.shape == [1, self.n_parts] => Ok(values.to_vec()),
+                Some(_) => Err(format!("f32 {:?}", output.shape)),
+                None => Err("of another type".to_owned()),
+            };
+        })?;
+        sigma.map_err(|got| shape(SIGMA, got, format!("f32 [1, {}]", self.n_parts)))
     }
 }
 
@@ -262,12 +236,6 @@ fn length(name: &'static str, values: &[f32], expected: usize) -> Result<(), Net
         return Err(shape(name, count(values.len()), count(expected)));
     }
     Ok(())
-}
-
-/// Formats the sides of an input.
-fn written(sides: &[Side]) -> String {
-    let words: Vec<String> = sides.iter().map(ToString::to_string).collect();
-    format!("[{}]", words.join(", "))
 }
 
 /// Height and width of the tile: those of the card, else those of the input.

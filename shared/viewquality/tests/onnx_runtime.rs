@@ -6,8 +6,9 @@
 
 use std::path::{Path, PathBuf};
 
+use inference::LoadError;
 use testkit::networks::of_colours;
-use viewquality::{Network, NetworkError, OnnxRuntime, TileShape, n_evidence};
+use viewquality::{Network, OnnxRuntime, TileShape, n_evidence};
 
 const SHIPPED: &[u8] = include_bytes!("../../../configs/models/person.quality.onnx");
 const N_PARTS: usize = 26;
@@ -25,7 +26,7 @@ fn runtime() -> OnnxRuntime {
 fn a_missing_library_is_named() {
     let error = OnnxRuntime::load(Path::new("/nowhere/libonnxruntime.so")).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
-    assert!(matches!(error, NetworkError::Library(_)), "{error}");
+    assert!(matches!(error, LoadError::Library(_)), "{error}");
     assert!(cause.contains("/nowhere/libonnxruntime.so"), "{cause}");
 }
 

@@ -9,7 +9,7 @@ const MAX_DEPTH: usize = 32;
 
 /// A type of message in the format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Model,
     Graph,
     Node,
@@ -44,12 +44,12 @@ impl Kind {
 /// The byte at which the nesting is wrong, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the file is truncated or not an ONNX file: unexpected byte {at}")]
-pub(super) struct MalformedFile {
+pub(crate) struct MalformedFile {
     at: usize,
 }
 
 /// Checks a whole file.
-pub(super) fn check(file: &[u8]) -> Result<(), MalformedFile> {
+pub(crate) fn check(file: &[u8]) -> Result<(), MalformedFile> {
     walk(Kind::Model, file, 0, 0)
 }
 

@@ -8,8 +8,8 @@ use ort::environment::Environment;
 use ort::session::{Session, SessionInputValue};
 use ort::value::{TensorRef, ValueType};
 
-use super::NetworkError;
-use super::engine::{Description, Engine, EngineError, Input, InputInfo, Output, Side};
+use crate::Values;
+use crate::engine::{Description, Engine, EngineError, Input, LoadError, Output, Port, Side};
 
 /// The library of this process: only one can be loaded, and it stays loaded.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
@@ -28,18 +28,18 @@ impl OnnxRuntime {
     ///
     /// # Errors
     ///
-    /// [`NetworkError::Library`] if it cannot be loaded or is too old, or if another one has been loaded before.
-    pub fn load(library: &Path) -> Result<Self, NetworkError> {
+    /// [`LoadError::Library`] if it cannot be loaded or is too old, or if another one has been loaded before.
+    pub fn load(library: &Path) -> Result<Self, LoadError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {
             Some((file, environment)) if file == library => environment.clone(),
             Some((file, _)) => {
                 let [wanted, has] = [library, file].map(Path::display);
                 let message = format!("{wanted} cannot be loaded, {has} is already in use");
-                return Err(NetworkError::Library(message.into()));
+                return Err(LoadError::Library(message.into()));
             }
             None => {
-                let environment = begin(library).map_err(NetworkError::Library)?;
+                let environment = begin(library).map_err(LoadError::Library)?;
                 *loaded = Some((library.to_owned(), environment.clone()));
                 environment
             }
@@ -60,9 +60,9 @@ impl OnnxRuntime {
         }
     }
 
-    pub(super) fn load_network(&self, file: &[u8]) -> Result<(Loaded, Description), NetworkError> {
-        let session = self.session(file).map_err(NetworkError::Load)?;
-        let description = described(&session).map_err(NetworkError::Load)?;
+    pub(crate) fn load_network(&self, file: &[u8]) -> Result<(Loaded, Description), LoadError> {
+        let session = self.session(file).map_err(LoadError::File)?;
+        let description = described(&session).map_err(LoadError::File)?;
         Ok((Loaded(Mutex::new(session)), description))
     }
 
@@ -103,18 +103,14 @@ fn described(session: &Session) -> Result<Description, EngineError> {
         let value = metadata.custom(&key)?;
         Some((key, value))
     });
-    let port = |outlet: &ort::value::Outlet| InputInfo {
+    let port = |outlet: &ort::value::Outlet| Port {
         name: outlet.name().to_owned(),
         sides: sides(outlet.dtype()),
     };
     Ok(Description {
         metadata: entries.collect(),
         inputs: session.inputs().iter().map(port).collect(),
-        outputs: session
-            .outputs()
-            .iter()
-            .map(|outlet| outlet.name().to_owned())
-            .collect(),
+        outputs: session.outputs().iter().map(port).collect(),
     })
 }
 
@@ -139,23 +135,44 @@ fn sides(of: &ValueType) -> Vec<Side> {
 
 /// A network loaded by the library; it runs for one caller at a time.
 #[derive(Debug)]
-pub(super) struct Loaded(Mutex<Session>);
+pub(crate) struct Loaded(Mutex<Session>);
 
 impl Engine for Loaded {
-    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, EngineError> {
+    fn run(
+        &self,
+        inputs: &[Input<'_>],
+        outputs: &[&str],
+        take: &mut dyn FnMut(Output<'_>),
+    ) -> Result<(), EngineError> {
         let mut given: Vec<(&str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
         for input in inputs {
-            let tensor = TensorRef::from_array_view((input.shape.clone(), input.values))?;
-            given.push((input.name, tensor.into()));
+            let shape = input.shape.to_vec();
+            given.push((
+                input.name,
+                match input.values {
+                    Values::F32(values) => TensorRef::from_array_view((shape, values))?.into(),
+                    Values::I32(values) => TensorRef::from_array_view((shape, values))?.into(),
+                    Values::U8(values) => TensorRef::from_array_view((shape, values))?.into(),
+                },
+            ));
         }
         let mut session = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let outputs = session.run(given)?;
-        let value = outputs.get(output);
-        let value = value.ok_or_else(|| format!("the network has no output `{output}`"))?;
-        let Ok((shape, values)) = value.try_extract_tensor::<f32>() else {
-            return Ok(None);
-        };
-        let sides = shape.iter().map(|&it| usize::try_from(it));
-        Ok(Some((sides.collect::<Result<_, _>>()?, values.to_vec())))
+        let found = session.run(given)?;
+        for (index, name) in outputs.iter().enumerate() {
+            let value = found.get(*name);
+            let value = value.ok_or_else(|| format!("the network has no output `{name}`"))?;
+            let sides = match value.dtype() {
+                ValueType::Tensor { shape, .. } => shape.iter().map(|&it| usize::try_from(it)),
+                _ => return Err(format!("the output `{name}` is no tensor").into()),
+            };
+            let shape: Vec<usize> = sides.collect::<Result<_, _>>()?;
+            let values = value.try_extract_tensor::<f32>().ok();
+            take(Output {
+                index,
+                shape: &shape,
+                values: values.map(|it| it.1),
+            });
+        }
+        Ok(())
     }
 }

@@ -6,31 +6,27 @@ use rten::{Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueOrView}
 use rten_tensor::TensorView;
 use rten_tensor::prelude::*;
 
-use super::NetworkError;
-use super::engine::{Description, Engine, EngineError, Input, InputInfo, Output, Side};
+use crate::Values;
+use crate::engine::{Description, Engine, EngineError, Input, LoadError, Output, Port, Side};
 
 /// A network and the thread on which it runs.
 #[derive(Debug)]
-pub(super) struct Rten {
+pub(crate) struct Rten {
     model: Model,
     threads: Arc<ThreadPool>,
 }
 
 impl Rten {
     /// * `file`: the bytes of an ONNX file.
-    pub(super) fn load(file: Vec<u8>) -> Result<(Self, Description), NetworkError> {
-        let model = Model::load(file).map_err(|error| NetworkError::Load(Box::new(error)))?;
-        let named = |id: &NodeId| name(&model, *id).to_owned();
+    pub(crate) fn load(file: Vec<u8>) -> Result<(Self, Description), LoadError> {
+        let model = Model::load(file).map_err(|error| LoadError::File(Box::new(error)))?;
         let metadata = model.metadata().fields();
         let metadata = metadata.map(|(name, value)| (name.to_owned(), value.to_owned()));
+        let ports = |ids: &[NodeId]| ids.iter().map(|&id| port(&model, id)).collect();
         let description = Description {
             metadata: metadata.collect(),
-            inputs: model
-                .input_ids()
-                .iter()
-                .map(|&id| port(&model, id))
-                .collect(),
-            outputs: model.output_ids().iter().map(named).collect(),
+            inputs: ports(model.input_ids()),
+            outputs: ports(model.output_ids()),
         };
         let threads = Arc::new(ThreadPool::with_num_threads(1));
         Ok((Self { model, threads }, description))
@@ -45,18 +41,41 @@ impl Rten {
 }
 
 impl Engine for Rten {
-    fn run(&self, inputs: &[Input<'_>], output: &str) -> Result<Option<Output>, EngineError> {
+    fn run(
+        &self,
+        inputs: &[Input<'_>],
+        outputs: &[&str],
+        take: &mut dyn FnMut(Output<'_>),
+    ) -> Result<(), EngineError> {
         let mut given: Vec<(NodeId, ValueOrView<'_>)> = Vec::with_capacity(inputs.len());
         for input in inputs {
             let id = self.id(self.model.input_ids(), input.name)?;
-            let view = TensorView::from_data(input.shape.as_slice(), input.values);
-            given.push((id, view.into()));
+            given.push((
+                id,
+                match input.values {
+                    Values::F32(values) => TensorView::from_data(input.shape, values).into(),
+                    Values::I32(values) => TensorView::from_data(input.shape, values).into(),
+                    Values::U8(values) => TensorView::from_data(input.shape, values).into(),
+                },
+            ));
         }
-        let id = self.id(self.model.output_ids(), output)?;
+        let ids: Result<Vec<NodeId>, EngineError> = outputs
+            .iter()
+            .map(|it| self.id(self.model.output_ids(), it))
+            .collect();
         let options = RunOptions::default().with_thread_pool(Some(Arc::clone(&self.threads)));
-        let outputs = self.model.run(given, &[id], Some(options))?;
-        let output: Option<TensorView<'_, f32>> = outputs.first().and_then(Value::as_tensor_view);
-        Ok(output.map(|tensor| (tensor.shape().to_vec(), tensor.iter().copied().collect())))
+        let found = self.model.run(given, &ids?, Some(options))?;
+        for (index, value) in found.iter().enumerate() {
+            let tensor: Option<TensorView<'_, f32>> = Value::as_tensor_view(value);
+            let shape = value.shape();
+            let tensor = tensor.as_ref().map(|it| it.to_contiguous());
+            take(Output {
+                index,
+                shape: &shape,
+                values: tensor.as_ref().map(|it| it.data()),
+            });
+        }
+        Ok(())
     }
 }
 
@@ -65,13 +84,13 @@ fn name(model: &Model, id: NodeId) -> &str {
     info.and_then(|info| info.name()).unwrap_or_default()
 }
 
-fn port(model: &Model, id: NodeId) -> InputInfo {
+fn port(model: &Model, id: NodeId) -> Port {
     let sides = model.node_info(id).and_then(|info| info.shape());
     let sides = sides.unwrap_or_default().into_iter().map(|it| match it {
         Dimension::Fixed(n) => Side::Fixed(n),
         Dimension::Symbolic(name) => Side::Named(name),
     });
-    InputInfo {
+    Port {
         name: name(model, id).to_owned(),
         sides: sides.collect(),
     }

@@ -1,0 +1,14 @@
+//! Networks that find keypoints as the evidence of a view, in place of the filters.
+//!
+//! [`PoseNetwork`] is a network with its card: a picture and a box around a person in, a [`Sight`] out. [`JointMaps`] are the
+//! logarithms of its maps for the 14 joints of the skeleton, from which the responses of a view are filled
+//! ([`JointMaps::fill`]). [`springs::learn`] learns the tree that holds the joints together: a mixture of Gaussian springs
+//! (Yang & Ramanan 2013 with the unary of Chen & Yuille 2014, without their image-dependent part).
+#![forbid(unsafe_code)]
+
+mod maps;
+mod network;
+pub mod springs;
+
+pub use maps::{JointMaps, MapSettings};
+pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};

@@ -1,0 +1,257 @@
+//! The maps of the skeleton's joints, as logarithms: the evidence that a network gives.
+
+use fmp::{Layout, Placement, Scope};
+use keypoints::{Codec, Keypoint, Score, Window, joint_rows};
+use skeleton::PARSE14;
+
+use crate::network::{LookError, Read, Sight};
+
+/// Number of joints, each with a map.
+pub const N_JOINTS: usize = PARSE14.joints.len();
+
+/// How a map becomes evidence: `lambda * ln(max(h, 0) + eps)` with `h` the heat from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapSettings {
+    /// Weight of the logarithm.
+    pub lambda: f64,
+    /// Heat of a place that the network says nothing of: the floor that keeps one view from ruling out what the others see.
+    pub eps: f64,
+    /// Standard deviation of a position without a map, share of the height of the input.
+    pub point_sigma: f64,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        Self {
+            lambda: 1.0,
+            eps: 0.02,
+            point_sigma: 0.02,
+        }
+    }
+}
+
+/// Maps of the joints in a window of a picture, on the grid of the network's own maps.
+#[derive(Debug, Clone, Default)]
+pub struct JointMaps {
+    /// `[joint][row][column]`, logarithms with their weight.
+    values: Vec<f32>,
+    rows: usize,
+    columns: usize,
+    /// Pixels of the input between two cells, across and down; the first cell lies on the first pixel.
+    step: [f64; 2],
+    floor: f32,
+    window: Option<Window>,
+    /// Where each joint's map is highest, pixels of the picture, and its heat there from 0 to 1.
+    peaks: Vec<Option<Keypoint>>,
+}
+
+/// Cells between two columns or rows of a grid that is made for a codec without maps.
+const GRID_PX: f64 = 2.0;
+/// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
+const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
+
+impl JointMaps {
+    /// Reads what a network sees.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError::Output`]; never, once the network has looked.
+    pub fn read(&mut self, sight: &Sight<'_>, settings: &MapSettings) -> Result<(), LookError> {
+        let keypoints = sight.keypoints()?;
+        let rows = joint_rows(sight.network().names());
+        let read = sight.read()?;
+        let size = sight.network().size();
+        self.window = Some(*sight.window());
+        self.floor = (settings.lambda * settings.eps.ln()) as f32;
+        [self.rows, self.columns] = match &read {
+            Read::Maps(maps) => maps.size(),
+            _ => [size[1], size[0]].map(|it| (it as f64 / GRID_PX) as usize),
+        };
+        let udp = matches!(
+            sight.network().card().output,
+            Codec::HeatMap { udp: true, .. }
+        );
+        self.step = [(size[0], self.columns), (size[1], self.rows)].map(|(px, cells)| {
+            let (px, cells) = (px as f64, cells as f64);
+            if udp {
+                (px - 1.0) / (cells - 1.0).max(1.0)
+            } else {
+                px / cells
+            }
+        });
+        self.values.clear();
+        self.values
+            .resize(N_JOINTS * self.rows * self.columns, self.floor);
+        self.peaks.clear();
+        for (joint, row) in rows.iter().enumerate() {
+            let peak = row.as_ref().map(|row| derived(row, &keypoints, sight));
+            self.peaks.push(peak);
+            if let (Some(row), Some(peak)) = (row, peak) {
+                self.fill_joint(joint, (row, peak), (&read, sight), settings);
+            }
+        }
+        Ok(())
+    }
+
+    /// Fills the map of one joint, which is a weighted sum of keypoints.
+    fn fill_joint(
+        &mut self,
+        joint: usize,
+        (row, peak): (&[(usize, f64)], Keypoint),
+        (read, sight): (&Read<'_>, &Sight<'_>),
+        settings: &MapSettings,
+    ) {
+        let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
+        let size = sight.network().size();
+        let heat = |value: f64| (settings.lambda * (value.max(0.0) + settings.eps).ln()) as f32;
+        let cells = self.values[joint * area..(joint + 1) * area].iter_mut();
+        let cells = cells
+            .enumerate()
+            .map(|(cell, value)| ([cell % columns, cell / columns], value));
+        match (read, row) {
+            (Read::Maps(maps), [(keypoint, _)]) => {
+                let score = score_of(sight);
+                for ([column, row], value) in cells {
+                    *value = heat(share(f64::from(maps.value(*keypoint, row, column)), score));
+                }
+            }
+            (Read::SimCc(simcc), [(keypoint, _)]) => {
+                let axes = [0, 1].map(|axis| likelihood(simcc.axis(*keypoint, axis), axis, sight));
+                let bin = |cell: usize, axis: usize| {
+                    let bins = axes[axis].len() as f64 / size[axis] as f64;
+                    let at = (cell as f64 * step[axis] * bins).round() as usize;
+                    axes[axis][at.min(axes[axis].len() - 1)]
+                };
+                for ([column, row], value) in cells {
+                    *value = heat(bin(column, 0) * bin(row, 1));
+                }
+            }
+            _ => {
+                let at = sight.window().in_input(peak.at);
+                let sigma = settings.point_sigma * size[1] as f64;
+                for ([column, row], value) in cells {
+                    let x = column as f64 * step[0] - at[0];
+                    let y = row as f64 * step[1] - at[1];
+                    let gauss = (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
+                    *value = heat(peak.score.clamp(0.0, 1.0) * gauss);
+                }
+            }
+        }
+    }
+
+    /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that its
+    /// keypoints do not tell.
+    pub fn peaks(&self) -> &[Option<Keypoint>] {
+        &self.peaks
+    }
+
+    /// The evidence for a joint at a point of the picture, between four cells; the floor beyond the window.
+    pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+        let Some(window) = &self.window else {
+            return self.floor;
+        };
+        let at = window.in_input(point);
+        let cell = [at[0] / self.step[0], at[1] / self.step[1]];
+        let (left, top) = (cell[0].floor(), cell[1].floor());
+        let (u, v) = ((cell[0] - left) as f32, (cell[1] - top) as f32);
+        let area = self.rows * self.columns;
+        let map = &self.values[joint * area..(joint + 1) * area];
+        let value = |column: f64, row: f64| {
+            let inside = column >= 0.0
+                && row >= 0.0
+                && column < self.columns as f64
+                && row < self.rows as f64;
+            if inside {
+                map[row as usize * self.columns + column as usize]
+            } else {
+                self.floor
+            }
+        };
+        let line = |row: f64| {
+            let (a, b) = (value(left, row), value(left + 1.0, row));
+            a + (b - a) * u
+        };
+        let (a, b) = (line(top), line(top + 1.0));
+        a + (b - a) * v
+    }
+
+    /// Fills the responses of a scope. Filter `j` is joint `j` of `skeleton::PARSE14`; further filters, of parts between
+    /// joints, respond with 0 everywhere.
+    ///
+    /// * `layout`: of a model of [`springs`](crate::springs), whose filters have one cell.
+    /// * `responses`: [`Layout::n_values`] values of the scope, overwritten.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer values.
+    pub fn fill(&self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
+        for level in scope.levels().map(usize::from) {
+            let window = layout.window(scope, level);
+            let values = &mut responses[layout.maps_in(scope, level)];
+            let area = window.rows * window.cols;
+            for (filter, map) in values.chunks_exact_mut(area.max(1)).enumerate() {
+                if filter >= N_JOINTS {
+                    map.fill(0.0);
+                    continue;
+                }
+                for (cell, value) in map.iter_mut().enumerate() {
+                    let place = Placement {
+                        x: (window.left + cell % window.cols) as u16,
+                        y: (window.top + cell / window.cols) as u16,
+                        mixture: 0,
+                    };
+                    *value = self.at(filter, layout.centre(level, [1, 1], place));
+                }
+            }
+        }
+    }
+}
+
+/// A joint as a weighted sum of keypoints; its score is the lowest of theirs.
+fn derived(row: &[(usize, f64)], keypoints: &[Keypoint], sight: &Sight<'_>) -> Keypoint {
+    let mut at = [0.0; 2];
+    let mut score = f64::INFINITY;
+    for &(keypoint, weight) in row {
+        let it = &keypoints[keypoint];
+        at[0] += weight * it.at[0];
+        at[1] += weight * it.at[1];
+        score = score.min(it.score);
+    }
+    if let (Ok(Read::SimCc(simcc)), [(keypoint, _)]) = (sight.read(), row) {
+        let peak = |axis| {
+            let values = likelihood(simcc.axis(*keypoint, axis), axis, sight);
+            values.into_iter().fold(0.0, f64::max)
+        };
+        score = peak(0) * peak(1);
+    }
+    Keypoint { at, score }
+}
+
+/// The likelihood along an axis, as a share of what a label of the published width would give at its middle, at most 1.
+fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<f64> {
+    let nats = match sight.network().card().output {
+        Codec::Simcc { nats, .. } => nats,
+        _ => 1.0,
+    };
+    let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let each = values.iter().map(|it| (nats * f64::from(it - most)).exp());
+    let each: Vec<f64> = each.collect();
+    let sum: f64 = each.iter().sum();
+    let of_label = 1.0 / (SIMCC_SIGMA[axis] * core::f64::consts::TAU.sqrt());
+    let share = |it: f64| (it / sum / of_label).min(1.0);
+    each.into_iter().map(share).collect()
+}
+
+fn score_of(sight: &Sight<'_>) -> Score {
+    match sight.network().card().output {
+        Codec::HeatMap { score, .. } | Codec::Keypoints { score, .. } => score,
+        Codec::Simcc { .. } => Score::Share,
+    }
+}
+
+fn share(value: f64, score: Score) -> f64 {
+    match score {
+        Score::Share => value,
+        Score::LogOdds => 1.0 / (1.0 + (-value).exp()),
+    }
+}
