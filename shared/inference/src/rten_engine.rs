@@ -68,11 +68,11 @@ impl Engine for Rten {
         for (index, value) in found.iter().enumerate() {
             let tensor: Option<TensorView<'_, f32>> = Value::as_tensor_view(value);
             let shape = value.shape();
-            let tensor = tensor.as_ref().map(|it| it.to_contiguous());
+            let tensor = tensor.map(|it| it.to_contiguous());
             take(Output {
                 index,
                 shape: &shape,
-                values: tensor.as_ref().map(|it| it.data()),
+                values: tensor.as_ref().map(rten_tensor::Contiguous::data),
             });
         }
         Ok(())

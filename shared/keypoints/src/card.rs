@@ -281,8 +281,10 @@ pub enum CardError {
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
     /// It is something else, or of another version.
-    #[error("`{format}` version {version}, expected `{FORMAT}` version {VERSION}")]
+    #[error("`{format}` version {version}, expected `{expected}` version {VERSION}")]
     Version {
+        /// The format name that is read.
+        expected: &'static str,
         /// Its format name.
         format: String,
         /// Its version.
@@ -300,6 +302,19 @@ pub enum CardError {
     },
 }
 
+impl Input {
+    /// A colour of a picture (red first, 0 to 255) as the network takes it, in its own order.
+    pub(crate) fn prepared(&self, colour: [f32; 3]) -> [f32; 3] {
+        core::array::from_fn(|channel| {
+            let source = match self.colour {
+                Colour::Rgb => channel,
+                Colour::Bgr => 2 - channel,
+            };
+            (colour[source] * self.scale - self.mean[channel]) / self.std[channel]
+        })
+    }
+}
+
 impl Card {
     /// Reads a card.
     ///
@@ -312,6 +327,7 @@ impl Card {
             return Err(CardError::Version {
                 format: card.format.chars().take(32).collect(),
                 version: card.version,
+                expected: FORMAT,
             });
         }
         card.check()?;
@@ -331,30 +347,7 @@ impl Card {
     }
 
     fn check(&self) -> Result<(), CardError> {
-        for (key, side) in [
-            ("input.width", self.input.width),
-            ("input.height", self.input.height),
-        ] {
-            let fits = (8..=MAX_SIDE).contains(&side);
-            demand(fits, key, &side, || format!("8 to {MAX_SIDE} pixels"))?;
-        }
-        let Input {
-            scale, mean, std, ..
-        } = &self.input;
-        demand(
-            *scale > 0.0 && scale.is_finite(),
-            "input.scale",
-            scale,
-            || "more than 0".to_owned(),
-        )?;
-        let is_finite = mean.iter().all(|it| it.is_finite());
-        demand(is_finite, "input.mean", &format!("{mean:?}"), || {
-            "three finite numbers".to_owned()
-        })?;
-        let divides = std.iter().all(|it| it.is_finite() && *it > 0.0);
-        demand(divides, "input.std", &format!("{std:?}"), || {
-            "three numbers above 0".to_owned()
-        })?;
+        check_input(&self.input)?;
         let margin = self.crop.margin;
         demand(
             (0.5..=4.0).contains(&margin),
@@ -430,7 +423,32 @@ impl Card {
     }
 }
 
-fn demand(
+/// Checks what any network takes.
+pub(crate) fn check_input(input: &Input) -> Result<(), CardError> {
+    for (key, side) in [("input.width", input.width), ("input.height", input.height)] {
+        let fits = (8..=MAX_SIDE).contains(&side);
+        demand(fits, key, &side, || format!("8 to {MAX_SIDE} pixels"))?;
+    }
+    let Input {
+        scale, mean, std, ..
+    } = input;
+    demand(
+        *scale > 0.0 && scale.is_finite(),
+        "input.scale",
+        scale,
+        || "more than 0".to_owned(),
+    )?;
+    let is_finite = mean.iter().all(|it| it.is_finite());
+    demand(is_finite, "input.mean", &format!("{mean:?}"), || {
+        "three finite numbers".to_owned()
+    })?;
+    let divides = std.iter().all(|it| it.is_finite() && *it > 0.0);
+    demand(divides, "input.std", &format!("{std:?}"), || {
+        "three numbers above 0".to_owned()
+    })
+}
+
+pub(crate) fn demand(
     holds: bool,
     key: &'static str,
     got: &dyn core::fmt::Display,

@@ -323,7 +323,7 @@ fn share(value: f64, score: Score) -> f64 {
     }
 }
 
-fn finite(values: &[f32]) -> Result<(), OutputError> {
+pub(crate) fn finite(values: &[f32]) -> Result<(), OutputError> {
     match values.iter().position(|it| !it.is_finite()) {
         None => Ok(()),
         Some(index) => Err(OutputError::NotANumber {

@@ -16,6 +16,7 @@
 
 mod card;
 mod decode;
+mod detector;
 mod names;
 mod window;
 
@@ -24,5 +25,6 @@ pub use card::{
     Numbers, Refine, Score, Sides,
 };
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
+pub use detector::{Boxes, DetectorCard, PersonBox};
 pub use names::{BODY_25, COCO_17, HALPE_26, LSP_14, MPII_16, SETS, joint_rows};
 pub use window::Window;

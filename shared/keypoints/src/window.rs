@@ -1,6 +1,6 @@
 //! The window of a picture that a network sees.
 
-use crate::card::{Card, Colour, Fit, Layout};
+use crate::card::{Card, Fit, Layout};
 
 /// Where the input of a network lies in a picture.
 ///
@@ -81,18 +81,12 @@ impl Window {
             for column in 0..width {
                 let at = self.in_picture([column as f64, row as f64]);
                 let colour = sample(rgb, size, at, f32::from(card.crop.fill));
-                for channel in 0..3 {
-                    let source = match card.input.colour {
-                        Colour::Rgb => channel,
-                        Colour::Bgr => 2 - channel,
-                    };
-                    let pixel = row * width + column;
-                    let place = match card.input.layout {
+                let pixel = row * width + column;
+                for (channel, value) in card.input.prepared(colour).into_iter().enumerate() {
+                    values[match card.input.layout {
                         Layout::Planes => channel * plane + pixel,
                         Layout::Pixels => 3 * pixel + channel,
-                    };
-                    let value = colour[source] * card.input.scale - card.input.mean[channel];
-                    values[place] = value / card.input.std[channel];
+                    }] = value;
                 }
             }
         }
@@ -126,7 +120,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::card::tests::card;
+    use crate::card::{Colour, tests::card};
 
     #[test]
     fn a_widened_box_has_the_shape_of_the_input_and_holds_the_box() {

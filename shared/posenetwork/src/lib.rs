@@ -6,9 +6,11 @@
 //! (Yang & Ramanan 2013 with the unary of Chen & Yuille 2014, without their image-dependent part).
 #![forbid(unsafe_code)]
 
+mod detector;
 mod maps;
 mod network;
 pub mod springs;
 
+pub use detector::Detector;
 pub use maps::{JointMaps, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};

@@ -120,7 +120,7 @@ impl PoseNetwork {
     /// [`FitError`], with the names and sides of both.
     pub fn new(session: Session, card: Card) -> Result<Self, FitError> {
         let description = session.description();
-        let input = input_of(&card, &description.inputs)?;
+        let input = input_of(&card.input, &description.inputs)?;
         let outputs = outputs_of(&card, &description.outputs)?;
         let network = Self {
             names: card.names(),
@@ -325,8 +325,8 @@ fn listed(ports: &[Port]) -> String {
 }
 
 /// The name of the input, checked against the card.
-fn input_of(card: &Card, inputs: &[Port]) -> Result<String, FitError> {
-    let input = match (&card.input.name, inputs) {
+pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result<String, FitError> {
+    let input = match (&input_card.name, inputs) {
         (Some(name), _) => {
             inputs
                 .iter()
@@ -351,10 +351,10 @@ fn input_of(card: &Card, inputs: &[Port]) -> Result<String, FitError> {
         height,
         layout,
         ..
-    } = card.input;
+    } = input_card;
     let expected = match layout {
-        Layout::Planes => [1, 3, height, width],
-        Layout::Pixels => [1, height, width, 3],
+        Layout::Planes => [1, 3, *height, *width],
+        Layout::Pixels => [1, *height, *width, 3],
     };
     let sides = &input.sides;
     let fits = sides.len() == 4 && sides.iter().zip(expected).all(|(side, n)| side.may_be(n));
@@ -370,28 +370,34 @@ fn input_of(card: &Card, inputs: &[Port]) -> Result<String, FitError> {
 
 /// The names of the outputs that the codec reads.
 fn outputs_of(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
-    let named = |name: &String| {
-        if outputs.iter().any(|it| it.name == *name) {
-            return Ok(name.clone());
-        }
-        Err(FitError::Name {
+    match &card.output {
+        Codec::HeatMap { maps, .. } => Ok(vec![only(maps.as_ref(), outputs, "output.maps")?]),
+        Codec::Simcc { x, y, .. } => Ok(vec![
+            only(Some(x), outputs, "output.x")?,
+            only(Some(y), outputs, "output.y")?,
+        ]),
+        Codec::Keypoints { list, .. } => Ok(vec![only(list.as_ref(), outputs, "output.list")?]),
+    }
+}
+
+/// The output of a name, or the only one.
+pub(crate) fn only(
+    name: Option<&String>,
+    outputs: &[Port],
+    key: &'static str,
+) -> Result<String, FitError> {
+    match (name, outputs) {
+        (Some(name), _) if outputs.iter().any(|it| it.name == *name) => Ok(name.clone()),
+        (Some(name), _) => Err(FitError::Name {
             what: "output",
             wanted: name.clone(),
             has: listed(outputs),
-        })
-    };
-    let only = |name: &Option<String>, key: &'static str| match (name, outputs) {
-        (Some(name), _) => named(name),
+        }),
         (None, [output]) => Ok(output.name.clone()),
         (None, _) => Err(FitError::Several {
             what: "output",
             has: listed(outputs),
             key,
         }),
-    };
-    match &card.output {
-        Codec::HeatMap { maps, .. } => Ok(vec![only(maps, "output.maps")?]),
-        Codec::Simcc { x, y, .. } => Ok(vec![named(x)?, named(y)?]),
-        Codec::Keypoints { list, .. } => Ok(vec![only(list, "output.list")?]),
     }
 }

@@ -1,0 +1,383 @@
+//! Networks that find the boxes of people: what a card says of them, and what their output means.
+
+use serde::{Deserialize, Serialize};
+
+use crate::card::{CardError, Input, Layout, check_input, demand};
+use crate::decode::OutputError;
+use crate::decode::finite;
+
+/// The format name of a card.
+const FORMAT: &str = "parallax-detector";
+/// The version that is read.
+const VERSION: u32 = 1;
+
+/// The card of a network that finds the boxes of people.
+///
+/// The whole picture is resized to fit into the input, its top-left corner in that of the input; the rest is filled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DetectorCard {
+    /// `parallax-detector`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// What the network is called.
+    pub name: String,
+    /// Where its weights come from.
+    #[serde(default)]
+    pub weights: String,
+    /// The licence of the weights.
+    #[serde(default)]
+    pub licence: String,
+    /// What it takes.
+    pub input: Input,
+    /// The colour beyond the picture, 0 to 255.
+    #[serde(default = "grey")]
+    pub fill: u8,
+    /// What it gives.
+    pub output: Boxes,
+    /// Boxes with a lower score are dropped.
+    #[serde(default = "least_score")]
+    pub least_score: f64,
+    /// Of two boxes that share more than this of their union the worse is dropped.
+    #[serde(default = "most_overlap")]
+    pub most_overlap: f64,
+}
+
+/// What a detector gives, and how it is read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Boxes {
+    /// The grids of YOLOX (Ge et al. 2021), `[1, cells, 5 + classes]`: middle, size, objectness, and classes. Positions are
+    /// in cells from the cell, sizes are logarithms in cells.
+    Yolox {
+        /// The output; left out: the only one.
+        grids: Option<String>,
+        /// Pixels of the input for a cell of each grid.
+        #[serde(default = "strides")]
+        strides: Vec<usize>,
+        /// The number of the class of people.
+        #[serde(default)]
+        person: usize,
+        /// Whether positions and sizes are in pixels of the input already.
+        #[serde(default)]
+        decoded: bool,
+    },
+    /// Boxes of people alone, `[1, n, 5]`: left, top, right, bottom, pixels of the input, and score (`RTMDet` as exported by
+    /// mmdeploy).
+    List {
+        /// The output.
+        boxes: String,
+    },
+}
+
+fn grey() -> u8 {
+    114
+}
+
+fn least_score() -> f64 {
+    0.3
+}
+
+fn most_overlap() -> f64 {
+    0.65
+}
+
+fn strides() -> Vec<usize> {
+    vec![8, 16, 32]
+}
+
+/// A box around a person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PersonBox {
+    /// Left, top, right, bottom, pixels.
+    pub outline: [f64; 4],
+    /// How sure the network is, 0 to 1.
+    pub score: f64,
+}
+
+impl DetectorCard {
+    /// Reads a card.
+    ///
+    /// # Errors
+    ///
+    /// [`CardError`], naming the key.
+    pub fn parse(text: &str) -> Result<Self, CardError> {
+        let card: Self = toml::from_str(text)?;
+        if card.format != FORMAT || card.version != VERSION {
+            return Err(CardError::Version {
+                format: card.format.chars().take(32).collect(),
+                version: card.version,
+                expected: FORMAT,
+            });
+        }
+        check_input(&card.input)?;
+        for (key, share) in [
+            ("least_score", card.least_score),
+            ("most_overlap", card.most_overlap),
+        ] {
+            let fits = (0.0..=1.0).contains(&share);
+            demand(fits, key, &share, || "0 to 1".to_owned())?;
+        }
+        if let Boxes::Yolox {
+            strides, person, ..
+        } = &card.output
+        {
+            let fits =
+                (1..=8).contains(&strides.len()) && strides.iter().all(|it| (1..=256).contains(it));
+            demand(fits, "output.strides", &format!("{strides:?}"), || {
+                "one to eight numbers from 1 to 256".to_owned()
+            })?;
+            demand(*person < 10_000, "output.person", person, || {
+                "less than 10000".to_owned()
+            })?;
+        }
+        Ok(card)
+    }
+
+    /// The boxes of people, the surest first, in pixels of the input.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError`] if the output has another shape, or a value is not finite.
+    pub fn boxes(&self, values: &[f32], shape: &[usize]) -> Result<Vec<PersonBox>, OutputError> {
+        finite(values)?;
+        let mut found = match &self.output {
+            Boxes::Yolox {
+                strides,
+                person,
+                decoded,
+                ..
+            } => self.of_grids((values, shape), strides, *person, *decoded)?,
+            Boxes::List { .. } => {
+                let &[1, n, 5] = shape else {
+                    return Err(other(shape, "[1, n, 5]".to_owned()));
+                };
+                if values.len() != 5 * n {
+                    return Err(other(shape, "[1, n, 5]".to_owned()));
+                }
+                let one = |it: &[f32]| PersonBox {
+                    outline: [0, 1, 2, 3].map(|side| f64::from(it[side])),
+                    score: f64::from(it[4]),
+                };
+                values.chunks_exact(5).map(one).collect()
+            }
+        };
+        found.retain(|it| it.score >= self.least_score && area(&it.outline) > 0.0);
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut kept: Vec<PersonBox> = Vec::new();
+        for it in found {
+            let is_new =
+                |other: &PersonBox| overlap(&it.outline, &other.outline) <= self.most_overlap;
+            if kept.iter().all(is_new) {
+                kept.push(it);
+            }
+        }
+        Ok(kept)
+    }
+
+    fn of_grids(
+        &self,
+        (values, shape): (&[f32], &[usize]),
+        strides: &[usize],
+        person: usize,
+        decoded: bool,
+    ) -> Result<Vec<PersonBox>, OutputError> {
+        let [width, height] = [self.input.width, self.input.height];
+        let cells: usize = strides.iter().map(|it| (width / it) * (height / it)).sum();
+        let n = match *shape {
+            [1, rows, n] if rows == cells && n > 5 + person && values.len() == rows * n => n,
+            _ => {
+                let least = 6 + person;
+                return Err(other(shape, format!("[1, {cells}, {least} or more]")));
+            }
+        };
+        let grids = strides.iter().flat_map(|stride| {
+            let columns = (width / stride).max(1);
+            let n_cells = (width / stride) * (height / stride);
+            (0..n_cells).map(move |cell| (*stride, cell % columns, cell / columns))
+        });
+        let one = |((stride, column, row), it): ((usize, usize, usize), &[f32])| {
+            let raw = |at: usize| f64::from(it[at]);
+            let (middle, size) = if decoded {
+                ([raw(0), raw(1)], [raw(2), raw(3)])
+            } else {
+                let stride = stride as f64;
+                let middle = [raw(0) + column as f64, raw(1) + row as f64];
+                (
+                    middle.map(|it| it * stride),
+                    [raw(2), raw(3)].map(|it| it.exp() * stride),
+                )
+            };
+            PersonBox {
+                outline: [
+                    middle[0] - size[0] / 2.0,
+                    middle[1] - size[1] / 2.0,
+                    middle[0] + size[0] / 2.0,
+                    middle[1] + size[1] / 2.0,
+                ],
+                score: raw(4) * raw(5 + person),
+            }
+        };
+        Ok(grids.zip(values.chunks_exact(n)).map(one).collect())
+    }
+
+    /// Writes the input of the network, and returns how many pixels of the picture lie between two of the input.
+    ///
+    /// * `rgb`: the picture, row major, red first; `size` is its width and height.
+    /// * `values`: three for every pixel of the input, all of them written.
+    ///
+    /// # Panics
+    ///
+    /// If the picture or the values have another length.
+    pub fn fill(&self, rgb: &[u8], size: [usize; 2], values: &mut [f32]) -> f64 {
+        let [width, height] = [self.input.width, self.input.height];
+        assert_eq!(rgb.len(), 3 * size[0] * size[1], "the picture is RGB");
+        assert_eq!(values.len(), 3 * width * height, "three values for a pixel");
+        let step = (size[0] as f64 / width as f64).max(size[1] as f64 / height as f64);
+        for row in 0..height {
+            for column in 0..width {
+                let colour = self.cell(rgb, size, ([column, row], step));
+                let pixel = row * width + column;
+                for (channel, value) in self.input.prepared(colour).into_iter().enumerate() {
+                    values[match self.input.layout {
+                        Layout::Planes => channel * width * height + pixel,
+                        Layout::Pixels => 3 * pixel + channel,
+                    }] = value;
+                }
+            }
+        }
+        step
+    }
+
+    /// The mean colour of the pixels of the picture that a pixel of the input covers; at least one.
+    fn cell(&self, rgb: &[u8], size: [usize; 2], (at, step): ([usize; 2], f64)) -> [f32; 3] {
+        let span = [0, 1].map(|axis| {
+            let begin = (at[axis] as f64 * step) as usize;
+            let end = ((at[axis] + 1) as f64 * step) as usize;
+            begin..end.max(begin + 1).min(size[axis])
+        });
+        let [columns, rows] = span;
+        if columns.is_empty() || rows.is_empty() {
+            return [f32::from(self.fill); 3];
+        }
+        let n = (columns.len() * rows.len()) as f32;
+        let mut sum = [0_u32; 3];
+        for row in rows {
+            let line = &rgb[3 * (row * size[0] + columns.start)..3 * (row * size[0] + columns.end)];
+            for pixel in line.chunks_exact(3) {
+                for channel in 0..3 {
+                    sum[channel] += u32::from(pixel[channel]);
+                }
+            }
+        }
+        sum.map(|it| it as f32 / n)
+    }
+}
+
+fn other(shape: &[usize], expected: String) -> OutputError {
+    OutputError::Shape {
+        got: shape.to_vec(),
+        expected,
+    }
+}
+
+fn area([left, top, right, bottom]: &[f64; 4]) -> f64 {
+    (right - left).max(0.0) * (bottom - top).max(0.0)
+}
+
+/// What two boxes share, as a share of their union.
+fn overlap(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    let shared = area(&[
+        a[0].max(b[0]),
+        a[1].max(b[1]),
+        a[2].min(b[2]),
+        a[3].min(b[3]),
+    ]);
+    shared / (area(a) + area(b) - shared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const YOLOX: &str = r#"
+format = "parallax-detector"
+version = 1
+name = "a small one"
+input = { width = 64, height = 32, colour = "bgr" }
+output = { codec = "yolox", strides = [16, 32] }
+"#;
+
+    #[test]
+    fn boxes_of_grids_are_where_their_cells_say_and_the_surest_of_overlapping_ones_stays() {
+        let card = DetectorCard::parse(YOLOX).unwrap();
+        // Grids of 4 by 2 and of 2 by 1 cells, two classes.
+        let mut values = vec![0.0_f32; 10 * 7];
+        let mut set =
+            |cell: usize, it: [f32; 7]| values[7 * cell..7 * cell + 7].copy_from_slice(&it);
+        set(5, [0.5, 0.5, 0.0, 2.0_f32.ln(), 0.9, 0.8, 0.0]);
+        set(6, [-0.5, 0.5, 0.0, 2.0_f32.ln(), 0.9, 0.7, 0.0]);
+        set(9, [0.5, 0.5, 0.0, 0.0, 0.5, 0.9, 0.0]);
+        set(2, [0.5, 0.5, 0.0, 0.0, 0.9, 0.1, 0.9]);
+        let found = card.boxes(&values, &[1, 10, 7]).unwrap();
+        let outlines: Vec<[f64; 4]> = found.iter().map(|it| it.outline).collect();
+        assert_eq!(found.len(), 2, "{found:?}");
+        let near = |a: [f64; 4], b: [f64; 4]| (0..4).all(|it| (a[it] - b[it]).abs() < 1e-4);
+        assert!(near(outlines[0], [16.0, 8.0, 32.0, 40.0]), "{outlines:?}");
+        assert!(near(outlines[1], [32.0, 0.0, 64.0, 32.0]), "{outlines:?}");
+        assert!((found[0].score - 0.72).abs() < 1e-6);
+    }
+
+    #[test]
+    fn listed_boxes_are_taken_as_they_are() {
+        let text = YOLOX.replace(
+            r#"codec = "yolox", strides = [16, 32]"#,
+            r#"codec = "list", boxes = "dets""#,
+        );
+        let card = DetectorCard::parse(&text).unwrap();
+        let values = [
+            1.0, 2.0, 11.0, 22.0, 0.9, 0.0, 0.0, 0.0, 0.0, 0.8, 5.0, 5.0, 9.0, 9.0, 0.1,
+        ];
+        let found = card.boxes(&values, &[1, 3, 5]).unwrap();
+        assert_eq!(found.len(), 1, "an empty one and one below the least score");
+        assert_eq!(found[0].outline, [1.0, 2.0, 11.0, 22.0]);
+    }
+
+    #[test]
+    fn other_shapes_and_values_that_are_no_numbers_are_refused() {
+        let card = DetectorCard::parse(YOLOX).unwrap();
+        let mut values = vec![0.0_f32; 70];
+        let refused = card.boxes(&values, &[1, 7, 10]).unwrap_err().to_string();
+        assert!(refused.contains("expected [1, 10, 6 or more]"), "{refused}");
+        values[3] = f32::NAN;
+        assert!(card.boxes(&values, &[1, 10, 7]).is_err());
+        for (from, to) in [
+            ("width = 64", "width = 3"),
+            ("strides = [16, 32]", "strides = []"),
+            ("strides = [16, 32]", "strides = [0]"),
+            ("version = 1", "version = 1\nleast_score = 7"),
+            ("version = 1", "version = 2"),
+        ] {
+            assert!(
+                DetectorCard::parse(&YOLOX.replace(from, to)).is_err(),
+                "{to}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_picture_keeps_its_shape_and_the_rest_is_grey() {
+        let card = DetectorCard::parse(YOLOX).unwrap();
+        let rgb: Vec<u8> = [10, 20, 30].repeat(64 * 64);
+        let mut values = vec![f32::NAN; 3 * 64 * 32];
+        let step = card.fill(&rgb, [64, 64], &mut values);
+        assert_eq!(step, 2.0);
+        let plane = 64 * 32;
+        assert_eq!(
+            [values[0], values[plane], values[2 * plane]],
+            [30.0, 20.0, 10.0]
+        );
+        assert_eq!(values[32], 114.0, "right of the picture");
+    }
+}
