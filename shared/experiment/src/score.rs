@@ -4,6 +4,7 @@ use evaluation::{Point, aligned, joint_errors, segment_errors, segments};
 use geometry::Camera;
 use nalgebra::Point3;
 use sequences::{Frame, Sequence};
+use skeleton::SIDES;
 
 use crate::{FrameResult, parse14};
 
@@ -70,8 +71,6 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
 /// * `found`, `truth`: of `skeleton::PARSE14`, metres.
 /// * Returns `None` if no pair of joints of both sides is found and known.
 fn is_exchanged(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<bool> {
-    /// Right and left, joints of `skeleton::PARSE14`.
-    const SIDES: [[usize; 2]; 6] = [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]];
     let distance = |a: Point, b: Point| (Point3::from(a) - Point3::from(b)).norm();
     let (mut n, mut as_named, mut exchanged) = (0, 0.0, 0.0);
     for [right, left] in SIDES {

@@ -59,6 +59,13 @@ impl Window {
         })
     }
 
+    /// The same window elsewhere in the picture.
+    #[must_use]
+    pub fn shifted(self, by: [f64; 2]) -> Self {
+        let centre = [self.centre[0] + by[0], self.centre[1] + by[1]];
+        Self { centre, ..self }
+    }
+
     /// Pixels of the picture for a pixel of the input, across and down.
     pub fn step(&self) -> [f64; 2] {
         self.step

@@ -7,7 +7,7 @@ use skeleton::PARSE14;
 use crate::network::{LookError, Read, Sight};
 
 /// Number of joints, each with a map.
-pub const N_JOINTS: usize = PARSE14.joints.len();
+pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 
 /// How a map becomes evidence: `lambda * ln(max(h, 0) + eps)` with `h` the heat from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,34 +145,95 @@ impl JointMaps {
         &self.peaks
     }
 
-    /// The evidence for a joint at a point of the picture, between four cells; the floor beyond the window.
+    /// The evidence for a joint at a point of the picture, between sixteen cells, so that a maximum may lie between two; the floor
+    /// beyond the window.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
         let Some(window) = &self.window else {
             return self.floor;
         };
         let at = window.in_input(point);
         let cell = [at[0] / self.step[0], at[1] / self.step[1]];
-        let (left, top) = (cell[0].floor(), cell[1].floor());
-        let (u, v) = ((cell[0] - left) as f32, (cell[1] - top) as f32);
+        let beyond = |axis: usize, n: usize| cell[axis] < -1.0 || cell[axis] > n as f64;
+        if beyond(0, self.columns) || beyond(1, self.rows) || !(cell[0] + cell[1]).is_finite() {
+            return self.floor;
+        }
+        let first = [0, 1].map(|axis| cell[axis].floor() as i64 - 1);
+        let weights = [0, 1].map(|axis| cubic((cell[axis] - cell[axis].floor()) as f32));
         let area = self.rows * self.columns;
         let map = &self.values[joint * area..(joint + 1) * area];
-        let value = |column: f64, row: f64| {
-            let inside = column >= 0.0
-                && row >= 0.0
-                && column < self.columns as f64
-                && row < self.rows as f64;
+        let mut sum = 0.0;
+        for (down, row_weight) in (0..).zip(weights[1]) {
+            let row = (first[1] + down).clamp(0, self.rows as i64 - 1) as usize;
+            let line = &map[row * self.columns..(row + 1) * self.columns];
+            for (across, weight) in (0..).zip(weights[0]) {
+                let column = (first[0] + across).clamp(0, self.columns as i64 - 1) as usize;
+                sum += row_weight * weight * line[column];
+            }
+        }
+        sum
+    }
+
+    /// The highest maxima of a joint's map, at cells: pixels of the picture, and the evidence there.
+    ///
+    /// * `n`: at most so many.
+    pub fn maxima(&self, joint: usize, n: usize) -> Vec<([f64; 2], f32)> {
+        let Some(window) = &self.window else {
+            return Vec::new();
+        };
+        let area = self.rows * self.columns;
+        let map = &self.values[joint * area..(joint + 1) * area];
+        let value = |column: i64, row: i64| {
+            let inside =
+                (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
             if inside {
                 map[row as usize * self.columns + column as usize]
             } else {
-                self.floor
+                f32::NEG_INFINITY
             }
         };
-        let line = |row: f64| {
-            let (a, b) = (value(left, row), value(left + 1.0, row));
-            a + (b - a) * u
-        };
-        let (a, b) = (line(top), line(top + 1.0));
-        a + (b - a) * v
+        let mut found: Vec<([f64; 2], f32)> = Vec::new();
+        for row in 0..self.rows as i64 {
+            for column in 0..self.columns as i64 {
+                let here = value(column, row);
+                let around = |down: i64, across: i64| value(column + across, row + down);
+                let is_highest = here > self.floor
+                    && (-1..=1).all(|down| {
+                        (-1..=1)
+                            .all(|across| (down, across) == (0, 0) || around(down, across) <= here)
+                    });
+                if is_highest {
+                    let at = [column as f64 * self.step[0], row as f64 * self.step[1]];
+                    found.push((window.in_picture(at), here));
+                }
+            }
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found.truncate(n);
+        found
+    }
+
+    /// The evidence where a view shows nothing of a joint.
+    pub fn floor(&self) -> f32 {
+        self.floor
+    }
+
+    /// Exchanges what the network calls left and right.
+    pub fn exchange_sides(&mut self) {
+        let area = self.rows * self.columns;
+        for [right, left] in skeleton::SIDES {
+            for cell in 0..area {
+                self.values.swap(right * area + cell, left * area + cell);
+            }
+            self.peaks.swap(right, left);
+        }
+    }
+
+    /// Moves everything in the picture, pixels.
+    pub fn shift(&mut self, by: [f64; 2]) {
+        self.window = self.window.map(|it| it.shifted(by));
+        for peak in self.peaks.iter_mut().flatten() {
+            peak.at = [peak.at[0] + by[0], peak.at[1] + by[1]];
+        }
     }
 
     /// Fills the responses of a scope. Filter `j` is joint `j` of `skeleton::PARSE14`; further filters, of parts between
@@ -254,4 +315,15 @@ fn share(value: f64, score: Score) -> f64 {
         Score::Share => value,
         Score::LogOdds => 1.0 / (1.0 + (-value).exp()),
     }
+}
+
+/// Weights of four neighbours for a place between the two in the middle (Catmull & Rom 1974).
+fn cubic(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        0.5 * (-t3 + 2.0 * t2 - t),
+        0.5 * (3.0 * t3 - 5.0 * t2 + 2.0),
+        0.5 * (-3.0 * t3 + 4.0 * t2 + t),
+        0.5 * (t3 - t2),
+    ]
 }

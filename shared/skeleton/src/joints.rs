@@ -131,6 +131,9 @@ pub static PARSE14: JointSet = JointSet {
     ],
 };
 
+/// Joints of [`PARSE14`] on the right side, each with the same of the left.
+pub const SIDES: [[usize; 2]; 6] = [[0, 5], [1, 4], [2, 3], [6, 11], [7, 10], [8, 9]];
+
 /// The 15 joints of UMPM; the pelvis is the middle of the hips.
 pub static UMPM15: JointSet = JointSet {
     name: "umpm15",

@@ -9,5 +9,5 @@
 mod joints;
 mod parts;
 
-pub use joints::{HUMANEVA20, Joint, JointMap, JointSet, PARSE14, UMPM15};
+pub use joints::{HUMANEVA20, Joint, JointMap, JointSet, PARSE14, SIDES, UMPM15};
 pub use parts::{MIRROR, N_PARTS, PARENT, PART_NAMES};

@@ -1,0 +1,434 @@
+//! A pictorial structure in space: the joints of all views at once, over the maps of a network.
+//!
+//! The energy is the sum of the views' evidence where the joints project, and of springs on the lengths of bones:
+//!
+//! `E(X) = sum_v sum_j u_v(j, P_v X_j) - mu sum_(i,j) rho((|X_i - X_j| - L_ij) / s_ij)`
+//!
+//! with `u = lambda ln(max(h, 0) + eps)`, whose floor lets a view that sees nothing of a joint be outvoted, and
+//! `rho(z) = min(z^2 / 2, cap)`. The bones form a tree, so that the best choice among places of every joint is exact (Felzenszwalb &
+//! Huttenlocher 2005). Places are where pairs of views put a joint, then grids about the solution, from coarse to fine
+//! (Pavlakos et al. 2017; Qiu et al. 2019).
+
+use nalgebra::Point3;
+
+use geometry::Camera;
+
+/// Number of joints: those of `skeleton::PARSE14`.
+const N: usize = 14;
+
+/// The bones of the tree, `[parent, child]`, joints of `skeleton::PARSE14`, parents first. A hip hangs on the neck.
+pub const TREE: [[usize; 2]; N - 1] = [
+    [12, 13],
+    [12, 8],
+    [8, 7],
+    [7, 6],
+    [12, 9],
+    [9, 10],
+    [10, 11],
+    [12, 2],
+    [2, 1],
+    [1, 0],
+    [12, 3],
+    [3, 4],
+    [4, 5],
+];
+const ROOT: usize = 12;
+
+/// The evidence of a view.
+pub trait JointEvidence {
+    /// How well a joint fits at a point of the picture, pixels.
+    fn at(&self, joint: usize, point: [f64; 2]) -> f32;
+    /// Where a joint may be, pixels of the picture, the best first, each with its evidence.
+    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
+    /// What is known of a joint where the view shows nothing of it: the floor of its evidence.
+    fn floor(&self) -> f32;
+}
+
+/// A view.
+#[derive(Clone, Copy)]
+pub struct SpaceView<'a> {
+    /// Its camera.
+    pub camera: &'a Camera,
+    /// What it shows.
+    pub evidence: &'a dyn JointEvidence,
+    /// Whether left and right are exchanged in its evidence, of the arms and of the legs.
+    pub exchanged: [bool; 2],
+}
+
+/// The expected length of a bone of [`TREE`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoneLength {
+    /// Mean, metres.
+    pub mean: f64,
+    /// Standard deviation, metres.
+    pub sd: f64,
+}
+
+/// Settings of the solution in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpaceSettings {
+    /// Weight of the springs (mu).
+    pub springs: f64,
+    /// Most that a bone costs: half the square of so many standard deviations.
+    pub cap: f64,
+    /// By how much exchanged sides must fit a view better.
+    pub margin: f64,
+    /// A view contradicts all others if three quarters of its joints fit their solution by so much less than their own best places.
+    pub most_misfit: f64,
+    /// Most places of a joint at the start.
+    pub n_places: usize,
+    /// Distance between the places of the coarsest grid, metres.
+    pub coarsest_m: f64,
+    /// Distance between the places of the finest grid, metres.
+    pub finest_m: f64,
+}
+
+impl Default for SpaceSettings {
+    fn default() -> Self {
+        Self {
+            springs: 1.0,
+            cap: 8.0,
+            margin: 3.0,
+            most_misfit: 1.0,
+            n_places: 40,
+            coarsest_m: 0.04,
+            finest_m: 0.005,
+        }
+    }
+}
+
+/// The joints in space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpacePose {
+    /// Joints of `skeleton::PARSE14`, metres in the world.
+    pub joints: [Point3<f64>; N],
+    /// The energy.
+    pub energy: f64,
+}
+
+/// Solves for a person of whom nothing is known.
+///
+/// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
+/// 2. A view that fits it better with left and right of its arms or of its legs exchanged is exchanged.
+/// 3. Of four views or more, those that contradict all others are left out: their camera was moved, or they look at somebody else.
+/// 4. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
+///
+/// * Returns `None` if a joint is seen by fewer than two views.
+pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
+    let mut views = views.to_vec();
+    let first = first_of(&mut views, settings)?;
+    let mut changed = views.iter().any(|it| it.exchanged != [false; 2]);
+    changed |= exchange(&mut views, &first, settings.margin);
+    while let Some(worst) = contradicts(&views, settings) {
+        views.remove(worst);
+        changed = true;
+    }
+    let first = if changed {
+        coarse(&views, settings)?
+    } else {
+        first
+    };
+    let all = places(&views, settings.n_places);
+    let lengths = lengths_of(Some(&first.joints));
+    solve_in_space(&views, &all, &lengths, settings)
+}
+
+/// The best choice among the places of the joints, for a person of any stature.
+fn coarse(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
+    let all = places(views, settings.n_places);
+    best_on_tree(views, &all, &lengths_of(None), settings)
+}
+
+/// The best first solution with no view, or one view, exchanged.
+fn first_of(views: &mut [SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
+    let mut best = coarse(views, settings)?;
+    if views.len() < 3 {
+        // Which one of two is exchanged cannot be told.
+        return Some(best);
+    }
+    let mut exchanged = None;
+    let mut most = best.energy + settings.margin;
+    for nth in 0..views.len() {
+        views[nth].exchanged = [true; 2];
+        let found = coarse(views, settings)?;
+        views[nth].exchanged = [false; 2];
+        if found.energy > most {
+            (most, exchanged, best) = (found.energy, Some(nth), found);
+        }
+    }
+    if let Some(nth) = exchanged {
+        views[nth].exchanged = [true; 2];
+    }
+    Some(best)
+}
+
+/// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
+/// none, or for fewer than four views, of which it cannot be told.
+///
+/// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
+fn contradicts(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<usize> {
+    const LEAST: usize = 4;
+    if views.len() < LEAST {
+        return None;
+    }
+    let judged = |nth: usize| -> Option<(usize, f64, f64)> {
+        let others: Vec<SpaceView<'_>> = (0..views.len())
+            .filter(|it| *it != nth)
+            .map(|it| views[it])
+            .collect();
+        let found = coarse(&others, settings)?;
+        let misfits = others.iter().map(|it| misfit(it, &found));
+        Some((nth, misfit(&views[nth], &found), misfits.sum()))
+    };
+    let all = (0..views.len()).filter_map(judged);
+    let contradicting = all.filter(|it| it.1 > settings.most_misfit);
+    let worst = contradicting.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    Some(worst.0)
+}
+
+/// By how much three quarters of the joints, or more, fit a view less than the best places that it knows for them.
+fn misfit(view: &SpaceView<'_>, found: &SpacePose) -> f64 {
+    let mut short: [f64; N] = core::array::from_fn(|joint| {
+        let named = view.named(joint);
+        let best = view.evidence.maxima(named).iter().map(|it| it.1);
+        let best = f64::from(best.fold(view.evidence.floor(), f32::max));
+        best - view.at(named, &found.joints[joint])
+    });
+    short.sort_by(f64::total_cmp);
+    short[N / 4]
+}
+
+/// Exchanges left and right in views that then fit better; returns whether there were any.
+fn exchange(views: &mut [SpaceView<'_>], found: &SpacePose, margin: f64) -> bool {
+    let mut any = false;
+    for view in views {
+        for (limb, pairs) in LIMBS.iter().enumerate() {
+            let sum = |exchanged: bool| -> f64 {
+                let of = |[right, left]: &[usize; 2]| {
+                    let names = if exchanged {
+                        [left, right]
+                    } else {
+                        [right, left]
+                    };
+                    view.at(*names[0], &found.joints[*right])
+                        + view.at(*names[1], &found.joints[*left])
+                };
+                pairs.iter().map(of).sum()
+            };
+            let own = view.exchanged[limb];
+            if sum(!own) > sum(own) + margin {
+                view.exchanged[limb] = !own;
+                any = true;
+            }
+        }
+    }
+    any
+}
+
+/// Stature of people of whom nothing is known, and its standard deviation, metres (adults: ANSUR II, both sexes).
+const STATURE: [f64; 2] = [1.65, 0.20];
+
+/// The bones of [`TREE`] of a person with these joints; without them, of any person.
+///
+/// The stature is what the joints say and what is known of people, each by its certainty.
+pub fn lengths_of(joints: Option<&[Point3<f64>; N]>) -> [BoneLength; N - 1] {
+    use body::Kind::{
+        Head, HipWidth, LowerArm, LowerLeg, ShoulderToNeck, Trunk, UpperArm, UpperLeg,
+    };
+    const KINDS: [body::Kind; N - 1] = [
+        Head,
+        ShoulderToNeck,
+        UpperArm,
+        LowerArm,
+        ShoulderToNeck,
+        UpperArm,
+        LowerArm,
+        Trunk,
+        UpperLeg,
+        LowerLeg,
+        Trunk,
+        UpperLeg,
+        LowerLeg,
+    ];
+    let [mean, sd] = STATURE;
+    let said = joints.and_then(|joints| body::stature(&joints.map(Some)));
+    let [own, known] = [said.map_or(0.0, |it| it.sd.powi(-2)), sd.powi(-2)];
+    let stature = (own * said.map_or(0.0, |it| it.metres) + known * mean) / (own + known);
+    let unsure = (own + known).powf(-0.5) / stature;
+    KINDS.map(|kind| {
+        let proportion = kind.proportion();
+        let length = proportion.length(stature);
+        let half = if kind == Trunk {
+            HipWidth.proportion().length(stature) / 2.0
+        } else {
+            0.0
+        };
+        let length = length.hypot(half);
+        let sd = length * proportion.spread().hypot(unsure);
+        BoneLength { mean: length, sd }
+    })
+}
+
+/// Where pairs of views put every joint, the best first.
+///
+/// * Returns an empty list for a joint that no two views show.
+pub fn places(views: &[SpaceView<'_>], n: usize) -> [Vec<Point3<f64>>; N] {
+    core::array::from_fn(|joint| {
+        let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
+        for (nth, a) in views.iter().enumerate() {
+            for b in &views[nth + 1..] {
+                for (in_a, _) in a.evidence.maxima(a.named(joint)) {
+                    for (in_b, _) in b.evidence.maxima(b.named(joint)) {
+                        if let Some(at) = nearest([a.camera, b.camera], [*in_a, *in_b]) {
+                            found.push((unary(views, joint, &at), at));
+                        }
+                    }
+                }
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(n);
+        found.into_iter().map(|it| it.1).collect()
+    })
+}
+
+/// The point nearest to the rays of two pixels; `None` behind a camera, or for rays that are parallel.
+fn nearest(cameras: [&Camera; 2], pixels: [[f64; 2]; 2]) -> Option<Point3<f64>> {
+    let ray = |nth: usize| cameras[nth].ray(&pixels[nth].into());
+    let (a, b) = (ray(0)?, ray(1)?);
+    let (u, v) = (a.direction.into_inner(), b.direction.into_inner());
+    let between = b.origin - a.origin;
+    let cosine = u.dot(&v);
+    let sine2 = 1.0 - cosine * cosine;
+    if sine2 < 1e-6 {
+        return None;
+    }
+    let along_a = (between.dot(&u) - cosine * between.dot(&v)) / sine2;
+    let along_b = (cosine * between.dot(&u) - between.dot(&v)) / sine2;
+    if along_a <= 0.0 || along_b <= 0.0 {
+        return None;
+    }
+    Some(nalgebra::center(
+        &(a.origin + u * along_a),
+        &(b.origin + v * along_b),
+    ))
+}
+
+/// The evidence of all views for a joint at a place.
+fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
+    views
+        .iter()
+        .map(|view| view.at(view.named(joint), at))
+        .sum()
+}
+
+impl SpaceView<'_> {
+    /// What the view calls a joint.
+    fn named(&self, joint: usize) -> usize {
+        let limb = LIMBS.iter().zip(self.exchanged).filter(|it| it.1);
+        let pair = limb.flat_map(|it| it.0).find(|pair| pair.contains(&joint));
+        pair.map_or(joint, |[right, left]| right + left - joint)
+    }
+
+    /// The evidence for what the view calls a joint, at a place.
+    fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
+        f64::from(match self.camera.project(at) {
+            Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),
+            None => self.evidence.floor(),
+        })
+    }
+}
+
+/// Joints of the arms and of the legs, right and left.
+const LIMBS: [[[usize; 2]; 3]; 2] = [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
+
+/// Solves for all joints at once.
+///
+/// * `places`: of every joint, at least one each, for example of [`places`].
+/// * `lengths`: of the bones of [`TREE`].
+/// * Returns `None` if a joint has no place.
+pub fn solve_in_space(
+    views: &[SpaceView<'_>],
+    places: &[Vec<Point3<f64>>; N],
+    lengths: &[BoneLength; N - 1],
+    settings: &SpaceSettings,
+) -> Option<SpacePose> {
+    let mut best = best_on_tree(views, places, lengths, settings)?;
+    let mut step = settings.coarsest_m;
+    while step >= settings.finest_m {
+        for _ in 0..2 {
+            let about: [Vec<Point3<f64>>; N] =
+                core::array::from_fn(|joint| grid(&best.joints[joint], step));
+            let found = best_on_tree(views, &about, lengths, settings)?;
+            let has_moved = found.joints != best.joints;
+            best = found;
+            if !has_moved {
+                break;
+            }
+        }
+        step /= 2.0;
+    }
+    Some(best)
+}
+
+/// The 125 places of a grid about a place, that one in the middle.
+fn grid(about: &Point3<f64>, step: f64) -> Vec<Point3<f64>> {
+    let along = |nth: usize| (nth as f64 - 2.0) * step;
+    (0..125)
+        .map(|nth| {
+            let by = [along(nth % 5), along(nth / 5 % 5), along(nth / 25)];
+            about + nalgebra::Vector3::from(by)
+        })
+        .collect()
+}
+
+/// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
+fn best_on_tree(
+    views: &[SpaceView<'_>],
+    places: &[Vec<Point3<f64>>; N],
+    lengths: &[BoneLength; N - 1],
+    settings: &SpaceSettings,
+) -> Option<SpacePose> {
+    if places.iter().any(Vec::is_empty) {
+        return None;
+    }
+    let mut scores: [Vec<f64>; N] = core::array::from_fn(|joint| {
+        let of_place = |at: &Point3<f64>| unary(views, joint, at);
+        places[joint].iter().map(of_place).collect()
+    });
+    let mut choices: [Vec<usize>; N - 1] = core::array::from_fn(|_| Vec::new());
+    for (bone, [parent, child]) in TREE.into_iter().enumerate().rev() {
+        let BoneLength { mean, sd } = lengths[bone];
+        let choice: Vec<(usize, f64)> = places[parent]
+            .iter()
+            .map(|from| {
+                let mut best = (0, f64::NEG_INFINITY);
+                for (nth, (to, score)) in places[child].iter().zip(&scores[child]).enumerate() {
+                    let z = ((to - from).norm() - mean) / sd;
+                    let total = score - settings.springs * (0.5 * z * z).min(settings.cap);
+                    if total > best.1 {
+                        best = (nth, total);
+                    }
+                }
+                best
+            })
+            .collect();
+        for (score, it) in scores[parent].iter_mut().zip(&choice) {
+            *score += it.1;
+        }
+        choices[bone] = choice.into_iter().map(|it| it.0).collect();
+    }
+    let mut chosen = [0; N];
+    let root = scores[ROOT].iter().enumerate();
+    let (at, energy) = root.fold((0, f64::NEG_INFINITY), |best, (nth, it)| {
+        if *it > best.1 { (nth, *it) } else { best }
+    });
+    chosen[ROOT] = at;
+    for (bone, [parent, child]) in TREE.into_iter().enumerate() {
+        chosen[child] = choices[bone][chosen[parent]];
+    }
+    Some(SpacePose {
+        joints: core::array::from_fn(|joint| places[joint][chosen[joint]]),
+        energy,
+    })
+}
