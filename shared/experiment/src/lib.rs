@@ -13,7 +13,10 @@
 mod version;
 
 mod bench;
+mod by_network;
 mod film;
+mod plain;
+mod stress;
 mod truth;
 
 mod predicted;
@@ -29,13 +32,16 @@ mod published;
 pub mod testing;
 
 pub use bench::{Bench, ErrorPredictor, Expectation, Setup, SingleView, Trial};
+pub use by_network::{Method, NetworkView, joints_by};
 pub use film::{Film, FilmError, FilmSettings};
 pub use latex::{latex, number, overall, pictures_latex};
 pub use pictures::{Intervals, Judged, Pictures, Table};
+pub use plain::{Sighting, dropping, linear};
 pub use predicted::{Judgement, Predicted, judge};
 pub use published::published;
 pub use record::{FrameResult, Header, Record, RecordError, read_records};
 pub use score::{FrameScore, Joints, projected, score};
+pub use stress::{Stress, UnknownStress, cover_half};
 pub use summary::{ChangesOf, Group, Measured, Numbers, Summary, summarise};
 pub use truth::{parse14, part_errors, part_errors_and_facing, size, tenth_of};
 pub use version::{Combining, Terms, Version, VersionError};

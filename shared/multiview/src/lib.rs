@@ -110,6 +110,7 @@ mod settings;
 mod pair;
 mod term;
 mod view;
+mod who;
 
 mod consistency;
 mod heat_map;
@@ -152,3 +153,4 @@ pub use space_tree::{
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;
 pub use view::{ViewInput, ViewPlan};
+pub use who::{SeenPerson, same_person};

@@ -26,6 +26,7 @@ mod searches;
 pub mod images;
 
 pub mod consistency;
+pub mod detector;
 pub mod eval;
 pub mod examples;
 pub mod joints;

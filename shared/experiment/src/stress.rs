@@ -1,0 +1,200 @@
+//! What goes wrong in real rooms, made on purpose: part of a view is covered, a camera is turned, a view looks at somebody else.
+
+use core::fmt;
+use core::str::FromStr;
+
+use geometry::Camera;
+
+/// One thing that goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stress {
+    /// Nothing.
+    Clean,
+    /// In so many views half of the person is covered by grey: the left, right, upper or lower half in turn.
+    Covered(usize),
+    /// Only so many views are there, others from frame to frame.
+    Views(usize),
+    /// One camera was turned by so many degrees about its vertical axis since it was calibrated.
+    Turned(f64),
+    /// One view looks at somebody else: the same person, half a height beside.
+    Bystander,
+    /// One view names left and right the wrong way.
+    Exchanged,
+}
+
+impl Stress {
+    /// The set that `--stress all` means.
+    pub const ALL: [Self; 7] = [
+        Self::Clean,
+        Self::Covered(1),
+        Self::Covered(2),
+        Self::Views(2),
+        Self::Turned(2.0),
+        Self::Bystander,
+        Self::Exchanged,
+    ];
+
+    /// The views that are used at a frame.
+    ///
+    /// * `nth`: number of the frame, from 0.
+    pub fn views(self, nth: usize, n_views: usize) -> Vec<usize> {
+        match self {
+            Self::Views(n) => (0..n.min(n_views)).map(|it| (it + nth) % n_views).collect(),
+            _ => (0..n_views).collect(),
+        }
+    }
+
+    /// Whether it happens to a view at a frame: to each in turn.
+    pub fn hits(self, nth: usize, view: usize, n_views: usize) -> bool {
+        let place = (view + nth) % n_views.max(1);
+        match self {
+            Self::Clean | Self::Views(_) => false,
+            Self::Covered(n) => place < n,
+            Self::Turned(_) | Self::Bystander | Self::Exchanged => place == 0,
+        }
+    }
+
+    /// The camera as the calibration has it, once it was turned.
+    pub fn calibrated(self, camera: &Camera) -> Camera {
+        let Self::Turned(degrees) = self else {
+            return camera.clone();
+        };
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.0, degrees.to_radians(), 0.0);
+        Camera {
+            camera_from_world: turn * camera.camera_from_world,
+            ..camera.clone()
+        }
+    }
+}
+
+/// Covers half of a person with grey.
+///
+/// * `rgb`: the picture, three bytes for a pixel; `size` is its width and height.
+/// * `outline`: of the person: left, top, right, bottom, pixels; a margin of 15 % of its height is added.
+/// * `nth`: which half: left, right, upper or lower in turn.
+pub fn cover_half(rgb: &mut [u8], size: [usize; 2], outline: [f64; 4], nth: usize) {
+    const GREY: u8 = 127;
+    let margin = 0.15 * (outline[3] - outline[1]);
+    let [mut left, mut top] = [outline[0] - margin, outline[1] - margin];
+    let [mut right, mut bottom] = [outline[2] + margin, outline[3] + margin];
+    match nth % 4 {
+        0 => right = f64::midpoint(left, right),
+        1 => left = f64::midpoint(left, right),
+        2 => bottom = f64::midpoint(top, bottom),
+        _ => top = f64::midpoint(top, bottom),
+    }
+    let pixels = |from: f64, to: f64, side: usize| {
+        let at = |it: f64| (it.max(0.0) as usize).min(side);
+        at(from)..at(to).max(at(from))
+    };
+    let columns = pixels(left, right, size[0]);
+    for row in pixels(top, bottom, size[1]) {
+        rgb[3 * (row * size[0] + columns.start)..3 * (row * size[0] + columns.end)].fill(GREY);
+    }
+}
+
+impl fmt::Display for Stress {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Clean => to.write_str("clean"),
+            Self::Covered(n) => write!(to, "covered:{n}"),
+            Self::Views(n) => write!(to, "views:{n}"),
+            Self::Turned(degrees) => write!(to, "turned:{degrees}"),
+            Self::Bystander => to.write_str("bystander"),
+            Self::Exchanged => to.write_str("exchanged"),
+        }
+    }
+}
+
+/// The text names no stress.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{0:?} is none of clean, covered:N, views:N (N from 2), turned:DEGREES, bystander, exchanged"
+)]
+pub struct UnknownStress(String);
+
+impl FromStr for Stress {
+    type Err = UnknownStress;
+
+    fn from_str(text: &str) -> Result<Self, UnknownStress> {
+        let unknown = || UnknownStress(text.to_owned());
+        let (name, value) = text.split_once(':').unwrap_or((text, ""));
+        let count = |least: usize| match value.parse() {
+            Ok(n) if (least..=64).contains(&n) => Ok(n),
+            _ => Err(unknown()),
+        };
+        match (name, value) {
+            ("clean", "") => Ok(Self::Clean),
+            ("covered", _) => count(1).map(Self::Covered),
+            ("views", _) => count(2).map(Self::Views),
+            ("turned", _) => match value.parse::<f64>() {
+                Ok(degrees) if degrees.abs() <= 180.0 => Ok(Self::Turned(degrees)),
+                _ => Err(unknown()),
+            },
+            ("bystander", "") => Ok(Self::Bystander),
+            ("exchanged", "") => Ok(Self::Exchanged),
+            _ => Err(unknown()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stress_is_read_as_it_is_written_and_others_are_refused() {
+        for stress in Stress::ALL {
+            assert_eq!(stress.to_string().parse(), Ok(stress));
+        }
+        for text in [
+            "",
+            "dirty",
+            "covered",
+            "covered:0",
+            "views:1",
+            "turned:x",
+            "turned:NaN",
+            "clean:1",
+        ] {
+            let refused = text.parse::<Stress>().unwrap_err();
+            assert!(refused.to_string().contains("is none of clean"), "{text}");
+        }
+    }
+
+    #[test]
+    fn it_happens_to_every_view_in_turn() {
+        for stress in [Stress::Covered(2), Stress::Bystander] {
+            let hit: Vec<Vec<usize>> = (0..4)
+                .map(|nth| (0..4).filter(|view| stress.hits(nth, *view, 4)).collect())
+                .collect();
+            let n = if stress == Stress::Bystander { 1 } else { 2 };
+            assert!(hit.iter().all(|it| it.len() == n), "{hit:?}");
+            assert!((0..4).all(|view| hit.iter().filter(|it| it.contains(&view)).count() == n));
+        }
+        assert_eq!(Stress::Views(2).views(3, 4), [3, 0]);
+        assert_eq!(Stress::Clean.views(3, 4), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn a_half_is_grey_and_the_other_as_it_was() {
+        for nth in 0..4 {
+            let mut rgb = vec![9; 3 * 100 * 80];
+            cover_half(&mut rgb, [100, 80], [20.0, 10.0, 60.0, 50.0], nth);
+            let grey = rgb.iter().filter(|it| **it == 127).count() / 3;
+            assert_eq!(grey, 52 * 26, "{nth}");
+            let inside = |x: usize, y: usize| rgb[3 * (y * 100 + x)] == 127;
+            let corners = [inside(16, 6), inside(63, 6), inside(16, 53), inside(63, 53)];
+            let expected = [
+                [true, false, true, false],
+                [false, true, false, true],
+                [true, true, false, false],
+                [false, false, true, true],
+            ];
+            assert_eq!(corners, expected[nth], "{nth}");
+        }
+        let mut small = vec![9; 3 * 4 * 4];
+        cover_half(&mut small, [4, 4], [-90.0, -90.0, -50.0, -50.0], 0);
+        assert!(small.iter().all(|it| *it == 9));
+    }
+}

@@ -1,0 +1,87 @@
+//! Which of the people that networks found in every view is the same person in all of them.
+
+use geometry::Camera;
+use nalgebra::Point2;
+
+/// A person whom a network found in a view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenPerson {
+    /// The 14 joints of `skeleton::PARSE14`, pixels of the picture, and how sure the network is of each, 0 to 1.
+    pub joints: Vec<Option<([f64; 2], f64)>>,
+    /// Height of the box, as a share of that of the picture.
+    pub height: f64,
+}
+
+/// Rays farther apart, metres, do not mean the same person: the median over joints.
+const SAME_M: f64 = 0.20;
+/// Joints of a lower score say nothing about who it is.
+const LEAST_SCORE: f64 = 0.3;
+/// Most people of a view that are looked at, those of the largest boxes first.
+const MOST: usize = 4;
+
+/// Chooses one person in every view, so that their rays meet; the largest one where several people could be meant.
+///
+/// * `views`: the camera and the people of every view.
+/// * Returns the index of the person of each view; `None` where nobody fits the others. A single view keeps its largest
+///   person.
+pub fn same_person(views: &[(&Camera, &[SeenPerson])]) -> Vec<Option<usize>> {
+    let by_size = |people: &[SeenPerson]| {
+        let mut order: Vec<usize> = (0..people.len()).collect();
+        order.sort_by(|&a, &b| people[b].height.total_cmp(&people[a].height));
+        order.truncate(MOST);
+        order
+    };
+    let mut best: (f64, Vec<Option<usize>>) = (f64::NEG_INFINITY, vec![None; views.len()]);
+    // Everybody in turn is the person; every other view gives whoever lies nearest to the rays.
+    for (nth, (camera, people)) in views.iter().enumerate() {
+        for person in by_size(people) {
+            let mut chosen = vec![None; views.len()];
+            chosen[nth] = Some(person);
+            let mut size = people[person].height;
+            for (other, (their_camera, theirs)) in views.iter().enumerate() {
+                if other == nth {
+                    continue;
+                }
+                let distance =
+                    |it: &usize| apart((*camera, &people[person]), (*their_camera, &theirs[*it]));
+                let near = by_size(theirs)
+                    .into_iter()
+                    .filter_map(|it| Some((distance(&it)?, it)));
+                let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((_, it)) = nearest.filter(|it| it.0 < SAME_M) {
+                    chosen[other] = Some(it);
+                    size += theirs[it].height;
+                }
+            }
+            // Who is seen by more views is the person, then who is larger.
+            let n = chosen.iter().flatten().count();
+            let score = 100.0 * n as f64 + size;
+            if score > best.0 {
+                best = (score, chosen);
+            }
+        }
+    }
+    best.1
+}
+
+/// The median distance between the rays of the joints that two views show; `None` if they share fewer than three.
+fn apart(a: (&Camera, &SeenPerson), b: (&Camera, &SeenPerson)) -> Option<f64> {
+    let ray = |camera: &Camera, joint: &Option<([f64; 2], f64)>| {
+        let (at, score) = (*joint)?;
+        (score >= LEAST_SCORE).then(|| camera.ray(&Point2::from(at)))?
+    };
+    let both = a.1.joints.iter().zip(&b.1.joints);
+    let mut distances: Vec<f64> = both
+        .filter_map(|(in_a, in_b)| {
+            let (a, b) = (ray(a.0, in_a)?, ray(b.0, in_b)?);
+            let normal = a.direction.cross(&b.direction);
+            let length = normal.norm();
+            (length > 1e-3).then(|| ((b.origin - a.origin).dot(&normal) / length).abs())
+        })
+        .collect();
+    if distances.len() < 3 {
+        return None;
+    }
+    distances.sort_by(f64::total_cmp);
+    Some(distances[distances.len() / 2])
+}
