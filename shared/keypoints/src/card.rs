@@ -151,6 +151,9 @@ pub enum Codec {
         /// Order of its axes: `[1, keypoints, rows, columns]`, or keypoints last.
         #[serde(default)]
         layout: Layout,
+        /// Maps after those of the keypoints that are not read: the background, fields between joints.
+        #[serde(default)]
+        further: usize,
         /// Whether the corner cells lie on the corner pixels (UDP: Huang et al. 2020); else a cell covers a whole number of
         /// pixels from the corner of the input on.
         #[serde(default)]
@@ -242,7 +245,7 @@ pub enum ListUnit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeypointNames {
-    /// A known set: `coco-17`, `halpe-26`, `body-25`, `mpii-16`, `lsp-14`.
+    /// A known set: [`SETS`](crate::SETS).
     pub set: Option<String>,
     /// Their names, in the order of the output, in place of a set.
     pub names: Option<Vec<String>>,
@@ -361,7 +364,11 @@ impl Card {
 
     fn check_output(&self) -> Result<(), CardError> {
         match &self.output {
-            Codec::HeatMap { .. } => Ok(()),
+            Codec::HeatMap { further, .. } => {
+                demand(*further <= MAX_KEYPOINTS, "output.further", further, || {
+                    format!("0 to {MAX_KEYPOINTS}")
+                })
+            }
             Codec::Simcc {
                 bins_per_pixel,
                 nats,

@@ -38,6 +38,8 @@ pub struct HeatMaps<'a> {
     values: &'a [f32],
     layout: Layout,
     n: usize,
+    /// Maps of the output: of the keypoints, then others.
+    channels: usize,
     rows: usize,
     columns: usize,
 }
@@ -46,7 +48,7 @@ impl<'a> HeatMaps<'a> {
     /// Takes an output.
     ///
     /// * `shape`: of the output, one picture.
-    /// * `n`: number of keypoints of the card.
+    /// * `n`, `further`: number of keypoints of the card, and of maps after theirs, which are not read.
     ///
     /// # Errors
     ///
@@ -55,19 +57,23 @@ impl<'a> HeatMaps<'a> {
         values: &'a [f32],
         shape: &[usize],
         layout: Layout,
-        n: usize,
+        [n, further]: [usize; 2],
     ) -> Result<Self, OutputError> {
+        let channels = n + further;
         let sides = match (layout, shape) {
             (Layout::Planes, &[1, keypoints, rows, columns])
             | (Layout::Pixels, &[1, rows, columns, keypoints]) => Some([keypoints, rows, columns]),
             _ => None,
         };
         let fits = |[keypoints, rows, columns]: &[usize; 3]| {
-            *keypoints == n && *rows > 0 && *columns > 0 && values.len() == n * rows * columns
+            *keypoints == channels
+                && *rows > 0
+                && *columns > 0
+                && values.len() == channels * rows * columns
         };
         let expected = || match layout {
-            Layout::Planes => format!("[1, {n}, rows, columns]"),
-            Layout::Pixels => format!("[1, rows, columns, {n}]"),
+            Layout::Planes => format!("[1, {channels}, rows, columns]"),
+            Layout::Pixels => format!("[1, rows, columns, {channels}]"),
         };
         let Some([_, rows, columns]) = sides.filter(fits) else {
             return Err(OutputError::Shape {
@@ -80,6 +86,7 @@ impl<'a> HeatMaps<'a> {
             values,
             layout,
             n,
+            channels,
             rows,
             columns,
         })
@@ -100,7 +107,7 @@ impl<'a> HeatMaps<'a> {
         let cell = row * self.columns + column;
         self.values[match self.layout {
             Layout::Planes => keypoint * self.rows * self.columns + cell,
-            Layout::Pixels => cell * self.n + keypoint,
+            Layout::Pixels => cell * self.channels + keypoint,
         }]
     }
 
@@ -366,7 +373,7 @@ mod tests {
         let truth = [5.3, 9.8];
         for layout in [Layout::Planes, Layout::Pixels] {
             let values = bump(truth, layout);
-            let maps = HeatMaps::new(&values, &shape(layout), layout, 2).unwrap();
+            let maps = HeatMaps::new(&values, &shape(layout), layout, [2, 0]).unwrap();
             let found = |refine| maps.keypoints([48, 64], false, refine, Score::Share)[0];
             assert_eq!(found(Refine::None).at, [20.0, 40.0]);
             assert_eq!(found(Refine::Quarter).at, [21.0, 39.0]);
@@ -383,15 +390,37 @@ mod tests {
     #[test]
     fn corner_cells_lie_on_corner_pixels_where_the_card_says_so() {
         let values = bump([11.0, 15.0], Layout::Planes);
-        let maps = HeatMaps::new(&values, &[1, 2, 16, 12], Layout::Planes, 2).unwrap();
+        let maps = HeatMaps::new(&values, &[1, 2, 16, 12], Layout::Planes, [2, 0]).unwrap();
         let found = |udp| maps.keypoints([48, 64], udp, Refine::Quarter, Score::Share)[0].at;
         assert_eq!(found(false), [44.0, 60.0]);
         assert_eq!(found(true), [47.0, 63.0]);
     }
 
     #[test]
+    fn further_maps_are_counted_and_not_read() {
+        let maps = |values, shape, layout| {
+            let maps = HeatMaps::new(values, shape, layout, [1, 1]).unwrap();
+            maps.keypoints([2, 1], false, Refine::None, Score::Share)
+        };
+        let expected = Keypoint {
+            at: [1.0, 0.0],
+            score: 0.5,
+        };
+        let planes = maps(&[0.25, 0.5, 9.0, 0.0], &[1, 2, 1, 2], Layout::Planes);
+        assert_eq!(planes, [expected]);
+        let pixels = maps(&[0.25, 9.0, 0.5, 0.0], &[1, 1, 2, 2], Layout::Pixels);
+        assert_eq!(pixels, [expected]);
+        let refused = HeatMaps::new(&[0.0; 2], &[1, 1, 1, 2], Layout::Planes, [1, 1]);
+        let refused = refused.unwrap_err().to_string();
+        assert!(
+            refused.contains("expected [1, 2, rows, columns]"),
+            "{refused}"
+        );
+    }
+
+    #[test]
     fn log_odds_become_shares() {
-        let maps = HeatMaps::new(&[0.0, 2.0], &[1, 1, 1, 2], Layout::Planes, 1).unwrap();
+        let maps = HeatMaps::new(&[0.0, 2.0], &[1, 1, 1, 2], Layout::Planes, [1, 0]).unwrap();
         let found = maps.keypoints([2, 1], false, Refine::None, Score::LogOdds)[0];
         assert!((found.score - 0.880_797).abs() < 1e-6);
     }
@@ -433,7 +462,7 @@ mod tests {
         let values = [0.0_f32; 24];
         let wrong = [&[1, 3, 2, 4][..], &[1, 2, 3, 5], &[2, 3, 4], &[1, 2, 0, 4]];
         for shape in wrong {
-            let refused = HeatMaps::new(&values, shape, Layout::Planes, 2).unwrap_err();
+            let refused = HeatMaps::new(&values, shape, Layout::Planes, [2, 0]).unwrap_err();
             assert!(
                 refused
                     .to_string()
@@ -441,7 +470,7 @@ mod tests {
                 "{refused}"
             );
         }
-        let right = HeatMaps::new(&values, &[1, 3, 4, 2], Layout::Pixels, 2);
+        let right = HeatMaps::new(&values, &[1, 3, 4, 2], Layout::Pixels, [2, 0]);
         assert_eq!(right.unwrap().size(), [3, 4]);
         let refused = SimCc::new([&values; 2], [&[1, 2, 12], &[1, 2, 11]], [12, 12], 2);
         assert!(
@@ -459,7 +488,7 @@ mod tests {
         );
         let mut odd = values;
         odd[7] = f32::NAN;
-        let refused = HeatMaps::new(&odd, &[1, 2, 3, 4], Layout::Planes, 2).unwrap_err();
+        let refused = HeatMaps::new(&odd, &[1, 2, 3, 4], Layout::Planes, [2, 0]).unwrap_err();
         assert_eq!(refused.to_string(), "value 7 of the output is NaN");
     }
 }

@@ -18,6 +18,7 @@ mod card;
 mod decode;
 mod detector;
 mod names;
+mod shipped;
 mod window;
 
 pub use card::{
@@ -26,5 +27,6 @@ pub use card::{
 };
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
 pub use detector::{Boxes, DetectorCard, PersonBox};
-pub use names::{BODY_25, COCO_17, HALPE_26, LSP_14, MPII_16, SETS, joint_rows};
+pub use names::{BODY_25, COCO_17, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS, joint_rows};
+pub use shipped::SHIPPED;
 pub use window::Window;

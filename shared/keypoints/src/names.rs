@@ -82,6 +82,28 @@ pub const BODY_25: [&str; 25] = [
     "right heel",
 ];
 
+/// OpenPose's older set, of networks that were trained on COCO.
+pub const OPENPOSE_18: [&str; 18] = [
+    "nose",
+    "neck",
+    "right shoulder",
+    "right elbow",
+    "right wrist",
+    "left shoulder",
+    "left elbow",
+    "left wrist",
+    "right hip",
+    "right knee",
+    "right ankle",
+    "left hip",
+    "left knee",
+    "left ankle",
+    "right eye",
+    "left eye",
+    "right ear",
+    "left ear",
+];
+
 /// Those of MPII Human Pose.
 pub const MPII_16: [&str; 16] = [
     "right ankle",
@@ -121,10 +143,11 @@ pub const LSP_14: [&str; 14] = [
 ];
 
 /// The sets that a card can name.
-pub const SETS: [(&str, &[&str]); 5] = [
+pub const SETS: [(&str, &[&str]); 6] = [
     ("coco-17", &COCO_17),
     ("halpe-26", &HALPE_26),
     ("body-25", &BODY_25),
+    ("openpose-18", &OPENPOSE_18),
     ("mpii-16", &MPII_16),
     ("lsp-14", &LSP_14),
 ];

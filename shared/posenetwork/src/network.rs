@@ -268,7 +268,10 @@ impl<'a> Sight<'a> {
         let [width, height] = self.network.size();
         let first = &self.outputs[0];
         let read = match &card.output {
-            Codec::HeatMap { layout, .. } => {
+            Codec::HeatMap {
+                layout, further, ..
+            } => {
+                let n = [n, *further];
                 HeatMaps::new(&first.values, &first.shape, *layout, n).map(Read::Maps)
             }
             Codec::Simcc { bins_per_pixel, .. } => {

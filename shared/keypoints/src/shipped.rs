@@ -1,0 +1,75 @@
+//! The cards of published networks that ship with Parallax; their weights do not.
+
+/// The cards of `configs/networks`: the name of the file without its ending, and the text.
+pub const SHIPPED: [(&str, &str); 8] = [
+    (
+        "rtmpose-coco17",
+        include_str!("../../../configs/networks/rtmpose-coco17.toml"),
+    ),
+    (
+        "rtmpose-halpe26",
+        include_str!("../../../configs/networks/rtmpose-halpe26.toml"),
+    ),
+    (
+        "vitpose-s",
+        include_str!("../../../configs/networks/vitpose-s.toml"),
+    ),
+    (
+        "hrnet-w32",
+        include_str!("../../../configs/networks/hrnet-w32.toml"),
+    ),
+    (
+        "pp-tinypose",
+        include_str!("../../../configs/networks/pp-tinypose.toml"),
+    ),
+    (
+        "movenet-lightning",
+        include_str!("../../../configs/networks/movenet-lightning.toml"),
+    ),
+    (
+        "blazepose-landmarks",
+        include_str!("../../../configs/networks/blazepose-landmarks.toml"),
+    ),
+    (
+        "lightweight-openpose",
+        include_str!("../../../configs/networks/lightweight-openpose.toml"),
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{Card, joint_rows};
+
+    #[test]
+    fn every_card_is_read_and_says_where_all_joints_lie() {
+        for (name, text) in SHIPPED {
+            let card = Card::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(
+                !card.weights.is_empty() && !card.licence.is_empty(),
+                "{name}"
+            );
+            let missing = joint_rows(&card.names())
+                .iter()
+                .filter(|it| it.is_none())
+                .count();
+            assert_eq!(missing, 0, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_file_of_the_folder_is_listed() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/networks");
+        let files = std::fs::read_dir(folder).unwrap();
+        let names = files.map(|it| it.unwrap().path());
+        let mut names: Vec<_> = names
+            .map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned())
+            .collect();
+        names.sort();
+        let mut listed = SHIPPED.map(|it| it.0);
+        listed.sort_unstable();
+        assert_eq!(names, listed);
+    }
+}
