@@ -11,6 +11,7 @@ pub(crate) mod eval;
 pub(crate) mod fuse_frame;
 pub(crate) mod judge;
 pub(crate) mod model;
+pub(crate) mod network;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod run;

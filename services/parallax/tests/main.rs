@@ -14,6 +14,7 @@ mod full;
 mod live;
 #[cfg(feature = "long-tests")]
 mod memory;
+mod networks;
 mod nonsense;
 mod parity;
 mod processes;

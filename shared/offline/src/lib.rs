@@ -12,6 +12,7 @@
 //! * [`joints`]: where joints lie among the parts of a model, from annotated people.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`examples`]: what a model takes for each type of its parts.
+//! * [`network`]: networks that find keypoints, with their cards.
 //! * [`pictures`]: pictures and videos that are searched; [`sheet`]: thumbnails with what was found.
 //! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
@@ -31,6 +32,7 @@ pub mod eval;
 pub mod examples;
 pub mod joints;
 pub mod judged;
+pub mod network;
 pub mod orientation;
 pub mod person;
 pub mod pictures;

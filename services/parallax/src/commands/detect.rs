@@ -1,5 +1,7 @@
 //! `parallax detect`: finds people in single images.
 
+mod by_network;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -9,12 +11,15 @@ use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use kernels::Rgb8View;
 use launch::inputs::{self, Joints};
 use launch::output;
+use offline::network::NetworkFile;
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
+use posenetwork::PoseNetwork;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::JointSet;
 
+use super::network::{Outline, outline};
 use crate::describe::{self, NamedJoints, Placed};
 
 /// Default of `--size`: the longest side of a searched image, pixels.
@@ -43,12 +48,18 @@ With --json one line per image, best detection first:
      \"level\", \"scale\", \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
 Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
 
+With --network a network of your own says where the keypoints are (docs/networks.md). It looks into the box that --box gives; \
+without it into the boxes that the filters find on the picture at 640 pixels (or --size, if smaller), widened by 10 %. A detection is then
+    {\"score\": the mean of its joints', \"box\", \"box_from\": \"given\" or \"filters\",
+     \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}
+
 Examples:
     parallax detect photo.jpg
     parallax detect folder/ --model parse.mat --threshold -0.5 --json > people.jsonl
     parallax detect *.png --overlay drawn/
     parallax detect clip.mp4 --every 10 --frames 20 --overlay drawn/
-    parallax detect folder/ --sheet sheet.png")]
+    parallax detect folder/ --sheet sheet.png
+    parallax detect photo.jpg --network pose.onnx --box 120,40,300,460 --overlay drawn/")]
 pub(crate) struct Arguments {
     /// Images, folders of images, or videos.
     #[arg(required = true)]
@@ -99,9 +110,36 @@ pub(crate) struct Arguments {
     /// processor with AMX.
     #[arg(long, value_name = "NAME", default_value = "f32", value_parser = precision)]
     precision: Precision,
+    /// Keypoints by this network (.onnx) in place of the filters' parts.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["joints", "joint_map"])]
+    network: Option<PathBuf>,
+    /// The card of the network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    #[arg(long, value_name = "CARD", requires = "network")]
+    card: Option<PathBuf>,
+    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
+    #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "network", allow_hyphen_values = true)]
+    outline: Option<Outline>,
 }
 
 impl Arguments {
+    /// The network, if one is named.
+    fn fitted_network(&self) -> Result<Option<PoseNetwork>, Failure> {
+        let Some(file) = &self.network else {
+            return Ok(None);
+        };
+        let read = NetworkFile::open(file, self.card.as_deref())?;
+        read.fitted().map(Some)
+    }
+
+    /// The longest side that is searched; none: all pixels.
+    fn longest(&self) -> Option<usize> {
+        let size = match self.network {
+            Some(_) => self.size.min(by_network::SIZE),
+            None => self.size,
+        };
+        (!self.full).then_some(size)
+    }
+
     /// The frames of a video to search.
     fn wanted(&self) -> Frames {
         Frames {
@@ -149,6 +187,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             max: arguments.max,
         },
         search: Search::in_precision(arguments.precision, model).or_fail(ExitKind::Usage)?,
+        network: arguments.fitted_network()?,
     };
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
@@ -197,6 +236,7 @@ struct Detector<'a> {
     joints: NamedJoints,
     search: Search,
     settings: CandidateSettings,
+    network: Option<PoseNetwork>,
 }
 
 impl Detector<'_> {
@@ -221,9 +261,15 @@ impl Detector<'_> {
                 Ok(None) => return Ok(Ok(())),
                 Err(failure) => return Ok(Err(failure)),
             };
-            let size = (!self.arguments.full).then_some(self.arguments.size);
-            let searched = Searched::new(&picture, size, &self.search);
-            let searched = match searched {
+            if let Some(network) = &self.network {
+                match self.look(network, &picture, sheet.as_deref_mut())? {
+                    Ok(()) => *n_searched += 1,
+                    Err(failure) => return Ok(Err(failure)),
+                }
+                continue;
+            }
+            let size = self.arguments.longest();
+            let searched = match Searched::new(&picture, size, &self.search) {
                 Ok(searched) => searched,
                 Err(failure) => return Ok(Err(failure)),
             };

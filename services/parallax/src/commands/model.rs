@@ -9,7 +9,18 @@ use launch::{inputs, output};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
-use super::judge;
+use super::{judge, network};
+
+/// What `show` says of networks.
+const NETWORKS: &str = "\
+Of a network (.onnx) it prints inputs and outputs, and, by its card, what they mean: preparation, codec, keypoints, the joints \
+that follow from them, licence. A network that does not fit its card is named with what differs, and the exit code is 4. Without \
+a card the nearest of configs/networks is named. Cards: docs/networks.md.
+
+Examples:
+    parallax model show person.fmp
+    parallax model show pose.onnx --card configs/networks/rtmpose-coco17.toml
+    parallax model show pose.onnx --image person.jpg --box 120,40,300,460 --out seen.png";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
@@ -22,9 +33,10 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print the structure of a model, or draw it.
+    /// Print the structure of a model, or draw it; explain a network that finds keypoints (.onnx).
+    #[command(after_help = NETWORKS)]
     Show {
-        /// The model file.
+        /// The model file, or the network.
         file: PathBuf,
         /// Print JSON.
         #[arg(long)]
@@ -37,6 +49,9 @@ pub(crate) enum Command {
         /// part, cut from these images.
         #[arg(long, value_name = "IMAGES", num_args = 1.., requires = "html")]
         examples: Vec<PathBuf>,
+        /// Options for networks.
+        #[command(flatten)]
+        network: network::Arguments,
     },
     /// Evaluate a model on annotated people: PCP and PCK.
     Judge(judge::Arguments),
@@ -53,8 +68,20 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
             examples,
             ..
         } => draw(file, html, examples),
+        Command::Show {
+            file,
+            json,
+            network,
+            ..
+        } if network.is_given() || is_network(file) => network::show(file, *json, network),
         Command::Show { file, json, .. } => show(file, *json),
     }
+}
+
+/// Whether a file is called as networks are.
+fn is_network(file: &Path) -> bool {
+    let ending = file.extension();
+    ending.is_some_and(|it| it.eq_ignore_ascii_case("onnx"))
 }
 
 fn import(file: &Path, out: &Path) -> Result<ExitCode, Failure> {

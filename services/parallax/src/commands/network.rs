@@ -1,0 +1,353 @@
+//! `parallax model show` of a network that finds keypoints: what it takes and gives, its card, what it sees in a picture.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use inference::{Description, Port, written};
+use keypoints::{Card, Codec, Fit, joint_rows};
+use launch::output;
+use offline::network::{self, CardPlace, NetworkFile};
+use offline::pictures::{Frames, Pictures};
+use posenetwork::{PoseNetwork, Sight, Workspace};
+use runtime::{ExitKind, Failure, OrFail as _};
+use serde_json::{Value, json};
+use skeleton::PARSE14;
+
+/// Options of `model show` for networks.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Of a network (.onnx): its card; if not given, the file beside the network whose ending is .toml, or the entry
+    /// `parallax.card` of the network.
+    #[arg(long, value_name = "CARD", conflicts_with = "html")]
+    card: Option<PathBuf>,
+    /// Of a network: a picture of a person that it shall look at.
+    #[arg(
+        long,
+        value_name = "PICTURE",
+        requires = "out",
+        conflicts_with = "html"
+    )]
+    image: Option<PathBuf>,
+    /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the whole picture.
+    #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
+    outline: Option<Outline>,
+    /// Draw the joints, and the map of each, into this PNG file.
+    #[arg(long, value_name = "FILE", requires = "image")]
+    out: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Whether any is given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.card.is_some() || self.image.is_some()
+    }
+}
+
+/// A box: left, top, right, bottom, pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Outline(pub(crate) [f64; 4]);
+
+/// Parses a box.
+pub(crate) fn outline(text: &str) -> Result<Outline, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|it| it.trim().parse()).collect();
+    let corners = numbers.ok().and_then(|it| <[f64; 4]>::try_from(it).ok());
+    let is_box =
+        |it: &[f64; 4]| it.iter().all(|it| it.is_finite()) && it[0] < it[2] && it[1] < it[3];
+    let corners = corners.filter(is_box);
+    corners.map(Outline).ok_or_else(|| {
+        format!(
+            "expected left,top,right,bottom in pixels, left < right and top < bottom, got {text:?}"
+        )
+    })
+}
+
+/// Shows a network.
+pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let read = NetworkFile::open(file, arguments.card.as_deref())?;
+    let description = read.description().clone();
+    let card = read.card().cloned();
+    let fitted = card.is_some().then(|| read.fitted()).transpose();
+    let found = match (&fitted, &arguments.image) {
+        (Ok(Some(network)), Some(image)) => Some(look(network, image, arguments)?),
+        _ => None,
+    };
+    if as_json {
+        let mut value = json!({
+            "schema_version": 1,
+            "file": file,
+            "inputs": ports(&description.inputs),
+            "outputs": ports(&description.outputs),
+            "card": card.as_ref().map(|(card, place)| card_json(card, place)),
+            "misfit": fitted.as_ref().err().map(ToString::to_string),
+        });
+        if card.is_none() {
+            value["nearest_cards"] = json!(network::nearest(&description));
+        }
+        if let Some(found) = &found {
+            value["keypoints"] = json!(found);
+        }
+        output::json(&value)?;
+    } else {
+        in_words(file, &description, card.as_ref())?;
+        if fitted.is_ok() && card.is_some() {
+            output::line("  the network fits its card")?;
+        }
+        for it in found.iter().flatten() {
+            output::line(format_args!(
+                "  {:<20} ({:8.1}, {:8.1})  {:.2}",
+                it["name"].as_str().unwrap_or_default(),
+                it["x"].as_f64().unwrap_or_default(),
+                it["y"].as_f64().unwrap_or_default(),
+                it["score"].as_f64().unwrap_or_default()
+            ))?;
+        }
+    }
+    if let (Some(out), Some(_)) = (&arguments.out, &found) {
+        output::message(format_args!("wrote {}", out.display()));
+    }
+    let fitted = fitted?;
+    if fitted.is_none() && arguments.image.is_some() {
+        let message = format!(
+            "{}: a network without a card cannot look at a picture",
+            file.display()
+        );
+        return Err(Failure::new(ExitKind::Input, message).with_hint("give one with --card"));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The keypoints that a network finds in a picture, which is drawn.
+fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Vec<Value>, Failure> {
+    let every = Frames {
+        every: 1,
+        most: Some(1),
+    };
+    let picture = Pictures::open(image, every)?.next_picture()?;
+    let picture = picture
+        .ok_or_else(|| Failure::new(ExitKind::Input, format!("{}: no picture", image.display())))?;
+    let whole = [picture.size.width as f64, picture.size.height as f64];
+    let whole = [0.0, 0.0, whole[0] - 1.0, whole[1] - 1.0];
+    let outline = arguments.outline.map_or(whole, |it| it.0);
+    let mut workspace = Workspace::default();
+    let sight = network::look(network, &picture, outline, &mut workspace)?;
+    if let Some(out) = &arguments.out {
+        let sheet = network::sheet(&picture, &sight).or_fail(ExitKind::Input)?;
+        sheet.save_png(out).or_fail(ExitKind::Input)?;
+    }
+    keypoints_json(&sight)
+}
+
+/// The keypoints with their names, pixels of the picture.
+pub(crate) fn keypoints_json(sight: &Sight<'_>) -> Result<Vec<Value>, Failure> {
+    let found = sight.keypoints().or_fail(ExitKind::Input)?;
+    let names = sight.network().names().iter();
+    let each = names.zip(found);
+    let each = each
+        .map(|(name, it)| json!({ "name": name, "x": it.at[0], "y": it.at[1], "score": it.score }));
+    Ok(each.collect())
+}
+
+fn ports(ports: &[Port]) -> Vec<Value> {
+    let each = ports.iter();
+    each.map(|it| {
+        let sides: Vec<String> = it.sides.iter().map(ToString::to_string).collect();
+        json!({ "name": it.name, "sides": sides })
+    })
+    .collect()
+}
+
+fn card_json(card: &Card, place: &CardPlace) -> Value {
+    let rows = joint_rows(&card.names());
+    let joints = PARSE14.joints.iter().zip(rows);
+    let missing: Vec<&str> = joints
+        .filter(|it| it.1.is_none())
+        .map(|it| it.0.name)
+        .collect();
+    json!({
+        "from": place.to_string(),
+        "name": card.name,
+        "licence": card.licence,
+        "weights": card.weights,
+        "input": card.input,
+        "crop": card.crop,
+        "output": card.output,
+        "keypoints": card.names(),
+        "sides": card.keypoints.sides,
+        "missing_joints": missing,
+    })
+}
+
+fn in_words(
+    file: &Path,
+    description: &Description,
+    card: Option<&(Card, CardPlace)>,
+) -> Result<(), Failure> {
+    output::line(format_args!("{}: a network", file.display()))?;
+    for (what, ports) in [
+        ("input", &description.inputs),
+        ("output", &description.outputs),
+    ] {
+        for it in ports {
+            let sides = match &it.sides[..] {
+                [] => "of sides that the file does not tell".to_owned(),
+                sides => written(sides),
+            };
+            output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
+        }
+    }
+    let Some((card, place)) = card else {
+        return without_card(file, description);
+    };
+    output::line(format_args!("  card   {place}: {}", card.name))?;
+    output::line(format_args!("  takes  {}", taken(card)))?;
+    output::line(format_args!("  gives  {}", given(card)))?;
+    let names = card.names();
+    output::line(format_args!(
+        "  {} keypoints: {}",
+        names.len(),
+        names.join(", ")
+    ))?;
+    joints_in_words(&names)?;
+    for (what, text) in [("licence", &card.licence), ("weights", &card.weights)] {
+        if !text.is_empty() {
+            output::line(format_args!("  {what} {text}"))?;
+        }
+    }
+    Ok(())
+}
+
+fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
+    let mut entries = description.metadata.iter();
+    if entries.any(|it| it.0 == viewquality::key::VERSION) {
+        return output::line(
+            "  it predicts the errors of single views (`[quality]` of a deployment), and finds no keypoints",
+        );
+    }
+    let nearest = network::nearest(description);
+    output::line("  no card: none beside it, none in it, none given")?;
+    let said = match &nearest[..] {
+        [] => "none of configs/networks comes near".to_owned(),
+        [one] => format!("configs/networks/{one}.toml comes nearest"),
+        several => format!(
+            "of configs/networks {} come equally near",
+            several.join(".toml, ") + ".toml"
+        ),
+    };
+    output::line(format_args!("  {said}, by the sides of input and outputs"))?;
+    output::line(format_args!(
+        "  copy one to {}, change what differs (docs/networks.md), and show the network again",
+        file.with_extension("toml").display()
+    ))
+}
+
+fn taken(card: &Card) -> String {
+    let input = &card.input;
+    let fit = match card.crop.fit {
+        Fit::Widen => "widened to the shape of the input",
+        Fit::Stretch => "stretched to the input",
+    };
+    format!(
+        "{} wide, {} high, {}, {}, {}; (colour x {} - {:?}) / {:?}; the box x {}, {fit}",
+        input.width,
+        input.height,
+        word(&json!(input.colour)),
+        word(&json!(input.layout)),
+        word(&json!(input.numbers)),
+        input.scale,
+        input.mean,
+        input.std,
+        card.crop.margin,
+    )
+}
+
+fn given(card: &Card) -> String {
+    match &card.output {
+        Codec::HeatMap {
+            udp,
+            refine,
+            score,
+            further,
+            ..
+        } => format!(
+            "a map for every keypoint and {further} further ones; corner cells on corner pixels: {udp}; maxima refined: {}; \
+             values: {}",
+            word(&json!(refine)),
+            word(&json!(score))
+        ),
+        Codec::Simcc {
+            x,
+            y,
+            bins_per_pixel,
+            ..
+        } => format!("`{x}` for columns, `{y}` for rows, {bins_per_pixel} bins for a pixel"),
+        Codec::Keypoints {
+            fields,
+            unit,
+            score,
+            ..
+        } => {
+            let fields = fields.iter().map(|it| json!(it));
+            let fields: Vec<String> = fields.map(|it| word(&it).to_owned()).collect();
+            format!(
+                "a list of {}; unit: {}; scores: {}",
+                fields.join(", "),
+                word(&json!(unit)),
+                word(&json!(score))
+            )
+        }
+    }
+}
+
+/// A value of a card as it is written there.
+fn word(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+fn joints_in_words(names: &[String]) -> Result<(), Failure> {
+    let rows = joint_rows(names);
+    let joints = PARSE14.joints.iter().zip(&rows);
+    let missing = joints.clone().filter(|it| it.1.is_none());
+    let missing: Vec<&str> = missing.map(|it| it.0.name).collect();
+    let derived = joints.filter_map(|(joint, row)| match row.as_deref() {
+        Some(several @ [_, _, ..]) => {
+            let from: Vec<String> = several
+                .iter()
+                .map(|(keypoint, weight)| format!("{weight:+.2} {}", names[*keypoint]))
+                .collect();
+            Some(format!("{} = {}", joint.name, from.join(" ")))
+        }
+        _ => None,
+    });
+    let n = PARSE14.joints.len();
+    output::line(format_args!("  joints {} of {n}", n - missing.len()))?;
+    if !missing.is_empty() {
+        output::line(format_args!("    missing: {}", missing.join(", ")))?;
+    }
+    for line in derived {
+        output::line(format_args!("    {line}"))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_has_four_numbers_and_an_extent() {
+        assert_eq!(outline("1,2, 3.5,4"), Ok(Outline([1.0, 2.0, 3.5, 4.0])));
+        assert_eq!(outline("-5,-2,3,4"), Ok(Outline([-5.0, -2.0, 3.0, 4.0])));
+        for text in [
+            "",
+            "1,2,3",
+            "1,2,3,4,5",
+            "3,2,1,4",
+            "1,4,3,4",
+            "1,2,nan,4",
+            "0,0,inf,1",
+        ] {
+            assert!(outline(text).is_err(), "{text}");
+        }
+    }
+}

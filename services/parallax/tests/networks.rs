@@ -1,0 +1,257 @@
+//! Networks that find keypoints: shown, and in place of the filters' parts.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::common;
+
+use common::{Case, Ended, PLAIN};
+use onnx::{Attribute, Network, Side};
+use serde_json::Value;
+
+/// Columns and rows of the input.
+const SIDES: [usize; 2] = [48, 64];
+
+const CARD: &str = r#"
+format = "parallax-keypoint-network"
+version = 1
+name = "Three colours"
+licence = "CC0"
+[input]
+width = 48
+height = 64
+scale = 0.00392156862745098
+[crop]
+margin = 1.0
+[output]
+codec = "heat-map"
+refine = "none"
+[keypoints]
+names = ["head top", "left hip", "right hip"]
+"#;
+
+/// Three maps of a quarter of the input's sides: the means of red, green and blue; `operator` makes them from these.
+fn network(operator: &str) -> Network {
+    let mut net = Network::default();
+    let [width, height] = SIDES;
+    let sides = |n: usize| [1, 3, height / n, width / n].map(Side::Fixed).to_vec();
+    net.inputs.push(("picture".to_owned(), sides(1)));
+    net.outputs.push(("maps".to_owned(), sides(4)));
+    let four = || Attribute::Ints(vec![4, 4]);
+    let attributes = vec![("kernel_shape", four()), ("strides", four())];
+    net.node("AveragePool", &["picture"], "means", attributes);
+    net.node(operator, &["means"], "maps", vec![]);
+    net
+}
+
+/// A case with a network, its card, and a picture of 96 by 128 pixels with three blocks of colour.
+fn case(name: &str) -> Case {
+    let case = Case::new(name, &[1, 1], PLAIN);
+    case.write("net.onnx", network("Relu").file());
+    case.write("card.toml", CARD);
+    let mut picture = image::RgbImage::new(96, 128);
+    for (channel, [left, top]) in BLOCKS.into_iter().enumerate() {
+        for (row, column) in (0..8).flat_map(|row| (0..8).map(move |it| (row, it))) {
+            picture.get_pixel_mut(left + column, top + row).0[channel] = 255;
+        }
+    }
+    picture.save(case.path("blocks.png")).unwrap();
+    case
+}
+
+/// The top-left corners of the blocks; each fills one cell of a map.
+const BLOCKS: [[u32; 2]; 3] = [[40, 8], [56, 64], [24, 72]];
+
+fn run(case: &Case, arguments: &[&str]) -> Ended {
+    case.start(arguments).wait()
+}
+
+fn json(ended: &Ended) -> Value {
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    serde_json::from_str(ended.stdout.trim()).unwrap()
+}
+
+#[test]
+fn a_network_is_explained_by_its_card() {
+    let case = case("network-shown");
+    let ended = run(&case, &["model", "show", "net.onnx", "--card", "card.toml"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for words in [
+        "`picture` [1, 3, 64, 48]",
+        "`maps` [1, 3, 16, 12]",
+        "Three colours",
+        "joints 3 of 14",
+        "missing: right ankle",
+        "licence CC0",
+        "fits its card",
+    ] {
+        assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
+    }
+    let mut net = network("Relu");
+    net.metadata
+        .push(("parallax.card".to_owned(), CARD.to_owned()));
+    case.write("inside.onnx", net.file());
+    let shown = json(&run(&case, &["model", "show", "inside.onnx", "--json"]));
+    assert_eq!(shown["card"]["name"], "Three colours", "{shown}");
+    assert_eq!(shown["inputs"][0]["sides"][3], "48");
+    assert!(shown["misfit"].is_null());
+}
+
+#[test]
+fn a_network_without_a_card_gets_the_nearest_ones_named() {
+    let case = case("network-bare");
+    let mut net = network("Relu");
+    net.inputs[0].1 = [1, 3, 256, 192].map(Side::Fixed).to_vec();
+    net.outputs[0].1 = vec![
+        Side::Fixed(1),
+        Side::Fixed(17),
+        Side::Named("h"),
+        Side::Named("w"),
+    ];
+    case.write("bare.onnx", net.file());
+    let ended = run(&case, &["model", "show", "bare.onnx"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for words in ["no card", "hrnet-w32.toml", "bare.toml", "docs/networks.md"] {
+        assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
+    }
+    let ended = run(&case, &["detect", "blocks.png", "--network", "bare.onnx"]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
+}
+
+#[test]
+fn what_does_not_fit_is_named_with_the_numbers() {
+    let case = case("network-misfit");
+    for (from, to, words) in [
+        ("width = 48", "width = 96", &["[1, 3, 64, 48]", "96"][..]),
+        (
+            "\"heat-map\"",
+            "\"heat-map\"\nmaps = \"other\"",
+            &["`other`", "`maps`"],
+        ),
+        (
+            ", \"right hip\"",
+            "",
+            &["[1, 3, 16, 12]", "[1, 2, rows, columns]"],
+        ),
+        ("[crop]", "name = \"x\"\n[crop]", &["`x`", "`picture`"]),
+        (
+            "margin = 1.0",
+            "margin = 9.0",
+            &["wrong.toml", "crop.margin", "0.5 to 4"],
+        ),
+    ] {
+        case.write("wrong.toml", CARD.replace(from, to));
+        for arguments in [
+            &["model", "show", "net.onnx", "--card", "wrong.toml"][..],
+            &[
+                "detect",
+                "blocks.png",
+                "--network",
+                "net.onnx",
+                "--card",
+                "wrong.toml",
+            ],
+        ] {
+            let ended = run(&case, arguments);
+            assert_eq!(ended.status.code(), Some(4), "{from}: {}", ended.stderr);
+            for words in words {
+                assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+            }
+        }
+    }
+}
+
+#[test]
+fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
+    let case = case("network-detect");
+    let plain = ["blocks.png", "--network", "net.onnx", "--card", "card.toml"];
+    let boxed = [
+        "--box",
+        "0,0,96,128",
+        "--overlay",
+        "drawn",
+        "--sheet",
+        "sheet.png",
+    ];
+    let arguments = [&["detect", "--json"], &plain[..], &boxed].concat();
+    let line = json(&run(&case, &arguments));
+    let person = &line["detections"][0];
+    assert_eq!(person["box_from"], "given", "{line}");
+    for (keypoint, [left, top]) in BLOCKS.into_iter().enumerate() {
+        let it = &person["keypoints"][keypoint];
+        // The first pixel of the cell, which is two pixels of the picture for one.
+        assert_eq!(it["x"], f64::from(left), "{it}");
+        assert_eq!(it["y"], f64::from(top), "{it}");
+        assert!(it["score"].as_f64().unwrap() > 0.6, "{it}");
+    }
+    assert_eq!(person["joints"]["head"][1], 8.0);
+    assert!(person["joints"]["neck"].is_null());
+    assert!(case.path("drawn/blocks.png").is_file() && case.path("sheet.png").is_file());
+
+    let arguments = ["model", "show", "net.onnx", "--card", "card.toml", "--json"];
+    let look = [
+        "--image",
+        "blocks.png",
+        "--box",
+        "0,0,96,128",
+        "--out",
+        "seen.png",
+    ];
+    let shown = json(&run(&case, &[&arguments[..], &look].concat()));
+    assert_eq!(shown["keypoints"], person["keypoints"]);
+    // The joints, and a map of each of the three.
+    let sheet = image::open(case.path("seen.png")).unwrap();
+    assert!(sheet.width() > 4 * 192, "{}", sheet.width());
+}
+
+#[test]
+fn without_a_box_the_filters_find_it_and_that_is_said() {
+    let case = case("network-search");
+    let model = [
+        "--model",
+        "model.plx",
+        "--network",
+        "net.onnx",
+        "--card",
+        "card.toml",
+    ];
+    let ended = run(&case, &[&["detect", "a/0000.png"], &model[..]].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let said = "boxes by the filters at 96x128 of 96x128, widened by 10 %";
+    assert!(ended.stdout.contains(said), "{}", ended.stdout);
+    // Nobody.
+    let nobody = ["detect", "blocks.png", "--threshold", "1000"];
+    let ended = run(&case, &[&nobody[..], &model].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(ended.stdout.contains("0 detections"), "{}", ended.stdout);
+    let said = "the filters find nobody";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+}
+
+#[test]
+fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
+    let case = case("network-broken");
+    let bytes = network("Relu").file();
+    case.write("short.onnx", &bytes[..bytes.len() / 2]);
+    // The logarithm of 0, where the picture is black.
+    case.write("log.onnx", network("Log").file());
+    let with = |name: &str| {
+        let card = ["--card", "card.toml"];
+        run(
+            &case,
+            &[&["detect", "blocks.png", "--network", name], &card[..]].concat(),
+        )
+    };
+    for (name, words) in [
+        ("short.onnx", &["short.onnx", "truncated"]),
+        ("log.onnx", &["`maps`", "inf"]),
+        ("absent.onnx", &["absent.onnx", "No such file"]),
+    ] {
+        let ended = with(name);
+        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        for words in words {
+            assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+        }
+    }
+    let ended = run(&case, &["detect", "blocks.png", "--box", "0,0,9,9"]);
+    assert_eq!(ended.status.code(), Some(2), "a box without a network");
+}

@@ -1,0 +1,116 @@
+//! What a network sees, as a picture.
+
+use footage::{Canvas, Limb, Side, Size, Tile, compose, draw_limbs};
+use keypoints::Keypoint;
+use posenetwork::{JointMaps, LookError, MapSettings, Sight};
+use skeleton::PARSE14;
+
+use crate::pictures::Picture;
+
+/// Tiles of a row.
+const N_COLUMNS: usize = 5;
+/// Height of a tile, pixels.
+const HEIGHT: usize = 256;
+/// The colour of a map where it is 1.
+const HOT: [f64; 3] = [255.0, 40.0, 40.0];
+
+/// The lines between the joints of `skeleton::PARSE14`.
+pub fn limbs() -> Vec<Limb> {
+    let side = |joint: usize| match PARSE14.joints[joint].name {
+        name if name.starts_with("left") => Side::Left,
+        name if name.starts_with("right") => Side::Right,
+        _ => Side::Centre,
+    };
+    let limb = |&(from, to): &(usize, usize)| Limb {
+        from,
+        to,
+        side: match side(from) {
+            Side::Centre => side(to),
+            known => known,
+        },
+    };
+    PARSE14.limbs.iter().map(limb).collect()
+}
+
+/// Draws what a network sees in its window of a picture: first the joints, then for each of them its map over the window,
+/// under its name and its score from 0 to 1. Maps are drawn relative to their highest value, so that weak ones show.
+///
+/// # Errors
+///
+/// [`LookError::Output`]; never, once the network has looked.
+pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> {
+    let settings = MapSettings::default();
+    let mut maps = JointMaps::default();
+    maps.read(sight, &settings)?;
+    let network = sight.network();
+    let [width, height] = network.size();
+    let size = Size::new((HEIGHT * width / height).clamp(1, 4 * HEIGHT), HEIGHT);
+    let per_tile = [
+        width as f64 / size.width as f64,
+        height as f64 / size.height as f64,
+    ];
+    let window = *sight.window();
+    let place = |pixel: usize| {
+        let at = [pixel % size.width, pixel / size.width];
+        let at = [0, 1].map(|axis| (at[axis] as f64 + 0.5) * per_tile[axis] - 0.5);
+        window.in_picture(at)
+    };
+    let places: Vec<[f64; 2]> = (0..size.width * size.height).map(place).collect();
+    let plain: Vec<[u8; 3]> = places.iter().map(|it| colour(picture, *it)).collect();
+    let in_tile = |point: [f64; 2]| {
+        let at = window.in_input(point);
+        [0, 1].map(|axis| (at[axis] + 0.5) / per_tile[axis] - 0.5)
+    };
+    let mut joints = Canvas::from_rgb(size, plain.as_flattened());
+    let peaks = maps.peaks();
+    let points: Vec<[f64; 2]> = peaks
+        .iter()
+        .map(|it| it.map_or([f64::NAN; 2], |it| in_tile(it.at)))
+        .collect();
+    draw_limbs(&mut joints, &points, &limbs());
+    let mut tiles = vec![(joints, network.card().name.clone())];
+    for (joint, (named, peak)) in PARSE14.joints.iter().zip(peaks).enumerate() {
+        let Some(peak) = peak else {
+            continue;
+        };
+        let heat = places.iter().map(|it| {
+            let value = f64::from(maps.at(joint, *it)) / settings.lambda;
+            (value.exp() - settings.eps).max(0.0)
+        });
+        let heat: Vec<f64> = heat.collect();
+        let mut tile = Canvas::from_rgb(size, heated(&plain, &heat).as_flattened());
+        tile.ring(in_tile(peak.at), 5.0, 1.5, footage::CENTRE);
+        tiles.push((tile, caption(named.name, peak)));
+    }
+    let tiles: Vec<Tile<'_>> = tiles
+        .iter()
+        .map(|(picture, caption)| Tile { picture, caption })
+        .collect();
+    Ok(compose(&tiles, N_COLUMNS))
+}
+
+fn caption(name: &str, peak: &Keypoint) -> String {
+    format!("{name} {:.2}", peak.score)
+}
+
+/// The picture with a map over it.
+fn heated(plain: &[[u8; 3]], heat: &[f64]) -> Vec<[u8; 3]> {
+    let most = heat.iter().copied().fold(1e-3, f64::max);
+    let mixed = |(colour, heat): (&[u8; 3], &f64)| {
+        let share = 0.8 * (heat / most).clamp(0.0, 1.0);
+        let grey = colour.iter().map(|it| f64::from(*it)).sum::<f64>() / 3.0;
+        HOT.map(|hot| (0.7 * grey * (1.0 - share) + hot * share).round() as u8)
+    };
+    plain.iter().zip(heat).map(mixed).collect()
+}
+
+/// The pixel at a point; black beyond the picture.
+fn colour(picture: &Picture, [x, y]: [f64; 2]) -> [u8; 3] {
+    let (x, y) = (x.round(), y.round());
+    let size = picture.size;
+    if x < 0.0 || y < 0.0 || x >= size.width as f64 || y >= size.height as f64 {
+        return [0; 3];
+    }
+    let pixel = y as usize * size.width + x as usize;
+    core::array::from_fn(|channel| picture.rgb[3 * pixel + channel])
+}

@@ -1,0 +1,129 @@
+//! Networks of the test's own making.
+
+use std::fs;
+
+use onnx::{Network, Side};
+
+use super::*;
+
+const CARD: &str = r#"
+format = "parallax-keypoint-network"
+version = 1
+name = "NAME"
+[input]
+width = 12
+height = 16
+[output]
+codec = "heat-map"
+[keypoints]
+names = ["head top", "neck", "left hip"]
+"#;
+
+/// Gives its input back: three maps.
+fn network() -> Network {
+    let mut net = Network::default();
+    let sides = [1, 3, 16, 12].map(Side::Fixed).to_vec();
+    net.inputs.push(("picture".to_owned(), sides.clone()));
+    net.outputs.push(("maps".to_owned(), sides));
+    net.node("Relu", &["picture"], "maps", vec![]);
+    net
+}
+
+#[test]
+fn a_card_is_found_beside_the_network_or_in_it_or_where_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.onnx");
+    let mut net = network();
+    net.metadata
+        .push((METADATA_KEY.to_owned(), CARD.replace("NAME", "inside")));
+    fs::write(&path, net.file()).unwrap();
+    let found = |given: Option<&Path>| {
+        let file = NetworkFile::open(&path, given).unwrap();
+        let (card, place) = file.card().unwrap().clone();
+        (card.name, place)
+    };
+    assert_eq!(found(None), ("inside".to_owned(), CardPlace::Metadata));
+    for name in ["net.onnx.toml", "net.toml", "other.toml"] {
+        let card = folder.path().join(name);
+        fs::write(&card, CARD.replace("NAME", name)).unwrap();
+        let given = (name == "other.toml").then_some(card.as_path());
+        assert_eq!(
+            found(given),
+            (name.to_owned(), CardPlace::File(card.clone()))
+        );
+    }
+    let fitted = NetworkFile::open(&path, None).unwrap().fitted().unwrap();
+    assert_eq!(fitted.card().name, "net.toml");
+}
+
+#[test]
+fn a_network_without_a_card_or_cut_short_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.onnx");
+    let bytes = network().file();
+    fs::write(&path, &bytes).unwrap();
+    let file = NetworkFile::open(&path, None).unwrap();
+    assert!(file.card().is_none());
+    let refused = file.fitted().unwrap_err();
+    assert!(refused.to_string().contains("has no card"), "{refused}");
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let refused = NetworkFile::open(&path, None).unwrap_err();
+    assert!(refused.to_string().contains("truncated"), "{refused}");
+    fs::write(&path, &bytes).unwrap();
+    let card = folder.path().join("card.toml");
+    fs::write(&card, CARD.replace("width = 12", "width = 24")).unwrap();
+    let file = NetworkFile::open(&path, Some(&card)).unwrap();
+    let refused = file.fitted().unwrap_err().to_string();
+    assert!(
+        refused.contains("[1, 3, 16, 12]") && refused.contains("[1, 3, 16, 24]"),
+        "{refused}"
+    );
+    fs::write(&card, CARD.replace("width", "wide")).unwrap();
+    let refused = NetworkFile::open(&path, Some(&card))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refused.contains("card.toml") && refused.contains("wide"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn the_nearest_card_has_the_networks_sides() {
+    let near = |inputs: &[usize], outputs: &[(&str, &[usize])]| {
+        let mut net = Network::default();
+        let sides = |it: &[usize]| it.iter().map(|it| Side::Fixed(*it)).collect::<Vec<_>>();
+        net.inputs.push(("x".to_owned(), sides(inputs)));
+        for (name, shape) in outputs {
+            net.outputs.push(((*name).to_owned(), sides(shape)));
+            net.floats(
+                &format!("{name}0"),
+                shape,
+                vec![0.0; shape.iter().product()],
+            );
+            net.node("Relu", &[&format!("{name}0")], name, vec![]);
+        }
+        nearest(Session::parse(net.file()).unwrap().description())
+    };
+    let simcc = |n: usize| {
+        near(
+            &[1, 3, 256, 192],
+            &[("simcc_x", &[1, n, 384]), ("simcc_y", &[1, n, 512])],
+        )
+    };
+    assert_eq!(simcc(17), ["rtmpose-coco17"]);
+    assert_eq!(simcc(26), ["rtmpose-halpe26"]);
+    assert_eq!(
+        near(&[1, 3, 256, 192], &[("y", &[1, 17, 64, 48])]),
+        ["vitpose-s", "hrnet-w32", "pp-tinypose"]
+    );
+    assert_eq!(
+        near(&[1, 192, 192, 3], &[("y", &[1, 1, 17, 3])]),
+        ["movenet-lightning"]
+    );
+    assert_eq!(
+        near(&[1, 256, 256, 3], &[("y", &[1, 195])]),
+        ["blazepose-landmarks"]
+    );
+    assert!(near(&[1, 7], &[("y", &[1, 7])]).is_empty());
+}
