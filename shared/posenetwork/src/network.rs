@@ -404,3 +404,6 @@ pub(crate) fn only(
         }),
     }
 }
+
+#[cfg(test)]
+mod tests;

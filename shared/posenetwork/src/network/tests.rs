@@ -1,0 +1,227 @@
+//! Networks of the test's own making, and cards that fit them or not.
+
+use onnx::{Attribute, Network, Side};
+
+use super::*;
+
+const CARD: &str = r#"
+format = "parallax-keypoint-network"
+version = 1
+name = "three colours"
+[input]
+width = 12
+height = 16
+[crop]
+margin = 1.0
+[output]
+codec = "heat-map"
+refine = "none"
+[keypoints]
+names = ["a", "b", "c"]
+"#;
+
+fn sides(sides: &[usize]) -> Vec<Side> {
+    sides.iter().map(|it| Side::Fixed(*it)).collect()
+}
+
+/// Gives what `operator` makes of its input as three maps.
+fn network(operator: &str) -> Network {
+    let mut net = Network::default();
+    net.inputs
+        .push(("picture".to_owned(), sides(&[1, 3, 16, 12])));
+    net.outputs
+        .push(("maps".to_owned(), sides(&[1, 3, 16, 12])));
+    net.node(operator, &["picture"], "maps", vec![]);
+    net
+}
+
+fn fitted(net: &Network, card: &str) -> Result<PoseNetwork, FitError> {
+    let session = Session::parse(net.file()).unwrap();
+    PoseNetwork::new(session, Card::parse(card).unwrap())
+}
+
+/// What is said of a network that does not fit.
+fn refused(net: &Network, card: &str) -> String {
+    fitted(net, card).unwrap_err().to_string()
+}
+
+/// Looks at a black picture of the input's size with some white pixels.
+fn keypoints(net: &Network, card: &str, white: &[[usize; 2]]) -> Vec<Keypoint> {
+    let network = fitted(net, card).unwrap();
+    let mut rgb = vec![0; 3 * 12 * 16];
+    for [x, y] in white {
+        let pixel = 3 * (12 * y + x);
+        rgb[pixel..pixel + 3].fill(1);
+    }
+    let image = Rgb8View::new(12, 16, &rgb).unwrap();
+    let mut workspace = Workspace::default();
+    let sight = network.look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace);
+    sight.unwrap().unwrap().keypoints().unwrap()
+}
+
+#[test]
+fn an_input_of_another_name_or_other_sides_is_refused() {
+    let named = CARD.replace("[crop]", "name = \"image\"\n[crop]");
+    assert_eq!(
+        refused(&network("Relu"), &named),
+        "the card names the input `image`, but the network has `picture` [1, 3, 16, 12]"
+    );
+    for (from, to, expected) in [
+        ("width = 12", "width = 24", "[1, 3, 16, 24]"),
+        ("[crop]", "layout = \"pixels\"\n[crop]", "[1, 16, 12, 3]"),
+    ] {
+        assert_eq!(
+            refused(&network("Relu"), &CARD.replace(from, to)),
+            format!(
+                "the input `picture` of the network is [1, 3, 16, 12], but the card says {expected}"
+            )
+        );
+    }
+}
+
+#[test]
+fn of_several_inputs_or_outputs_the_card_names_one() {
+    let mut net = network("Relu");
+    net.inputs.push(("more".to_owned(), sides(&[1])));
+    let said = refused(&net, CARD);
+    assert!(
+        said.contains("`picture` [1, 3, 16, 12], `more` [1]") && said.contains("`input.name`"),
+        "{said}"
+    );
+    let mut net = network("Relu");
+    net.outputs
+        .push(("again".to_owned(), sides(&[1, 3, 16, 12])));
+    net.node("Relu", &["maps"], "again", vec![]);
+    let said = refused(&net, CARD);
+    assert!(
+        said.contains("`again` [1, 3, 16, 12]") && said.contains("`output.maps`"),
+        "{said}"
+    );
+    let named = CARD.replace("refine", "maps = \"again\"\nrefine");
+    assert_eq!(keypoints(&net, &named, &[[5, 9]])[1].at, [5.0, 9.0]);
+}
+
+#[test]
+fn an_output_that_is_not_there_is_refused() {
+    let named = CARD.replace("refine", "maps = \"heat\"\nrefine");
+    assert_eq!(
+        refused(&network("Relu"), &named),
+        "the card names the output `heat`, but the network has `maps` [1, 3, 16, 12]"
+    );
+}
+
+#[test]
+fn another_number_of_maps_or_of_values_is_refused() {
+    let two = CARD.replace(", \"c\"", "");
+    assert_eq!(
+        refused(&network("Relu"), &two),
+        "output `maps`: the output is [1, 3, 16, 12], expected [1, 2, rows, columns]"
+    );
+    let further = two.replace("refine", "further = 1\nrefine");
+    assert_eq!(keypoints(&network("Relu"), &further, &[[5, 9]]).len(), 2);
+    let list = "codec = \"keypoints\"\nfields = [\"x\", \"y\"]";
+    let list = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", list);
+    assert_eq!(
+        refused(&network("Relu"), &list),
+        "output `maps`: the output is [1, 3, 16, 12], expected 3 keypoints of 2 numbers"
+    );
+}
+
+#[test]
+fn values_that_are_no_numbers_are_refused_when_they_come() {
+    assert_eq!(
+        refused(&network("Log"), CARD),
+        "output `maps`: value 0 of the output is -inf"
+    );
+    // On the empty picture of the trial all is well.
+    let shifted = CARD.replace("[crop]", "mean = [-1.0, -1.0, -1.0]\n[crop]");
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.floats("half", &[1], vec![1.5]);
+    net.node("Sub", &["half", "picture"], "rest", vec![]);
+    net.node("Log", &["rest"], "maps", vec![]);
+    let network = fitted(&net, &shifted).unwrap();
+    let image = [1; 3 * 12 * 16];
+    let image = Rgb8View::new(12, 16, &image).unwrap();
+    let mut workspace = Workspace::default();
+    let refused = network
+        .look(image, [0.0, 0.0, 12.0, 16.0], &mut workspace)
+        .unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            LookError::Output {
+                error: OutputError::NotANumber { .. },
+                ..
+            }
+        ),
+        "{refused}"
+    );
+    assert!(refused.to_string().contains("NaN"), "{refused}");
+}
+
+#[test]
+fn whole_numbers_as_output_are_refused() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    let keep = vec![("axis", Attribute::Int(1)), ("keepdims", Attribute::Int(1))];
+    net.node("ArgMax", &["picture"], "maps", keep);
+    assert_eq!(refused(&net, CARD), "output `maps` is not of type f32");
+}
+
+#[test]
+fn columns_and_rows_are_read_from_two_outputs() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs = vec![
+        ("across".to_owned(), sides(&[1, 3, 12])),
+        ("down".to_owned(), sides(&[1, 3, 16])),
+    ];
+    for (axis, name) in [(2, "across"), (3, "down")] {
+        let along = vec![
+            ("axes", Attribute::Ints(vec![axis])),
+            ("keepdims", Attribute::Int(0)),
+        ];
+        net.node("ReduceMax", &["picture"], name, along);
+    }
+    let simcc = "codec = \"simcc\"\nx = \"across\"\ny = \"down\"\nbins_per_pixel = 1";
+    let simcc = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", simcc);
+    let found = keypoints(&net, &simcc, &[[5, 9]]);
+    assert_eq!((found[2].at, found[2].score), ([5.0, 9.0], 1.0));
+    let exchanged = simcc
+        .replace("\"across\"", "\"x\"")
+        .replace("\"down\"", "\"across\"");
+    let exchanged = exchanged.replace("\"x\"", "\"down\"");
+    assert_eq!(
+        refused(&net, &exchanged),
+        "output `down`, `across`: the output is [1, 3, 16], expected [1, 3, 12]"
+    );
+    let missing = simcc.replace("\"down\"", "\"up\"");
+    assert!(refused(&net, &missing).contains("the output `up`"));
+}
+
+#[test]
+fn a_list_is_read_with_its_unit() {
+    let mut net = network("Relu");
+    net.nodes.clear();
+    net.outputs[0].1 = sides(&[1, 1, 3, 3]);
+    // The mean of the picture, which is black, and positions.
+    net.floats(
+        "places",
+        &[9],
+        vec![0.5, 0.25, 0.9, 0.0, 1.0, 0.1, 0.75, 0.5, 0.2],
+    );
+    net.node("GlobalMaxPool", &["picture"], "pooled", vec![]);
+    net.ints("shape", vec![1, 3]);
+    net.node("Reshape", &["pooled", "shape"], "three", vec![]);
+    let last = vec![("axis", Attribute::Int(1))];
+    net.node("Concat", &["three", "three", "three"], "nine", last);
+    net.node("Add", &["nine", "places"], "added", vec![]);
+    net.ints("listed", vec![1, 1, 3, 3]);
+    net.node("Reshape", &["added", "listed"], "maps", vec![]);
+    let list = "codec = \"keypoints\"\nfields = [\"y\", \"x\", \"score\"]\nunit = \"share\"";
+    let list = CARD.replace("codec = \"heat-map\"\nrefine = \"none\"", list);
+    let found = keypoints(&net, &list, &[]);
+    assert_eq!([found[0].at, found[1].at], [[3.0, 8.0], [12.0, 0.0]]);
+    assert!((found[2].score - 0.2).abs() < 1e-6);
+}
