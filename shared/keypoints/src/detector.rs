@@ -367,6 +367,17 @@ output = { codec = "yolox", strides = [16, 32] }
     }
 
     #[test]
+    fn the_cards_that_ship_are_read() {
+        for (text, name) in [
+            (include_str!("../../../configs/detectors/yolox.toml"), "YOLOX"),
+            (include_str!("../../../configs/detectors/rtmdet-person.toml"), "RTMDet"),
+        ] {
+            let card = DetectorCard::parse(text).unwrap();
+            assert!(card.name.starts_with(name) && card.licence == "Apache-2.0", "{name}");
+        }
+    }
+
+    #[test]
     fn a_picture_keeps_its_shape_and_the_rest_is_grey() {
         let card = DetectorCard::parse(YOLOX).unwrap();
         let rgb: Vec<u8> = [10, 20, 30].repeat(64 * 64);

@@ -432,3 +432,6 @@ fn best_on_tree(
         energy,
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -21,7 +21,7 @@ pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
     let card: PathBuf = card.map_or(beside, Path::to_path_buf);
     let text = std::fs::read_to_string(&card).map_err(|error| {
         refused(&card, &error).with_hint(
-            "a detector has a card: give it with --detector-card, or put it beside the network; configs/networks holds some",
+            "a detector has a card: give it with --detector-card, or put it beside the network; configs/detectors holds some",
         )
     })?;
     let card = DetectorCard::parse(&text).map_err(|error| refused(&card, &error))?;

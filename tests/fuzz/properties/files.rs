@@ -153,11 +153,18 @@ pub fn consistency(input: &[u8]) {
     }
 }
 
-/// The card of a network: what is read holds numbers that can be used, and its window shows a box.
+/// The card of a network, or of a detector: what is read holds numbers that can be used, and its window shows a box.
 pub fn network_card(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
     };
+    if let Ok(card) = keypoints::DetectorCard::parse(input) {
+        let mut values = vec![f32::NAN; 3 * card.input.width * card.input.height];
+        let step = card.fill(&[200; 3 * 7 * 5], [7, 5], &mut values);
+        assert!(step > 0.0 && values.iter().all(|it| !it.is_nan()));
+        let _outcome = card.boxes(&values[..15], &[1, 3, 5]);
+        return;
+    }
     let Ok(card) = keypoints::Card::parse(input) else {
         return;
     };

@@ -1,5 +1,6 @@
 //! `parallax eval`: the paper's evaluation on sequences with ground truth.
 
+mod evidence;
 mod pictures;
 mod report;
 
@@ -52,6 +53,10 @@ intervals; --only and --without choose among them. They and sequences are not ju
 OUT holds report.html, report.json, report.tex, and poses/ with what was found in every frame. With \
 --resume frames that are there are not solved again; other settings are refused. --json prints the report's \
 numbers.
+
+--network-evidence FILE --detector FILE judges the keypoints of a network (docs/networks.md): by plain \
+triangulation, with cameras left out, and in space over its maps, without and with the bones of a body. \
+--stress makes what goes wrong in real rooms. OUT then holds evidence.txt and evidence.json.
 
 Exit codes: 0 done; 2 the command line, 3 a setting is wrong; 4 a sequence or a model; 5 a calibration; \
 7 done, but footage ended before the truth; 130 interrupted.
@@ -146,6 +151,8 @@ pub(crate) struct Arguments {
     /// Print the numbers as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    evidence: evidence::Options,
 }
 
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
@@ -176,6 +183,12 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     if are_pictures(arguments)? {
         return pictures::run(arguments, &stop);
+    }
+    if let (Some(network), Some(detector)) = (
+        &arguments.evidence.network_evidence,
+        &arguments.evidence.detector,
+    ) {
+        return evidence::run(arguments, [network, detector], globals, stop);
     }
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;

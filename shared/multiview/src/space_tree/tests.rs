@@ -1,0 +1,239 @@
+//! People solved in space over maps whose truth is known.
+
+use geometry::{Intrinsics, Lens};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use super::*;
+use crate::{SeenPerson, same_person};
+
+/// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
+const STANDING: [[f64; 3]; N] = [
+    [0.02, -0.12, 0.08],
+    [0.04, -0.11, 0.49],
+    [0.0, -0.10, 0.92],
+    [0.0, 0.10, 0.92],
+    [0.05, 0.11, 0.49],
+    [-0.02, 0.12, 0.08],
+    [0.30, -0.30, 1.40],
+    [0.10, -0.38, 1.28],
+    [0.0, -0.19, 1.45],
+    [0.0, 0.19, 1.45],
+    [0.03, 0.24, 1.15],
+    [0.08, 0.26, 0.88],
+    [0.0, 0.0, 1.50],
+    [0.02, 0.0, 1.76],
+];
+
+fn camera(degrees: f64) -> Camera {
+    let angle = degrees.to_radians();
+    let eye = Point3::new(4.5 * angle.cos(), 4.5 * angle.sin(), 1.6);
+    Camera {
+        name: format!("camera at {degrees} degrees"),
+        intrinsics: Intrinsics {
+            fx: 800.0,
+            fy: 800.0,
+            cx: 319.5,
+            cy: 239.5,
+            size: [640, 480],
+            lens: Lens::default(),
+        },
+        // nalgebra's cameras look along -z.
+        camera_from_world: UnitQuaternion::from_axis_angle(
+            &Vector3::x_axis(),
+            core::f64::consts::PI,
+        ) * Isometry3::look_at_rh(
+            &eye,
+            &Point3::new(0.0, 0.0, 0.9),
+            &Vector3::z(),
+        ),
+    }
+}
+
+/// A view whose map of a joint is one bump; joints that are `None` are seen nowhere.
+struct Bumps {
+    at: [Option<[f64; 2]>; N],
+    maxima: Vec<Vec<([f64; 2], f32)>>,
+}
+
+const SIGMA: f64 = 9.0;
+const EPS: f64 = 0.02;
+
+impl Bumps {
+    fn new(at: [Option<[f64; 2]>; N]) -> Self {
+        let maxima = at.map(|it| it.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
+        Self {
+            at,
+            maxima: maxima.to_vec(),
+        }
+    }
+
+    fn of(camera: &Camera) -> Self {
+        Self::new(STANDING.map(|it| {
+            let at = camera.project(&Point3::from(it)).unwrap();
+            Some([at.x, at.y])
+        }))
+    }
+}
+
+impl JointEvidence for Bumps {
+    fn at(&self, joint: usize, [x, y]: [f64; 2]) -> f32 {
+        let heat = self.at[joint].map_or(0.0, |it| {
+            let squared = (x - it[0]).powi(2) + (y - it[1]).powi(2);
+            (-squared / (2.0 * SIGMA * SIGMA)).exp()
+        });
+        (heat + EPS).ln() as f32
+    }
+
+    fn maxima(&self, joint: usize) -> &[([f64; 2], f32)] {
+        &self.maxima[joint]
+    }
+
+    fn floor(&self) -> f32 {
+        EPS.ln() as f32
+    }
+}
+
+fn solved(cameras: &[Camera], bumps: &[Bumps]) -> SpacePose {
+    let views: Vec<SpaceView<'_>> = cameras
+        .iter()
+        .zip(bumps)
+        .map(|(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+        })
+        .collect();
+    solve_person(&views, &SpaceSettings::default()).unwrap()
+}
+
+/// The largest error, metres.
+fn worst(found: &SpacePose) -> f64 {
+    let errors = found.joints.iter().zip(STANDING);
+    errors
+        .map(|(it, truth)| (it - Point3::from(truth)).norm())
+        .fold(0.0, f64::max)
+}
+
+const RING: [f64; 4] = [10.0, 95.0, 190.0, 260.0];
+
+#[test]
+fn a_person_whom_all_views_show_is_found() {
+    for n in 2..=4 {
+        let cameras: Vec<Camera> = RING[..n].iter().map(|it| camera(*it)).collect();
+        let bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
+        let error = worst(&solved(&cameras, &bumps));
+        assert!(error < 0.03, "{n} views: {error}");
+    }
+}
+
+#[test]
+fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
+    let cameras = RING.map(camera);
+    let mut bumps = cameras.each_ref().map(Bumps::of);
+    for (view, joint) in [(0, 6), (1, 6), (2, 0), (3, 10)] {
+        let wrong = bumps[view].at[joint].map(|it| [it[0] + 70.0, it[1] - 40.0]);
+        bumps[view].at[joint] = wrong;
+        bumps[view].maxima[joint] = wrong.map(|it| (it, 0.0)).into_iter().collect();
+    }
+    let error = worst(&solved(&cameras, &bumps));
+    assert!(error < 0.03, "{error}");
+}
+
+#[test]
+fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() {
+    let cameras = RING.map(camera);
+    let mut bumps = cameras.each_ref().map(Bumps::of);
+    for view in [1, 3] {
+        bumps[view].at[6] = None;
+        bumps[view].maxima[6].clear();
+    }
+    assert!(worst(&solved(&cameras, &bumps)) < 0.03);
+    bumps[0].at[6] = None;
+    bumps[0].maxima[6].clear();
+    let views: Vec<SpaceView<'_>> = cameras
+        .iter()
+        .zip(&bumps)
+        .map(|(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+        })
+        .collect();
+    assert_eq!(solve_person(&views, &SpaceSettings::default()), None);
+}
+
+#[test]
+fn a_view_that_names_the_sides_the_wrong_way_is_exchanged() {
+    for n in 3..=4 {
+        let cameras: Vec<Camera> = RING[..n].iter().map(|it| camera(*it)).collect();
+        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::of).collect();
+        for [right, left] in LIMBS.into_iter().flatten() {
+            bumps[1].at.swap(right, left);
+            bumps[1].maxima.swap(right, left);
+        }
+        let error = worst(&solved(&cameras, &bumps));
+        assert!(error < 0.03, "{n} views: {error}");
+    }
+}
+
+#[test]
+fn a_camera_that_was_turned_is_left_out_where_three_others_agree() {
+    let cameras = RING.map(camera);
+    let bumps = cameras.each_ref().map(Bumps::of);
+    for turned in 0..4 {
+        let mut calibrated = cameras.clone();
+        let turn = UnitQuaternion::from_euler_angles(0.0, 3.0_f64.to_radians(), 0.0);
+        calibrated[turned].camera_from_world = turn * cameras[turned].camera_from_world;
+        let error = worst(&solved(&calibrated, &bumps));
+        assert!(error < 0.03, "camera {turned}: {error}");
+    }
+}
+
+#[test]
+fn bones_follow_the_stature_that_the_joints_say() {
+    let of_anybody = lengths_of(None);
+    let small = STANDING.map(|it| Point3::from(it) * 0.7);
+    let of_child = lengths_of(Some(&small));
+    for (bone, (anybody, child)) in of_anybody.iter().zip(of_child).enumerate() {
+        assert!(child.mean < anybody.mean, "{bone}");
+        assert!(child.sd < anybody.sd, "{bone}: less is unknown");
+    }
+    let thigh = of_child[8].mean;
+    assert!((thigh - 0.43 * 0.7).abs() < 0.05, "{thigh}");
+}
+
+#[test]
+fn whoever_is_the_same_person_in_most_views_is_chosen() {
+    let cameras = [camera(10.0), camera(95.0), camera(190.0)];
+    let seen = |camera: &Camera, by: [f64; 2], height: f64| SeenPerson {
+        joints: STANDING
+            .iter()
+            .map(|it| {
+                let at = camera.project(&(Point3::from(*it) + Vector3::new(by[0], by[1], 0.0)))?;
+                Some(([at.x, at.y], 0.9))
+            })
+            .collect(),
+        height,
+    };
+    let people = [
+        vec![
+            seen(&cameras[0], [1.5, 1.0], 0.7),
+            seen(&cameras[0], [0.0; 2], 0.5),
+        ],
+        vec![seen(&cameras[1], [0.0; 2], 0.5)],
+        vec![
+            seen(&cameras[2], [-1.0, 2.0], 0.8),
+            seen(&cameras[2], [0.0; 2], 0.5),
+        ],
+    ];
+    let views: Vec<(&Camera, &[SeenPerson])> = cameras
+        .iter()
+        .zip(&people)
+        .map(|(camera, it)| (camera, &it[..]))
+        .collect();
+    assert_eq!(same_person(&views), [Some(1), Some(0), Some(1)]);
+    assert_eq!(same_person(&views[..1]), [Some(0)], "alone, the largest");
+    let nobody: [(&Camera, &[SeenPerson]); 2] = [views[0], (&cameras[1], &[])];
+    assert_eq!(same_person(&nobody), [Some(0), None]);
+    assert_eq!(same_person(&[]), []);
+}
