@@ -112,6 +112,18 @@ fn a_network_without_a_card_gets_the_nearest_ones_named() {
     for words in ["no card", "hrnet-w32.toml", "bare.toml", "docs/networks.md"] {
         assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
     }
+    let look = ["--image", "blocks.png", "--out", "seen.png"];
+    let ended = run(
+        &case,
+        &[&["model", "show", "bare.onnx"], &look[..]].concat(),
+    );
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(ended.stderr.contains("without a card"), "{}", ended.stderr);
+    let shown = json(&run(&case, &["model", "show", "bare.onnx", "--json"]));
+    assert!(shown["card"].is_null(), "{shown}");
+    // All with this input, as none has maps of three keypoints.
+    let nearest = shown["nearest_cards"].as_array().unwrap();
+    assert!(nearest.contains(&Value::from("vitpose-s")), "{shown}");
     let ended = run(&case, &["detect", "blocks.png", "--network", "bare.onnx"]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
