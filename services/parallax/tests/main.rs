@@ -9,6 +9,7 @@ mod chaos;
 mod demo;
 mod detect;
 mod eval;
+mod eval_networks;
 mod faults;
 mod full;
 mod live;

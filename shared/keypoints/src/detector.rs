@@ -369,11 +369,20 @@ output = { codec = "yolox", strides = [16, 32] }
     #[test]
     fn the_cards_that_ship_are_read() {
         for (text, name) in [
-            (include_str!("../../../configs/detectors/yolox.toml"), "YOLOX"),
-            (include_str!("../../../configs/detectors/rtmdet-person.toml"), "RTMDet"),
+            (
+                include_str!("../../../configs/detectors/yolox.toml"),
+                "YOLOX",
+            ),
+            (
+                include_str!("../../../configs/detectors/rtmdet-person.toml"),
+                "RTMDet",
+            ),
         ] {
             let card = DetectorCard::parse(text).unwrap();
-            assert!(card.name.starts_with(name) && card.licence == "Apache-2.0", "{name}");
+            assert!(
+                card.name.starts_with(name) && card.licence == "Apache-2.0",
+                "{name}"
+            );
         }
     }
 
