@@ -1,5 +1,4 @@
 //! Sequences judged on the keypoints of a network, with networks small enough to be written here.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
 

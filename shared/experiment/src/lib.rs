@@ -1,11 +1,12 @@
 //! The paper's evaluation: versions of the method side by side on one sequence, scored, and reported.
 //!
 //! [`Film`] gives the frames of a sequence, [`Bench`] solves each of them once in every view and then
-//! by every [`Version`], [`Record`] keeps what was found (so that a run can go on), [`score`] compares
+//! by every [`Version`], [`Record`] keeps what was found (so that a run can go on), [`score()`] compares
 //! it with the truth, and [`Summary`] adds up: as JSON and as LaTeX ([`latex()`]), the paper's own numbers
 //! beside ours ([`published()`]).
 //!
-//! [`Pictures`] are single pictures of annotated people.
+//! [`Pictures`] are single pictures of annotated people. [`joints_by`] solves a frame on the keypoints of a network in the ways
+//! that are compared, and [`Stress`] is what goes wrong in it on purpose.
 //!
 //! Solving and scoring are separate: other thresholds or another ground truth need no second run.
 #![forbid(unsafe_code)]

@@ -181,7 +181,7 @@ mod tests {
         for nth in 0..4 {
             let mut rgb = vec![9; 3 * 100 * 80];
             cover_half(&mut rgb, [100, 80], [20.0, 10.0, 60.0, 50.0], nth);
-            let grey = rgb.iter().filter(|it| **it == 127).count() / 3;
+            let grey = rgb.chunks_exact(3).filter(|it| *it == [127; 3]).count();
             assert_eq!(grey, 52 * 26, "{nth}");
             let inside = |x: usize, y: usize| rgb[3 * (y * 100 + x)] == 127;
             let corners = [inside(16, 6), inside(63, 6), inside(16, 53), inside(63, 53)];

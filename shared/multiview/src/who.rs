@@ -12,7 +12,7 @@ pub struct SeenPerson {
     pub height: f64,
 }
 
-/// Rays farther apart, metres, do not mean the same person: the median over joints.
+/// Rays farther apart, metres, do not mean the same person: the nearest third of the joints, since half of a person may be covered.
 const SAME_M: f64 = 0.20;
 /// Joints of a lower score say nothing about who it is.
 const LEAST_SCORE: f64 = 0.3;
@@ -64,7 +64,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])]) -> Vec<Option<usize>> {
     best.1
 }
 
-/// The median distance between the rays of the joints that two views show; `None` if they share fewer than three.
+/// The distance within which the rays of a third of the joints meet that two views show; `None` if they share fewer than three.
 fn apart(a: (&Camera, &SeenPerson), b: (&Camera, &SeenPerson)) -> Option<f64> {
     let ray = |camera: &Camera, joint: &Option<([f64; 2], f64)>| {
         let (at, score) = (*joint)?;
@@ -83,5 +83,5 @@ fn apart(a: (&Camera, &SeenPerson), b: (&Camera, &SeenPerson)) -> Option<f64> {
         return None;
     }
     distances.sort_by(f64::total_cmp);
-    Some(distances[distances.len() / 2])
+    Some(distances[distances.len() / 3])
 }

@@ -184,12 +184,17 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if are_pictures(arguments)? {
         return pictures::run(arguments, &stop);
     }
-    if let (Some(network), Some(detector)) = (
-        &arguments.evidence.network_evidence,
-        &arguments.evidence.detector,
-    ) {
-        return evidence::run(arguments, [network, detector], globals, stop);
+    let evidence = &arguments.evidence;
+    match (&evidence.network_evidence, &evidence.detector) {
+        (Some(network), Some(detector)) => {
+            evidence::run(arguments, [network, detector], globals, stop)
+        }
+        _ => run_versions(arguments, globals, stop),
     }
+}
+
+/// Judges the versions of the method on sequences.
+fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<ExitCode, Failure> {
     let sequences = sequences(arguments)?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let config = config(arguments)?;

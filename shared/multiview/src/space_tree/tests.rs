@@ -59,19 +59,16 @@ const SIGMA: f64 = 9.0;
 const EPS: f64 = 0.02;
 
 impl Bumps {
-    fn new(at: [Option<[f64; 2]>; N]) -> Self {
+    fn of(camera: &Camera) -> Self {
+        let at = STANDING.map(|it| {
+            let at = camera.project(&Point3::from(it)).unwrap();
+            Some([at.x, at.y])
+        });
         let maxima = at.map(|it| it.map_or_else(Vec::new, |it| vec![(it, 1.02_f32.ln())]));
         Self {
             at,
             maxima: maxima.to_vec(),
         }
-    }
-
-    fn of(camera: &Camera) -> Self {
-        Self::new(STANDING.map(|it| {
-            let at = camera.project(&Point3::from(it)).unwrap();
-            Some([at.x, at.y])
-        }))
     }
 }
 

@@ -72,6 +72,9 @@ pub struct EvidenceRow {
     pub last_errs_less_mm: [f64; 3],
 }
 
+/// A person whom the network sees in a view, and what it sees.
+type Seen = (SeenPerson, NetworkView);
+
 /// A frame before it is disturbed.
 struct Instant<'a> {
     nth: usize,
@@ -159,7 +162,7 @@ impl EvidenceJob<'_> {
         view: usize,
         covered: Option<usize>,
         (workspace, values): &mut (Workspace, Vec<f32>),
-    ) -> Result<Vec<(SeenPerson, NetworkView)>, Failure> {
+    ) -> Result<Vec<Seen>, Failure> {
         let Some(image) = instant.images[view] else {
             return Ok(Vec::new());
         };
@@ -235,7 +238,7 @@ const MOST_PEOPLE: usize = 4;
 /// The person in every view that shows the same one, with the calibration that the stress leaves; disturbed.
 fn chosen(
     instant: &Instant<'_>,
-    seen: Vec<(usize, Vec<(SeenPerson, NetworkView)>)>,
+    seen: Vec<(usize, Vec<Seen>)>,
     stress: Stress,
 ) -> Vec<(Camera, NetworkView)> {
     let n_views = instant.cameras.len();
@@ -249,24 +252,23 @@ fn chosen(
         .map(|((view, _), people)| (&instant.cameras[*view], &people[..]))
         .collect();
     let same = same_person(&each);
-    let of_view =
-        |((view, people), who): ((usize, Vec<(SeenPerson, NetworkView)>), Option<usize>)| {
-            let (person, found) = people.into_iter().nth(who?)?;
-            let camera = &instant.cameras[view];
-            if !stress.hits(instant.nth, view, n_views) {
-                return Some((camera.clone(), found));
+    let of_view = |((view, people), who): ((usize, Vec<Seen>), Option<usize>)| {
+        let (person, found) = people.into_iter().nth(who?)?;
+        let camera = &instant.cameras[view];
+        if !stress.hits(instant.nth, view, n_views) {
+            return Some((camera.clone(), found));
+        }
+        let mut maps = found.maps().clone();
+        match stress {
+            Stress::Exchanged => maps.exchange_sides(),
+            Stress::Bystander => {
+                let height = person.height * f64::from(camera.intrinsics.size[1]);
+                maps.shift([height / 2.0, 0.0]);
             }
-            let mut maps = found.maps().clone();
-            match stress {
-                Stress::Exchanged => maps.exchange_sides(),
-                Stress::Bystander => {
-                    let height = person.height * f64::from(camera.intrinsics.size[1]);
-                    maps.shift([height / 2.0, 0.0]);
-                }
-                _ => {}
-            }
-            Some((stress.calibrated(camera), NetworkView::new(maps)))
-        };
+            _ => {}
+        }
+        Some((stress.calibrated(camera), NetworkView::new(maps)))
+    };
     seen.into_iter().zip(same).filter_map(of_view).collect()
 }
 
@@ -317,7 +319,7 @@ pub fn evidence_text(rows: &[EvidenceRow]) -> String {
         };
         let interval = |[from, to]: [f64; 2]| format!("({from:.1}-{to:.1})");
         // Writing to a string cannot fail.
-        let _ = writeln!(
+        let _written = writeln!(
             text,
             "{:<12} {:<16} {:>7.1} {:<15} {:>7.1} {:<15} {}",
             it.stress,
