@@ -124,6 +124,10 @@ pub(crate) fn check(arguments: &[String]) -> Result<(), String> {
     let mut asked = arguments.to_vec();
     asked.push("--help".to_owned());
     let (succeeded, said) = run(&asked);
+    // A line may ask for what only some processors have; there it is taken.
+    if !succeeded && said.contains("this processor has no AMX") {
+        return Ok(());
+    }
     if !succeeded {
         return Err(said);
     }
