@@ -100,8 +100,8 @@ impl Default for SpaceSettings {
 /// The joints in space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpacePose {
-    /// Joints of `skeleton::PARSE14`, metres in the world.
-    pub joints: [Point3<f64>; N],
+    /// Joints of `skeleton::PARSE14`, metres in the world; `None` for one that no two views show.
+    pub joints: [Option<Point3<f64>>; N],
     /// The energy.
     pub energy: f64,
 }
@@ -113,7 +113,7 @@ pub struct SpacePose {
 /// 3. Of four views or more, those that contradict all others are left out: their camera was moved, or they look at somebody else.
 /// 4. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
 ///
-/// * Returns `None` if a joint is seen by fewer than two views.
+/// * Returns `None` if no joint is seen by two views.
 pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
     let mut views = views.to_vec();
     let first = first_of(&mut views, settings)?;
@@ -192,7 +192,7 @@ fn misfit(view: &SpaceView<'_>, found: &SpacePose) -> f64 {
         let named = view.named(joint);
         let best = view.evidence.maxima(named).iter().map(|it| it.1);
         let best = f64::from(best.fold(view.evidence.floor(), f32::max));
-        best - view.at(named, &found.joints[joint])
+        found.joints[joint].map_or(0.0, |at| best - view.at(named, &at))
     });
     short.sort_by(f64::total_cmp);
     short[N / 4]
@@ -210,8 +210,10 @@ fn exchange(views: &mut [SpaceView<'_>], found: &SpacePose, margin: f64) -> bool
                     } else {
                         [right, left]
                     };
-                    view.at(*names[0], &found.joints[*right])
-                        + view.at(*names[1], &found.joints[*left])
+                    let at = |name: usize, joint: usize| {
+                        found.joints[joint].map_or(0.0, |it| view.at(name, &it))
+                    };
+                    at(*names[0], *right) + at(*names[1], *left)
                 };
                 pairs.iter().map(of).sum()
             };
@@ -231,7 +233,7 @@ const STATURE: [f64; 2] = [1.65, 0.20];
 /// The bones of [`TREE`] of a person with these joints; without them, of any person.
 ///
 /// The stature is what the joints say and what is known of people, each by its certainty.
-pub fn lengths_of(joints: Option<&[Point3<f64>; N]>) -> [BoneLength; N - 1] {
+pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N - 1] {
     use body::Kind::{
         Head, HipWidth, LowerArm, LowerLeg, ShoulderToNeck, Trunk, UpperArm, UpperLeg,
     };
@@ -251,7 +253,7 @@ pub fn lengths_of(joints: Option<&[Point3<f64>; N]>) -> [BoneLength; N - 1] {
         LowerLeg,
     ];
     let [mean, sd] = STATURE;
-    let said = joints.and_then(|joints| body::stature(&joints.map(Some)));
+    let said = joints.and_then(body::stature);
     let [own, known] = [said.map_or(0.0, |it| it.sd.powi(-2)), sd.powi(-2)];
     let stature = (own * said.map_or(0.0, |it| it.metres) + known * mean) / (own + known);
     let unsure = (own + known).powf(-0.5) / stature;
@@ -344,9 +346,9 @@ const LIMBS: [[[usize; 2]; 3]; 2] = [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4]
 
 /// Solves for all joints at once.
 ///
-/// * `places`: of every joint, at least one each, for example of [`places`].
+/// * `places`: of every joint, for example of [`places`]; a joint without one is left out.
 /// * `lengths`: of the bones of [`TREE`].
-/// * Returns `None` if a joint has no place.
+/// * Returns `None` if no joint has a place.
 pub fn solve_in_space(
     views: &[SpaceView<'_>],
     places: &[Vec<Point3<f64>>; N],
@@ -358,7 +360,10 @@ pub fn solve_in_space(
     while step >= settings.finest_m {
         for _ in 0..2 {
             let about: [Vec<Point3<f64>>; N] =
-                core::array::from_fn(|joint| grid(&best.joints[joint], step));
+                core::array::from_fn(|joint| match &best.joints[joint] {
+                    Some(at) => grid(at, step),
+                    None => Vec::new(),
+                });
             let found = best_on_tree(views, &about, lengths, settings)?;
             let has_moved = found.joints != best.joints;
             best = found;
@@ -389,23 +394,42 @@ fn best_on_tree(
     lengths: &[BoneLength; N - 1],
     settings: &SpaceSettings,
 ) -> Option<SpacePose> {
-    if places.iter().any(Vec::is_empty) {
+    if places.iter().all(Vec::is_empty) {
         return None;
     }
+    // A joint without a place has one that costs nothing: what hangs on it is solved without it.
+    let nowhere = [Point3::origin()];
+    let is_there = |joint: usize| !places[joint].is_empty();
+    let of = |joint: usize| -> &[Point3<f64>] {
+        if is_there(joint) {
+            &places[joint]
+        } else {
+            &nowhere
+        }
+    };
     let mut scores: [Vec<f64>; N] = core::array::from_fn(|joint| {
         let of_place = |at: &Point3<f64>| unary(views, joint, at);
-        places[joint].iter().map(of_place).collect()
+        if is_there(joint) {
+            places[joint].iter().map(of_place).collect()
+        } else {
+            vec![0.0]
+        }
     });
     let mut choices: [Vec<usize>; N - 1] = core::array::from_fn(|_| Vec::new());
     for (bone, [parent, child]) in TREE.into_iter().enumerate().rev() {
         let BoneLength { mean, sd } = lengths[bone];
-        let choice: Vec<(usize, f64)> = places[parent]
+        let springs = if is_there(parent) && is_there(child) {
+            settings.springs
+        } else {
+            0.0
+        };
+        let choice: Vec<(usize, f64)> = of(parent)
             .iter()
             .map(|from| {
                 let mut best = (0, f64::NEG_INFINITY);
-                for (nth, (to, score)) in places[child].iter().zip(&scores[child]).enumerate() {
+                for (nth, (to, score)) in of(child).iter().zip(&scores[child]).enumerate() {
                     let z = ((to - from).norm() - mean) / sd;
-                    let total = score - settings.springs * (0.5 * z * z).min(settings.cap);
+                    let total = score - springs * (0.5 * z * z).min(settings.cap);
                     if total > best.1 {
                         best = (nth, total);
                     }
@@ -428,7 +452,7 @@ fn best_on_tree(
         chosen[child] = choices[bone][chosen[parent]];
     }
     Some(SpacePose {
-        joints: core::array::from_fn(|joint| places[joint][chosen[joint]]),
+        joints: core::array::from_fn(|joint| places[joint].get(chosen[joint]).copied()),
         energy,
     })
 }
