@@ -326,8 +326,14 @@ mod tests {
         let mut child = shell("sleep 600 & echo $!; kill -9 $$");
         let (lines, status) = run(&mut child);
         assert!(!status.success());
-        let orphan = format!("/proc/{}/cmdline", lines[0]);
-        let is_alive = || std::fs::read(&orphan).is_ok_and(|line| !line.is_empty());
+        let orphan = format!("/proc/{}/stat", lines[0]);
+        // The state stands behind the name, which is in brackets. A process that begins another program has no command line for
+        // a moment, but it has a state.
+        let is_alive = || {
+            let stat = std::fs::read_to_string(&orphan).unwrap_or_default();
+            let state = stat.rsplit(") ").next().unwrap_or_default();
+            !state.is_empty() && !state.starts_with(['Z', 'X'])
+        };
         let begin = Instant::now();
         while is_alive() && begin.elapsed() < WATCHDOG {
             std::thread::sleep(Duration::from_millis(5));
