@@ -159,6 +159,9 @@ fn what_cannot_be_judged_is_refused() {
         2,
         "\"dirty\" is none of clean, covered:N",
     );
+    // What only the versions of the method have is not passed over.
+    refused(&["--versions", "geometry"], 2, "--versions");
+    refused(&["--resume"], 2, "--resume");
     refused(&["--detector-card", "none.toml"], 4, "none.toml");
     refused(&["--detector-card", "net.toml"], 4, "net.toml");
     refused(&["--card", "det.toml"], 4, "det.toml");

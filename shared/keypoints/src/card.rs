@@ -216,6 +216,16 @@ pub enum Score {
     LogOdds,
 }
 
+impl Score {
+    /// A value of the output as a score.
+    pub fn of(self, value: f64) -> f64 {
+        match self {
+            Self::Share => value,
+            Self::LogOdds => 1.0 / (1.0 + (-value).exp()),
+        }
+    }
+}
+
 /// One number of a listed keypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -97,6 +97,22 @@ impl<'a> HeatMaps<'a> {
         [self.rows, self.columns]
     }
 
+    /// Pixels of the input between two cells, across and down.
+    ///
+    /// * `input`: width and height of the network's input, pixels.
+    /// * `udp`: whether corner cells lie on corner pixels; else as many pixels as cells fit into the input.
+    pub fn step(&self, input: [usize; 2], udp: bool) -> [f64; 2] {
+        let cells = [self.columns, self.rows];
+        [0, 1].map(|axis| {
+            let (pixels, cells) = (input[axis] as f64, cells[axis] as f64);
+            if udp && cells > 1.0 {
+                (pixels - 1.0) / (cells - 1.0)
+            } else {
+                pixels / cells
+            }
+        })
+    }
+
     /// A value as it is.
     ///
     /// # Panics
@@ -123,15 +139,7 @@ impl<'a> HeatMaps<'a> {
         refine: Refine,
         score: Score,
     ) -> Vec<Keypoint> {
-        let cells = [self.columns, self.rows];
-        let step = [0, 1].map(|axis| {
-            let (pixels, cells) = (input[axis] as f64, cells[axis] as f64);
-            if udp && cells > 1.0 {
-                (pixels - 1.0) / (cells - 1.0)
-            } else {
-                pixels / cells
-            }
-        });
+        let step = self.step(input, udp);
         let keypoint = |keypoint: usize| {
             let [row, column] = self.maximum(keypoint);
             let across = self.refined(keypoint, [row, column], [0, 1], (refine, score));
@@ -141,7 +149,7 @@ impl<'a> HeatMaps<'a> {
                     (column as f64 + across) * step[0],
                     (row as f64 + down) * step[1],
                 ],
-                score: share(f64::from(self.value(keypoint, row, column)), score),
+                score: score.of(f64::from(self.value(keypoint, row, column))),
             }
         };
         (0..self.n).map(keypoint).collect()
@@ -175,7 +183,7 @@ impl<'a> HeatMaps<'a> {
         if !is_inside {
             return 0.0;
         }
-        let at = |row, column| share(f64::from(self.value(keypoint, row, column)), score);
+        let at = |row, column| score.of(f64::from(self.value(keypoint, row, column)));
         let before = at(row - down, column - across);
         let (here, after) = (at(row, column), at(row + down, column + across));
         match refine {
@@ -315,18 +323,11 @@ impl<'a> List<'a> {
             let [x, y] = [ListField::X, ListField::Y].map(|it| get(it).unwrap_or(0.0));
             Keypoint {
                 at: [x * scale[0], y * scale[1]],
-                score: get(ListField::Score).map_or(1.0, |it| share(it, score)),
+                score: get(ListField::Score).map_or(1.0, |it| score.of(it)),
             }
         };
         let each = self.values.chunks_exact(self.fields.len().max(1));
         each.map(keypoint).collect()
-    }
-}
-
-fn share(value: f64, score: Score) -> f64 {
-    match score {
-        Score::Share => value,
-        Score::LogOdds => 1.0 / (1.0 + (-value).exp()),
     }
 }
 

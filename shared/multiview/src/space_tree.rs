@@ -109,7 +109,8 @@ pub struct SpacePose {
 /// Solves for a person of whom nothing is known.
 ///
 /// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
-/// 2. A view that fits it better with left and right of its arms or of its legs exchanged is exchanged.
+/// 2. Of three views or more, one whose exchange of left and right gives a better first solution is exchanged; then the arms or the
+///    legs of any view that fit better so.
 /// 3. Of four views or more, those that contradict all others are left out: their camera was moved, or they look at somebody else.
 /// 4. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
 ///
@@ -186,16 +187,22 @@ fn contradicts(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<usiz
     Some(worst.0)
 }
 
-/// By how much three quarters of the joints, or more, fit a view less than the best places that it knows for them.
+/// By how much three quarters of the joints that were found, or more, fit a view less than the best places that it knows for them.
 fn misfit(view: &SpaceView<'_>, found: &SpacePose) -> f64 {
-    let mut short: [f64; N] = core::array::from_fn(|joint| {
+    let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);
         let best = view.evidence.maxima(named).iter().map(|it| it.1);
         let best = f64::from(best.fold(view.evidence.floor(), f32::max));
-        found.joints[joint].map_or(0.0, |at| best - view.at(named, &at))
-    });
+        Some(best - view.at(named, &(*at)?))
+    };
+    let mut short: Vec<f64> = found
+        .joints
+        .iter()
+        .enumerate()
+        .filter_map(of_joint)
+        .collect();
     short.sort_by(f64::total_cmp);
-    short[N / 4]
+    short.get(short.len() / 4).copied().unwrap_or(0.0)
 }
 
 /// Exchanges left and right in views that then fit better; returns whether there were any.
@@ -227,7 +234,7 @@ fn exchange(views: &mut [SpaceView<'_>], found: &SpacePose, margin: f64) -> bool
     any
 }
 
-/// Stature of people of whom nothing is known, and its standard deviation, metres (adults: ANSUR II, both sexes).
+/// Stature of people of whom nothing is known, and its standard deviation, metres: our choice, wide enough for children.
 const STATURE: [f64; 2] = [1.65, 0.20];
 
 /// The bones of [`TREE`] of a person with these joints; without them, of any person.

@@ -63,22 +63,21 @@ impl JointMaps {
         let size = sight.network().size();
         self.window = Some(*sight.window());
         self.floor = (settings.lambda * settings.eps.ln()) as f32;
-        [self.rows, self.columns] = match &read {
-            Read::Maps(maps) => maps.size(),
-            _ => [size[1], size[0]].map(|it| (it as f64 / GRID_PX) as usize),
+        (self.rows, self.columns, self.step) = if let Read::Maps(maps) = &read {
+            let [rows, columns] = maps.size();
+            let udp = matches!(
+                sight.network().card().output,
+                Codec::HeatMap { udp: true, .. }
+            );
+            (rows, columns, maps.step(size, udp))
+        } else {
+            let [columns, rows] = size.map(|it| (it as f64 / GRID_PX) as usize);
+            let step = [
+                size[0] as f64 / columns as f64,
+                size[1] as f64 / rows as f64,
+            ];
+            (rows, columns, step)
         };
-        let udp = matches!(
-            sight.network().card().output,
-            Codec::HeatMap { udp: true, .. }
-        );
-        self.step = [(size[0], self.columns), (size[1], self.rows)].map(|(px, cells)| {
-            let (px, cells) = (px as f64, cells as f64);
-            if udp {
-                (px - 1.0) / (cells - 1.0).max(1.0)
-            } else {
-                px / cells
-            }
-        });
         self.values.clear();
         self.values
             .resize(N_JOINTS * self.rows * self.columns, self.floor);
@@ -112,7 +111,7 @@ impl JointMaps {
             (Read::Maps(maps), [(keypoint, _)]) => {
                 let score = score_of(sight);
                 for ([column, row], value) in cells {
-                    *value = heat(share(f64::from(maps.value(*keypoint, row, column)), score));
+                    *value = heat(score.of(f64::from(maps.value(*keypoint, row, column))));
                 }
             }
             (Read::SimCc(simcc), [(keypoint, _)]) => {
@@ -307,13 +306,6 @@ fn score_of(sight: &Sight<'_>) -> Score {
     match sight.network().card().output {
         Codec::HeatMap { score, .. } | Codec::Keypoints { score, .. } => score,
         Codec::Simcc { .. } => Score::Share,
-    }
-}
-
-fn share(value: f64, score: Score) -> f64 {
-    match score {
-        Score::Share => value,
-        Score::LogOdds => 1.0 / (1.0 + (-value).exp()),
     }
 }
 

@@ -317,6 +317,9 @@ fn are_pictures(arguments: &Arguments) -> Result<bool, Failure> {
     if n == 0 && selects {
         return refuse("--only and --without choose single pictures, and there are none");
     }
+    if n > 0 && arguments.evidence.network_evidence.is_some() {
+        return refuse("--network-evidence judges sequences, not single pictures");
+    }
     if n > 0 && n < arguments.sequences.len() {
         return refuse("single pictures and sequences are not judged in one run");
     }

@@ -19,7 +19,12 @@ use crate::terminal::Terminal;
 #[derive(Debug, Args)]
 pub(super) struct Options {
     /// Judge the keypoints of this network (ONNX) in place of the filters; needs --detector.
-    #[arg(long, value_name = "FILE", requires = "detector")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "detector",
+        conflicts_with_all = ["model", "versions", "fuse", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
+    )]
     pub(super) network_evidence: Option<PathBuf>,
     /// The card of the network; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
