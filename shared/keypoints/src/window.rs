@@ -1,6 +1,12 @@
 //! The window of a picture that a network sees.
 
 use crate::card::{Card, Fit, Layout};
+use crate::decode::Keypoint;
+
+/// Least side of the window over a grid, pixels of the picture.
+const LEAST_SIDE_PX: f64 = 8.0;
+/// Most that one side of such a window is longer than the other.
+const MOST_SLENDER: f64 = 4.0;
 
 /// Where the input of a network lies in a picture.
 ///
@@ -41,6 +47,39 @@ impl Window {
             step: [size[0] / width, size[1] / height],
             input,
         })
+    }
+
+    /// The window around a person without a network: its input is a grid of square cells over the box, none of them smaller than
+    /// a pixel. A box that is very slender, or a point, is widened.
+    ///
+    /// * `outline`: the box: left, top, right, bottom, pixels of the picture.
+    /// * `margin`: the box is enlarged by it about its middle.
+    /// * `most_rows`: most cells down; across there are at most four times as many.
+    /// * Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
+    pub fn grid(outline: [f64; 4], margin: f64, most_rows: usize) -> Option<Self> {
+        let [left, top, right, bottom] = outline;
+        let [width, height] = [right - left, bottom - top].map(|it| it * margin);
+        let is_box = outline.iter().all(|it| it.is_finite()) && width >= 0.0 && height >= 0.0;
+        if !is_box || !(width + height).is_finite() || most_rows == 0 {
+            return None;
+        }
+        let [width, height] = [
+            width.max(height / MOST_SLENDER).max(LEAST_SIDE_PX),
+            height.max(width / MOST_SLENDER).max(LEAST_SIDE_PX),
+        ];
+        let rows = height.ceil().min(most_rows as f64);
+        let step = height / rows;
+        let columns = (width / step).ceil().max(1.0);
+        Some(Self {
+            centre: [f64::midpoint(left, right), f64::midpoint(top, bottom)],
+            step: [step; 2],
+            input: [columns as usize, rows as usize],
+        })
+    }
+
+    /// Width and height of the input.
+    pub fn input(&self) -> [usize; 2] {
+        self.input
     }
 
     /// The point of the picture at a point of the input.
@@ -98,6 +137,16 @@ impl Window {
             }
         }
     }
+}
+
+/// The box around the keypoints that were found with a score above 0: left, top, right, bottom.
+pub(crate) fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
+    let found = keypoints.iter().flatten().filter(|it| it.score > 0.0);
+    found.fold(None, |around: Option<[f64; 4]>, it| {
+        let [x, y] = it.at;
+        let [left, top, right, bottom] = around.unwrap_or([x, y, x, y]);
+        Some([left.min(x), top.min(y), right.max(x), bottom.max(y)])
+    })
 }
 
 /// The colour at a point, between four pixels; `fill` for those beyond the picture.
@@ -198,5 +247,49 @@ mod tests {
             let back = window.in_input(window.in_picture(at));
             prop_assert!((0..2).all(|axis| (back[axis] - at[axis]).abs() < 1e-6), "{:?}", back);
         }
+    }
+
+    #[test]
+    fn a_grid_holds_the_box_in_square_cells() {
+        let window = Window::grid([100.0, 50.0, 300.0, 450.0], 1.25, 64).unwrap();
+        assert_eq!(window.input(), [32, 64]);
+        assert_eq!(window.step(), [7.8125; 2]);
+        assert_eq!(window.in_picture([16.0, 32.0]), [200.0, 250.0]);
+        let small = Window::grid([0.0, 0.0, 20.0, 24.0], 1.25, 64).unwrap();
+        assert_eq!((small.input(), small.step()), ([25, 30], [1.0; 2]));
+    }
+
+    #[test]
+    fn a_grid_over_a_line_or_a_point_is_widened_and_stays_small() {
+        for outline in [
+            [10.0, 5.0, 900.0, 5.0],
+            [10.0, 5.0, 10.0, 900.0],
+            [10.0, 5.0, 10.0, 5.0],
+            [-1e6, -1e6, 1e6, 1e6],
+        ] {
+            let window = Window::grid(outline, 1.25, 64).unwrap();
+            let [columns, rows] = window.input();
+            assert!((8..=64).contains(&rows) && (8..=257).contains(&columns));
+            for corner in [[outline[0], outline[1]], [outline[2], outline[3]]] {
+                let [x, y] = window.in_input(corner);
+                assert!(x >= 0.0 && x <= columns as f64 && y >= 0.0 && y <= rows as f64);
+            }
+        }
+        assert_eq!(Window::grid([0.0, 0.0, f64::NAN, 1.0], 1.25, 64), None);
+        assert_eq!(Window::grid([5.0, 0.0, 1.0, 1.0], 1.25, 64), None);
+        assert_eq!(Window::grid([f64::MIN, 0.0, f64::MAX, 1.0], 1.25, 64), None);
+    }
+
+    #[test]
+    fn the_box_of_keypoints_is_of_those_that_were_found() {
+        let at = |x, y, score| Some(Keypoint { at: [x, y], score });
+        let all = [
+            at(5.0, 9.0, 0.1),
+            None,
+            at(0.0, 0.0, 0.0),
+            at(7.0, 2.0, 1.0),
+        ];
+        assert_eq!(outline(&all), Some([5.0, 2.0, 7.0, 9.0]));
+        assert_eq!(outline(&all[1..3]), None);
     }
 }
