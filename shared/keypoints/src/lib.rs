@@ -11,12 +11,15 @@
 //! | `keypoints` | positions and scores | [`List`] |
 //!
 //! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture.
-//! Nothing here reads a file or runs a network.
+//! What other programs found is read from their files by [`files`].
+//!
+//! Nothing here opens a file or runs a network.
 #![forbid(unsafe_code)]
 
 mod card;
 mod decode;
 mod detector;
+pub mod files;
 mod names;
 mod shipped;
 mod window;

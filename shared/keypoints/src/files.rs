@@ -1,0 +1,18 @@
+//! Keypoints that other programs wrote into JSON files.
+//!
+//! | layout | files | read by |
+//! |---|---|---|
+//! | OpenPose's | one for every frame | [`openpose::parse`] |
+//! | COCO's, a data set or a list of results | one for all frames | [`coco::parse`] |
+//!
+//! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). Nothing here reads a file; what is read
+//! is checked: numbers, lengths and counts have limits.
+
+pub mod coco;
+pub mod openpose;
+
+mod names;
+mod seen;
+
+pub use names::{NameSet, NamesError};
+pub use seen::{FileError, MAX_FRAMES, MAX_PEOPLE, SeenKeypoints};

@@ -1,0 +1,157 @@
+//! The names of the keypoints of a file.
+
+use crate::names::{BODY_25, COCO_17, HALPE_26, OPENPOSE_18, SETS, joint_rows};
+
+/// Most keypoints of a person.
+const MAX_KEYPOINTS: usize = 256;
+
+/// The names of keypoints, each once, in the order of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NameSet(Vec<String>);
+
+/// Why texts are not the names of keypoints.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NamesError {
+    /// No set of this name is known.
+    #[error("{name:?} is no known set of keypoints, expected one of {}", SETS.map(|it| it.0).join(", "))]
+    UnknownSet {
+        /// The name.
+        name: String,
+    },
+    /// Too few or too many.
+    #[error("{n} names of keypoints, expected 1 to {MAX_KEYPOINTS}")]
+    Number {
+        /// How many.
+        n: usize,
+    },
+    /// Two keypoints have one name.
+    #[error("the keypoint {name:?} twice, expected every name once")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+    /// No joint of the skeleton follows from them.
+    #[error(
+        "no joint of the skeleton follows from the keypoints {names}; expected names such as \"left shoulder\""
+    )]
+    NoJoint {
+        /// The first of them.
+        names: String,
+    },
+}
+
+impl NameSet {
+    /// Takes names; `left_hip` and `Left Hip` are `left hip`.
+    ///
+    /// # Errors
+    ///
+    /// [`NamesError`].
+    pub fn new(names: impl IntoIterator<Item = impl AsRef<str>>) -> Result<Self, NamesError> {
+        // One more than can be, so that too many are seen without taking all of them.
+        let names = names.into_iter().take(MAX_KEYPOINTS + 1);
+        let plain = |it: &str| it.trim().replace(['_', '-'], " ").to_lowercase();
+        let names: Vec<String> = names.map(|it| plain(it.as_ref())).collect();
+        if !(1..=MAX_KEYPOINTS).contains(&names.len()) {
+            return Err(NamesError::Number { n: names.len() });
+        }
+        let twice = names
+            .iter()
+            .enumerate()
+            .find(|(nth, it)| names[..*nth].contains(it));
+        if let Some((_, name)) = twice {
+            return Err(NamesError::Twice { name: name.clone() });
+        }
+        if joint_rows(&names).iter().all(Option::is_none) {
+            let first: Vec<String> = names.iter().take(4).map(|it| format!("{it:?}")).collect();
+            return Err(NamesError::NoJoint {
+                names: first.join(", "),
+            });
+        }
+        Ok(Self(names))
+    }
+
+    /// A known set: one of [`SETS`].
+    ///
+    /// # Errors
+    ///
+    /// [`NamesError::UnknownSet`].
+    pub fn of_set(name: &str) -> Result<Self, NamesError> {
+        let known = SETS.iter().find(|it| it.0 == name);
+        let unknown = || NamesError::UnknownSet {
+            name: name.chars().take(64).collect(),
+        };
+        let (_, names) = known.ok_or_else(unknown)?;
+        Ok(Self::known(names))
+    }
+
+    /// The set that programs write with this number of keypoints: 17 `coco-17`, 18 `openpose-18`, 25 `body-25`, 26 `halpe-26`.
+    pub fn of_number(n: usize) -> Option<Self> {
+        match n {
+            17 => Some(Self::known(&COCO_17)),
+            18 => Some(Self::known(&OPENPOSE_18)),
+            25 => Some(Self::known(&BODY_25)),
+            26 => Some(Self::known(&HALPE_26)),
+            _ => None,
+        }
+    }
+
+    fn known(names: &[&str]) -> Self {
+        Self(names.iter().map(|&it| it.to_owned()).collect())
+    }
+
+    /// The names, in order.
+    pub fn names(&self) -> &[String] {
+        &self.0
+    }
+
+    /// How many there are.
+    pub fn n(&self) -> usize {
+        self.0.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_name_the_sets_that_programs_write() {
+        for (n, set) in [
+            (17, "coco-17"),
+            (18, "openpose-18"),
+            (25, "body-25"),
+            (26, "halpe-26"),
+        ] {
+            let found = NameSet::of_number(n).unwrap();
+            assert_eq!((found.n(), &found), (n, &NameSet::of_set(set).unwrap()));
+        }
+        assert_eq!(NameSet::of_number(133), None);
+    }
+
+    #[test]
+    fn every_known_set_passes_the_checks_of_given_names() {
+        for (set, names) in SETS {
+            assert_eq!(NameSet::new(names), NameSet::of_set(set), "{set}");
+        }
+    }
+
+    #[test]
+    fn names_are_taken_in_the_spelling_of_coco() {
+        let set = NameSet::new(["nose", "left_hip", "Right Hip"]).unwrap();
+        assert_eq!(set.names(), ["nose", "left hip", "right hip"]);
+    }
+
+    #[test]
+    fn names_that_cannot_be_are_refused() {
+        let refused = |names: &[&str]| NameSet::new(names).unwrap_err().to_string();
+        assert!(refused(&[]).contains("0 names"));
+        assert!(refused(&["neck"; 300]).contains("257 names"));
+        assert!(refused(&["left_hip", "left hip"]).contains("\"left hip\" twice"));
+        assert!(refused(&["kp_0", "kp_1"]).contains("no joint of the skeleton"));
+        let unknown = NameSet::of_set("coco17").unwrap_err().to_string();
+        assert!(
+            unknown.contains("\"coco17\"") && unknown.contains("coco-17"),
+            "{unknown}"
+        );
+    }
+}

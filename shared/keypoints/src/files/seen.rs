@@ -1,0 +1,171 @@
+//! A person of a file, and why a file cannot be read.
+
+use crate::decode::Keypoint;
+use crate::files::names::{NameSet, NamesError};
+
+/// Most people of a frame.
+pub const MAX_PEOPLE: usize = 1000;
+/// Most frames of a file, by their numbers.
+pub const MAX_FRAMES: u64 = 10_000_000;
+/// Farthest from the top-left pixel that a keypoint can lie, pixels.
+const FARTHEST_PX: f64 = 1e6;
+
+/// The keypoints of one person, as another program saw them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SeenKeypoints {
+    /// In the order of the names: the place, pixels of the footage with the centre of the top-left pixel at (0, 0), and a score
+    /// from 0 to 1. `None` for a keypoint that was not found, or not labelled.
+    pub keypoints: Vec<Option<Keypoint>>,
+}
+
+impl SeenKeypoints {
+    /// The box around the keypoints that were found with a score above 0: left, top, right, bottom, pixels.
+    pub fn outline(&self) -> Option<[f64; 4]> {
+        crate::window::outline(&self.keypoints)
+    }
+}
+
+/// Why a file of keypoints cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It is not JSON of the layout.
+    #[error("expected {layout}: {source}")]
+    Json {
+        /// The layout.
+        layout: &'static str,
+        /// Why, and where.
+        source: serde_json::Error,
+    },
+    /// A list has a wrong number of numbers.
+    #[error("`{entry}` has {got} numbers, expected {expected}")]
+    Length {
+        /// The list.
+        entry: String,
+        /// How many it has.
+        got: usize,
+        /// How many are read.
+        expected: String,
+    },
+    /// A number is out of range.
+    #[error("number {index} of `{entry}` is {value}, expected {expected}")]
+    Number {
+        /// The list.
+        entry: String,
+        /// Which of its numbers, from 0.
+        index: usize,
+        /// What it is.
+        value: f64,
+        /// What is accepted.
+        expected: String,
+    },
+    /// The number of keypoints tells no set.
+    #[error(
+        "`{entry}` has {n} keypoints, which no known program writes (17, 18, 25 or 26 are known): say what they are called"
+    )]
+    UnknownSet {
+        /// The list.
+        entry: String,
+        /// Number of keypoints.
+        n: usize,
+    },
+    /// The names of the keypoints cannot be used.
+    #[error("`{entry}`: {source}")]
+    Names {
+        /// The list of names.
+        entry: String,
+        /// Why.
+        source: NamesError,
+    },
+    /// There are too many of something.
+    #[error("{got} {what}, at most {most} are read")]
+    TooMany {
+        /// Of what.
+        what: String,
+        /// How many.
+        got: u64,
+        /// How many are read.
+        most: u64,
+    },
+    /// Something else is wrong with an entry.
+    #[error("`{entry}` is {got}, expected {expected}")]
+    Entry {
+        /// The entry.
+        entry: String,
+        /// What it is.
+        got: String,
+        /// What is accepted.
+        expected: String,
+    },
+}
+
+/// Refuses more than can be.
+pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileError> {
+    if got <= most {
+        return Ok(());
+    }
+    Err(FileError::TooMany {
+        what: what.to_owned(),
+        got: got as u64,
+        most: most as u64,
+    })
+}
+
+/// A person of a list of numbers: column, row and a third one for every keypoint. No numbers at all are a person without
+/// keypoints.
+///
+/// * `entry`: the list, for errors.
+/// * `is_found`: whether three numbers are a keypoint that was found.
+pub(crate) fn person(
+    values: &[f64],
+    names: &NameSet,
+    entry: impl Fn() -> String,
+    is_found: fn([f64; 3]) -> bool,
+) -> Result<SeenKeypoints, FileError> {
+    let n = names.n();
+    if values.is_empty() {
+        return Ok(SeenKeypoints {
+            keypoints: vec![None; n],
+        });
+    }
+    if values.len() != 3 * n {
+        return Err(FileError::Length {
+            entry: entry(),
+            got: values.len(),
+            expected: format!("{}: 3 for each of {n} keypoints", 3 * n),
+        });
+    }
+    for (index, &value) in values.iter().enumerate() {
+        // Not-a-number is within no range.
+        if !(-FARTHEST_PX..=FARTHEST_PX).contains(&value) {
+            return Err(FileError::Number {
+                entry: entry(),
+                index,
+                value,
+                expected: format!("{} to {FARTHEST_PX}", -FARTHEST_PX),
+            });
+        }
+    }
+    let keypoint = |it: &[f64; 3]| {
+        is_found(*it).then_some(Keypoint {
+            at: [it[0], it[1]],
+            score: it[2].clamp(0.0, 1.0),
+        })
+    };
+    let (triples, _) = values.as_chunks::<3>();
+    Ok(SeenKeypoints {
+        keypoints: triples.iter().map(keypoint).collect(),
+    })
+}
+
+/// The set of names that a number of numbers tells.
+pub(crate) fn told_by(n_values: usize, entry: impl Fn() -> String) -> Result<NameSet, FileError> {
+    if !n_values.is_multiple_of(3) {
+        return Err(FileError::Length {
+            entry: entry(),
+            got: n_values,
+            expected: "3 for each keypoint".to_owned(),
+        });
+    }
+    let n = n_values / 3;
+    NameSet::of_number(n).ok_or_else(|| FileError::UnknownSet { entry: entry(), n })
+}
