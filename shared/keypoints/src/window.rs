@@ -140,7 +140,7 @@ impl Window {
 }
 
 /// The box around the keypoints that were found with a score above 0: left, top, right, bottom.
-pub(crate) fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
+pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
     let found = keypoints.iter().flatten().filter(|it| it.score > 0.0);
     found.fold(None, |around: Option<[f64; 4]>, it| {
         let [x, y] = it.at;

@@ -30,6 +30,12 @@ impl Default for MapSettings {
     }
 }
 
+impl MapSettings {
+    fn of_heat(&self, heat: f64) -> f32 {
+        (self.lambda * (heat.max(0.0) + self.eps).ln()) as f32
+    }
+}
+
 /// Maps of the joints in a window of a picture, on the grid of the network's own maps.
 #[derive(Debug, Clone, Default)]
 pub struct JointMaps {
@@ -47,6 +53,12 @@ pub struct JointMaps {
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.
 const GRID_PX: f64 = 2.0;
+/// A box around keypoints is enlarged by it: the grid of a person that another program saw.
+const BOX_MARGIN: f64 = 1.25;
+/// Most rows of such a grid.
+const MOST_ROWS: usize = 64;
+/// Least standard deviation on such a grid, cells: a narrower one would be lost between two.
+const LEAST_SIGMA: f64 = 1.0;
 /// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
 const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
 
@@ -92,6 +104,75 @@ impl JointMaps {
         Ok(())
     }
 
+    /// Makes maps of the keypoints of a person that another program saw: around every joint a Gaussian as high as its score,
+    /// over the floor. Where nobody was found, everything is the floor, and no joint has a peak.
+    ///
+    /// * `keypoints`: pixels of the picture; `None` for those that were not found, as for those with a score of 0.
+    /// * `rows`: how the joints follow from them: [`joint_rows`] of their names. A joint has a peak where all keypoints of its
+    ///   row were found.
+    /// * `settings`: its `point_sigma` is not used.
+    /// * `sigma`: standard deviation, share of the height of the enlarged box, as [`MapSettings::point_sigma`] is.
+    /// * Returns whether there is anybody.
+    ///
+    /// # Panics
+    ///
+    /// If a row names a keypoint beyond the list.
+    pub fn of_keypoints(
+        &mut self,
+        keypoints: &[Option<Keypoint>],
+        rows: &[Option<Vec<(usize, f64)>>],
+        settings: &MapSettings,
+        sigma: f64,
+    ) -> bool {
+        self.floor = (settings.lambda * settings.eps.ln()) as f32;
+        self.step = [1.0; 2];
+        self.window =
+            keypoints::outline(keypoints).and_then(|it| Window::grid(it, BOX_MARGIN, MOST_ROWS));
+        [self.columns, self.rows] = self.window.map_or([0, 0], |it| it.input());
+        let n_values = N_JOINTS * self.rows * self.columns;
+        self.values.clear();
+        // Once for the widest grid, so that no later frame allocates.
+        self.values
+            .reserve(N_JOINTS * MOST_ROWS * (4 * MOST_ROWS + 1));
+        self.values.resize(n_values, self.floor);
+        self.peaks.clear();
+        self.peaks.resize(N_JOINTS, None);
+        let Some(window) = self.window else {
+            return false;
+        };
+        let sigma = (sigma * self.rows as f64).max(LEAST_SIGMA);
+        for (joint, row) in rows.iter().enumerate().take(N_JOINTS) {
+            let found = |at: usize| keypoints[at].filter(|it| it.score > 0.0);
+            let peak = row.as_ref().and_then(|row| weighted(row, found));
+            self.peaks[joint] = peak;
+            if let Some(peak) = peak {
+                let at = window.in_input(peak.at);
+                self.fill_bump(joint, (at, peak.score), sigma, settings);
+            }
+        }
+        true
+    }
+
+    /// Fills the map of one joint with a Gaussian.
+    ///
+    /// * `at`, `sigma`: pixels of the input.
+    fn fill_bump(
+        &mut self,
+        joint: usize,
+        (at, score): ([f64; 2], f64),
+        sigma: f64,
+        settings: &MapSettings,
+    ) {
+        let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
+        let cells = &mut self.values[joint * area..(joint + 1) * area];
+        for (cell, value) in cells.iter_mut().enumerate() {
+            let x = (cell % columns) as f64 * step[0] - at[0];
+            let y = (cell / columns) as f64 * step[1] - at[1];
+            let gauss = (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
+            *value = settings.of_heat(score.clamp(0.0, 1.0) * gauss);
+        }
+    }
+
     /// Fills the map of one joint, which is a weighted sum of keypoints.
     fn fill_joint(
         &mut self,
@@ -102,7 +183,7 @@ impl JointMaps {
     ) {
         let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
         let size = sight.network().size();
-        let heat = |value: f64| (settings.lambda * (value.max(0.0) + settings.eps).ln()) as f32;
+        let heat = |value: f64| settings.of_heat(value);
         let cells = self.values[joint * area..(joint + 1) * area].iter_mut();
         let cells = cells
             .enumerate()
@@ -128,12 +209,7 @@ impl JointMaps {
             _ => {
                 let at = sight.window().in_input(peak.at);
                 let sigma = settings.point_sigma * size[1] as f64;
-                for ([column, row], value) in cells {
-                    let x = column as f64 * step[0] - at[0];
-                    let y = row as f64 * step[1] - at[1];
-                    let gauss = (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
-                    *value = heat(peak.score.clamp(0.0, 1.0) * gauss);
-                }
+                self.fill_bump(joint, (at, peak.score), sigma, settings);
             }
         }
     }
@@ -269,22 +345,35 @@ impl JointMaps {
 
 /// A joint as a weighted sum of keypoints; its score is the lowest of theirs.
 fn derived(row: &[(usize, f64)], keypoints: &[Keypoint], sight: &Sight<'_>) -> Keypoint {
-    let mut at = [0.0; 2];
-    let mut score = f64::INFINITY;
-    for &(keypoint, weight) in row {
-        let it = &keypoints[keypoint];
-        at[0] += weight * it.at[0];
-        at[1] += weight * it.at[1];
-        score = score.min(it.score);
-    }
+    let mut peak = weighted(row, |it| Some(keypoints[it])).unwrap_or(NOWHERE);
     if let (Ok(Read::SimCc(simcc)), [(keypoint, _)]) = (sight.read(), row) {
-        let peak = |axis| {
+        let axis_peak = |axis| {
             let values = likelihood(simcc.axis(*keypoint, axis), axis, sight);
             values.into_iter().fold(0.0, f64::max)
         };
-        score = peak(0) * peak(1);
+        peak.score = axis_peak(0) * axis_peak(1);
     }
-    Keypoint { at, score }
+    peak
+}
+
+/// What a row without keypoints would be.
+const NOWHERE: Keypoint = Keypoint {
+    at: [0.0; 2],
+    score: 0.0,
+};
+
+/// A weighted sum of keypoints; its score is the lowest of theirs. `None` where one of them was not found.
+fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<Keypoint> {
+    let mut sum = Keypoint {
+        score: f64::INFINITY,
+        ..NOWHERE
+    };
+    for &(keypoint, weight) in row {
+        let it = found(keypoint)?;
+        sum.at = [sum.at[0] + weight * it.at[0], sum.at[1] + weight * it.at[1]];
+        sum.score = sum.score.min(it.score);
+    }
+    Some(sum)
 }
 
 /// The likelihood along an axis, as a share of what a label of the published width would give at its middle, at most 1.
@@ -319,3 +408,6 @@ fn cubic(t: f32) -> [f32; 4] {
         0.5 * (t3 - t2),
     ]
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,160 @@
+//! Tests of the maps of keypoints that another program saw.
+
+use keypoints::{BODY_25, COCO_17};
+
+use super::*;
+
+/// A person of 400 pixels height about column 300, with all scores 0.8; the neck is the second keypoint.
+fn person() -> Vec<Option<Keypoint>> {
+    let keypoint = |nth: usize| Keypoint {
+        at: [
+            250.0 + 10.0 * (nth % 11) as f64,
+            100.0 + 400.0 * nth as f64 / 24.0,
+        ],
+        score: 0.8,
+    };
+    (0..25).map(|nth| Some(keypoint(nth))).collect()
+}
+
+fn rows(names: &[&str]) -> Vec<Option<Vec<(usize, f64)>>> {
+    let names: Vec<String> = names.iter().map(|&it| it.to_owned()).collect();
+    joint_rows(&names)
+}
+
+fn maps(keypoints: &[Option<Keypoint>]) -> JointMaps {
+    let mut maps = JointMaps::default();
+    maps.of_keypoints(keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+    maps
+}
+
+const SETTINGS: MapSettings = MapSettings {
+    lambda: 1.0,
+    eps: 0.02,
+    point_sigma: 0.0,
+};
+/// The neck of `skeleton::PARSE14`, and of `body-25`.
+const NECK: usize = 12;
+const NECK_25: usize = 1;
+
+#[test]
+fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
+    let keypoints = person();
+    let maps = maps(&keypoints);
+    assert_eq!(PARSE14.joints[NECK].name, "neck");
+    let neck = keypoints[NECK_25].unwrap();
+    assert_eq!(maps.peaks()[NECK], Some(neck));
+    // The peak lies within half a cell of the highest one: 500 / 64 pixels for a cell.
+    let (at, value) = maps.maxima(NECK, 1)[0];
+    let away = (at[0] - neck.at[0]).hypot(at[1] - neck.at[1]);
+    assert!(away < 0.71 * 500.0 / 64.0, "{away}");
+    assert!(value <= 0.82_f32.ln() && value > 0.5_f32.ln(), "{value}");
+    let here = maps.at(NECK, neck.at);
+    assert!((here - 0.82_f32.ln()).abs() < 0.05, "{here}");
+    // One standard deviation beside, by the bump itself: 0.02 of the box of 500 pixels.
+    let beside = maps.at(NECK, [neck.at[0] + 10.0, neck.at[1]]);
+    let expected = (0.8 * (-0.5_f32).exp() + 0.02).ln();
+    assert!((beside - expected).abs() < 0.05, "{beside} {expected}");
+}
+
+#[test]
+fn far_from_a_joint_and_beyond_the_box_is_the_floor() {
+    let maps = maps(&person());
+    assert_eq!(maps.floor(), 0.02_f32.ln());
+    for point in [[300.0, 450.0], [300.0, -500.0], [f64::NAN, 0.0]] {
+        let got = maps.at(NECK, point);
+        assert!((got - maps.floor()).abs() < 1e-3, "{point:?}: {got}");
+    }
+}
+
+#[test]
+fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
+    for lost in [None, Some(NOWHERE)] {
+        let mut keypoints = person();
+        keypoints[NECK_25] = lost;
+        let maps = maps(&keypoints);
+        assert_eq!(maps.peaks()[NECK], None);
+        assert_eq!(maps.maxima(NECK, 3), []);
+        // The head follows from the neck; the left hip does not.
+        assert_eq!(maps.peaks()[13], None);
+        assert!(maps.peaks()[3].is_some());
+    }
+}
+
+#[test]
+fn a_derived_joint_has_the_lowest_score_of_its_keypoints() {
+    let mut keypoints = person();
+    keypoints.truncate(17);
+    keypoints[5] = Some(Keypoint {
+        at: [200.0, 150.0],
+        score: 0.3,
+    });
+    keypoints[6] = Some(Keypoint {
+        at: [240.0, 170.0],
+        score: 0.9,
+    });
+    let mut maps = JointMaps::default();
+    assert!(maps.of_keypoints(&keypoints, &rows(&COCO_17), &SETTINGS, 0.02));
+    let neck = maps.peaks()[NECK].unwrap();
+    assert_eq!((neck.at, neck.score), ([220.0, 160.0], 0.3));
+    let here = maps.at(NECK, neck.at);
+    assert!((here - 0.32_f32.ln()).abs() < 0.05, "{here}");
+}
+
+#[test]
+fn nobody_leaves_the_floor_and_nothing_of_an_earlier_frame() {
+    let mut maps = maps(&person());
+    for keypoints in [vec![None; 25], vec![Some(NOWHERE); 25]] {
+        let is_there = maps.of_keypoints(&keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+        assert!(!is_there);
+        assert_eq!(maps.peaks(), [None; N_JOINTS]);
+        assert_eq!(maps.at(NECK, [300.0, 116.0]), maps.floor());
+        assert_eq!(maps.maxima(NECK, 3), []);
+        maps.exchange_sides();
+        maps.shift([1.0, 2.0]);
+    }
+}
+
+#[test]
+fn a_small_or_strange_box_has_maps_too() {
+    let one = |at: [f64; 2]| {
+        let mut keypoints = vec![None; 25];
+        keypoints[NECK_25] = Some(Keypoint { at, score: 1.0 });
+        keypoints
+    };
+    let mut far = one([-1e6, 1e6]);
+    far[0] = Some(Keypoint {
+        at: [1e6, -1e6],
+        score: 1.0,
+    });
+    for keypoints in [one([5.0, 5.0]), far] {
+        let maps = maps(&keypoints);
+        let at = keypoints[NECK_25].unwrap().at;
+        assert!(maps.at(NECK, at) > maps.floor() + 1.0);
+        assert!(maps.values.iter().all(|it| it.is_finite()));
+    }
+}
+
+#[test]
+fn frames_after_the_first_need_no_further_memory() {
+    let mut maps = maps(&person());
+    let before = [maps.values.capacity(), maps.peaks.capacity()];
+    // As wide as it gets.
+    let mut wide = vec![None; 25];
+    for (nth, x) in [(0, 0.0), (1, 5000.0)] {
+        wide[nth] = Some(Keypoint {
+            at: [x, 9.0],
+            score: 1.0,
+        });
+    }
+    maps.of_keypoints(&wide, &rows(&BODY_25), &SETTINGS, 0.02);
+    assert_eq!([maps.values.capacity(), maps.peaks.capacity()], before);
+}
+
+#[test]
+fn what_moves_in_the_picture_moves_its_maps() {
+    let mut maps = maps(&person());
+    let before = maps.at(NECK, [262.0, 118.0]);
+    maps.shift([100.0, -30.0]);
+    let after = maps.at(NECK, [362.0, 88.0]);
+    assert!((before - after).abs() < 1e-4, "{before} {after}");
+}
