@@ -1,5 +1,7 @@
 //! Section `[capture]` of a deployment file, and its `[[camera]]` entries.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +14,15 @@ pub struct Camera {
     /// The camera of the rig, by its name there.
     pub name: String,
     /// A video, an image, a folder of images, a glob such as `frames/*.png`, or a scene that is made while it
-    /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`.
+    /// runs: `synth://humaneva?camera=C1&action=walking&subject=3&seed=1`. With `keypoints` it may be left out.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
+    /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose,
+    /// or one JSON file in that of COCO.
+    pub keypoints: Option<PathBuf>,
+    /// What these are called: `coco-17`, `halpe-26`, `body-25`, `openpose-18`, `mpii-16` or `lsp-14`; without it what their number
+    /// tells, or the file itself.
+    pub keypoint_names: Option<String>,
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,

@@ -88,9 +88,6 @@ fn of_what_is_missing(key: &str) -> &'static str {
         "rig" | "output" | "camera" | "name" => {
             "; a deployment file needs `name`, `rig`, `output`, and a [[camera]] with `name` and `source` for each camera"
         }
-        "source" => {
-            "; every [[camera]] needs `name`, as the rig calls it, and `source`, its footage"
-        }
         _ => "",
     }
 }

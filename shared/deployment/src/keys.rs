@@ -78,6 +78,21 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_can_have_keypoints_in_place_of_footage() {
+        let names: Vec<String> = camera_keys().into_iter().map(|it| it.name).collect();
+        assert_eq!(
+            names[..4],
+            ["name", "source", "keypoints", "keypoint_names"]
+        );
+        let required = &schema()["$defs"]["Camera"]["required"];
+        assert_eq!(*required, serde_json::json!(["name"]));
+        let keys = camera_keys();
+        for (set, _) in keypoints::SETS {
+            assert!(keys[3].meaning.contains(set), "{set}: {}", keys[3].meaning);
+        }
+    }
+
+    #[test]
     fn keys_are_in_the_order_of_their_sections() {
         let names: Vec<String> = keys().into_iter().map(|it| it.name).collect();
         assert_eq!(names[..3], ["name", "rig", "unit"]);

@@ -201,7 +201,12 @@ impl Deployment {
             *model = relative_to(model, base);
         }
         for camera in &mut self.cameras {
-            camera.source = machine.footage(&camera.source, base);
+            if !camera.source.is_empty() {
+                camera.source = machine.footage(&camera.source, base);
+            }
+            if let Some(keypoints) = &mut camera.keypoints {
+                *keypoints = base.join(&keypoints);
+            }
         }
         let quality = &mut self.quality;
         let files = [&mut quality.table, &mut quality.onnx_runtime];

@@ -75,8 +75,35 @@ fn cameras(it: &Deployment) -> Result<(), Complaint> {
             &format!("{:?}", camera.name),
             geometry::PLAIN_NAME,
         )?;
+        pictures(camera)?;
     }
     Ok(())
+}
+
+/// What a camera sees: footage, keypoints, or both.
+fn pictures(camera: &capture::Camera) -> Result<(), Complaint> {
+    demand(
+        !camera.source.is_empty() || camera.keypoints.is_some(),
+        "camera.source",
+        &format!("left out of camera {:?}", camera.name),
+        "its footage: every [[camera]] needs that, or `keypoints` that another program found in it",
+    )?;
+    let Some(names) = &camera.keypoint_names else {
+        return Ok(());
+    };
+    demand(
+        camera.keypoints.is_some(),
+        "camera.keypoint_names",
+        &format!("given for camera {:?}", camera.name),
+        "none without `keypoints`",
+    )?;
+    let known = keypoints::SETS.map(|it| it.0);
+    demand(
+        known.contains(&names.as_str()),
+        "camera.keypoint_names",
+        &format!("{names:?}"),
+        &format!("one of {}", known.join(", ")),
+    )
 }
 
 fn capture(it: &capture::Config) -> Result<(), Complaint> {

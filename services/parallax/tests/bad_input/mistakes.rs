@@ -203,12 +203,6 @@ const FOOTAGE: &[Mistake] = &[
         &["relative to the deployment file"],
     ),
     footage(
-        "no name",
-        |it| source(it, ""),
-        &["the footage has no name", "camera \"b\""],
-        &["is a video, an image"],
-    ),
-    footage(
         "empty video",
         |it| {
             source(it, "b.mp4");

@@ -108,8 +108,26 @@ const FILES: &[Mistake] = &[
     config(
         "camera without footage",
         |it| it.edit("deployment.toml", "source = \"b\"", ""),
-        &["missing key `source`"],
-        &["every [[camera]] needs"],
+        &["`camera.source` is left out of camera \"b\""],
+        &["every [[camera]] needs", "`keypoints`"],
+    ),
+    config(
+        "footage without a name",
+        |it| it.edit("deployment.toml", "source = \"b\"", "source = \"\""),
+        &["`camera.source` is left out of camera \"b\""],
+        &["every [[camera]] needs", "`keypoints`"],
+    ),
+    config(
+        "names of keypoints that no set has",
+        |it| {
+            it.edit(
+                "deployment.toml",
+                "source = \"b\"",
+                "keypoints = \"b\"\nkeypoint_names = \"coco17\"",
+            );
+        },
+        &["`camera.keypoint_names` is \"coco17\""],
+        &["one of coco-17, halpe-26"],
     ),
     config(
         "a name of many words",

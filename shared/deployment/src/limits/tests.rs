@@ -436,3 +436,38 @@ fn what_is_hardly_meant_is_named_with_its_number() {
         );
     }
 }
+
+#[test]
+fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
+    let of_camera = |lines: &str| {
+        let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n");
+        let read = Loaded::parse(&text, Path::new("/room/deployment.toml"), &[], &AnyMachine);
+        read.map_err(|it| it.to_string())
+    };
+    for (lines, words) in [
+        ("", "`camera.source` is left out of camera \"c\""),
+        ("source = ''", "`camera.source` is left out of camera \"c\""),
+        (
+            "source = 'c.mp4'\nkeypoint_names = 'coco-17'",
+            "expected none without `keypoints`",
+        ),
+        (
+            "keypoints = 'c'\nkeypoint_names = 'coco17'",
+            "`camera.keypoint_names` is \"coco17\", expected one of coco-17, halpe-26",
+        ),
+        ("keypoints = 3", "keypoints"),
+    ] {
+        let refused = of_camera(lines).unwrap_err();
+        assert!(refused.contains(words), "{lines}: {refused}");
+    }
+    let taken = of_camera("keypoints = 'c_json/'\nkeypoint_names = 'body-25'").unwrap();
+    let camera = &taken.deployment.cameras[2];
+    assert_eq!(camera.source, "");
+    assert_eq!(
+        camera.keypoints.as_deref(),
+        Some(Path::new("/room/c_json/"))
+    );
+    assert_eq!(camera.keypoint_names.as_deref(), Some("body-25"));
+    let again = Loaded::again(&taken.deployment, &[], |_| None, &AnyMachine).unwrap();
+    assert_eq!(again.deployment, taken.deployment);
+}
