@@ -5,6 +5,9 @@ use std::sync::Arc;
 use footage::{FootageError, FrameView, Size, Source, SourceKind, SourceSpec, Turn};
 use scene::{Address, AddressError, Scene, SceneError, View};
 
+use crate::blank::{Blank, BlankError, BlankFeed};
+use crate::info::FeedInfo;
+
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
 pub enum FeedError {
@@ -19,6 +22,14 @@ pub enum FeedError {
         /// What is wrong with it.
         source: AddressError,
     },
+    /// The address of grey footage is invalid.
+    #[error("{address}: {source}")]
+    Blank {
+        /// As the user wrote it.
+        address: String,
+        /// What is wrong with it.
+        source: BlankError,
+    },
     /// The scene of an address cannot be made.
     #[error("{address}")]
     Scene {
@@ -29,26 +40,15 @@ pub enum FeedError {
     },
 }
 
-/// The properties of a camera's pictures.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FeedInfo {
-    /// Size of every picture.
-    pub size: Size,
-    /// Number of frames.
-    pub n_frames: u64,
-    /// Frames per second of the scene, where it is known.
-    pub frame_rate_hz: Option<f64>,
-    /// The orientation tag of the first image. It is not applied: a calibration refers to the pixels as stored.
-    pub turn: Turn,
-}
-
-/// The pictures of a camera, in order: footage, or `synth://` (see [`Address`]).
+/// The pictures of a camera, in order: footage, `synth://` (see [`Address`]), or `blank://` (see [`Blank`]).
 #[derive(Debug)]
 pub enum Feed {
     /// Files.
     Footage(Box<Source>),
     /// A scene.
     Scene(Box<Stage>),
+    /// Grey frames, of a camera whose pictures nobody needs.
+    Blank(Box<BlankFeed>),
 }
 
 /// A camera of a scene.
@@ -71,6 +71,9 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn look(spec: &SourceSpec) -> Result<FeedInfo, FeedError> {
+        if let Some(blank) = blank(spec)? {
+            return Ok(BlankFeed::look(&blank, spec)?);
+        }
         if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)).info());
         }
@@ -95,6 +98,9 @@ impl Feed {
     ///
     /// [`FeedError`].
     pub fn open(spec: &SourceSpec) -> Result<Self, FeedError> {
+        if let Some(blank) = blank(spec)? {
+            return Ok(Self::Blank(Box::new(BlankFeed::open(&blank, spec)?)));
+        }
         if !Address::is_address(&spec.path) {
             return Ok(Self::Footage(Box::new(Source::open(spec)?)));
         }
@@ -125,6 +131,7 @@ impl Feed {
                 turn: source.info().turn,
             },
             Self::Scene(stage) => stage.info,
+            Self::Blank(feed) => feed.info,
         }
     }
 
@@ -137,6 +144,7 @@ impl Feed {
         match self {
             Self::Footage(source) => source.next_frame(),
             Self::Scene(stage) => Ok(stage.next_frame()),
+            Self::Blank(feed) => Ok(feed.next_frame()),
         }
     }
 
@@ -145,14 +153,16 @@ impl Feed {
         match self {
             Self::Footage(source) => source.pixels(),
             Self::Scene(stage) => &stage.rgb,
+            Self::Blank(feed) => &feed.rgb,
         }
     }
 
-    /// Whether the source is a single image that repeats, which does not count as frozen.
+    /// Whether the pictures are all the same by nature, a single image or grey, which does not count as frozen.
     pub fn is_still(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Still,
             Self::Scene(_) => false,
+            Self::Blank(_) => true,
         }
     }
 
@@ -160,7 +170,7 @@ impl Feed {
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
-            Self::Scene(_) => false,
+            Self::Scene(_) | Self::Blank(_) => false,
         }
     }
 
@@ -177,6 +187,7 @@ impl Feed {
                 stage.skip(n);
                 Ok(n)
             }
+            Self::Blank(feed) => Ok(feed.skip(n)),
         }
     }
 }
@@ -206,6 +217,18 @@ impl Stage {
             rgb: &self.rgb,
         })
     }
+}
+
+/// Grey footage, where the source is meant to be that.
+fn blank(spec: &SourceSpec) -> Result<Option<Blank>, FeedError> {
+    if !Blank::is_blank(&spec.path) {
+        return Ok(None);
+    }
+    let blank = Blank::parse(&spec.path).map_err(|source| FeedError::Blank {
+        address: spec.path.clone(),
+        source,
+    })?;
+    Ok(Some(blank))
 }
 
 fn address(spec: &SourceSpec) -> Result<Address, FeedError> {
@@ -272,12 +295,36 @@ mod tests {
     }
 
     #[test]
+    fn grey_frames_are_selected_like_those_of_footage_and_never_frozen() {
+        const GREY: &str = "blank://32x16?rate=20&frames=10";
+        let whole = frames(&SourceSpec::new(GREY), 0);
+        assert_eq!(whole.len(), 10);
+        assert!(whole.iter().all(|it| it.1 == [128; 32 * 16 * 3]));
+        let part = SourceSpec {
+            start: 1,
+            step: 3,
+            count: Some(9),
+            ..SourceSpec::new(GREY)
+        };
+        let info = Feed::look(&part).unwrap();
+        assert_eq!((info.n_frames, info.frame_rate_hz), (3, Some(20.0 / 3.0)));
+        assert_eq!(info.size, Size::new(32, 16));
+        let of = |skip| frames(&part, skip).into_iter().map(|it| it.0);
+        assert_eq!(of(0).collect::<Vec<u64>>(), [1, 4, 7]);
+        assert_eq!(of(2).collect::<Vec<u64>>(), [7]);
+        assert_eq!(of(9).count(), 0);
+        let feed = Feed::open(&part).unwrap();
+        assert!(feed.is_still() && !feed.is_video());
+    }
+
+    #[test]
     fn a_source_that_cannot_be_opened_is_an_error_with_the_cause() {
         let refused = |spec: &SourceSpec| causes::in_one_line(&Feed::look(spec).unwrap_err());
         let path = |path: &str| SourceSpec::new(path);
         assert!(refused(&path("synth://ring:2?camera=7")).contains("only c1, c2"));
         assert!(refused(&path("synth://ring:2")).contains("names no camera"));
         assert!(refused(&path("synth://nobody.toml?camera=0")).contains("rig"));
+        assert!(refused(&path("blank://32x16?rate=20")).contains("no `frames`"));
         assert!(refused(&path("nothing/here.mp4")).contains("no such footage"));
         let beyond = SourceSpec {
             start: 10,

@@ -1,13 +1,17 @@
 //! Reads the footage of a camera, and sends its frames.
 #![forbid(unsafe_code)]
 
+mod blank;
 mod camera;
 mod feed;
 mod guard;
+mod info;
 mod job;
 mod service;
 mod supply;
 
-pub use feed::{Feed, FeedError, FeedInfo, Stage};
+pub use blank::{Blank, BlankError, BlankFeed};
+pub use feed::{Feed, FeedError, Stage};
+pub use info::FeedInfo;
 pub use job::Job;
 pub use service::run;

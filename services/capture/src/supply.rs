@@ -6,8 +6,9 @@ mod tests;
 use footage::{FootageError, Size, SourceSpec};
 use messages::Status;
 
-use crate::feed::{Feed, FeedError, FeedInfo};
+use crate::feed::{Feed, FeedError};
 use crate::guard::Guard;
+use crate::info::FeedInfo;
 use deployment::capture::{Fault, FaultKind, Faults};
 
 /// Time between attempts to reopen a camera, nanoseconds.
@@ -303,7 +304,11 @@ impl Supply {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
             // A scene that was made once can be made again, unless its files are gone.
-            Err(FeedError::Address { address, .. } | FeedError::Scene { address, .. }) => {
+            Err(
+                FeedError::Address { address, .. }
+                | FeedError::Blank { address, .. }
+                | FeedError::Scene { address, .. },
+            ) => {
                 return Err(FootageError::NotFound { path: address });
             }
         };
