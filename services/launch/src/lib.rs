@@ -30,6 +30,7 @@ mod views;
 
 pub mod budget;
 pub mod inputs;
+pub mod keypoints;
 pub mod live;
 pub mod load;
 pub mod no_results;

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use capture::Blank;
 use deployment::pose::Precision;
 use deployment::{ConfigError, Deployment, Loaded, Machine};
 use runtime::{ExitKind, Fault};
@@ -98,6 +99,9 @@ impl Machine for ThisMachine {
     fn footage(&self, named: &str, base: &Path) -> String {
         if Address::is_address(named) {
             return Address::relative_to(named, base);
+        }
+        if Blank::is_blank(named) {
+            return named.to_owned();
         }
         let on_disk = base.join(named);
         if named.is_empty() || (footage::is_live(named) && !on_disk.exists()) {

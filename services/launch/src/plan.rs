@@ -14,6 +14,7 @@ use supervise::{Plan, Policy, ProcessSpec, Role};
 use tracing::Level;
 
 use crate::inputs;
+use crate::keypoints;
 use crate::prepare::Prepared;
 use crate::process::Name;
 use crate::resolved::Resolved;
@@ -26,13 +27,15 @@ use crate::vertical;
 /// of the longest iteration so far an iteration may take.
 const MAX_WORK_FACTOR: u32 = 3;
 
-/// Resolves a deployment: reads the metadata of its footage, checks footage and calibration against each other, finds the
+/// Resolves a deployment: gives cameras that have keypoints alone grey footage, reads the metadata of its footage, checks footage and calibration against each other, finds the
 /// vertical if it is not given, and logs warnings.
 ///
 /// # Errors
 ///
 /// Footage or calibration cannot be read, or no joints can be located in space with them.
 pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
+    let lengths = keypoints::lengths(deployment)?;
+    let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
     let footage = inputs::footage(deployment);
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
@@ -41,7 +44,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
         recording: None,
         replay: None,
     };
-    sanity::warn(&resolved)?;
+    sanity::warn(&resolved, &lengths)?;
     // Stored in the deployment, so that every process and a replay use the same vertical.
     if let Some(found) = vertical::find(deployment)? {
         tracing::warn!("{}", found.why);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use capture::Feed;
+use capture::{Blank, Feed};
 use deployment::Deployment;
 use footage::SourceSpec;
 use geometry::Rig;
@@ -11,6 +11,7 @@ use runtime::{ExitKind, Failure};
 use scene::Address;
 
 use crate::inputs;
+use crate::keypoints;
 use crate::resolved::Resolved;
 
 /// The largest ratio of two frame rates at which frames can be paired by number.
@@ -28,7 +29,7 @@ const CELLS: usize = 32;
 ///
 /// No joints can be located in space: a single camera, cameras in one place, a wrong unit, one source for two
 /// cameras, or different frame rates.
-pub(crate) fn check(resolved: &Resolved) -> Result<Vec<String>, Failure> {
+fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let mut warnings = deployment.doubts(n_cores());
     check_number(deployment)?;
@@ -37,6 +38,7 @@ pub(crate) fn check(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     warnings.extend(check_rates(resolved)?);
     warnings.extend(check_lengths(resolved));
     warnings.extend(check_images(resolved)?);
+    warnings.extend(keypoints::check_lengths(resolved, lengths));
     Ok(warnings)
 }
 
@@ -70,7 +72,8 @@ fn check_sources(deployment: &Deployment) -> Result<(), Failure> {
         .map(|it| canonical(&it.source))
         .collect();
     for (nth, source) in all.iter().enumerate() {
-        let Some(first) = all[..nth].iter().position(|it| it == source) else {
+        let is_blank = Blank::is_blank(&deployment.cameras[nth].source);
+        let Some(first) = all[..nth].iter().position(|it| it == source && !is_blank) else {
             continue;
         };
         let [a, b] = [first, nth].map(|it| &deployment.cameras[it].name);
@@ -225,12 +228,12 @@ struct FirstImages {
 }
 
 impl FirstImages {
-    /// None for a synthetic camera, for unreadable footage, and for a first image without contrast.
+    /// None for a synthetic camera, for one without pictures, for unreadable footage, and for a first image without contrast.
     fn of(
         camera: &deployment::capture::Camera,
         capture: &deployment::capture::Config,
     ) -> Option<Self> {
-        if Address::is_address(&camera.source) {
+        if Address::is_address(&camera.source) || Blank::is_blank(&camera.source) {
             return None;
         }
         let spec = SourceSpec {
@@ -278,11 +281,13 @@ fn grid(rgb: &[u8], [width, height]: [usize; 2]) -> Vec<f64> {
 
 /// Runs the checks and logs the warnings.
 ///
+/// * `lengths`: number of frames of the keypoints of every camera, where it has some.
+///
 /// # Errors
 ///
 /// As for [`check`].
-pub(crate) fn warn(resolved: &Resolved) -> Result<(), Failure> {
-    for warning in check(resolved)? {
+pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), Failure> {
+    for warning in check(resolved, lengths)? {
         tracing::warn!("{warning}");
     }
     Ok(())

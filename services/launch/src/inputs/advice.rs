@@ -44,7 +44,8 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
             "this is the `source` of {camera}; a player, or `ffprobe FILE`, shows whether the file is whole"
         ),
         _ => format!(
-            "the `source` of {camera} is a video, an image, a folder of images, a glob or a scene (synth://...); \
+            "the `source` of {camera} is a video, an image, a folder of images, a glob or a scene (synth://...), or it is left out where there \
+             are `keypoints`; \
              relative paths are relative to the deployment file"
         ),
     }

@@ -1,0 +1,132 @@
+//! The keypoints that another program found in the footage of cameras, and grey footage for cameras that have them alone.
+
+use std::path::Path;
+
+use capture::Blank;
+use deployment::Deployment;
+use deployment::capture::{Camera, Config};
+use footage::Size;
+use geometry::Rig;
+use keypointfiles::KeypointSource;
+use keypoints::files::NameSet;
+use runtime::{ExitKind, Failure, OrFail as _};
+
+use crate::inputs;
+use crate::resolved::Resolved;
+
+/// Opens the keypoints of a camera; none for a camera that names none.
+///
+/// # Errors
+///
+/// They cannot be read; the message names the file.
+pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
+    let Some(path) = &camera.keypoints else {
+        return Ok(None);
+    };
+    let names = camera.keypoint_names.as_deref().map(NameSet::of_set);
+    let names = names.transpose().or_fail(ExitKind::Config)?;
+    let source = KeypointSource::open(path, names).map_err(|error| {
+        let hint = format!(
+            "these are the `keypoints` of camera {:?}: a folder with a JSON file for every frame, in the layout of OpenPose, or one JSON \
+             file in that of COCO; `keypoint_names` says what they are called",
+            camera.name
+        );
+        Failure::new(ExitKind::Input, error).with_hint(hint)
+    })?;
+    Ok(Some(source))
+}
+
+/// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.
+pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failure> {
+    let cameras = deployment.cameras.iter();
+    cameras
+        .map(|it| Ok(of_camera(it)?.map(|it| it.n_frames())))
+        .collect()
+}
+
+/// The deployment with grey footage for every camera without a source: of the size that the rig says, as long as its keypoints.
+///
+/// # Errors
+///
+/// The frame rate is not given, or the rig lacks the camera.
+pub(crate) fn with_pictures(
+    mut deployment: Deployment,
+    lengths: &[Option<u64>],
+) -> Result<Deployment, Failure> {
+    if deployment.cameras.iter().all(|it| !it.source.is_empty()) {
+        return Ok(deployment);
+    }
+    let rig = inputs::rig_of(&deployment)?;
+    let rate_hz = deployment.capture.frame_rate_hz;
+    for (camera, n_frames) in deployment.cameras.iter_mut().zip(lengths) {
+        if let (true, Some(n_frames)) = (camera.source.is_empty(), n_frames) {
+            let size = size(camera, &rig, &deployment.rig)?;
+            camera.source = grey(&camera.name, size, *n_frames, rate_hz)?.to_string();
+        }
+    }
+    Ok(deployment)
+}
+
+/// The size of a camera's pictures, as the rig says.
+fn size(camera: &Camera, rig: &Rig, file: &Path) -> Result<Size, Failure> {
+    let of_rig = rig.camera(&camera.name).ok_or_else(|| {
+        let names: Vec<&str> = rig.cameras().iter().map(|it| it.name.as_str()).collect();
+        let message = format!(
+            "{} has no camera {:?}; it has {}",
+            file.display(),
+            camera.name,
+            names.join(", ")
+        );
+        Failure::new(ExitKind::Calibration, message)
+    })?;
+    let [width, height] = of_rig.intrinsics.size.map(|side| side as usize);
+    Ok(Size::new(width, height))
+}
+
+fn grey(name: &str, size: Size, n_frames: u64, rate_hz: Option<f64>) -> Result<Blank, Failure> {
+    let rate_hz = rate_hz.ok_or_else(|| {
+        let message = format!(
+            "camera {name:?} has keypoints and no `source`, and nothing says how many frames they have per second"
+        );
+        let hint = "give `capture.frame_rate_hz` in the deployment: frames per second of the footage that they were found in";
+        Failure::new(ExitKind::Config, message).with_hint(hint)
+    })?;
+    Ok(Blank {
+        size,
+        n_frames,
+        rate_hz,
+    })
+}
+
+/// Warns of footage that is longer or shorter than its keypoints.
+///
+/// * `lengths`: as [`lengths`] gives them.
+pub(crate) fn check_lengths(resolved: &Resolved, lengths: &[Option<u64>]) -> Vec<String> {
+    let capture = &resolved.deployment.capture;
+    let cameras = resolved.deployment.cameras.iter();
+    let cameras = cameras.zip(&resolved.footage).zip(lengths);
+    let odd = cameras.filter_map(|((camera, footage), n_frames)| {
+        let (used, known) = (footage.n_frames, used_of((*n_frames)?, capture));
+        let what = match used.cmp(&known) {
+            core::cmp::Ordering::Equal => return None,
+            core::cmp::Ordering::Greater => "the last frames have no keypoints",
+            core::cmp::Ordering::Less => "the last keypoints have no frames",
+        };
+        Some(format!(
+            "camera {:?}: {used} frames of footage and keypoints of {known} frames are to be used: {what}; both are counted from the \
+             first one, so do they begin together?",
+            camera.name
+        ))
+    });
+    odd.collect()
+}
+
+/// How many of `n_frames` are used.
+fn used_of(n_frames: u64, capture: &Config) -> u64 {
+    let left = n_frames.saturating_sub(capture.start_frame);
+    let used = left.div_ceil(capture.frame_step.max(1));
+    capture.n_frames.map_or(used, |most| most.min(used))
+}
+
+#[cfg(test)]
+mod tests;
