@@ -7,6 +7,7 @@ use deployment::{AnyMachine, Loaded, Stage, Topology};
 use fmp::Model;
 use fmp::files::{describe, mat, own, text};
 use geometry::files::{ReadOptions, humaneva, opencv, panoptic, pose2sim, qualisys, umpm};
+use keypoints::files::{NameSet, SeenKeypoints, coco, openpose};
 use multiview::Compatibility;
 use runfiles::{FrameLine, LatencyReport, Line, RunSummary, TimesLine, ViewLine};
 use scene::Address;
@@ -177,6 +178,38 @@ pub fn network_card(input: &[u8]) {
     let mut values = vec![f32::NAN; 3 * card.input.width * card.input.height];
     window.fill(&card, &[200; 3 * 7 * 5], [7, 5], &mut values);
     assert!(values.iter().all(|it| !it.is_nan()));
+}
+
+/// Keypoints of other programs, in either layout: what is read has as many keypoints as names, in their limits.
+pub fn keypoint_files(input: &[u8]) {
+    let given = NameSet::of_set("mpii-16").expect("a set");
+    let check = |people: &[SeenKeypoints], n: usize| {
+        assert!(people.len() <= keypoints::files::MAX_PEOPLE);
+        for person in people {
+            assert_eq!(person.keypoints.len(), n);
+            for it in person.keypoints.iter().flatten() {
+                let [x, y] = it.at;
+                assert!(x.abs() <= 1e6 && y.abs() <= 1e6 && (0.0..=1.0).contains(&it.score));
+            }
+            if let Some(outline) = person.outline() {
+                let window = keypoints::Window::grid(outline, 1.25, 64).expect("a box");
+                let [columns, rows] = window.input();
+                assert!((8..=64).contains(&rows) && (8..=257).contains(&columns));
+            }
+        }
+    };
+    for names in [None, Some(&given)] {
+        if let Ok(frame) = openpose::parse(input, names) {
+            check(&frame.people, frame.names.map_or(0, |it| it.n()));
+        }
+        if let Ok(film) = coco::parse(input, names) {
+            assert!(film.n_frames <= keypoints::files::MAX_FRAMES);
+            for (number, people) in &film.frames {
+                assert!(*number < film.n_frames);
+                check(people, film.names.n());
+            }
+        }
+    }
 }
 
 /// Where joints lie among the parts: the file, and the map to every set of joints; the parts of a point are that point.

@@ -5,9 +5,9 @@ mod files;
 mod messages;
 
 pub use files::{
-    calibration, consistency, deployment_text, joint_file, model_mat, model_own, model_text,
-    motion_c3d, network_card, people_lines, people_mat, quality_network, quality_table, run_files,
-    scene_text, training_checkpoint, type_table,
+    calibration, consistency, deployment_text, joint_file, keypoint_files, model_mat, model_own,
+    model_text, motion_c3d, network_card, people_lines, people_mat, quality_network, quality_table,
+    run_files, scene_text, training_checkpoint, type_table,
 };
 pub use messages::{wire_fusion, wire_messages};
 
@@ -15,11 +15,12 @@ pub use messages::{wire_fusion, wire_messages};
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 19] = [
+pub const TARGETS: [Target; 20] = [
     ("calibration", calibration),
     ("consistency", consistency),
     ("deployment_text", deployment_text),
     ("joint_file", joint_file),
+    ("keypoint_files", keypoint_files),
     ("network_card", network_card),
     ("model_mat", model_mat),
     ("model_own", model_own),
