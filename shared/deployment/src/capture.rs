@@ -20,8 +20,8 @@ pub struct Camera {
     /// Keypoints that another program found in the footage: a folder with a JSON file for every frame, in the layout of OpenPose,
     /// or one JSON file in that of COCO.
     pub keypoints: Option<PathBuf>,
-    /// What these are called: `coco-17`, `halpe-26`, `body-25`, `openpose-18`, `mpii-16` or `lsp-14`; without it what their number
-    /// tells, or the file itself.
+    /// What these are called: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16` or `lsp-14`; without
+    /// it what their number tells, or the file itself.
     pub keypoint_names: Option<String>,
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.

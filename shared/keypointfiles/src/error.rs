@@ -72,4 +72,16 @@ pub enum KeypointFileError {
         /// The folder.
         path: PathBuf,
     },
+    /// There are 25 keypoints, but not in the order that is usual.
+    #[error(
+        "{} has 25 keypoints, but not those of `body-25`: its pelvis would lie {off:.2} of people's height beside the middle of their \
+         hips; say `keypoint_names = \"body-25b\"` if they are of OpenPose's experimental model, or \"body-25\" if this is right",
+        path.display()
+    )]
+    NotBody25 {
+        /// The folder or the file.
+        path: PathBuf,
+        /// Distance of the pelvis from the middle of the hips, share of the longer side of a person's box.
+        off: f64,
+    },
 }

@@ -5,6 +5,7 @@
 
 mod error;
 mod folder;
+mod order;
 mod source;
 
 pub use error::KeypointFileError;

@@ -5,14 +5,18 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use keypoints::BODY_25;
 use keypoints::files::{FileError, NameSet, SeenKeypoints, coco, openpose};
 
 use crate::error::KeypointFileError;
 use crate::folder;
+use crate::order::pelvis_off;
 
 /// Largest file of one frame, and of all frames, bytes.
 const MOST_OF_FRAME: u64 = 16 << 20;
 const MOST_OF_FILM: u64 = 1 << 30;
+/// Files with people that are read to see which 25 keypoints they have.
+const N_LOOKED_AT: usize = 20;
 
 /// The keypoints of a film, by the numbers of its frames.
 #[derive(Debug)]
@@ -37,7 +41,7 @@ impl KeypointSource {
     /// frames that tell nothing. Files that do not end in `.json` are passed over.
     ///
     /// * `names`: what the keypoints are called; `None`: what the files tell by their number or their category. Then the files of
-    ///   a folder are read up to the first person.
+    ///   a folder are read up to the first person, or a few more.
     ///
     /// # Errors
     ///
@@ -48,6 +52,9 @@ impl KeypointSource {
         }
         let text = read(path, MOST_OF_FILM)?;
         let film = coco::parse(&text, names.as_ref()).map_err(|source| in_file(path, source))?;
+        if names.is_none() && is_body_25(&film.names) {
+            checked(path, &mut film.frames.values().flatten())?;
+        }
         Ok(Self {
             names: film.names,
             n_frames: film.n_frames,
@@ -59,9 +66,7 @@ impl KeypointSource {
         let files = folder::files(path)?;
         let names = match names {
             Some(names) => names,
-            None => told(&files)?.ok_or_else(|| KeypointFileError::Nobody {
-                path: path.to_owned(),
-            })?,
+            None => told(path, &files)?,
         };
         Ok(Self {
             names,
@@ -116,15 +121,46 @@ impl KeypointSource {
 }
 
 /// The names that the first file with a person tells.
-fn told(files: &[(u64, PathBuf)]) -> Result<Option<NameSet>, KeypointFileError> {
+fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFileError> {
+    let mut told: Option<NameSet> = None;
+    let mut people = Vec::new();
+    let mut n_looked_at = 0;
     for (_, path) in files {
         let text = read(path, MOST_OF_FRAME)?;
-        let frame = openpose::parse(&text, None).map_err(|source| in_file(path, source))?;
-        if frame.names.is_some() {
-            return Ok(frame.names);
+        let frame = openpose::parse(&text, told.as_ref()).map_err(|it| in_file(path, it))?;
+        told = frame.names;
+        let Some(names) = &told else { continue };
+        people.extend(frame.people);
+        n_looked_at += 1;
+        if n_looked_at == N_LOOKED_AT || !is_body_25(names) {
+            break;
         }
     }
-    Ok(None)
+    let names = told.ok_or_else(|| KeypointFileError::Nobody {
+        path: folder.to_owned(),
+    })?;
+    if is_body_25(&names) {
+        checked(folder, &mut people.iter())?;
+    }
+    Ok(names)
+}
+
+fn is_body_25(names: &NameSet) -> bool {
+    names.names() == BODY_25
+}
+
+/// Refuses 25 keypoints that are not `body-25`.
+fn checked(
+    path: &Path,
+    people: &mut dyn Iterator<Item = &SeenKeypoints>,
+) -> Result<(), KeypointFileError> {
+    match pelvis_off(people) {
+        None => Ok(()),
+        Some(off) => Err(KeypointFileError::NotBody25 {
+            path: path.to_owned(),
+            off,
+        }),
+    }
 }
 
 fn in_file(path: &Path, source: FileError) -> KeypointFileError {

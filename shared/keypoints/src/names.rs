@@ -82,6 +82,35 @@ pub const BODY_25: [&str; 25] = [
     "right heel",
 ];
 
+/// Those of OpenPose's experimental model: COCO's, then those of MPII and of feet. Files do not tell them from [`BODY_25`].
+pub const BODY_25B: [&str; 25] = [
+    "nose",
+    "left eye",
+    "right eye",
+    "left ear",
+    "right ear",
+    "left shoulder",
+    "right shoulder",
+    "left elbow",
+    "right elbow",
+    "left wrist",
+    "right wrist",
+    "left hip",
+    "right hip",
+    "left knee",
+    "right knee",
+    "left ankle",
+    "right ankle",
+    "neck",
+    "head top",
+    "left big toe",
+    "left small toe",
+    "left heel",
+    "right big toe",
+    "right small toe",
+    "right heel",
+];
+
 /// OpenPose's older set, of networks that were trained on COCO.
 pub const OPENPOSE_18: [&str; 18] = [
     "nose",
@@ -143,10 +172,11 @@ pub const LSP_14: [&str; 14] = [
 ];
 
 /// The sets that a card can name.
-pub const SETS: [(&str, &[&str]); 6] = [
+pub const SETS: [(&str, &[&str]); 7] = [
     ("coco-17", &COCO_17),
     ("halpe-26", &HALPE_26),
     ("body-25", &BODY_25),
+    ("body-25b", &BODY_25B),
     ("openpose-18", &OPENPOSE_18),
     ("mpii-16", &MPII_16),
     ("lsp-14", &LSP_14),

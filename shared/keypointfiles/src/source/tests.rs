@@ -57,7 +57,8 @@ fn a_malformed_file_is_named_and_the_others_are_read() {
         ("a2.json", "{"),
         ("a3.json", &frame(&[1.0]).replace("1.0,", "")),
     ]);
-    let source = KeypointSource::open(folder.path(), None).unwrap();
+    let names = NameSet::of_set("body-25").ok();
+    let source = KeypointSource::open(folder.path(), names).unwrap();
     let mut people = Vec::new();
     let error = source.of_frame(1, &mut people).unwrap_err().to_string();
     assert!(
@@ -103,7 +104,8 @@ fn a_file_that_is_too_large_is_not_read() {
     let folder = folder(&[("1.json", &frame(&[1.0])), ("2.json", "")]);
     let large = File::create(folder.path().join("2.json")).unwrap();
     large.set_len(MOST_OF_FRAME + 1).unwrap();
-    let source = KeypointSource::open(folder.path(), None).unwrap();
+    let names = NameSet::of_set("body-25").ok();
+    let source = KeypointSource::open(folder.path(), names).unwrap();
     let error = source.of_frame(1, &mut Vec::new()).unwrap_err().to_string();
     assert!(
         error.contains("2.json has 16777217 bytes, at most 16777216"),
@@ -130,4 +132,51 @@ fn one_file_in_the_layout_of_coco_has_all_frames() {
     assert_eq!(of, [Some(1), None, Some(1), None]);
     let error = KeypointSource::open(&folder.path().join("frame.json"), None).unwrap_err();
     assert!(error.to_string().contains("frame.json: expected"));
+}
+
+/// A frame of one upright person with the keypoints of a set, as far as they have names below.
+fn upright(names: &[&str]) -> String {
+    let at = |name: &str| match name {
+        "pelvis" => [101.0, 100.0],
+        "left hip" => [110.0, 98.0],
+        "right hip" => [90.0, 98.0],
+        "right elbow" => [70.0, 80.0],
+        "left wrist" => [140.0, 110.0],
+        "head top" | "nose" => [100.0, 10.0],
+        _ => [100.0, 200.0],
+    };
+    let values = names.iter().flat_map(|it| [at(it)[0], at(it)[1], 0.5]);
+    let values: Vec<f64> = values.collect();
+    format!("{{\"people\":[{{\"pose_keypoints_2d\":{values:?}}}]}}")
+}
+
+#[test]
+fn the_other_25_keypoints_of_openpose_are_not_taken_for_the_usual_ones() {
+    let usual = upright(&BODY_25);
+    let other = upright(&keypoints::BODY_25B);
+    let open = |files: &[(&str, &str)], names: Option<&str>| {
+        let folder = folder(files);
+        let names = names.map(|it| NameSet::of_set(it).unwrap());
+        let opened = KeypointSource::open(folder.path(), names);
+        opened
+            .map(|it| it.names().clone())
+            .map_err(|it| it.to_string())
+    };
+    let taken = open(
+        &[("1.json", &usual), ("2.json", &usual), ("3.json", &other)],
+        None,
+    );
+    assert_eq!(taken, Ok(NameSet::of_number(25).unwrap()));
+    let files: [(&str, &str); 2] = [("1.json", &other), ("2.json", &other)];
+    let refused = open(&files, None).unwrap_err();
+    assert!(
+        refused.contains("keypoint_names = \"body-25b\""),
+        "{refused}"
+    );
+    for set in ["body-25b", "body-25"] {
+        assert_eq!(
+            open(&files, Some(set)),
+            NameSet::of_set(set).map_err(|it| it.to_string())
+        );
+    }
 }
