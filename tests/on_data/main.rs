@@ -15,6 +15,7 @@ mod bf16;
 mod calibration;
 mod footage;
 mod iterations;
+mod keypoint_files;
 mod models;
 mod motion;
 mod multi_view;
