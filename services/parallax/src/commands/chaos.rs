@@ -25,8 +25,8 @@ supervise.missed_beats of the deployment) plus a second, and may be away longer 
 much processor time as that limit, and three times that of any frame before; with lossless delivery, once its main loop \
 has made no progress for three seconds, which the scenario sets (supervise.hang_limit_s). With kill-random every killed \
 process comes back (--max-return-ms for 99 of 100); if the run is long enough (nine samples, a second apart, at which all \
-processes worked), memory, descriptors and files at the end exceed those at the start by at most a tenth, 32 MB and 8 \
-files; a run longer than --part-seconds is also reported in parts. With kill-supervisor its processes end by themselves \
+processes worked), memory (at equal ages of the processes), descriptors and files at the end exceed those at the start by \
+at most a tenth, 32 MB and 8 files; a run longer than --part-seconds is also reported in parts. With kill-supervisor its processes end by themselves \
 within a second, and the next start of the same deployment removes what is left, and works.
 
 With camera-... a camera fails for a fifth of the footage (its source does what `fault` in a deployment describes): its \

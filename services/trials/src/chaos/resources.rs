@@ -1,4 +1,7 @@
 //! Measures the resources of a run every second: memory, descriptors and files.
+//!
+//! Buffers of a process grow to what its largest frame needed, so that an old process holds more than one that was just started.
+//! What a run holds at its start and at its end is therefore compared at equal ages of its processes.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -32,14 +35,43 @@ pub(super) struct ResourceUse {
     pub shared_bytes: u64,
 }
 
+/// The resources in use at one time, and the memory of every process.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Measured {
+    /// The resources of all processes.
+    pub used: ResourceUse,
+    /// Anonymous resident memory of every process except the supervisor, in the order in which they were asked for, bytes.
+    pub memory_bytes: Vec<u64>,
+}
+
+/// A process that is measured.
+#[derive(Debug)]
+struct Watched {
+    pid: u32,
+    epoch: u32,
+    /// When it was started, `runtime::now_nanos`.
+    started_at: u64,
+    /// Whether it has worked in this epoch.
+    has_worked: bool,
+}
+
+/// What was in use at one time.
+#[derive(Debug)]
+struct Sample {
+    /// When, `runtime::now_nanos`.
+    at: u64,
+    used: ResourceUse,
+    /// Class of age and memory of every process, bytes; in the order of their names.
+    processes: Vec<(u32, u64)>,
+}
+
 /// Takes a sample every second in which all processes work.
 #[derive(Debug, Default)]
 pub(super) struct ResourceMonitor {
-    /// Process id, epoch, and whether it has worked in this epoch; by name.
-    processes: BTreeMap<String, (u32, u32, bool)>,
+    /// By name.
+    processes: BTreeMap<String, Watched>,
     taken_at: u64,
-    /// The samples and their times, `runtime::now_nanos`.
-    samples: Vec<(u64, ResourceUse)>,
+    samples: Vec<Sample>,
 }
 
 impl ResourceMonitor {
@@ -51,7 +83,7 @@ impl ResourceMonitor {
         &mut self,
         event: &Event<'_>,
         now: u64,
-        measure: impl FnOnce(&[u32]) -> ResourceUse,
+        measure: impl FnOnce(&[u32]) -> Measured,
     ) {
         match *event {
             Event::Started {
@@ -59,48 +91,106 @@ impl ResourceMonitor {
                 pid,
                 epoch,
             } => {
-                let state = (pid, epoch, false);
-                self.processes.insert(process.to_owned(), state);
+                let watched = Watched {
+                    pid,
+                    epoch,
+                    started_at: now,
+                    has_worked: false,
+                };
+                self.processes.insert(process.to_owned(), watched);
             }
             Event::Died { process, .. } => {
                 if let Some(it) = self.processes.get_mut(process) {
-                    it.2 = false;
+                    it.has_worked = false;
                 }
             }
             Event::Health { process, health } => {
                 if let Some(it) = self.processes.get_mut(process) {
-                    it.2 |= has_worked(process, health, it.1);
+                    it.has_worked |= has_worked(process, health, it.epoch);
                 }
             }
             _ => {}
         }
         let is_due = now.saturating_sub(self.taken_at) >= PERIOD;
-        if is_due && !self.processes.is_empty() && self.processes.values().all(|it| it.2) {
+        if is_due && !self.processes.is_empty() && self.processes.values().all(|it| it.has_worked) {
             self.taken_at = now;
-            let pids: Vec<u32> = self.processes.values().map(|it| it.0).collect();
-            self.samples.push((now, measure(&pids)));
+            let pids: Vec<u32> = self.processes.values().map(|it| it.pid).collect();
+            let Measured { used, memory_bytes } = measure(&pids);
+            let ages = self.processes.values();
+            let ages = ages.map(|it| age_class(now.saturating_sub(it.started_at)));
+            self.samples.push(Sample {
+                at: now,
+                used,
+                processes: ages.zip(memory_bytes).collect(),
+            });
         }
     }
 
-    /// The resources at the start and at the end: the medians of the first and of the last third of the samples. None if
-    /// there are too few samples.
+    /// The resources at the start and at the end: the medians of the first and of the last third of the samples; the memory of
+    /// every process at equal ages. None if there are too few samples.
     pub(super) fn ends(&self) -> Option<[ResourceUse; 2]> {
         let third = self.samples.len() / 3;
         if self.samples.len() < MIN_SAMPLES {
             return None;
         }
         let last = self.samples.len() - third;
-        let of = |samples: &[(u64, ResourceUse)]| median(samples.iter().map(|it| it.1));
-        Some([of(&self.samples[..third])?, of(&self.samples[last..])?])
+        let ends = [&self.samples[..third], &self.samples[last..]];
+        let memory = at_equal_ages(ends);
+        let of = |nth: usize| {
+            let used = median(ends[nth].iter().map(|it| it.used))?;
+            Some(ResourceUse {
+                memory_bytes: memory[nth],
+                ..used
+            })
+        };
+        Some([of(0)?, of(1)?])
     }
 
     /// The median of the samples in a span of time; none if there are none.
     ///
     /// * `span`: `runtime::now_nanos`.
     pub(super) fn within(&self, span: &Range<u64>) -> Option<ResourceUse> {
-        let within = self.samples.iter().filter(|it| span.contains(&it.0));
-        median(within.map(|it| it.1))
+        let within = self.samples.iter().filter(|it| span.contains(&it.at));
+        median(within.map(|it| it.used))
     }
+}
+
+/// Ages of one class differ by less than a factor of two: the logarithm of the age in seconds.
+fn age_class(nanos: u64) -> u32 {
+    (nanos / 1_000_000_000)
+        .checked_ilog2()
+        .map_or(0, |it| it + 1)
+}
+
+/// The memory of all processes in two parts of a run, bytes: of every process the mean over the classes of age that it had in
+/// both, and of each class the median. A process that had no age in both counts in neither.
+fn at_equal_ages(parts: [&[Sample]; 2]) -> [u64; 2] {
+    let n_processes = parts.iter().flat_map(|it| it.iter());
+    let n_processes = n_processes.map(|it| it.processes.len()).max().unwrap_or(0);
+    let mut sums = [0; 2];
+    for process in 0..n_processes {
+        let by_class = parts.map(|samples| {
+            let mut classes: BTreeMap<u32, Vec<u64>> = BTreeMap::new();
+            for (class, memory) in samples.iter().filter_map(|it| it.processes.get(process)) {
+                classes.entry(*class).or_default().push(*memory);
+            }
+            classes
+        });
+        let both: Vec<u32> = by_class[0]
+            .keys()
+            .filter(|it| by_class[1].contains_key(it))
+            .copied()
+            .collect();
+        for (sum, classes) in sums.iter_mut().zip(by_class) {
+            let medians = both.iter().filter_map(|it| {
+                let mut all = classes.get(it)?.clone();
+                all.sort_unstable();
+                all.get(all.len() / 2).copied()
+            });
+            *sum += medians.sum::<u64>() / (both.len() as u64).max(1);
+        }
+    }
+    sums
 }
 
 /// The median of every field; none if there are no samples.
@@ -123,15 +213,19 @@ fn median(samples: impl Iterator<Item = ResourceUse>) -> Option<ResourceUse> {
 /// Measures the resources of a deployment whose supervisor is this process.
 ///
 /// * `pids`: the ids of its other processes.
-pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> ResourceUse {
+pub(super) fn measure(namespace: &Namespace, pids: &[u32]) -> Measured {
     let own = std::process::id();
     let descriptors = pids.iter().copied().chain([own]).map(descriptors);
-    ResourceUse {
-        memory_bytes: pids.iter().copied().map(memory).sum(),
-        supervisor_memory_bytes: memory(own),
-        descriptors: descriptors.sum(),
-        files: n_files(namespace),
-        shared_bytes: shared_files(namespace).iter().map(|it| shared(it)).sum(),
+    let memory_bytes: Vec<u64> = pids.iter().copied().map(memory).collect();
+    Measured {
+        used: ResourceUse {
+            memory_bytes: memory_bytes.iter().sum(),
+            supervisor_memory_bytes: memory(own),
+            descriptors: descriptors.sum(),
+            files: n_files(namespace),
+            shared_bytes: shared_files(namespace).iter().map(|it| shared(it)).sum(),
+        },
+        memory_bytes,
     }
 }
 
@@ -193,10 +287,13 @@ mod tests {
             process,
             health: &health,
         };
-        monitor.handle(&event, seconds * PERIOD, |pids| ResourceUse {
-            files: seconds,
-            descriptors: pids.len() as u64,
-            ..ResourceUse::default()
+        monitor.handle(&event, seconds * PERIOD, |pids| Measured {
+            used: ResourceUse {
+                files: seconds,
+                descriptors: pids.len() as u64,
+                ..ResourceUse::default()
+            },
+            memory_bytes: vec![0; pids.len()],
         });
     }
 
@@ -206,7 +303,7 @@ mod tests {
             pid: 7,
             epoch,
         };
-        monitor.handle(&event, 0, |_| ResourceUse::default());
+        monitor.handle(&event, 0, |_| Measured::default());
     }
 
     #[test]
@@ -215,14 +312,14 @@ mod tests {
         start(&mut monitor, "a", 0);
         start(&mut monitor, "b", 0);
         health_at(&mut monitor, "a", 0, 1);
-        assert_eq!(monitor.samples, [], "b has not worked yet");
+        assert!(monitor.samples.is_empty(), "b has not worked yet");
         health_at(&mut monitor, "b", 0, 2);
         health_at(&mut monitor, "a", 0, 2);
         let died = Event::Died {
             process: "a",
             death: Death::Signal { number: 9 },
         };
-        monitor.handle(&died, 0, |_| ResourceUse::default());
+        monitor.handle(&died, 0, |_| Measured::default());
         health_at(&mut monitor, "b", 0, 3);
         start(&mut monitor, "a", 1);
         health_at(&mut monitor, "a", 0, 4);
@@ -230,12 +327,34 @@ mod tests {
         let taken: Vec<_> = monitor
             .samples
             .iter()
-            .map(|it| (it.1.files, it.1.descriptors))
+            .map(|it| (it.used.files, it.used.descriptors))
             .collect();
         assert_eq!(taken, [(2, 2), (5, 2)]);
         let within = |span: Range<u64>| monitor.within(&(span.start * PERIOD..span.end * PERIOD));
         assert_eq!(within(3..6).map(|it| it.files), Some(5));
         assert_eq!(within(3..5), None);
+    }
+
+    /// A sample of one process.
+    fn sample(age_s: u64, memory: u64) -> Sample {
+        Sample {
+            at: 0,
+            used: ResourceUse::default(),
+            processes: vec![(age_class(age_s * PERIOD), memory)],
+        }
+    }
+
+    #[test]
+    fn memory_is_compared_at_equal_ages() {
+        // At first it is killed often, and at last grows old: what it holds depends on its age alone.
+        let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, it)| sample(age, it));
+        let old = [(5, 60), (20, 120), (100, 180)].map(|(age, it)| sample(age, it));
+        assert_eq!(at_equal_ages([&young, &old]), [60, 60]);
+        // What every new process holds more of was left by those before it.
+        let leaking = [(1, 90), (2, 95), (5, 100)].map(|(age, it)| sample(age, it));
+        assert_eq!(at_equal_ages([&young, &leaking]), [55, 95]);
+        let older = [(50, 90)].map(|(age, it)| sample(age, it));
+        assert_eq!(at_equal_ages([&young, &older]), [0, 0], "no age in common");
     }
 
     #[test]
@@ -254,7 +373,7 @@ mod tests {
     #[test]
     fn this_process_uses_resources() {
         let namespace = Namespace::below("nobody", &std::env::temp_dir().join("px-none")).unwrap();
-        let sample = measure(&namespace, &[std::process::id()]);
+        let sample = measure(&namespace, &[std::process::id()]).used;
         assert!(sample.memory_bytes > 100_000, "{sample:?}");
         assert!(sample.descriptors >= 2 * 3, "{sample:?}");
         assert_eq!(sample.files, 0);

@@ -96,6 +96,7 @@ mod tests {
     use supervise::Event;
 
     use super::*;
+    use crate::chaos::resources::Measured;
     use crate::trial::injection::FaultTimes;
     use crate::trial::results::ViewResult;
 
@@ -142,7 +143,7 @@ mod tests {
             pid: 7,
             epoch: 0,
         };
-        monitor.handle(&event, SESSION, |_| ResourceUse::default());
+        monitor.handle(&event, SESSION, |_| Measured::default());
         let health = messages::Health {
             n_sent: 1,
             ..messages::Health::default()
@@ -152,9 +153,13 @@ mod tests {
                 process: "pose-1",
                 health: &health,
             };
-            monitor.handle(&event, SESSION + seconds * SECOND, |_| ResourceUse {
+            let used = ResourceUse {
                 files: *seconds,
                 ..ResourceUse::default()
+            };
+            monitor.handle(&event, SESSION + seconds * SECOND, |_| Measured {
+                used,
+                memory_bytes: Vec::new(),
             });
         }
         monitor
