@@ -123,7 +123,7 @@ pub fn joints_by(
                 settings.springs = 0.0;
             }
             match solve_person(&each, &settings) {
-                Some(found) => found.joints.map(|it| it.map(as_point)).to_vec(),
+                Some(found) => found.pose.joints.map(|it| it.map(as_point)).to_vec(),
                 None => vec![None; N],
             }
         }

@@ -121,6 +121,7 @@ mod average;
 mod consensus;
 mod facing;
 mod optimise;
+mod space_person;
 mod space_tree;
 mod start;
 
@@ -146,9 +147,10 @@ pub use optimise::{Iteration, PairEstimate, PairStart, estimate_pair};
 pub use pair::PairInput;
 pub use settings::{EnergyKind, Settings, SwitchBy, TypeTables};
 pub use sides::{Sides, SidesFilter, SidesSettings};
+pub use space_person::{SolvedPerson, solve_person};
 pub use space_tree::{
     BoneLength, JointEvidence, SpacePose, SpaceSettings, SpaceView, TREE, lengths_of, places,
-    solve_in_space, solve_person,
+    solve_in_space,
 };
 pub use start::{Start, choose_start, rank_starts};
 pub use term::Epipolar;

@@ -73,6 +73,9 @@ pub struct SpaceSettings {
     pub cap: f64,
     /// By how much exchanged sides must fit a view better.
     pub margin: f64,
+    /// The first solution fits a view if three quarters of its joints fit by at most so much less than their own best places: no
+    /// other is then looked for.
+    pub good_fit: f64,
     /// A view contradicts all others if three quarters of its joints fit their solution by so much less than their own best places.
     pub most_misfit: f64,
     /// Most places of a joint at the start.
@@ -89,6 +92,7 @@ impl Default for SpaceSettings {
             springs: 1.0,
             cap: 8.0,
             margin: 3.0,
+            good_fit: 0.7,
             most_misfit: 1.0,
             n_places: 40,
             coarsest_m: 0.04,
@@ -104,134 +108,6 @@ pub struct SpacePose {
     pub joints: [Option<Point3<f64>>; N],
     /// The energy.
     pub energy: f64,
-}
-
-/// Solves for a person of whom nothing is known.
-///
-/// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
-/// 2. Of three views or more, one whose exchange of left and right gives a better first solution is exchanged; then the arms or the
-///    legs of any view that fit better so.
-/// 3. Of four views or more, those that contradict all others are left out: their camera was moved, or they look at somebody else.
-/// 4. The bones of a person of the first solution's stature, and finer and finer grids, give the second one.
-///
-/// * Returns `None` if no joint is seen by two views.
-pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
-    let mut views = views.to_vec();
-    let first = first_of(&mut views, settings)?;
-    let mut changed = views.iter().any(|it| it.exchanged != [false; 2]);
-    changed |= exchange(&mut views, &first, settings.margin);
-    while let Some(worst) = contradicts(&views, settings) {
-        views.remove(worst);
-        changed = true;
-    }
-    let first = if changed {
-        coarse(&views, settings)?
-    } else {
-        first
-    };
-    let all = places(&views, settings.n_places);
-    let lengths = lengths_of(Some(&first.joints));
-    solve_in_space(&views, &all, &lengths, settings)
-}
-
-/// The best choice among the places of the joints, for a person of any stature.
-fn coarse(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
-    let all = places(views, settings.n_places);
-    best_on_tree(views, &all, &lengths_of(None), settings)
-}
-
-/// The best first solution with no view, or one view, exchanged.
-fn first_of(views: &mut [SpaceView<'_>], settings: &SpaceSettings) -> Option<SpacePose> {
-    let mut best = coarse(views, settings)?;
-    if views.len() < 3 {
-        // Which one of two is exchanged cannot be told.
-        return Some(best);
-    }
-    let mut exchanged = None;
-    let mut most = best.energy + settings.margin;
-    for nth in 0..views.len() {
-        views[nth].exchanged = [true; 2];
-        let found = coarse(views, settings)?;
-        views[nth].exchanged = [false; 2];
-        if found.energy > most {
-            (most, exchanged, best) = (found.energy, Some(nth), found);
-        }
-    }
-    if let Some(nth) = exchanged {
-        views[nth].exchanged = [true; 2];
-    }
-    Some(best)
-}
-
-/// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is
-/// none, or for fewer than four views, of which it cannot be told.
-///
-/// A view of which half is covered fits with the other half; one whose camera was turned fits with nothing.
-fn contradicts(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<usize> {
-    const LEAST: usize = 4;
-    if views.len() < LEAST {
-        return None;
-    }
-    let judged = |nth: usize| -> Option<(usize, f64, f64)> {
-        let others: Vec<SpaceView<'_>> = (0..views.len())
-            .filter(|it| *it != nth)
-            .map(|it| views[it])
-            .collect();
-        let found = coarse(&others, settings)?;
-        let misfits = others.iter().map(|it| misfit(it, &found));
-        Some((nth, misfit(&views[nth], &found), misfits.sum()))
-    };
-    let all = (0..views.len()).filter_map(judged);
-    let contradicting = all.filter(|it| it.1 > settings.most_misfit);
-    let worst = contradicting.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    Some(worst.0)
-}
-
-/// By how much three quarters of the joints that were found, or more, fit a view less than the best places that it knows for them.
-fn misfit(view: &SpaceView<'_>, found: &SpacePose) -> f64 {
-    let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
-        let named = view.named(joint);
-        let best = view.evidence.maxima(named).iter().map(|it| it.1);
-        let best = f64::from(best.fold(view.evidence.floor(), f32::max));
-        Some(best - view.at(named, &(*at)?))
-    };
-    let mut short: Vec<f64> = found
-        .joints
-        .iter()
-        .enumerate()
-        .filter_map(of_joint)
-        .collect();
-    short.sort_by(f64::total_cmp);
-    short.get(short.len() / 4).copied().unwrap_or(0.0)
-}
-
-/// Exchanges left and right in views that then fit better; returns whether there were any.
-fn exchange(views: &mut [SpaceView<'_>], found: &SpacePose, margin: f64) -> bool {
-    let mut any = false;
-    for view in views {
-        for (limb, pairs) in LIMBS.iter().enumerate() {
-            let sum = |exchanged: bool| -> f64 {
-                let of = |[right, left]: &[usize; 2]| {
-                    let names = if exchanged {
-                        [left, right]
-                    } else {
-                        [right, left]
-                    };
-                    let at = |name: usize, joint: usize| {
-                        found.joints[joint].map_or(0.0, |it| view.at(name, &it))
-                    };
-                    at(*names[0], *right) + at(*names[1], *left)
-                };
-                pairs.iter().map(of).sum()
-            };
-            let own = view.exchanged[limb];
-            if sum(!own) > sum(own) + margin {
-                view.exchanged[limb] = !own;
-                any = true;
-            }
-        }
-    }
-    any
 }
 
 /// Stature of people of whom nothing is known, and its standard deviation, metres: our choice, wide enough for children.
@@ -332,15 +208,20 @@ fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
 }
 
 impl SpaceView<'_> {
+    /// The evidence for a joint of the body at a place, whatever the view calls it.
+    pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
+        self.at(self.named(joint), at) as f32
+    }
+
     /// What the view calls a joint.
-    fn named(&self, joint: usize) -> usize {
+    pub(crate) fn named(&self, joint: usize) -> usize {
         let limb = LIMBS.iter().zip(self.exchanged).filter(|it| it.1);
         let pair = limb.flat_map(|it| it.0).find(|pair| pair.contains(&joint));
         pair.map_or(joint, |[right, left]| right + left - joint)
     }
 
     /// The evidence for what the view calls a joint, at a place.
-    fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
+    pub(crate) fn at(&self, named: usize, at: &Point3<f64>) -> f64 {
         f64::from(match self.camera.project(at) {
             Some(pixel) => self.evidence.at(named, [pixel.x, pixel.y]),
             None => self.evidence.floor(),
@@ -349,7 +230,8 @@ impl SpaceView<'_> {
 }
 
 /// Joints of the arms and of the legs, right and left.
-const LIMBS: [[[usize; 2]; 3]; 2] = [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
+pub(crate) const LIMBS: [[[usize; 2]; 3]; 2] =
+    [[[8, 9], [7, 10], [6, 11]], [[2, 3], [1, 4], [0, 5]]];
 
 /// Solves for all joints at once.
 ///
@@ -395,7 +277,7 @@ fn grid(about: &Point3<f64>, step: f64) -> Vec<Point3<f64>> {
 }
 
 /// The best of all choices of one place for each joint: messages from the leaves to the root, then back.
-fn best_on_tree(
+pub(crate) fn best_on_tree(
     views: &[SpaceView<'_>],
     places: &[Vec<Point3<f64>>; N],
     lengths: &[BoneLength; N - 1],

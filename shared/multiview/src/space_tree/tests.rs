@@ -4,6 +4,7 @@ use geometry::{Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::*;
+use crate::solve_person;
 use crate::{SeenPerson, same_person};
 
 /// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
@@ -100,7 +101,9 @@ fn solved(cameras: &[Camera], bumps: &[Bumps]) -> SpacePose {
             exchanged: [false; 2],
         })
         .collect();
-    solve_person(&views, &SpaceSettings::default()).unwrap()
+    solve_person(&views, &SpaceSettings::default())
+        .unwrap()
+        .pose
 }
 
 /// The largest error, metres.
