@@ -10,6 +10,7 @@
 //! * [`orientation`]: the network that tells the direction in which a person faces.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`joints`]: where joints lie among the parts of a model, from annotated people.
+//! * [`springs`]: the springs between joints, from annotated people.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`examples`]: what a model takes for each type of its parts.
 //! * [`network`]: networks that find keypoints, with their cards.
@@ -38,6 +39,7 @@ pub mod person;
 pub mod pictures;
 pub mod quality;
 pub mod sheet;
+pub mod springs;
 pub mod synth;
 
 pub use console::Console;

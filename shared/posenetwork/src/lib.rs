@@ -7,10 +7,14 @@
 #![forbid(unsafe_code)]
 
 mod detector;
+mod expected;
 mod maps;
 mod network;
+mod outline;
 pub mod springs;
 
 pub use detector::Detector;
-pub use maps::{JointMaps, MapSettings};
+pub use expected::expected_error;
+pub use maps::{JointMaps, MapSettings, interpolate};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};
+pub use outline::{outline_of, overlap};

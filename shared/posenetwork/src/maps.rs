@@ -20,6 +20,18 @@ pub struct MapSettings {
     pub point_sigma: f64,
 }
 
+impl MapSettings {
+    /// The evidence of a place that the network says nothing of.
+    pub fn floor(&self) -> f32 {
+        (self.lambda * self.eps.ln()) as f32
+    }
+
+    /// The heat, 0 to 1, that gives an amount of evidence.
+    pub fn heat(&self, evidence: f32) -> f64 {
+        ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
+    }
+}
+
 impl Default for MapSettings {
     fn default() -> Self {
         Self {
@@ -49,6 +61,8 @@ pub struct JointMaps {
     window: Option<Window>,
     /// Where each joint's map is highest, pixels of the picture, and its heat there from 0 to 1.
     peaks: Vec<Option<Keypoint>>,
+    /// Across and down: between which cells those of a layout lie.
+    taps: [Vec<Tap>; 2],
 }
 
 /// Cells between two columns or rows of a grid that is made for a codec without maps.
@@ -74,7 +88,7 @@ impl JointMaps {
         let read = sight.read()?;
         let size = sight.network().size();
         self.window = Some(*sight.window());
-        self.floor = (settings.lambda * settings.eps.ln()) as f32;
+        self.floor = settings.floor();
         (self.rows, self.columns, self.step) = if let Read::Maps(maps) = &read {
             let [rows, columns] = maps.size();
             let udp = matches!(
@@ -227,25 +241,16 @@ impl JointMaps {
             return self.floor;
         };
         let at = window.in_input(point);
-        let cell = [at[0] / self.step[0], at[1] / self.step[1]];
-        let beyond = |axis: usize, n: usize| cell[axis] < -1.0 || cell[axis] > n as f64;
-        if beyond(0, self.columns) || beyond(1, self.rows) || !(cell[0] + cell[1]).is_finite() {
+        let [across, down] = [
+            Tap::at(at[0] / self.step[0], self.columns),
+            Tap::at(at[1] / self.step[1], self.rows),
+        ];
+        if !(across.is_inside && down.is_inside) {
             return self.floor;
         }
-        let first = [0, 1].map(|axis| cell[axis].floor() as i64 - 1);
-        let weights = [0, 1].map(|axis| cubic((cell[axis] - cell[axis].floor()) as f32));
         let area = self.rows * self.columns;
         let map = &self.values[joint * area..(joint + 1) * area];
-        let mut sum = 0.0;
-        for (down, row_weight) in (0..).zip(weights[1]) {
-            let row = (first[1] + down).clamp(0, self.rows as i64 - 1) as usize;
-            let line = &map[row * self.columns..(row + 1) * self.columns];
-            for (across, weight) in (0..).zip(weights[0]) {
-                let column = (first[0] + across).clamp(0, self.columns as i64 - 1) as usize;
-                sum += row_weight * weight * line[column];
-            }
-        }
-        sum
+        between(map, self.columns, &down, &across)
     }
 
     /// The highest maxima of a joint's map, at cells: pixels of the picture, and the evidence there.
@@ -311,8 +316,21 @@ impl JointMaps {
         }
     }
 
+    /// The rectangle of the picture that the maps cover: left, top, right, bottom, pixels; zeros before the first picture.
+    pub fn extent(&self) -> [f64; 4] {
+        let Some(window) = &self.window else {
+            return [0.0; 4];
+        };
+        let last = [
+            self.columns as f64 * self.step[0],
+            self.rows as f64 * self.step[1],
+        ];
+        let ([left, top], [right, bottom]) = (window.in_picture([0.0; 2]), window.in_picture(last));
+        [left, top, right, bottom]
+    }
+
     /// Fills the responses of a scope. Filter `j` is joint `j` of `skeleton::PARSE14`; further filters, of parts between
-    /// joints, respond with 0 everywhere.
+    /// joints, respond with 0 everywhere. Every value is that of [`Self::at`], to the bit.
     ///
     /// * `layout`: of a model of [`springs`](crate::springs), whose filters have one cell.
     /// * `responses`: [`Layout::n_values`] values of the scope, overwritten.
@@ -320,27 +338,138 @@ impl JointMaps {
     /// # Panics
     ///
     /// If there are fewer values.
-    pub fn fill(&self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
+    pub fn fill(&mut self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
+        self.write(layout, scope, (responses, Write::Over));
+    }
+
+    /// Raises the responses of a scope to these maps where they are lower: the maps of another person.
+    ///
+    /// * the others as for [`Self::fill`].
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer values.
+    pub fn raise(&mut self, layout: &Layout, scope: &Scope, responses: &mut [f32]) {
+        self.write(layout, scope, (responses, Write::Highest));
+    }
+
+    fn write(&mut self, layout: &Layout, scope: &Scope, (responses, how): (&mut [f32], Write)) {
         for level in scope.levels().map(usize::from) {
             let window = layout.window(scope, level);
             let values = &mut responses[layout.maps_in(scope, level)];
-            let area = window.rows * window.cols;
-            for (filter, map) in values.chunks_exact_mut(area.max(1)).enumerate() {
-                if filter >= N_JOINTS {
-                    map.fill(0.0);
-                    continue;
-                }
-                for (cell, value) in map.iter_mut().enumerate() {
+            let firsts = [window.left, window.top];
+            let counts = [window.cols, window.rows];
+            for axis in 0..2 {
+                self.taps(axis, counts[axis], |nth| {
+                    let at = (firsts[axis] + nth) as u16;
                     let place = Placement {
-                        x: (window.left + cell % window.cols) as u16,
-                        y: (window.top + cell / window.cols) as u16,
+                        x: at,
+                        y: at,
                         mixture: 0,
                     };
-                    *value = self.at(filter, layout.centre(level, [1, 1], place));
+                    layout.centre(level, [1, 1], place)[axis]
+                });
+            }
+            let area = window.rows * window.cols;
+            for (filter, map) in values.chunks_exact_mut(area.max(1)).enumerate() {
+                if filter < N_JOINTS {
+                    self.write_joint(filter, map, how);
+                } else if how == Write::Over {
+                    map.fill(0.0);
                 }
             }
         }
     }
+
+    /// Which cells of the maps the cells of a layout lie between, along one axis, and how much each counts.
+    fn taps(&mut self, axis: usize, n: usize, centre: impl Fn(usize) -> f64) {
+        let cells = [self.columns, self.rows][axis];
+        let (window, step) = (self.window, self.step[axis]);
+        let taps = &mut self.taps[axis];
+        taps.clear();
+        taps.extend((0..n).map(|nth| {
+            let centre = centre(nth);
+            let cell = window.map_or(f64::NAN, |it| it.in_input([centre; 2])[axis] / step);
+            Tap::at(cell, cells)
+        }));
+    }
+
+    fn write_joint(&self, joint: usize, map: &mut [f32], how: Write) {
+        let area = self.rows * self.columns;
+        let own = &self.values[joint * area..(joint + 1) * area];
+        let [across, down] = &self.taps;
+        for (row, line) in down.iter().zip(map.chunks_exact_mut(across.len().max(1))) {
+            for (column, value) in across.iter().zip(line) {
+                let here = if row.is_inside && column.is_inside {
+                    between(own, self.columns, row, column)
+                } else {
+                    self.floor
+                };
+                *value = match how {
+                    Write::Over => here,
+                    Write::Highest => value.max(here),
+                };
+            }
+        }
+    }
+}
+
+/// How values are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Write {
+    /// In the place of others.
+    Over,
+    /// Where they are higher than others.
+    Highest,
+}
+
+/// Four neighbouring cells along an axis, and how much each counts.
+#[derive(Debug, Clone, Copy)]
+struct Tap {
+    cells: [usize; 4],
+    weights: [f32; 4],
+    is_inside: bool,
+}
+
+impl Tap {
+    /// Those about a place; beyond the `n` cells of the axis there are none.
+    fn at(cell: f64, n: usize) -> Self {
+        let is_inside = (-1.0..=n as f64).contains(&cell);
+        if !is_inside {
+            return Self {
+                cells: [0; 4],
+                weights: [0.0; 4],
+                is_inside,
+            };
+        }
+        let first = cell.floor() as i64 - 1;
+        Self {
+            cells: [0, 1, 2, 3].map(|it| (first + it).clamp(0, n as i64 - 1) as usize),
+            weights: cubic((cell - cell.floor()) as f32),
+            is_inside,
+        }
+    }
+}
+
+/// The value of a map at a place between its cells (Catmull & Rom 1974); `None` beyond it.
+///
+/// * `map`: row major; `size` is the number of its columns and rows.
+/// * `cell`: column and row, the first cell at 0.
+pub fn interpolate(map: &[f32], [columns, rows]: [usize; 2], cell: [f64; 2]) -> Option<f32> {
+    let [across, down] = [Tap::at(cell[0], columns), Tap::at(cell[1], rows)];
+    (across.is_inside && down.is_inside).then(|| between(map, columns, &down, &across))
+}
+
+/// The value of a map between sixteen cells.
+fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f32 {
+    let mut sum = 0.0;
+    for (down, row_weight) in row.cells.into_iter().zip(row.weights) {
+        let line = &map[down * columns..(down + 1) * columns];
+        for (across, weight) in column.cells.into_iter().zip(column.weights) {
+            sum += row_weight * weight * line[across];
+        }
+    }
+    sum
 }
 
 /// A joint as a weighted sum of keypoints; its score is the lowest of theirs.

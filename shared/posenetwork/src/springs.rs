@@ -38,6 +38,15 @@ pub fn joint_of(part: usize) -> Option<usize> {
     PARSE14.joints.iter().position(|it| it.parts == [part])
 }
 
+/// Whether a model is a tree of springs, whose evidence is the maps of a network.
+pub fn is_tree(model: &Model) -> bool {
+    let spec = model.spec();
+    let is_cell = |it: &Filter| it.rows == 1 && it.cols == 1;
+    spec.parts.len() == N_PARTS
+        && spec.filters.len() == N_JOINTS + 1
+        && spec.filters.iter().all(is_cell)
+}
+
 /// A type of a joint: where it lies from its parent, cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Gauss {

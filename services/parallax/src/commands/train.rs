@@ -5,6 +5,7 @@ mod joints;
 mod orientation;
 mod people;
 mod quality;
+mod springs;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -72,6 +73,8 @@ pub(crate) enum Command {
     Orientation(Box<orientation::Arguments>),
     /// Learn where joints lie among the parts of a model, on photographs of marked people.
     Joints(Box<joints::Arguments>),
+    /// Learn the springs that hold the maps of a network together, from the marks of people.
+    Springs(Box<springs::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and write the samples for training the quality network.
@@ -118,6 +121,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         Command::Consistency(it) => return consistency::run(&it, globals),
         Command::Orientation(arguments) => return orientation::run(&arguments, globals),
         Command::Joints(it) => return joints::run(&it, globals),
+        Command::Springs(it) => return springs::run(&it, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };
