@@ -161,7 +161,7 @@ impl Estimator {
             Some(evidence.with_bounds(&estimate.bounds))
         };
         let evidence: Vec<Option<Responses<'_>>> = (0..estimates.len()).map(evidence).collect();
-        let all_views = (self.solved_in == Views::All)
+        let all_views = (self.solved_in != Views::Pairs)
             .then(|| {
                 self.fuse
                     .all_views(&answers, &evidence, &others, Support::Mean)
@@ -169,7 +169,7 @@ impl Estimator {
             .flatten();
         let pairs = match self.solved_in {
             Views::Pairs => self.pairs(&answers, &evidence, &start),
-            Views::All => Vec::new(),
+            Views::All | Views::Space => Vec::new(),
         };
         let skeleton = match &all_views {
             Some(result) => self.skeleton.run_all_views(&answers, result),

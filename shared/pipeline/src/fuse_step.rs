@@ -59,6 +59,8 @@ pub enum Views {
     /// All at once; each view is supported by the mean of the terms of all others.
     #[default]
     All,
+    /// All at once, in space, over the maps of networks ([`SpaceStep`](crate::SpaceStep)).
+    Space,
 }
 
 /// Weight of the terms of a pair where all views are solved at once.

@@ -9,10 +9,12 @@ mod following;
 mod fuse_step;
 mod fused;
 mod fused_view;
+mod network_step;
 mod people;
 mod skeleton_settings;
 mod skeleton_step;
 mod space;
+mod space_step;
 mod view_result;
 mod view_step;
 
@@ -25,8 +27,10 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
+pub use network_step::{Boxes, MOST_VALUES, NetworkMemory, NetworkSettings, NetworkStep};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
+pub use space_step::{SpaceResult, SpaceStep};
 pub use view_result::ViewResult;
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use posenetwork::MapSettings;
+use skeleton::PARSE14;
 
 use crate::ViewResult;
 
@@ -356,7 +358,12 @@ fn sightings(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<Sighting> {
     let scores = answer.candidates.iter().map(|it| f64::from(it.score));
     let mut scores: Vec<f64> = scores.collect();
     scores.sort_by(|a, b| b.total_cmp(a));
-    let usual = scores.get(scores.len() * 2 / 3).copied().unwrap_or(0.0);
+    let usual = if posenetwork::springs::is_tree(plan.model()) {
+        // Whoever a network sees is somebody: the score counts above that of a place of which it says nothing.
+        f64::from(MapSettings::default().floor()) * PARSE14.joints.len() as f64
+    } else {
+        scores.get(scores.len() * 2 / 3).copied().unwrap_or(0.0)
+    };
     let sighting = |pose: &fmp::Pose| {
         let points_px = LINE.map(|parts| {
             let [a, b] = parts.map(|part| plan.centre(pose, part));

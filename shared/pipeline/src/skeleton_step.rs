@@ -324,7 +324,7 @@ impl SkeletonStep {
                 .collect();
             let (n_pairs, single_score) = (poses.len(), f64::from(best.score));
             if poses.is_empty() {
-                if !frame.is_alone {
+                if !(frame.is_alone && self.space.settings.keep_unfused) {
                     return None;
                 }
                 poses.push(candidate(single_score, best));

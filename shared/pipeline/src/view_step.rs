@@ -118,6 +118,11 @@ impl ViewStep {
         &self.layout
     }
 
+    /// The box around the boxes of a pose's parts: left, top, right, bottom, pixels of the image.
+    pub fn bounding_box(&self, pose: &Pose) -> [f64; 4] {
+        pose.bounding_box(self.solver.model(), &self.layout)
+    }
+
     /// Creates a tracker for the frames of one camera, with the settings of the step.
     pub fn tracker(&self) -> Tracker {
         Tracker::new(self.settings.track)

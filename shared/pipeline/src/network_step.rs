@@ -1,0 +1,372 @@
+//! The single-view step with a network in place of the filters: pixels in, maps of the joints and candidates out.
+//!
+//! A network that looks at one person needs a box. While a person is seen well, the box of the next frame is that of the pose,
+//! widened; now and then, and where nobody is seen well, boxes are looked for: by a detector, or by the search of the filters.
+
+use std::sync::Arc;
+
+use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solver, local_scores};
+use kernels::Rgb8View;
+use posenetwork::springs::{WINDOW_CELLS, joint_of};
+use posenetwork::{
+    Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of, overlap,
+};
+
+use crate::view_step::{ViewEstimate, ViewStep};
+
+/// Where boxes around people come from.
+#[derive(Debug)]
+pub enum Boxes {
+    /// A detector of people.
+    Detector(Box<Detector>),
+    /// The search of the filters over the whole picture.
+    Filters(Box<ViewStep>),
+}
+
+/// Settings of the step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NetworkSettings {
+    /// Most people of a view: each costs a run of the network.
+    pub n_people: usize,
+    /// Boxes are looked for in every n-th frame, and in every one in which nobody is seen well.
+    pub find_every: u64,
+    /// Least mean heat of the joints of a person who is seen well, 0 to 1.
+    pub least_heat: f64,
+    /// How maps become evidence.
+    pub maps: MapSettings,
+}
+
+impl Default for NetworkSettings {
+    fn default() -> Self {
+        Self {
+            n_people: 4,
+            find_every: 10,
+            least_heat: 0.2,
+            maps: MapSettings::default(),
+        }
+    }
+}
+
+/// Boxes that overlap by more are of one person.
+const SAME: f64 = 0.5;
+/// How far the boxes of the filters' parts are widened, share of their sides, on each side.
+const WIDENED: f64 = 0.1;
+/// Most response values of a frame; the cells of the evidence become larger rather than more.
+pub const MOST_VALUES: usize = 1 << 20;
+
+/// The single-view step by a network, for frames of one size.
+#[derive(Debug)]
+pub struct NetworkStep {
+    network: PoseNetwork,
+    boxes: Boxes,
+    solver: Solver,
+    layout: Arc<Layout>,
+    settings: NetworkSettings,
+}
+
+/// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
+#[derive(Debug, Default)]
+pub struct NetworkMemory {
+    workspace: Workspace,
+    values: Vec<f32>,
+    /// The boxes for the next frame, pixels.
+    outlines: Vec<[f64; 4]>,
+    /// The people of this frame; those beyond `n_seen` are memory for more.
+    seen: Vec<Seen>,
+    n_seen: usize,
+    /// Frames since boxes were looked for; none if they never were.
+    since: Option<u64>,
+}
+
+/// A person in a frame.
+#[derive(Debug, Default)]
+struct Seen {
+    maps: JointMaps,
+    outline: [f64; 4],
+    /// Mean heat of the joints at their peaks, 0 to 1.
+    heat: f64,
+    level: u16,
+    responses: Vec<f32>,
+}
+
+impl NetworkMemory {
+    /// The people that the network sees in this frame.
+    fn people(&self) -> &[Seen] {
+        &self.seen[..self.n_seen]
+    }
+
+    /// Whether boxes were looked for in this frame.
+    pub fn has_searched(&self) -> bool {
+        self.since == Some(0)
+    }
+}
+
+impl NetworkStep {
+    /// Prepares the step.
+    ///
+    /// * `solver`: of a tree of [`posenetwork::springs`].
+    /// * `layout`: of the frames, for that tree.
+    pub fn new(
+        network: PoseNetwork,
+        boxes: Boxes,
+        solver: Solver,
+        layout: Arc<Layout>,
+        settings: NetworkSettings,
+    ) -> Self {
+        Self {
+            network,
+            boxes,
+            solver,
+            layout,
+            settings,
+        }
+    }
+
+    /// The pyramid of the evidence.
+    pub fn layout(&self) -> &Arc<Layout> {
+        &self.layout
+    }
+
+    /// Looks at a frame; returns what of it the responses will cover, or `None` if nobody is seen well.
+    ///
+    /// # Errors
+    ///
+    /// [`LookError`] if the network or the detector fails, or gives numbers that are not finite.
+    pub fn look(
+        &self,
+        image: Rgb8View<'_>,
+        memory: &mut NetworkMemory,
+    ) -> Result<Option<Scope>, LookError> {
+        memory.since = memory.since.map(|it| it + 1);
+        let is_due = memory.since.is_none_or(|it| it >= self.settings.find_every);
+        memory.n_seen = 0;
+        let tracked = core::mem::take(&mut memory.outlines);
+        for outline in &tracked {
+            self.see(image, *outline, memory)?;
+        }
+        if is_due || memory.n_seen == 0 {
+            memory.since = Some(0);
+            for outline in self.find(image, &mut memory.values)? {
+                let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
+                if memory.n_seen < self.settings.n_people && !memory.people().iter().any(is_known) {
+                    self.see(image, outline, memory)?;
+                }
+            }
+        }
+        // The memory of the list is kept.
+        memory.outlines = tracked;
+        memory.outlines.clear();
+        Ok(self.scope(memory))
+    }
+
+    /// Looks at the person in a box, and keeps what is seen well.
+    fn see(
+        &self,
+        image: Rgb8View<'_>,
+        outline: [f64; 4],
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        let Some(sight) = self.network.look(image, outline, &mut memory.workspace)? else {
+            return Ok(());
+        };
+        if memory.seen.len() == memory.n_seen {
+            memory.seen.push(Seen::default());
+        }
+        let seen = &mut memory.seen[memory.n_seen];
+        seen.maps.read(&sight, &self.settings.maps)?;
+        seen.outline = outline;
+        let peaks = seen.maps.peaks().iter();
+        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
+        seen.heat = heat / seen.maps.peaks().len().max(1) as f64;
+        let is_inside = self.region(&seen.maps).is_some();
+        if seen.heat >= self.settings.least_heat && is_inside {
+            seen.level = self.level(&seen.maps);
+            memory.n_seen += 1;
+        }
+        Ok(())
+    }
+
+    /// Boxes around people, pixels, the best first.
+    fn find(&self, image: Rgb8View<'_>, values: &mut Vec<f32>) -> Result<Vec<[f64; 4]>, LookError> {
+        match &self.boxes {
+            Boxes::Detector(detector) => {
+                let mut found = detector.people(image, values)?;
+                // Who is sure and large first: the frame has room for a few.
+                let weight = |it: &keypoints::PersonBox| {
+                    f64::from(it.score) * (it.outline[3] - it.outline[1])
+                };
+                found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+                Ok(found.into_iter().map(|it| it.outline).collect())
+            }
+            Boxes::Filters(step) => {
+                let whole = Scope::whole(step.layout());
+                values.resize(values.len().max(step.layout().n_values(&whole)), 0.0);
+                let found = step.run(image, whole, values);
+                let outline = |it: &Pose| {
+                    let [left, top, right, bottom] = step.bounding_box(it);
+                    let more = [right - left, bottom - top].map(|it| WIDENED * it);
+                    [
+                        left - more[0],
+                        top - more[1],
+                        right + more[0],
+                        bottom + more[1],
+                    ]
+                };
+                Ok(found.candidates.iter().map(outline).collect())
+            }
+        }
+    }
+
+    /// The level whose cells are nearest to those that the springs were learned with.
+    fn level(&self, maps: &JointMaps) -> u16 {
+        let [_, top, _, bottom] = maps.extent();
+        let cell = (bottom - top) / WINDOW_CELLS;
+        let distance = |level: usize| (self.layout.levels[level].scale / cell).ln().abs();
+        let levels = 0..self.layout.levels.len();
+        let nearest = levels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        nearest.unwrap_or(0) as u16
+    }
+
+    /// The pixels of the frame that maps cover; `None` if they lie beyond it.
+    fn region(&self, maps: &JointMaps) -> Option<Region> {
+        let [left, top, right, bottom] = maps.extent();
+        let along = |from: f64, to: f64, side: usize| {
+            let from = from.floor().clamp(0.0, side as f64) as u32;
+            let to = to.ceil().clamp(0.0, side as f64) as u32;
+            (from < to).then_some([from, to])
+        };
+        let [width, height] = self.layout.image_size;
+        Some(Region {
+            x: along(left, right, width)?,
+            y: along(top, bottom, height)?,
+        })
+    }
+
+    /// What the responses of the people of a frame cover: one level, fine enough for the smallest of them if there is room.
+    fn scope(&self, memory: &NetworkMemory) -> Option<Scope> {
+        let join = |a: Region, b: Region| {
+            let side = |a: [u32; 2], b: [u32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+            Region {
+                x: side(a.x, b.x),
+                y: side(a.y, b.y),
+            }
+        };
+        let people = memory.people().iter();
+        let region = people.filter_map(|it| self.region(&it.maps)).reduce(join)?;
+        let finest = memory.people().iter().map(|it| it.level).min()?;
+        let mut levels = finest..self.layout.levels.len() as u16;
+        levels.find_map(|level| {
+            let scope = Scope::new(&self.layout, level..level + 1, region).ok()?;
+            (self.layout.n_values(&scope) <= MOST_VALUES).then_some(scope)
+        })
+    }
+
+    /// Fills the responses of a frame that was looked at, and solves the tree of every person.
+    ///
+    /// * `scope`: what [`Self::look`] returned; `responses`: as many values as it has.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer values.
+    pub fn fill(
+        &self,
+        scope: Scope,
+        responses: &mut [f32],
+        memory: &mut NetworkMemory,
+    ) -> ViewEstimate {
+        let level = scope.levels().start;
+        let n_seen = memory.n_seen;
+        let mut candidates: Vec<Pose> = Vec::with_capacity(n_seen);
+        for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
+            if nth == 0 {
+                seen.maps.fill(&self.layout, &scope, responses);
+            } else {
+                seen.maps.raise(&self.layout, &scope, responses);
+            }
+            let found = if n_seen == 1 && seen.level == level {
+                self.best(responses, scope)
+            } else {
+                self.alone(seen)
+            };
+            if let Some(pose) = found {
+                memory.outlines.extend(self.outline(&pose));
+                candidates.extend(self.at_level(&pose, &scope));
+            }
+        }
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let best = candidates.first();
+        let local = best.map(|pose| {
+            let levels = [level];
+            let evidence = Responses::within(&self.layout, responses, &levels, scope);
+            local_scores(self.solver.model(), &evidence, pose)
+        });
+        ViewEstimate {
+            local: local.unwrap_or_default(),
+            candidates,
+            front: Vec::new(),
+            levels: vec![level],
+            bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),
+            scope,
+        }
+    }
+
+    fn best(&self, responses: &[f32], scope: Scope) -> Option<Pose> {
+        let levels: Vec<u16> = scope.levels().collect();
+        let evidence = Responses::within(&self.layout, responses, &levels, scope);
+        self.solver.best(&evidence, None)
+    }
+
+    /// The best pose of a person on the maps of the person alone.
+    fn alone(&self, seen: &mut Seen) -> Option<Pose> {
+        let region = self.region(&seen.maps)?;
+        let scope = Scope::new(&self.layout, seen.level..seen.level + 1, region).ok()?;
+        let n_values = self.layout.n_values(&scope);
+        seen.responses.resize(n_values, 0.0);
+        seen.maps.fill(&self.layout, &scope, &mut seen.responses);
+        self.best(&seen.responses, scope)
+    }
+
+    /// The box of a pose for the next frame.
+    fn outline(&self, pose: &Pose) -> Option<[f64; 4]> {
+        let model = self.solver.model();
+        let joints = (0..pose.parts.len()).filter(|part| joint_of(*part).is_some());
+        outline_of(joints.map(|part| pose.centre(model, &self.layout, part)))
+    }
+
+    /// The same pose on the level of a scope.
+    fn at_level(&self, pose: &Pose, scope: &Scope) -> Option<Pose> {
+        let level = scope.levels().start;
+        if pose.level == level {
+            return Some(pose.clone());
+        }
+        let window = self.layout.window(scope, usize::from(level));
+        let mut moved = pose.clone();
+        moved.level = level;
+        for (part, at) in moved.parts.iter_mut().enumerate() {
+            let centre = pose.centre(self.solver.model(), &self.layout, part);
+            let cell = cell_at(&self.layout, level, centre);
+            let within = |it: f64, first: usize, n: usize| {
+                it.round().clamp(first as f64, (first + n - 1) as f64) as u16
+            };
+            *at = Placement {
+                x: within(cell[0], window.left, window.cols),
+                y: within(cell[1], window.top, window.rows),
+                mixture: at.mixture,
+            };
+        }
+        Some(moved)
+    }
+}
+
+/// The cell of a level at a point of the frame, of filters of one cell; with fractions.
+pub(crate) fn cell_at(layout: &Layout, level: u16, at: [f64; 2]) -> [f64; 2] {
+    let level = usize::from(level);
+    let first = Placement {
+        x: 0,
+        y: 0,
+        mixture: 0,
+    };
+    let origin = layout.centre(level, [1, 1], first);
+    let scale = layout.levels[level].scale;
+    [0, 1].map(|axis| (at[axis] - origin[axis]) / scale)
+}
