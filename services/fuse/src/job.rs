@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use multiview::ViewPlan;
-use pipeline::{Follow, FuseStep, Views};
+use pipeline::{Follow, FuseStep, SpaceStep, Views};
 
 /// What one worker's process has to do.
 #[derive(Debug)]
@@ -19,6 +19,8 @@ pub struct Job {
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: Arc<FuseStep>,
+    /// The fusion step in space; there where `views` says so.
+    pub space: Option<SpaceStep>,
     /// The views of the rig.
     pub plans: Vec<Arc<ViewPlan>>,
     /// Whether there are processes that send expected errors.

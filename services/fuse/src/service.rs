@@ -46,8 +46,10 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         output: stage.output(&topic::pair_pose(job.worker), job.n_consumers)?,
     };
     // A pair may need one solution or many, but the work per pyramid level is always similar.
-    let step = Arc::clone(&job.step);
-    service.progress().follow(move || step.n_sweeps());
+    if job.space.is_none() {
+        let step = Arc::clone(&job.step);
+        service.progress().follow(move || step.n_sweeps());
+    }
     let mut following = Following::new(job.follow);
     stage.run(|frame| worker.fuse(frame, &mut following))
 }

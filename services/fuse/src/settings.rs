@@ -63,6 +63,7 @@ pub fn views(from: Views) -> pipeline::Views {
     match from {
         Views::Pairs => pipeline::Views::Pairs,
         Views::All => pipeline::Views::All,
+        Views::Space => pipeline::Views::Space,
     }
 }
 

@@ -68,7 +68,7 @@ impl Worker<'_> {
         };
         match self.job.views {
             Views::Pairs => self.pairs(&views),
-            Views::All => self.all_views(&views),
+            Views::All | Views::Space => self.all_views(views),
         }
     }
 
@@ -163,13 +163,30 @@ impl Worker<'_> {
     }
 
     /// Solves all views at once.
-    fn all_views(&self, frame: &FrameViews<'_>) -> Result<(), Failure> {
+    fn all_views(&self, mut frame: FrameViews<'_>) -> Result<(), Failure> {
         frame.turn.restart(now_nanos());
         let evidence = frame.evidence.iter();
         let evidence = evidence.map(|view| view.as_ref().map(EvidenceView::responses));
         let evidence: Vec<Option<Responses<'_>>> = evidence.collect();
-        let step = &self.job.step;
-        let answer = step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean);
+        let answer = match &self.job.space {
+            None => {
+                let step = &self.job.step;
+                step.all_views(&frame.answers, &evidence, &frame.others, Support::Mean)
+            }
+            Some(step) => {
+                let found = step.run(&frame.answers, &evidence, &frame.others);
+                found.map(|found| {
+                    let views = found.views.views.iter();
+                    for (view, sigma_px) in views.zip(found.sigma_px) {
+                        if let Some(answer) = &mut frame.answers[*view] {
+                            answer.sigma_px = Some(sigma_px);
+                        }
+                    }
+                    found.views
+                })
+            }
+        };
+        let frame = &frame;
         let (n_views, present) = (frame.answers.len(), frame.present());
         let messages = wire::all_views_to_messages(n_views, answer.as_ref(), present);
         let messages = self.or_bad_input(messages, || {

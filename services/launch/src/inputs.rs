@@ -2,6 +2,7 @@
 
 mod advice;
 mod joints;
+mod maps;
 
 use std::borrow::Cow;
 use std::fs;
@@ -28,6 +29,7 @@ use crate::shipped::Shipped;
 use runtime::no_text;
 
 pub use joints::Joints;
+pub use maps::{detector, pose_network, springs};
 pub use runtime::{in_file, read_text as text};
 
 /// Reads the named model, or the shipped model if none is named.

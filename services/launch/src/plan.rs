@@ -74,6 +74,7 @@ pub fn check(deployment: &Deployment) -> Result<String, Failure> {
     let pairs = match prepared.settings.views {
         pipeline::Views::Pairs => format!("{} pairs", prepared.pairs.len()),
         pipeline::Views::All => "solved at once".to_owned(),
+        pipeline::Views::Space => "solved in space".to_owned(),
     };
     let size = resolved.search_size.as_ref();
     let size = size.map_or_else(String::new, |it| format!("\n{}", it.text()));
@@ -96,7 +97,11 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
             .iter()
             .product::<usize>()
             * 3,
-        evidence_values: it.plan.layout().n_responses(),
+        evidence_values: if resolved.deployment.has_maps() {
+            it.plan.layout().n_responses().min(pipeline::MOST_VALUES)
+        } else {
+            it.plan.layout().n_responses()
+        },
     });
     let delivery = resolved.delivery();
     let held_frames = if resolved.deployment.has_network() && delivery == Delivery::Realtime {

@@ -60,7 +60,11 @@ impl Prepared {
 
     fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
-        let model = inputs::model_or_shipped(deployment.model.as_deref())?;
+        let model = if deployment.has_maps() {
+            inputs::springs(&deployment.pose.springs)?
+        } else {
+            inputs::model_or_shipped(deployment.model.as_deref())?
+        };
         let rig = inputs::rig_of(deployment)?;
         let (mut views, mut sizes) = (Vec::new(), Vec::new());
         for (index, camera) in deployment.cameras.iter().enumerate() {
@@ -233,7 +237,11 @@ fn settings(
     }
     Ok(EstimatorSettings {
         view: ViewSettings {
-            orientation: inputs::orientation(&deployment.pose.orientation, model)?,
+            orientation: if deployment.has_maps() {
+                None
+            } else {
+                inputs::orientation(&deployment.pose.orientation, model)?
+            },
             ..pose::settings(&deployment.pose)
         },
         fuse: fuse::settings(
@@ -249,6 +257,9 @@ fn settings(
     })
 }
 
+/// Standard deviation of what is rounded to a cell, cells.
+const ROUNDING_CELLS: f64 = 0.29;
+
 fn skeleton_settings(
     deployment: &Deployment,
     learned: Option<&Learned>,
@@ -256,10 +267,22 @@ fn skeleton_settings(
     let defaults = SkeletonSettings::default();
     let config = &deployment.triangulate;
     let joints = JointSet::by_name(&config.joints).unwrap_or(defaults.joints);
-    let joint_map = inputs::Joints::of(&config.joint_map, deployment.model.as_deref())?;
+    let joint_map = if deployment.has_maps() {
+        // The joints themselves are parts.
+        None
+    } else {
+        inputs::Joints::of(&config.joint_map, deployment.model.as_deref())?.map(learned, joints)
+    };
+    let in_space = deployment.views() == deployment::fuse::Views::Space;
     Ok(SkeletonSettings {
         joints,
-        joint_map: joint_map.map(learned, joints),
+        joint_map,
+        keep_unfused: !in_space,
+        sigma_cells: if in_space {
+            ROUNDING_CELLS
+        } else {
+            defaults.sigma_cells
+        },
         triangulation: geometry::Settings {
             loss_px: config.loss_px,
             ..defaults.triangulation
@@ -271,7 +294,8 @@ fn skeleton_settings(
         } else {
             BodySettings::NONE
         },
-        facing: deployment.fuse.facing,
+        // Networks name the sides of the body.
+        facing: deployment.fuse.facing && !deployment.has_maps(),
         ..defaults
     })
 }

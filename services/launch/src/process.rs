@@ -5,8 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use deployment::Stage;
+use fmp::{Layout, Solver};
 use messages::topic;
-use pipeline::{FuseStep, SkeletonStep, ViewStep};
+use multiview::SpaceSettings;
+use pipeline::{
+    Boxes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep, ViewSettings, ViewStep,
+    Views,
+};
+use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
@@ -167,10 +173,9 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let layout = Arc::new(prepared.views[view].plan.layout().clone());
-    let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
     let job = pose::Job {
         view,
-        step: step.or_fail(ExitKind::Config)?,
+        step: view_step(resolved, prepared, view, layout)?,
         n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
         start_frame: resolved.deployment.capture.start_frame,
@@ -179,6 +184,44 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         patience: resolved.patience(),
     };
     pose::run(service, &job)
+}
+
+/// The single-view step: by the network of the deployment, or by the filters.
+fn view_step(
+    resolved: &Resolved,
+    prepared: Prepared,
+    view: usize,
+    layout: Arc<Layout>,
+) -> Result<pose::Step, Failure> {
+    let config = &resolved.deployment.pose;
+    let Some(network) = inputs::pose_network(config)? else {
+        let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
+        return Ok(pose::Step::Filters(step.or_fail(ExitKind::Config)?));
+    };
+    let boxes = match inputs::detector(config)? {
+        Some(detector) => Boxes::Detector(Box::new(detector)),
+        None => {
+            let model = inputs::model_or_shipped(resolved.deployment.model.as_deref())?;
+            let camera = prepared.views[view].framing.camera();
+            let plan = pipeline::plan(&model, camera).or_fail(ExitKind::Input)?;
+            let layout = Arc::new(plan.layout().clone());
+            let settings = ViewSettings {
+                n_candidates: config.people,
+                precision: prepared.settings.view.precision,
+                ..ViewSettings::default()
+            };
+            let step = ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)?;
+            Boxes::Filters(Box::new(step))
+        }
+    };
+    let settings = NetworkSettings {
+        n_people: config.people,
+        find_every: config.find_every,
+        ..NetworkSettings::default()
+    };
+    let solver = Solver::new(prepared.model);
+    let step = NetworkStep::new(network, boxes, solver, layout, settings);
+    Ok(pose::Step::Network(Box::new(step)))
 }
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
@@ -223,6 +266,13 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
             plans.clone(),
             prepared.settings.tables,
         )),
+        space: (prepared.settings.views == Views::Space).then(|| {
+            SpaceStep::new(
+                plans.clone(),
+                SpaceSettings::default(),
+                MapSettings::default(),
+            )
+        }),
         plans,
         has_quality: resolved.deployment.has_quality(),
         quality_deadline: Duration::from_millis(resolved.deployment.quality.deadline_ms),
@@ -267,6 +317,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let scene = results::Scene {
         views: views.collect(),
         model: prepared.model,
+        has_maps: deployment.has_maps(),
         joints: prepared.settings.skeleton.joints,
         frame_rate_hz: resolved.frame_rate_hz(),
         frame_step: deployment.capture.frame_step,

@@ -23,16 +23,19 @@ pub enum Shipped {
     Orientation,
     /// Where joints lie among the parts of the model.
     Joints,
+    /// The springs that hold the maps of a network together.
+    Springs,
 }
 
 impl Shipped {
     /// All of them.
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Model,
         Self::Network,
         Self::Consistency,
         Self::Orientation,
         Self::Joints,
+        Self::Springs,
     ];
 
     /// The content of the file.
@@ -43,6 +46,7 @@ impl Shipped {
             Self::Consistency => include_bytes!("../../../configs/models/person.consistency"),
             Self::Orientation => include_bytes!("../../../configs/models/person.orientation"),
             Self::Joints => include_bytes!("../../../configs/models/person.joints"),
+            Self::Springs => include_bytes!("../../../configs/models/person.springs"),
         }
     }
 
@@ -54,6 +58,7 @@ impl Shipped {
             Self::Consistency => "consistency",
             Self::Orientation => "orientation",
             Self::Joints => "joints",
+            Self::Springs => "springs",
         };
         format!("{SHIPPED}:{kind}").into()
     }
@@ -96,6 +101,7 @@ impl Shipped {
             Self::Consistency => ["fuse.consistency", "train consistency"],
             Self::Orientation => ["pose.orientation", "train orientation"],
             Self::Joints => ["triangulate.joint_map", "train joints"],
+            Self::Springs => ["pose.springs", "train springs"],
         };
         format!(
             "`{key}` is a file that `parallax {made_by}` made, or \"{SHIPPED}\": the one that is built in"
@@ -115,6 +121,7 @@ mod tests {
         let text = core::str::from_utf8(Shipped::Consistency.bytes()).unwrap();
         consistency::Learned::parse(text).unwrap();
         orientation::Network::from_bytes(Shipped::Orientation.bytes()).unwrap();
+        crate::inputs::springs(Path::new(SHIPPED)).unwrap();
     }
 
     #[test]

@@ -2,7 +2,29 @@
 
 use core::time::Duration;
 
-use pipeline::ViewStep;
+use std::sync::Arc;
+
+use fmp::Layout;
+use pipeline::{NetworkStep, ViewStep};
+
+/// The single-view step.
+#[derive(Debug)]
+pub enum Step {
+    /// By the filters of a model.
+    Filters(ViewStep),
+    /// By a network that finds keypoints.
+    Network(Box<NetworkStep>),
+}
+
+impl Step {
+    /// The pyramid of the evidence.
+    pub(crate) fn layout(&self) -> &Arc<Layout> {
+        match self {
+            Self::Filters(it) => it.layout(),
+            Self::Network(it) => it.layout(),
+        }
+    }
+}
 
 /// What one view's process has to do.
 #[derive(Debug)]
@@ -10,7 +32,7 @@ pub struct Job {
     /// The view.
     pub view: usize,
     /// The single-view step.
-    pub step: ViewStep,
+    pub step: Step,
     /// Processes that receive the candidates.
     pub n_pose_consumers: usize,
     /// Processes that receive the evidence.

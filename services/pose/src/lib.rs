@@ -1,11 +1,12 @@
 //! Receives frames, sends single-view candidates and their evidence.
 #![forbid(unsafe_code)]
 
+mod by_network;
 mod job;
 mod service;
 mod settings;
 mod view;
 
-pub use job::Job;
+pub use job::{Job, Step};
 pub use service::run;
 pub use settings::{precision, settings};

@@ -4,7 +4,7 @@ use messages::topic;
 use runtime::{Failure, Service};
 use stage::{Range, Stage};
 
-use crate::job::Job;
+use crate::job::{Job, Step};
 use crate::view::{Memory, View};
 
 /// Searches every frame of one view, until the footage ends or a stop is requested.
@@ -20,9 +20,9 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
         poses: stage.view_output(&topic::view_pose(job.view), job.n_pose_consumers)?,
         evidence: stage.bulk_output(&topic::evidence(job.view), job.n_evidence_consumers)?,
     };
-    let mut memory = Memory {
-        tracker: job.step.tracker(),
-        responses: Vec::new(),
+    let mut memory = match &job.step {
+        Step::Filters(step) => Memory::Filters(step.tracker(), Vec::new()),
+        Step::Network(_) => Memory::Network(Box::default()),
     };
     let range = Range {
         start: job.start_frame,

@@ -6,26 +6,28 @@ use fmp::{FrameTime, Scope, Tracker};
 use kernels::Rgb8View;
 use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
 use metrics::Passage;
-use pipeline::ViewEstimate;
+use pipeline::{ViewEstimate, ViewStep};
 use runtime::{ExitKind, Failure, Loan, OrFail as _, Sample, Service, SlicePublisher, now_nanos};
 use stage::{Output, StreamFrame, Turn};
 
-use crate::job::Job;
+use crate::by_network::NetworkState;
+use crate::job::{Job, Step};
 
 /// What is kept from frame to frame.
-pub(crate) struct Memory {
-    pub(crate) tracker: Tracker,
-    /// Responses that do not lie in shared memory.
-    pub(crate) responses: Vec<f32>,
+pub(crate) enum Memory {
+    /// The last pose, and responses that do not lie in shared memory.
+    Filters(Tracker, Vec<f32>),
+    Network(Box<NetworkState>),
 }
 
 /// What was found in a frame, and its evidence if a process receives it.
-struct Found<'a> {
-    estimate: ViewEstimate,
+pub(crate) struct Found<'a> {
+    pub(crate) estimate: ViewEstimate,
     /// How long the stage waited for the memory of the evidence.
-    loan_nanos: u64,
+    pub(crate) loan_nanos: u64,
     /// The responses of the scope that was searched.
-    evidence: Option<Loan<'a, f32, EvidenceHeader>>,
+    pub(crate) evidence: Option<Loan<'a, f32, EvidenceHeader>>,
+    pub(crate) searched: Searched,
 }
 
 /// The search of one view, and its outputs.
@@ -105,11 +107,7 @@ impl View<'_> {
             .as_ref()
             .map_or(0, |_| layout.n_values(&estimate.scope));
         Ok(ViewPose {
-            searched: if estimate.scope == Scope::whole(layout) {
-                Searched::FULL
-            } else {
-                Searched::TRACKED
-            },
+            searched: found.searched,
             evidence_bytes: (n_values * size_of::<f32>()) as u64,
             ..message
         })
@@ -140,48 +138,82 @@ impl View<'_> {
             frame: nth,
             seconds: rate.map(|rate| header.stamp.frame as f64 / rate),
         };
-        let scope = memory.tracker.scope(layout, at);
-        let mut found = self.find(image, scope, &mut memory.responses)?;
-        if self
-            .job
-            .step
-            .needs_full_search(&memory.tracker, &found.estimate)
-        {
+        match (&self.job.step, memory) {
+            (Step::Filters(step), Memory::Filters(tracker, responses)) => {
+                self.search(step, (image, at), (tracker, responses)).map(Ok)
+            }
+            (Step::Network(step), Memory::Network(state)) => {
+                self.look(step, (image, header.stamp), state)
+            }
+            _ => Ok(Err(Status::BAD_INPUT)),
+        }
+    }
+
+    /// Searches a frame with the filters, near the last pose or in full.
+    fn search(
+        &self,
+        step: &ViewStep,
+        (image, at): (Rgb8View<'_>, FrameTime),
+        (tracker, responses): (&mut Tracker, &mut Vec<f32>),
+    ) -> Result<Found<'_>, Failure> {
+        let layout = step.layout();
+        let scope = tracker.scope(layout, at);
+        let mut found = self.find(step, (image, scope), responses)?;
+        if step.needs_full_search(tracker, &found.estimate) {
             // Its memory for evidence is released first.
             drop(found);
-            found = self.find(image, Scope::whole(layout), &mut memory.responses)?;
+            found = self.find(step, (image, Scope::whole(layout)), responses)?;
         }
-        let step = &self.job.step;
-        step.update(&mut memory.tracker, at, &found.estimate);
-        Ok(Ok(found))
+        step.update(tracker, at, &found.estimate);
+        Ok(found)
     }
 
     /// Searches a frame. Responses that a process receives are written into shared memory directly.
     fn find(
         &self,
-        image: Rgb8View<'_>,
-        scope: Scope,
+        step: &ViewStep,
+        (image, scope): (Rgb8View<'_>, Scope),
         responses: &mut Vec<f32>,
     ) -> Result<Found<'_>, Failure> {
-        let (step, layout) = (&self.job.step, self.job.step.layout());
-        let n_values = layout.n_values(&scope);
+        let searched = if scope == Scope::whole(step.layout()) {
+            Searched::FULL
+        } else {
+            Searched::TRACKED
+        };
+        let run = |responses: &mut [f32]| step.run(image, scope, responses);
+        self.fill(&scope, searched, responses, run)
+    }
+
+    /// Has the responses of a scope written: into shared memory directly if a process receives them.
+    ///
+    /// * `responses`: memory for those that nobody receives.
+    pub(crate) fn fill(
+        &self,
+        scope: &Scope,
+        searched: Searched,
+        responses: &mut Vec<f32>,
+        run: impl FnOnce(&mut [f32]) -> ViewEstimate,
+    ) -> Result<Found<'_>, Failure> {
+        let n_values = self.job.step.layout().n_values(scope);
         if self.job.n_evidence_consumers == 0 {
             responses.resize(responses.len().max(n_values), 0.0);
             return Ok(Found {
-                estimate: step.run(image, scope, responses),
+                estimate: run(responses),
                 loan_nanos: 0,
                 evidence: None,
+                searched,
             });
         }
         let begin = now_nanos();
         let mut loan = self.evidence.loan(n_values)?;
         let loan_nanos = now_nanos() - begin;
-        let estimate = step.run(image, scope, loan.payload_mut());
+        let estimate = run(loan.payload_mut());
         let is_there = !estimate.candidates.is_empty();
         Ok(Found {
             evidence: is_there.then_some(loan),
             estimate,
             loan_nanos,
+            searched,
         })
     }
 }

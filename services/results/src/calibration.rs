@@ -141,14 +141,18 @@ fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2
     let fused = pose
         .views
         .get(view)
-        .filter(|it| view < pose.n_views as usize && it.status == Status::OK)?;
-    let best = record.candidates(scene, view).into_iter().next()?;
+        .filter(|it| view < pose.n_views as usize && it.status == Status::OK);
+    // Over the maps of networks, fusion leaves out a view that contradicts the others: that is what is looked for here.
+    if fused.is_none() && !scene.has_maps {
+        return None;
+    }
+    let best = record.own(scene, view)?;
     let mirror = scene
         .model
         .spec()
         .mirror
         .as_deref()
-        .filter(|_| fused.exchanged == 1);
+        .filter(|_| fused.is_some_and(|it| it.exchanged == 1));
     let part = |nth: usize| mirror.map_or(nth, |it| it[nth]);
     let layout = &scene.views[view].layout;
     let parts = (0..best.parts.len()).map(part);

@@ -1,7 +1,7 @@
 //! All messages about one frame.
 
 use fmp::Pose;
-use messages::{FrameHeader, PairPose, Pose3d, ViewPose, ViewQuality};
+use messages::{FrameHeader, PairPose, Pose3d, Status, ViewPose, ViewQuality};
 
 use crate::{Missing, Scene};
 
@@ -70,6 +70,28 @@ impl FrameRecord {
             }
             None => Vec::new(),
         }
+    }
+
+    /// The candidate of a view that is the person, as far as the view itself can tell: the best one of the filters; of the people that a
+    /// network sees, the one nearest to where fusion put the person, or the only one.
+    pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Pose> {
+        let candidates = self.candidates(scene, view);
+        if !scene.has_maps || candidates.len() < 2 {
+            return candidates.into_iter().next();
+        }
+        let pose = &self.pose3d;
+        let fused = pose.views.get(view).filter(|it| {
+            view < pose.n_views as usize && it.status == Status::OK && it.n_parts > 0
+        })?;
+        let layout = &scene.views[view].layout;
+        let distance = |it: &Pose| -> f64 {
+            let centres = it.centres(&scene.model, layout);
+            let both = centres.iter().zip(&fused.centres_px);
+            both.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
+        };
+        let distances = candidates.into_iter().map(|it| (distance(&it), it));
+        let nearest = distances.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map(|it| it.1)
     }
 
     /// How many frames ago the expected errors were predicted that fusion used for a view, at least: the

@@ -64,8 +64,7 @@ fn fused(record: &FrameRecord, view: usize) -> Option<&FusedView> {
 }
 
 fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
-    let candidates = record.candidates(scene, view);
-    let Some(best) = candidates.first() else {
+    let Some(best) = record.own(scene, view) else {
         return;
     };
     let width = thin(canvas);

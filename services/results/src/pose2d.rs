@@ -64,7 +64,7 @@ fn fused_pose(view: &View, fused: &FusedView) -> FusedPose {
 
 fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Option<SinglePose> {
     let candidates = record.candidates(scene, view);
-    let best = candidates.first()?;
+    let best = record.own(scene, view)?;
     let it = &scene.views[view];
     let part = |part: usize| {
         let centre = best.centre(&scene.model, &it.layout, part);

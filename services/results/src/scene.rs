@@ -26,6 +26,8 @@ pub struct Scene {
     pub model: Arc<Model>,
     /// The views, as they are numbered in messages.
     pub views: Vec<View>,
+    /// Whether the candidates of a view are the people that a network sees: which of them is the person is fusion's to say.
+    pub has_maps: bool,
     /// The joints of the result.
     pub joints: &'static JointSet,
     /// Frames of the footage per second, where known.

@@ -41,6 +41,7 @@ pub(crate) fn scene() -> Scene {
         joints: &skeleton::PARSE14,
         frame_rate_hz: Some(60.0),
         frame_step: 2,
+        has_maps: false,
         follow: deployment::person::Follow::default(),
         up_in_world: Some(Vector3::z_axis()),
     }

@@ -88,7 +88,7 @@ struct PairInput {
 fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     match job.views {
         Views::Pairs => wire::check_views(message, &job.pairs)?,
-        Views::All => wire::check_all_views(message, job.plans.len())?,
+        Views::All | Views::Space => wire::check_all_views(message, job.plans.len())?,
     }
     let n_parts = job.plans.first().map_or(0, |plan| plan.model().n_parts());
     let sigma_px = |side| wire::sigma_from_pair(message, side, n_parts);

@@ -14,8 +14,9 @@ use crate::{Deployment, triangulate};
 pub struct Config {
     /// `paper`: the paper's; `released`: what the authors' program computes.
     pub energy: Energy,
-    /// `pairs`: pairs of views, then combined, as in the paper; `all`: every view with all others at once. Without it: `all`
-    /// of 3 to 8 cameras, unless another key is set that pairs alone have (`energy`, `pairs`, `workers`, `combine`).
+    /// `pairs`: pairs of views, then combined, as in the paper; `all`: every view with all others at once; `space`: the maps of
+    /// `pose.network` with bones in space. Without it: `space` with maps; else `all` of 3 to 8 cameras, unless another key is set
+    /// that pairs alone have (`energy`, `pairs`, `workers`, `combine`).
     pub views: Option<Views>,
     /// What `parallax train consistency` learned, or `"shipped"`: part-type tables, weights, thresholds, joints.
     pub consistency: Option<PathBuf>,
@@ -83,6 +84,7 @@ impl Deployment {
             || self.triangulate.combine != triangulate::Combine::Mean;
         match fuse.views {
             Some(views) => views,
+            None if self.has_maps() && !needs_pairs => Views::Space,
             None if needs_pairs || !(3..=MOST_AT_ONCE).contains(&self.cameras.len()) => {
                 Views::Pairs
             }
@@ -94,7 +96,7 @@ impl Deployment {
     pub(crate) fn most_workers(&self) -> usize {
         match self.views() {
             Views::Pairs => self.fuse.workers,
-            Views::All => 1,
+            Views::All | Views::Space => 1,
         }
     }
 }
@@ -107,6 +109,8 @@ pub enum Views {
     Pairs,
     /// All at once, every view supported by all others.
     All,
+    /// All at once, in space, over the maps of networks.
+    Space,
 }
 
 /// Which energy ties two views together.

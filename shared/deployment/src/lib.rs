@@ -162,6 +162,11 @@ impl Default for Supervision {
 }
 
 impl Deployment {
+    /// Whether networks that find keypoints take the place of the filters.
+    pub fn has_maps(&self) -> bool {
+        self.pose.network.is_some()
+    }
+
     /// Whether expected errors are predicted from the frames.
     pub fn has_network(&self) -> bool {
         self.quality.network.is_some()
@@ -217,6 +222,18 @@ impl Deployment {
         for file in may_ship.into_iter().flatten() {
             *file = relative_to(file, base);
         }
+        let pose = &mut self.pose;
+        let files = [
+            &mut pose.network,
+            &mut pose.network_card,
+            &mut pose.detector,
+            &mut pose.detector_card,
+            &mut pose.onnx_runtime,
+        ];
+        for file in files.into_iter().flatten() {
+            *file = base.join(&file);
+        }
+        pose.springs = relative_to(&pose.springs, base);
         if !is_none(&self.pose.orientation) {
             self.pose.orientation = relative_to(&self.pose.orientation, base);
         }

@@ -21,6 +21,22 @@ pub struct Config {
     /// What tells from the picture in which direction a person faces, for left and right: a file that
     /// `parallax train orientation` made; `"shipped"`: the one that ships; `"none"`: nothing.
     pub orientation: PathBuf,
+    /// An ONNX file of a network that finds keypoints, which takes the place of the filters.
+    pub network: Option<PathBuf>,
+    /// The card that describes the network; without it the file beside it (`.toml` for `.onnx`), or what its metadata say.
+    pub network_card: Option<PathBuf>,
+    /// `network`: an ONNX file of a detector of people, which says where the network looks; without it the filters do.
+    pub detector: Option<PathBuf>,
+    /// The card that describes the detector; without it the file beside it.
+    pub detector_card: Option<PathBuf>,
+    /// `network`: what holds its maps together: a file that `parallax train springs` made; `"shipped"`: the one that ships.
+    pub springs: PathBuf,
+    /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
+    pub find_every: u64,
+    /// `network`: most people of a view that it looks at.
+    pub people: usize,
+    /// `network`: the library of ONNX Runtime (`libonnxruntime.so`) that runs it and the detector; without it `rten`, which is built in.
+    pub onnx_runtime: Option<PathBuf>,
     /// Threads of one pose process.
     pub threads: usize,
     /// `f32`: the same bits everywhere; `bf16`: faster and less exact, needs a processor with AMX.
@@ -74,6 +90,14 @@ impl Default for Config {
             candidates: 8,
             min_separation: 1.0,
             orientation: PathBuf::from(SHIPPED),
+            network: None,
+            network_card: None,
+            detector: None,
+            detector_card: None,
+            springs: PathBuf::from(SHIPPED),
+            find_every: 10,
+            people: 3,
+            onnx_runtime: None,
             threads: 1,
             precision: Precision::F32,
             search: Search::Full,

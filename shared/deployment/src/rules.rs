@@ -11,6 +11,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     cameras(it)?;
     capture(&it.capture)?;
     pose(&it.pose)?;
+    maps(it)?;
     quality(it)?;
     fuse(it)?;
     if let Some(budget) = it.supervise.latency_budget_ms {
@@ -134,6 +135,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
 
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
     whole("pose.candidates", it.candidates)?;
+    whole("pose.find_every", it.find_every)?;
+    whole("pose.people", it.people)?;
     whole("pose.threads", it.threads)?;
     not_negative("pose.tracked_margin", it.tracked_margin)?;
     not_negative("pose.tracked_max_drop", f64::from(it.tracked_max_drop))?;
@@ -141,6 +144,48 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
     not_negative("pose.tracked_max_gap_ms", it.tracked_max_gap_ms)?;
     not_negative("pose.tracked_full_every_ms", it.tracked_full_every_ms)?;
     not_negative("pose.min_separation", it.min_separation)
+}
+
+/// Checks what goes with a network that finds keypoints, and what does not.
+fn maps(deployment: &Deployment) -> Result<(), Complaint> {
+    let it = &deployment.pose;
+    let beside = [
+        ("pose.network_card", it.network_card.is_some()),
+        ("pose.detector", it.detector.is_some()),
+        ("pose.onnx_runtime", it.onnx_runtime.is_some()),
+    ];
+    for (key, is_given) in beside {
+        demand(
+            !is_given || it.network.is_some(),
+            key,
+            "given",
+            "none without `pose.network`",
+        )?;
+    }
+    demand(
+        it.detector_card.is_none() || it.detector.is_some(),
+        "pose.detector_card",
+        "given",
+        "none without `pose.detector`",
+    )?;
+    let of_filters = [
+        ("quality.network", deployment.quality.network.is_some()),
+        ("quality.table", deployment.quality.table.is_some()),
+        ("fuse.consistency", deployment.fuse.consistency.is_some()),
+        (
+            "fuse.compatibility",
+            !deployment.fuse.compatibility.is_empty(),
+        ),
+    ];
+    for (key, is_given) in of_filters {
+        demand(
+            !is_given || !deployment.has_maps(),
+            key,
+            "given",
+            "none with `pose.network`: it is about poses that the filters find",
+        )?;
+    }
+    Ok(())
 }
 
 fn quality(deployment: &Deployment) -> Result<(), Complaint> {
@@ -236,8 +281,15 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         return Ok(());
     }
     let n_views = deployment.cameras.len();
+    let in_space = deployment.views() == fuse::Views::Space;
     demand(
-        n_views <= fuse::MOST_AT_ONCE,
+        !in_space || deployment.has_maps(),
+        "fuse.views",
+        "\"space\"",
+        "\"all\" or \"pairs\" without `pose.network`: filters give no maps of joints",
+    )?;
+    demand(
+        in_space || n_views <= fuse::MOST_AT_ONCE,
         "fuse.views",
         &format!("\"all\" of {n_views} cameras"),
         &format!(

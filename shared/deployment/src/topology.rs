@@ -371,7 +371,7 @@ fn process(
 /// The pairs of views that are fused, ascending.
 fn pairs(deployment: &Deployment) -> Vec<[usize; 2]> {
     let n_views = deployment.cameras.len();
-    if deployment.views() == fuse::Views::All {
+    if deployment.views() != fuse::Views::Pairs {
         return (1..n_views).map(|view| [view - 1, view]).collect();
     }
     let mut pairs: Vec<[usize; 2]> = if deployment.fuse.pairs.is_empty() {

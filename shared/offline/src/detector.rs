@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use inference::Session;
 use keypoints::DetectorCard;
 use posenetwork::Detector;
 use runtime::{ExitKind, Failure};
+
+use crate::network::Library;
 
 /// Reads a detector and its card, and tries it once.
 ///
@@ -15,8 +16,16 @@ use runtime::{ExitKind, Failure};
 ///
 /// A file cannot be read, is no network that can be run, is no card, or the two do not fit.
 pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| refused(path, &error))?;
-    let session = Session::parse(bytes).map_err(|error| refused(path, &error))?;
+    open_with(path, card, &Library::BuiltIn)
+}
+
+/// As [`open`], run by a library of choice.
+///
+/// # Errors
+///
+/// As for [`open`].
+pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Detector, Failure> {
+    let session = library.session(path)?;
     let beside = path.with_extension("toml");
     let card: PathBuf = card.map_or(beside, Path::to_path_buf);
     let text = std::fs::read_to_string(&card).map_err(|error| {

@@ -1,0 +1,62 @@
+//! Networks that find keypoints, and what goes with them: detectors of people, and the springs between joints.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use deployment::pose::Config;
+use fmp::Model;
+use offline::network::{Library, NetworkFile};
+use posenetwork::{Detector, PoseNetwork};
+use runtime::{ExitKind, Failure, OrFail as _, in_file};
+
+use crate::shipped::Shipped;
+
+/// Reads the tree of springs that holds the maps of a network together; `shipped` stands for the one that ships.
+///
+/// # Errors
+///
+/// The file cannot be read, or is another model.
+pub fn springs(file: &Path) -> Result<Arc<Model>, Failure> {
+    let bytes = Shipped::Springs.read(file)?;
+    let spec = fmp::files::own::decode(&bytes).map_err(|error| in_file(file, &error))?;
+    let model = Model::new(spec).or_fail(ExitKind::Input)?;
+    if !posenetwork::springs::is_tree(&model) {
+        let message = format!("{}: a model, but no tree of springs", file.display());
+        let hint =
+            "`parallax train springs` makes such a file; \"shipped\": the one that is built in";
+        return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
+    }
+    Ok(Arc::new(model))
+}
+
+/// Loads the network of a deployment, if it has one, and tries it once.
+///
+/// # Errors
+///
+/// A file cannot be read, is no network that can be run or no card, or the two do not fit.
+pub fn pose_network(config: &Config) -> Result<Option<PoseNetwork>, Failure> {
+    let Some(file) = &config.network else {
+        return Ok(None);
+    };
+    let library = library(config)?;
+    let network = NetworkFile::open_with(file, config.network_card.as_deref(), &library)?;
+    network.fitted().map(Some)
+}
+
+/// Loads the detector of a deployment, if it has one, and tries it once.
+///
+/// # Errors
+///
+/// As for [`pose_network`].
+pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
+    let Some(file) = &config.detector else {
+        return Ok(None);
+    };
+    let library = library(config)?;
+    offline::detector::open_with(file, config.detector_card.as_deref(), &library).map(Some)
+}
+
+fn library(config: &Config) -> Result<Library, Failure> {
+    let file = config.onnx_runtime.as_deref();
+    file.map_or(Ok(Library::BuiltIn), Library::load)
+}
