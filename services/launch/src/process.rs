@@ -9,8 +9,8 @@ use fmp::{Layout, Solver};
 use messages::topic;
 use multiview::SpaceSettings;
 use pipeline::{
-    Boxes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep, ViewSettings, ViewStep,
-    Views,
+    Boxes, Eyes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep, ViewSettings,
+    ViewStep, Views,
 };
 use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
@@ -18,6 +18,7 @@ use runtime::{ExitKind, Failure, OrFail as _, Service};
 use viewquality::Forecaster;
 
 use crate::inputs;
+use crate::keypoints;
 use crate::prepare::{Prepared, frame_scale, framing};
 use crate::recorded;
 use crate::resolved::Resolved;
@@ -193,35 +194,53 @@ fn view_step(
     view: usize,
     layout: Arc<Layout>,
 ) -> Result<pose::Step, Failure> {
-    let config = &resolved.deployment.pose;
-    let Some(network) = inputs::pose_network(config)? else {
+    let deployment = &resolved.deployment;
+    if !deployment.has_maps() {
         let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
         return Ok(pose::Step::Filters(step.or_fail(ExitKind::Config)?));
-    };
-    let boxes = match inputs::detector(config)? {
-        Some(detector) => Boxes::Detector(Box::new(detector)),
-        None => {
-            let model = inputs::model_or_shipped(resolved.deployment.model.as_deref())?;
-            let camera = prepared.views[view].framing.camera();
-            let plan = pipeline::plan(&model, camera).or_fail(ExitKind::Input)?;
-            let layout = Arc::new(plan.layout().clone());
-            let settings = ViewSettings {
-                n_candidates: config.people,
-                precision: prepared.settings.view.precision,
-                ..ViewSettings::default()
-            };
-            let step = ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)?;
-            Boxes::Filters(Box::new(step))
-        }
-    };
+    }
+    let config = &deployment.pose;
     let settings = NetworkSettings {
         n_people: config.people,
         find_every: config.find_every,
+        keypoint_sigma: config.keypoint_sigma,
         ..NetworkSettings::default()
     };
+    if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
+        let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
+        let frame_from_source = prepared.views[view].framing.output_from_source();
+        let solver = Solver::new(prepared.model);
+        return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
+            step: NetworkStep::new(eyes, solver, layout, settings),
+            source,
+            frame_from_source,
+        })));
+    }
+    let network = inputs::pose_network(deployment, view)?
+        .ok_or("the camera has neither a network nor keypoints")
+        .or_fail(ExitKind::Config)?;
+    let boxes = match inputs::detector(config)? {
+        Some(detector) => Boxes::Detector(Box::new(detector)),
+        None => Boxes::Filters(Box::new(filters(resolved, &prepared, view)?)),
+    };
+    let eyes = Eyes::Network(Box::new(network), boxes);
     let solver = Solver::new(prepared.model);
-    let step = NetworkStep::new(network, boxes, solver, layout, settings);
+    let step = NetworkStep::new(eyes, solver, layout, settings);
     Ok(pose::Step::Network(Box::new(step)))
+}
+
+/// The search of the filters over the whole frame, which finds boxes for a network.
+fn filters(resolved: &Resolved, prepared: &Prepared, view: usize) -> Result<ViewStep, Failure> {
+    let model = inputs::model_or_shipped(resolved.deployment.model.as_deref())?;
+    let camera = prepared.views[view].framing.camera();
+    let plan = pipeline::plan(&model, camera).or_fail(ExitKind::Input)?;
+    let layout = Arc::new(plan.layout().clone());
+    let settings = ViewSettings {
+        n_candidates: resolved.deployment.pose.people,
+        precision: prepared.settings.view.precision,
+        ..ViewSettings::default()
+    };
+    ViewStep::new(model, layout, settings).or_fail(ExitKind::Config)
 }
 
 fn quality(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {

@@ -5,7 +5,19 @@ use core::time::Duration;
 use std::sync::Arc;
 
 use fmp::Layout;
+use keypointfiles::KeypointSource;
 use pipeline::{NetworkStep, ViewStep};
+
+/// Keypoints that another program found in the footage of a view.
+#[derive(Debug)]
+pub struct Keypoints {
+    /// What makes evidence of them.
+    pub step: NetworkStep,
+    /// Where they are.
+    pub source: KeypointSource,
+    /// From pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
+    pub frame_from_source: [[f64; 3]; 2],
+}
 
 /// The single-view step.
 #[derive(Debug)]
@@ -14,6 +26,8 @@ pub enum Step {
     Filters(ViewStep),
     /// By a network that finds keypoints.
     Network(Box<NetworkStep>),
+    /// By keypoints that another program found.
+    Keypoints(Box<Keypoints>),
 }
 
 impl Step {
@@ -22,6 +36,7 @@ impl Step {
         match self {
             Self::Filters(it) => it.layout(),
             Self::Network(it) => it.layout(),
+            Self::Keypoints(it) => it.step.layout(),
         }
     }
 }

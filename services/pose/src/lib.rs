@@ -1,12 +1,13 @@
 //! Receives frames, sends single-view candidates and their evidence.
 #![forbid(unsafe_code)]
 
+mod by_keypoints;
 mod by_network;
 mod job;
 mod service;
 mod settings;
 mod view;
 
-pub use job::{Job, Step};
+pub use job::{Job, Keypoints, Step};
 pub use service::run;
 pub use settings::{precision, settings};

@@ -23,6 +23,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut memory = match &job.step {
         Step::Filters(step) => Memory::Filters(step.tracker(), Vec::new()),
         Step::Network(_) => Memory::Network(Box::default()),
+        Step::Keypoints(_) => Memory::Keypoints(Box::default()),
     };
     let range = Range {
         start: job.start_frame,

@@ -10,6 +10,7 @@ use pipeline::{ViewEstimate, ViewStep};
 use runtime::{ExitKind, Failure, Loan, OrFail as _, Sample, Service, SlicePublisher, now_nanos};
 use stage::{Output, StreamFrame, Turn};
 
+use crate::by_keypoints::KeypointState;
 use crate::by_network::NetworkState;
 use crate::job::{Job, Step};
 
@@ -18,6 +19,7 @@ pub(crate) enum Memory {
     /// The last pose, and responses that do not lie in shared memory.
     Filters(Tracker, Vec<f32>),
     Network(Box<NetworkState>),
+    Keypoints(Box<KeypointState>),
 }
 
 /// What was found in a frame, and its evidence if a process receives it.
@@ -144,6 +146,9 @@ impl View<'_> {
             }
             (Step::Network(step), Memory::Network(state)) => {
                 self.look(step, (image, header.stamp), state)
+            }
+            (Step::Keypoints(keypoints), Memory::Keypoints(state)) => {
+                self.take(keypoints, header.stamp, state)
             }
             _ => Ok(Err(Status::BAD_INPUT)),
         }

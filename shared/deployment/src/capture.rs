@@ -23,6 +23,10 @@ pub struct Camera {
     /// What these are called: `coco-17`, `halpe-26`, `body-25`, `body-25b`, `openpose-18`, `mpii-16` or `lsp-14`; without
     /// it what their number tells, or the file itself.
     pub keypoint_names: Option<String>,
+    /// A network of this camera's own, in the place of `pose.network`.
+    pub network: Option<PathBuf>,
+    /// The card of that network; without it as for `pose.network_card`.
+    pub network_card: Option<PathBuf>,
     /// Where the source's top-left pixel lies on the calibrated image, `[x, y]` pixels, for a source
     /// that lacks rows or columns of it. Without it the sizes must be equal.
     pub source_offset_px: Option<[u32; 2]>,

@@ -162,9 +162,20 @@ impl Default for Supervision {
 }
 
 impl Deployment {
-    /// Whether networks that find keypoints take the place of the filters.
+    /// Whether networks that find keypoints, or keypoints that other programs found, take the place of the filters.
     pub fn has_maps(&self) -> bool {
-        self.pose.network.is_some()
+        let has_own = |it: &capture::Camera| it.network.is_some() || it.keypoints.is_some();
+        self.pose.network.is_some() || self.cameras.iter().any(has_own)
+    }
+
+    /// The network of a camera and its card: its own, or that of all; none if it has keypoints.
+    pub fn pose_network(&self, camera: usize) -> Option<(&Path, Option<&Path>)> {
+        let it = &self.cameras[camera];
+        let own = (&it.network, &it.network_card);
+        let of_all = (&self.pose.network, &self.pose.network_card);
+        let (network, card) = if it.network.is_some() { own } else { of_all };
+        let network = network.as_deref().filter(|_| it.keypoints.is_none())?;
+        Some((network, card.as_deref()))
     }
 
     /// Whether expected errors are predicted from the frames.
@@ -209,8 +220,13 @@ impl Deployment {
             if !camera.source.is_empty() {
                 camera.source = machine.footage(&camera.source, base);
             }
-            if let Some(keypoints) = &mut camera.keypoints {
-                *keypoints = base.join(&keypoints);
+            let files = [
+                &mut camera.keypoints,
+                &mut camera.network,
+                &mut camera.network_card,
+            ];
+            for file in files.into_iter().flatten() {
+                *file = base.join(&file);
             }
         }
         let quality = &mut self.quality;

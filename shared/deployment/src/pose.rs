@@ -33,6 +33,9 @@ pub struct Config {
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
     pub find_every: u64,
+    /// Standard deviation of keypoints that another program found (`keypoints` of a `[[camera]]`), share of the height of the person's
+    /// box enlarged by a quarter.
+    pub keypoint_sigma: f64,
     /// `network`: most people of a view that it looks at.
     pub people: usize,
     /// `network`: the library of ONNX Runtime (`libonnxruntime.so`) that runs it and the detector; without it `rten`, which is built in.
@@ -96,6 +99,7 @@ impl Default for Config {
             detector_card: None,
             springs: PathBuf::from(SHIPPED),
             find_every: 10,
+            keypoint_sigma: 0.02,
             people: 3,
             onnx_runtime: None,
             threads: 1,

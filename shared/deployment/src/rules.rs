@@ -149,17 +149,46 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
 /// Checks what goes with a network that finds keypoints, and what does not.
 fn maps(deployment: &Deployment) -> Result<(), Complaint> {
     let it = &deployment.pose;
+    let cameras = 0..deployment.cameras.len();
+    let has_network = cameras
+        .clone()
+        .any(|it| deployment.pose_network(it).is_some());
     let beside = [
-        ("pose.network_card", it.network_card.is_some()),
-        ("pose.detector", it.detector.is_some()),
-        ("pose.onnx_runtime", it.onnx_runtime.is_some()),
+        (
+            "pose.network_card",
+            it.network_card.is_some(),
+            it.network.is_some(),
+        ),
+        ("pose.detector", it.detector.is_some(), has_network),
+        ("pose.onnx_runtime", it.onnx_runtime.is_some(), has_network),
     ];
-    for (key, is_given) in beside {
+    for (key, is_given, has_network) in beside {
         demand(
-            !is_given || it.network.is_some(),
+            !is_given || has_network,
             key,
             "given",
             "none without `pose.network`",
+        )?;
+    }
+    for (camera, nth) in deployment.cameras.iter().zip(cameras) {
+        demand(
+            camera.network_card.is_none() || camera.network.is_some(),
+            "camera.network_card",
+            &format!("given for {:?}", camera.name),
+            "none without `network` of this camera",
+        )?;
+        demand(
+            camera.network.is_none() || camera.keypoints.is_none(),
+            "camera.network",
+            &format!("given for {:?}, besides `keypoints`", camera.name),
+            "one of the two",
+        )?;
+        let has_maps = camera.keypoints.is_some() || deployment.pose_network(nth).is_some();
+        demand(
+            has_maps || !deployment.has_maps(),
+            "camera.network",
+            &format!("not given for {:?}", camera.name),
+            "`pose.network`, or a network or keypoints for every camera: maps and filters do not go together",
         )?;
     }
     demand(
@@ -182,7 +211,7 @@ fn maps(deployment: &Deployment) -> Result<(), Complaint> {
             !is_given || !deployment.has_maps(),
             key,
             "given",
-            "none with `pose.network`: it is about poses that the filters find",
+            "none with networks or keypoints: it is about poses that the filters find",
         )?;
     }
     Ok(())
@@ -286,7 +315,7 @@ fn all_views(deployment: &Deployment) -> Result<(), Complaint> {
         !in_space || deployment.has_maps(),
         "fuse.views",
         "\"space\"",
-        "\"all\" or \"pairs\" without `pose.network`: filters give no maps of joints",
+        "\"all\" or \"pairs\" without `pose.network` or keypoints: filters give no maps of joints",
     )?;
     demand(
         in_space || n_views <= fuse::MOST_AT_ONCE,

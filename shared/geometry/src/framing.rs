@@ -136,6 +136,18 @@ impl Framing {
         self.source_from_output
     }
 
+    /// Where a source pixel lies in the output: the inverse of [`Self::source_from_output`].
+    pub fn output_from_source(&self) -> [[f64; 3]; 2] {
+        let [[a, b, c], [d, e, f]] = self.source_from_output;
+        // A turn and a scale other than 0.
+        let determinant = a * e - b * d;
+        let [[a, b], [d, e]] = [
+            [e / determinant, -b / determinant],
+            [-d / determinant, a / determinant],
+        ];
+        [[a, b, -(a * c + b * f)], [d, e, -(d * c + e * f)]]
+    }
+
     /// The camera that takes the output image, of the output's size.
     pub fn camera(&self) -> &Camera {
         &self.camera

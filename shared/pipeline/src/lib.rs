@@ -27,7 +27,7 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
-pub use network_step::{Boxes, MOST_VALUES, NetworkMemory, NetworkSettings, NetworkStep};
+pub use network_step::{Boxes, Eyes, MOST_VALUES, NetworkMemory, NetworkSettings, NetworkStep};
 pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};

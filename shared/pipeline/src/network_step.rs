@@ -2,17 +2,28 @@
 //!
 //! A network that looks at one person needs a box. While a person is seen well, the box of the next frame is that of the pose,
 //! widened; now and then, and where nobody is seen well, boxes are looked for: by a detector, or by the search of the filters.
+//! Keypoints that another program found take the same way, without a picture.
 
 use std::sync::Arc;
 
 use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solver, local_scores};
 use kernels::Rgb8View;
+use keypoints::Keypoint;
 use posenetwork::springs::{WINDOW_CELLS, joint_of};
 use posenetwork::{
     Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of, overlap,
 };
 
 use crate::view_step::{ViewEstimate, ViewStep};
+
+/// What tells where the joints of people are.
+#[derive(Debug)]
+pub enum Eyes {
+    /// A network that looks into boxes, and what finds these.
+    Network(Box<PoseNetwork>, Boxes),
+    /// Keypoints that another program found: how the joints follow from them (`keypoints::joint_rows` of their names).
+    Keypoints(Vec<Option<Vec<(usize, f64)>>>),
+}
 
 /// Where boxes around people come from.
 #[derive(Debug)]
@@ -34,6 +45,8 @@ pub struct NetworkSettings {
     pub least_heat: f64,
     /// How maps become evidence.
     pub maps: MapSettings,
+    /// Standard deviation of keypoints that another program found, share of the height of the person's box enlarged by a quarter.
+    pub keypoint_sigma: f64,
 }
 
 impl Default for NetworkSettings {
@@ -43,6 +56,7 @@ impl Default for NetworkSettings {
             find_every: 10,
             least_heat: 0.2,
             maps: MapSettings::default(),
+            keypoint_sigma: 0.02,
         }
     }
 }
@@ -57,8 +71,7 @@ pub const MOST_VALUES: usize = 1 << 20;
 /// The single-view step by a network, for frames of one size.
 #[derive(Debug)]
 pub struct NetworkStep {
-    network: PoseNetwork,
-    boxes: Boxes,
+    eyes: Eyes,
     solver: Solver,
     layout: Arc<Layout>,
     settings: NetworkSettings,
@@ -106,16 +119,9 @@ impl NetworkStep {
     ///
     /// * `solver`: of a tree of [`posenetwork::springs`].
     /// * `layout`: of the frames, for that tree.
-    pub fn new(
-        network: PoseNetwork,
-        boxes: Boxes,
-        solver: Solver,
-        layout: Arc<Layout>,
-        settings: NetworkSettings,
-    ) -> Self {
+    pub fn new(eyes: Eyes, solver: Solver, layout: Arc<Layout>, settings: NetworkSettings) -> Self {
         Self {
-            network,
-            boxes,
+            eyes,
             solver,
             layout,
             settings,
@@ -137,19 +143,23 @@ impl NetworkStep {
         image: Rgb8View<'_>,
         memory: &mut NetworkMemory,
     ) -> Result<Option<Scope>, LookError> {
+        let Eyes::Network(network, boxes) = &self.eyes else {
+            memory.n_seen = 0;
+            return Ok(None);
+        };
         memory.since = memory.since.map(|it| it + 1);
         let is_due = memory.since.is_none_or(|it| it >= self.settings.find_every);
         memory.n_seen = 0;
         let tracked = core::mem::take(&mut memory.outlines);
         for outline in &tracked {
-            self.see(image, *outline, memory)?;
+            self.see((network, image), *outline, memory)?;
         }
         if is_due || memory.n_seen == 0 {
             memory.since = Some(0);
-            for outline in self.find(image, &mut memory.values)? {
+            for outline in find(boxes, image, &mut memory.values)? {
                 let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
                 if memory.n_seen < self.settings.n_people && !memory.people().iter().any(is_known) {
-                    self.see(image, outline, memory)?;
+                    self.see((network, image), outline, memory)?;
                 }
             }
         }
@@ -162,11 +172,11 @@ impl NetworkStep {
     /// Looks at the person in a box, and keeps what is seen well.
     fn see(
         &self,
-        image: Rgb8View<'_>,
+        (network, image): (&PoseNetwork, Rgb8View<'_>),
         outline: [f64; 4],
         memory: &mut NetworkMemory,
     ) -> Result<(), LookError> {
-        let Some(sight) = self.network.look(image, outline, &mut memory.workspace)? else {
+        let Some(sight) = network.look(image, outline, &mut memory.workspace)? else {
             return Ok(());
         };
         if memory.seen.len() == memory.n_seen {
@@ -175,46 +185,57 @@ impl NetworkStep {
         let seen = &mut memory.seen[memory.n_seen];
         seen.maps.read(&sight, &self.settings.maps)?;
         seen.outline = outline;
-        let peaks = seen.maps.peaks().iter();
-        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
-        seen.heat = heat / seen.maps.peaks().len().max(1) as f64;
-        let is_inside = self.region(&seen.maps).is_some();
-        if seen.heat >= self.settings.least_heat && is_inside {
-            seen.level = self.level(&seen.maps);
+        if self.is_well_seen(seen) {
             memory.n_seen += 1;
         }
         Ok(())
     }
 
-    /// Boxes around people, pixels, the best first.
-    fn find(&self, image: Rgb8View<'_>, values: &mut Vec<f32>) -> Result<Vec<[f64; 4]>, LookError> {
-        match &self.boxes {
-            Boxes::Detector(detector) => {
-                let mut found = detector.people(image, values)?;
-                // Who is sure and large first: the frame has room for a few.
-                let weight = |it: &keypoints::PersonBox| {
-                    f64::from(it.score) * (it.outline[3] - it.outline[1])
-                };
-                found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-                Ok(found.into_iter().map(|it| it.outline).collect())
+    /// Takes the people of a frame whose keypoints another program found; returns what of the frame the responses will cover, or
+    /// `None` if nobody is seen well.
+    ///
+    /// * `people`: keypoints of every person, pixels of the frame.
+    pub fn take<P: AsRef<[Option<Keypoint>]>>(
+        &self,
+        people: impl Iterator<Item = P>,
+        memory: &mut NetworkMemory,
+    ) -> Option<Scope> {
+        memory.outlines.clear();
+        memory.n_seen = 0;
+        let Eyes::Keypoints(rows) = &self.eyes else {
+            return None;
+        };
+        for keypoints in people {
+            if memory.n_seen == self.settings.n_people {
+                break;
             }
-            Boxes::Filters(step) => {
-                let whole = Scope::whole(step.layout());
-                values.resize(values.len().max(step.layout().n_values(&whole)), 0.0);
-                let found = step.run(image, whole, values);
-                let outline = |it: &Pose| {
-                    let [left, top, right, bottom] = step.bounding_box(it);
-                    let more = [right - left, bottom - top].map(|it| WIDENED * it);
-                    [
-                        left - more[0],
-                        top - more[1],
-                        right + more[0],
-                        bottom + more[1],
-                    ]
-                };
-                Ok(found.candidates.iter().map(outline).collect())
+            if memory.seen.len() == memory.n_seen {
+                memory.seen.push(Seen::default());
+            }
+            let seen = &mut memory.seen[memory.n_seen];
+            let NetworkSettings {
+                maps,
+                keypoint_sigma,
+                ..
+            } = &self.settings;
+            let is_there = seen
+                .maps
+                .of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
+            if is_there && self.is_well_seen(seen) {
+                memory.n_seen += 1;
             }
         }
+        self.scope(memory)
+    }
+
+    /// Judges what is seen of a person.
+    fn is_well_seen(&self, seen: &mut Seen) -> bool {
+        let peaks = seen.maps.peaks().iter();
+        let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
+        seen.heat = heat / seen.maps.peaks().len().max(1) as f64;
+        let is_inside = self.region(&seen.maps).is_some();
+        seen.level = self.level(&seen.maps);
+        seen.heat >= self.settings.least_heat && is_inside
     }
 
     /// The level whose cells are nearest to those that the springs were learned with.
@@ -355,6 +376,40 @@ impl NetworkStep {
             };
         }
         Some(moved)
+    }
+}
+
+/// Boxes around people, pixels, the best first.
+fn find(
+    boxes: &Boxes,
+    image: Rgb8View<'_>,
+    values: &mut Vec<f32>,
+) -> Result<Vec<[f64; 4]>, LookError> {
+    match boxes {
+        Boxes::Detector(detector) => {
+            let mut found = detector.people(image, values)?;
+            // Who is sure and large first: the frame has room for a few.
+            let weight =
+                |it: &keypoints::PersonBox| f64::from(it.score) * (it.outline[3] - it.outline[1]);
+            found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+            Ok(found.into_iter().map(|it| it.outline).collect())
+        }
+        Boxes::Filters(step) => {
+            let whole = Scope::whole(step.layout());
+            values.resize(values.len().max(step.layout().n_values(&whole)), 0.0);
+            let found = step.run(image, whole, values);
+            let outline = |it: &Pose| {
+                let [left, top, right, bottom] = step.bounding_box(it);
+                let more = [right - left, bottom - top].map(|it| WIDENED * it);
+                [
+                    left - more[0],
+                    top - more[1],
+                    right + more[0],
+                    bottom + more[1],
+                ]
+            };
+            Ok(found.candidates.iter().map(outline).collect())
+        }
     }
 }
 

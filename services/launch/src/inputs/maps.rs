@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use deployment::Deployment;
 use deployment::pose::Config;
 use fmp::Model;
 use offline::network::{Library, NetworkFile};
@@ -29,17 +30,20 @@ pub fn springs(file: &Path) -> Result<Arc<Model>, Failure> {
     Ok(Arc::new(model))
 }
 
-/// Loads the network of a deployment, if it has one, and tries it once.
+/// Loads the network of a camera, if it has one, and tries it once.
 ///
 /// # Errors
 ///
 /// A file cannot be read, is no network that can be run or no card, or the two do not fit.
-pub fn pose_network(config: &Config) -> Result<Option<PoseNetwork>, Failure> {
-    let Some(file) = &config.network else {
+pub fn pose_network(
+    deployment: &Deployment,
+    camera: usize,
+) -> Result<Option<PoseNetwork>, Failure> {
+    let Some((file, card)) = deployment.pose_network(camera) else {
         return Ok(None);
     };
-    let library = library(config)?;
-    let network = NetworkFile::open_with(file, config.network_card.as_deref(), &library)?;
+    let library = library(&deployment.pose)?;
+    let network = NetworkFile::open_with(file, card, &library)?;
     network.fitted().map(Some)
 }
 

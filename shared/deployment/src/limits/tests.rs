@@ -119,6 +119,11 @@ const ROWS: &[Row] = &[
         &["1", "30"],
     ),
     (
+        "pose.keypoint_sigma",
+        &[("0", "expected 0.001 to 0.5"), ("nan", "is NaN")],
+        &["0.05"],
+    ),
+    (
         "pose.people",
         &[("0", "is 0, expected 1 to 8"), ("9", "is 9")],
         &["1"],

@@ -1,0 +1,65 @@
+//! Takes what another program found in a frame.
+
+use keypoints::Keypoint;
+use keypoints::files::SeenKeypoints;
+use messages::{Searched, Stamp, Status};
+use pipeline::NetworkMemory;
+use runtime::Failure;
+
+use crate::job::Keypoints;
+use crate::view::{Found, View};
+
+/// What is kept from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct KeypointState {
+    memory: NetworkMemory,
+    people: Vec<SeenKeypoints>,
+    /// Responses that do not lie in shared memory.
+    responses: Vec<f32>,
+    /// Whether a file that cannot be read was told.
+    has_failed: bool,
+}
+
+impl View<'_> {
+    /// Takes the people of a frame. A frame whose file cannot be read is refused, with a warning the first time; one that no file
+    /// tells of has nobody in it.
+    pub(crate) fn take(
+        &self,
+        keypoints: &Keypoints,
+        stamp: Stamp,
+        state: &mut KeypointState,
+    ) -> Result<Result<Found<'_>, Status>, Failure> {
+        let KeypointState {
+            memory,
+            people,
+            responses,
+            has_failed,
+        } = state;
+        if let Err(error) = keypoints.source.of_frame(stamp.frame, people) {
+            if !*has_failed {
+                let error = causes::in_one_line(&error);
+                tracing::warn!(
+                    frame = stamp.frame,
+                    error,
+                    "the keypoints of a frame cannot be read"
+                );
+                *has_failed = true;
+            }
+            return Ok(Err(Status::BAD_INPUT));
+        }
+        for it in people.iter_mut().flat_map(|it| &mut it.keypoints).flatten() {
+            it.at = in_frame(&keypoints.frame_from_source, it);
+        }
+        let seen = people.iter().map(|it| &it.keypoints[..]);
+        let Some(scope) = keypoints.step.take(seen, memory) else {
+            return Ok(Err(Status::NO_DETECTION));
+        };
+        let fill = |responses: &mut [f32]| keypoints.step.fill(scope, responses, memory);
+        self.fill(&scope, Searched::FULL, responses, fill).map(Ok)
+    }
+}
+
+fn in_frame([[a, b, c], [d, e, f]]: &[[f64; 3]; 2], it: &Keypoint) -> [f64; 2] {
+    let [x, y] = it.at;
+    [a * x + b * y + c, d * x + e * y + f]
+}
