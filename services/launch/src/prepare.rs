@@ -113,7 +113,7 @@ impl Prepared {
         Ok(Some(predictor))
     }
 
-    /// Checks that the network, if there is one, can be loaded, and that the table of expected errors, if there is
+    /// Checks that the networks, if there are some, can be loaded, and that the table of expected errors, if there is
     /// one, contains every view. Warns of views without a row for any frame.
     ///
     /// # Errors
@@ -126,6 +126,7 @@ impl Prepared {
 
     fn check_quality(&self, resolved: &Resolved) -> Result<(), Failure> {
         let deployment = &resolved.deployment;
+        inputs::check_maps(deployment)?;
         let is_shipped =
             |file: &Option<PathBuf>| file.as_deref().is_some_and(deployment::is_shipped);
         let has_other_model = deployment.model.is_some() && !is_shipped(&deployment.model);
@@ -277,7 +278,7 @@ fn skeleton_settings(
     Ok(SkeletonSettings {
         joints,
         joint_map,
-        keep_unfused: !in_space,
+        in_space,
         sigma_cells: if in_space {
             ROUNDING_CELLS
         } else {

@@ -13,6 +13,7 @@ mod eval_networks;
 mod faults;
 mod full;
 mod live;
+mod maps;
 #[cfg(feature = "long-tests")]
 mod memory;
 mod networks;

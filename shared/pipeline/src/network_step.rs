@@ -63,6 +63,8 @@ impl Default for NetworkSettings {
 
 /// Boxes that overlap by more are of one person.
 const SAME: f64 = 0.5;
+/// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
+const TWIN: f64 = 0.05;
 /// How far the boxes of the filters' parts are widened, share of their sides, on each side.
 const WIDENED: f64 = 0.1;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
@@ -185,9 +187,8 @@ impl NetworkStep {
         let seen = &mut memory.seen[memory.n_seen];
         seen.maps.read(&sight, &self.settings.maps)?;
         seen.outline = outline;
-        if self.is_well_seen(seen) {
-            memory.n_seen += 1;
-        }
+        let is_new = self.is_well_seen(seen) && !is_known(&memory.seen, memory.n_seen);
+        memory.n_seen += usize::from(is_new);
         Ok(())
     }
 
@@ -377,6 +378,22 @@ impl NetworkStep {
         }
         Some(moved)
     }
+}
+
+/// Whether the person after the first `n` is one of these: two boxes can be of one person.
+fn is_known(seen: &[Seen], n: usize) -> bool {
+    let (before, last) = seen[..=n].split_at(n);
+    before.iter().any(|it| {
+        let [_, top, _, bottom] = it.maps.extent();
+        let both = it.maps.peaks().iter().zip(last[0].maps.peaks());
+        let both = both.filter_map(|(a, b)| Some((a.as_ref()?.at, b.as_ref()?.at)));
+        let mut distances: Vec<f64> = both
+            .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+            .collect();
+        distances.sort_by(f64::total_cmp);
+        let middle = distances.get(distances.len() / 2);
+        middle.is_some_and(|it| *it < TWIN * (bottom - top))
+    })
 }
 
 /// Boxes around people, pixels, the best first.

@@ -69,8 +69,9 @@ pub struct SkeletonSettings {
     /// How the views agree on a part. The decision about facing always uses the consensus: a mean
     /// of poses with different limbs is consistent under no assumption about left and right.
     pub consensus: ConsensusSettings,
-    /// Whether a view that was not fused keeps its own pose. Not where fusion leaves out the views that show something else.
-    pub keep_unfused: bool,
+    /// Whether fusion solved in space: then a view that it left out has no pose, and a part whose expected error is the diagonal of the
+    /// frame or more was not seen by the view.
+    pub in_space: bool,
     /// What bodies are like.
     pub body: BodySettings,
     /// Decide which views see the person from behind.
@@ -99,7 +100,7 @@ impl Default for SkeletonSettings {
             error_weight: 1.0,
             combine: Combine::default(),
             consensus: ConsensusSettings::default(),
-            keep_unfused: true,
+            in_space: false,
             body: BodySettings::default(),
             facing: true,
             facing_filter: FacingSettings::default(),

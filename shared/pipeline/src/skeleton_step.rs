@@ -11,7 +11,7 @@ use multiview::{
     ViewPlan, anatomical, is_exchanged,
 };
 use nalgebra::UnitVector3;
-use skeleton::PARSE14;
+use skeleton::{JointSet, PARSE14};
 
 use crate::bodies::{Bodies, Body, NoJoint};
 use crate::fused::Fused;
@@ -134,7 +134,8 @@ impl SkeletonStep {
         };
         let (views, kept) = self.better(solved, self.starts(&frame, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
-        let expected_px = self.expected_errors(answers, exchanged);
+        let expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
+        let of_body_px = self.expected_errors(answers, exchanged, &PARSE14);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
             Some(map) => Cow::from(map.from_parts(centres)),
             None => self.space.settings.joints.from_parts(centres).into(),
@@ -142,7 +143,7 @@ impl SkeletonStep {
         let joints = self
             .space
             .triangulate(&views, n_joints, points, &expected_px);
-        let (joints, body) = self.as_body(joints, &views);
+        let (joints, body) = self.as_body(joints, &views, &of_body_px);
         Skeleton {
             joints,
             body,
@@ -160,6 +161,7 @@ impl SkeletonStep {
         &mut self,
         joints: Vec<Result<Triangulated, TriangulateError>>,
         views: &[Option<FusedView>],
+        expected_px: &[Vec<f64>],
     ) -> (Vec<Result<Triangulated, NoJoint>>, Option<Body>) {
         let settings = &self.space.settings;
         let set = settings.joints;
@@ -172,8 +174,10 @@ impl SkeletonStep {
             joints.clone()
         } else {
             let points = |centres: &[[f64; 2]]| Cow::from(PARSE14.from_parts(centres));
+            // The check of the body knows nothing of expected errors, but of what was not seen.
+            let expected_px = if settings.in_space { expected_px } else { &[] };
             self.space
-                .triangulate(views, PARSE14.joints.len(), points, &[])
+                .triangulate(views, PARSE14.joints.len(), points, expected_px)
         };
         self.bodies.settle(&settings.body, &of_body, (set, joints))
     }
@@ -185,6 +189,7 @@ impl SkeletonStep {
         &self,
         answers: &[Option<ViewResult>],
         exchanged: Exchanges,
+        joints: &JointSet,
     ) -> Vec<Vec<f64>> {
         let of_view = |(view, answer): (usize, &Option<ViewResult>)| {
             let of_parts = answer.as_ref()?.sigma_px.as_ref()?.iter();
@@ -200,7 +205,7 @@ impl SkeletonStep {
             // The second number is only there because `anatomical` and `from_parts` take points.
             let of_parts: Vec<[f64; 2]> = of_parts.map(|it| [weighed(it), 0.0]).collect();
             let of_parts = anatomical(&of_parts, self.space.mirror(view, exchanged));
-            let of_joints = self.space.settings.joints.from_parts(&of_parts).into_iter();
+            let of_joints = joints.from_parts(&of_parts).into_iter();
             Some(of_joints.map(|[sigma, _]| sigma).collect())
         };
         let views = answers.iter().enumerate();
@@ -258,7 +263,7 @@ impl SkeletonStep {
         mut solved: Vec<Option<FusedView>>,
         start: Vec<Option<FusedView>>,
     ) -> (Vec<Option<FusedView>>, Kept) {
-        if start.iter().flatten().count() < 2 {
+        if self.space.settings.in_space || start.iter().flatten().count() < 2 {
             return (solved, Kept::Solved);
         }
         let agreement = |views: &[Option<FusedView>]| {
@@ -324,7 +329,7 @@ impl SkeletonStep {
                 .collect();
             let (n_pairs, single_score) = (poses.len(), f64::from(best.score));
             if poses.is_empty() {
-                if !(frame.is_alone && self.space.settings.keep_unfused) {
+                if !frame.is_alone || self.space.settings.in_space {
                     return None;
                 }
                 poses.push(candidate(single_score, best));

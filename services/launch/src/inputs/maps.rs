@@ -60,6 +60,26 @@ pub fn detector(config: &Config) -> Result<Option<Detector>, Failure> {
     offline::detector::open_with(file, config.detector_card.as_deref(), &library).map(Some)
 }
 
+/// Loads every network of a deployment once, to see that each fits its card.
+///
+/// # Errors
+///
+/// As for [`pose_network`].
+pub(crate) fn check_maps(deployment: &Deployment) -> Result<(), Failure> {
+    let mut known = Vec::new();
+    for camera in 0..deployment.cameras.len() {
+        let named = deployment.pose_network(camera);
+        if named.is_some() && !known.contains(&named) {
+            pose_network(deployment, camera)?;
+            known.push(named);
+        }
+    }
+    if !known.is_empty() {
+        detector(&deployment.pose)?;
+    }
+    Ok(())
+}
+
 fn library(config: &Config) -> Result<Library, Failure> {
     let file = config.onnx_runtime.as_deref();
     file.map_or(Ok(Library::BuiltIn), Library::load)

@@ -1,0 +1,389 @@
+//! Deployments whose evidence are the maps of a network, or keypoints of another program. The person is made of fourteen dots, each of
+//! its own colour, which a network of one layer finds.
+
+use crate::common;
+
+use core::fmt::Write as _;
+
+use common::{Case, Ended};
+use footage::{Canvas, Size};
+use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use onnx::{Attribute, Network, Side};
+use serde_json::Value;
+
+const SIZE: [u32; 2] = [200, 240];
+const N: usize = 14;
+const N_FRAMES: usize = 12;
+const RIGHT_WRIST: usize = 6;
+
+/// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
+const STANDING: [[f64; 3]; N] = [
+    [0.02, -0.12, 0.08],
+    [0.04, -0.11, 0.49],
+    [0.0, -0.10, 0.92],
+    [0.0, 0.10, 0.92],
+    [0.05, 0.11, 0.49],
+    [-0.02, 0.12, 0.08],
+    [0.30, -0.30, 1.40],
+    [0.10, -0.38, 1.28],
+    [0.0, -0.19, 1.45],
+    [0.0, 0.19, 1.45],
+    [0.03, 0.24, 1.15],
+    [0.08, 0.26, 0.88],
+    [0.0, 0.0, 1.50],
+    [0.02, 0.0, 1.76],
+];
+
+const CARD: &str = r#"
+format = "parallax-keypoint-network"
+version = 1
+name = "Fourteen colours"
+[input]
+width = 96
+height = 128
+scale = 0.00909090909090909
+mean = [1.16363636, 1.16363636, 1.16363636]
+[crop]
+fill = 128
+[output]
+codec = "heat-map"
+[keypoints]
+set = "lsp-14"
+"#;
+
+const DETECTOR_CARD: &str = r#"
+format = "parallax-detector"
+version = 1
+name = "The same box always"
+input = { width = 64, height = 64, scale = 0.00392156862745098 }
+output = { codec = "list", boxes = "dets" }
+"#;
+
+/// Fourteen directions in the space of colours, as far apart as a spiral puts them.
+fn directions() -> [[f64; 3]; N] {
+    core::array::from_fn(|nth| {
+        let z = 1.0 - (2.0 * nth as f64 + 1.0) / N as f64;
+        let angle = nth as f64 * core::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let radius = (1.0 - z * z).sqrt();
+        [radius * angle.cos(), radius * angle.sin(), z]
+    })
+}
+
+/// A map for every colour: 1 where it is full, 0 from three quarters of it down.
+fn network(bias: f32) -> Network {
+    let mut net = Network::default();
+    let sides = |n: [usize; 4]| n.map(Side::Fixed).to_vec();
+    net.inputs
+        .push(("picture".to_owned(), sides([1, 3, 128, 96])));
+    net.outputs
+        .push(("maps".to_owned(), sides([1, N, 128, 96])));
+    let weights = directions().into_iter().flatten();
+    let weights = weights.map(|it| 4.0 * it as f32);
+    net.floats("weights", &[N, 3, 1, 1], weights.collect());
+    net.floats("bias", &[N], vec![bias; N]);
+    let one = vec![("kernel_shape", Attribute::Ints(vec![1, 1]))];
+    if bias.is_nan() {
+        // Relu would make it 0.
+        net.node("Conv", &["picture", "weights", "bias"], "maps", one);
+    } else {
+        net.node("Conv", &["picture", "weights", "bias"], "sums", one);
+        net.node("Relu", &["sums"], "maps", vec![]);
+    }
+    net
+}
+
+/// One box in the middle of every picture.
+fn detector(score: f32) -> Network {
+    let mut net = Network::default();
+    net.inputs.push((
+        "picture".to_owned(),
+        [1, 3, 64, 64].map(Side::Fixed).to_vec(),
+    ));
+    net.outputs
+        .push(("dets".to_owned(), [1, 1, 5].map(Side::Fixed).to_vec()));
+    net.floats("box", &[1, 1, 5], vec![8.0, 6.0, 46.0, 58.0, score]);
+    net.floats("nothing", &[1], vec![0.0]);
+    net.ints("flat", vec![1, 1, 1]);
+    net.floats("mixture", &[1, 3, 1, 1], vec![1.0 / 3.0; 3]);
+    let whole = || Attribute::Ints(vec![64, 64]);
+    let attributes = vec![("kernel_shape", whole()), ("strides", whole())];
+    net.node("AveragePool", &["picture"], "colours", attributes);
+    let one = vec![("kernel_shape", Attribute::Ints(vec![1, 1]))];
+    net.node("Conv", &["colours", "mixture"], "mean", one);
+    net.node("Mul", &["mean", "nothing"], "zero", vec![]);
+    net.node("Reshape", &["zero", "flat"], "offset", vec![]);
+    net.node("Add", &["box", "offset"], "dets", vec![]);
+    net
+}
+
+/// Four cameras around the person.
+fn rig() -> Rig {
+    let cameras = (0..4).map(|view| {
+        let angle = 0.4 + 1.4 * f64::from(view);
+        let eye = Point3::new(4.5 * angle.cos(), 4.5 * angle.sin(), 1.6);
+        let at = Point3::new(0.0, 0.0, 0.9);
+        let looking = Isometry3::look_at_rh(&eye, &at, &Vector3::z());
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI);
+        Camera {
+            name: format!("c{view}"),
+            intrinsics: Intrinsics {
+                fx: 400.0,
+                fy: 400.0,
+                cx: 99.5,
+                cy: 119.5,
+                size: SIZE,
+                lens: Lens::new(LensModel::Pinhole),
+            },
+            camera_from_world: Isometry3::from_parts(Translation3::identity(), turned) * looking,
+        }
+    });
+    Rig::new(cameras.collect(), Some(Vector3::z_axis()), "dots").unwrap()
+}
+
+/// The joints in a frame, metres.
+fn joints(frame: usize) -> [Point3<f64>; N] {
+    let by = Vector3::new(0.01 * frame as f64, 0.15 * (0.5 * frame as f64).sin(), 0.0);
+    STANDING.map(|it| Point3::from(it) + by)
+}
+
+/// The joint whose name a view gives to a joint; 14: it is not seen.
+type Named = fn(usize) -> usize;
+
+fn as_it_is(joint: usize) -> usize {
+    joint
+}
+
+/// Left is called right.
+fn exchanged(joint: usize) -> usize {
+    let pair = skeleton::SIDES.iter().find(|it| it.contains(&joint));
+    pair.map_or(joint, |[a, b]| a + b - joint)
+}
+
+fn without_a_wrist(joint: usize) -> usize {
+    if joint == RIGHT_WRIST { N } else { joint }
+}
+
+/// The picture of a camera in a frame: dots on grey; the joints of the last of which are in front.
+fn picture(camera: &Camera, frame: usize, named: Named) -> Canvas {
+    let [width, height] = SIZE.map(|it| it as usize);
+    let mut canvas = Canvas::new(Size::new(width, height), [128; 3]);
+    for (joint, place) in joints(frame).iter().enumerate() {
+        if named(joint) == N {
+            continue;
+        }
+        let at = camera.project(place).unwrap();
+        let colour = directions()[named(joint)].map(|it| (128.0 + 110.0 * it).round() as u8);
+        canvas.disc(at.coords.into(), 4.0, colour);
+    }
+    canvas
+}
+
+/// A deployment with these pictures.
+///
+/// * `view`: what each view calls the joints; `None` for one that sees nothing.
+fn case(name: &str, views: [Option<Named>; 4]) -> Case {
+    let rig = rig();
+    let case = Case::with_rig(&rig, name, &[0; 4], "");
+    case.write("net.onnx", network(-3.0).file());
+    case.write("net.toml", CARD);
+    case.write("det.onnx", detector(0.9).file());
+    case.write("det.toml", DETECTOR_CARD);
+    for (camera, named) in rig.cameras().iter().zip(views) {
+        for frame in 0..N_FRAMES {
+            let file = case.path(&camera.name).join(format!("{frame:04}.png"));
+            let [width, height] = SIZE.map(|it| it as usize);
+            let canvas = match named {
+                Some(named) => picture(camera, frame, named),
+                // Never the same twice: the camera is not frozen.
+                None => Canvas::new(Size::new(width, height), [120 + frame as u8; 3]),
+            };
+            canvas.save_png(&file).unwrap();
+        }
+    }
+    // The shipped model is not needed: the detector says where to look.
+    case.edit(
+        "deployment.toml",
+        "model = \"model.plx\"\n",
+        "pose = { network = \"net.onnx\", detector = \"det.onnx\" }\n",
+    );
+    case
+}
+
+fn run(case: &Case, more: &[&str]) -> Ended {
+    case.start(&[&["run", "deployment.toml"], more].concat())
+        .wait()
+}
+
+/// The status of every frame, and the mean distance of its joints from the truth, metres.
+fn found(case: &Case) -> Vec<(String, f64)> {
+    let text = std::fs::read_to_string(case.path("out/pose3d.jsonl")).unwrap();
+    let frames = text.lines().map(|line| {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let truth = joints(line["frame"].as_u64().unwrap() as usize);
+        let names = skeleton::PARSE14.joints.iter().map(|it| it.name);
+        let distance = |(name, truth): (&str, &Point3<f64>)| {
+            let at = &line["joints"][name]["position_m"];
+            let axis = |nth: usize| at[nth].as_f64();
+            Some((Point3::new(axis(0)?, axis(1)?, axis(2)?) - truth).norm())
+        };
+        let each: Option<Vec<f64>> = names.zip(&truth).map(distance).collect();
+        let mean = each.map_or(f64::INFINITY, |it| it.iter().sum::<f64>() / it.len() as f64);
+        (line["status"].as_str().unwrap_or_default().to_owned(), mean)
+    });
+    frames.collect()
+}
+
+#[track_caller]
+fn all_are_near(case: &Case, metres: f64) {
+    let found = found(case);
+    assert_eq!(found.len(), N_FRAMES);
+    for (frame, (status, error)) in found.iter().enumerate() {
+        assert!(*error < metres, "frame {frame} ({status}): {error} m");
+    }
+}
+
+#[test]
+fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
+    let case = case("maps", [Some(as_it_is as Named); 4]);
+    let ended = run(&case, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    all_are_near(&case, 0.02);
+    let lines = std::fs::read_to_string(case.path("out/pose2d.jsonl")).unwrap();
+    let searched = |it: &str| lines.matches(&format!("\"search\":\"{it}\"")).count();
+    // Boxes are looked for in the first and in the eleventh frame.
+    assert_eq!([searched("full"), searched("tracked")], [8, 40]);
+}
+
+#[test]
+fn a_view_that_names_the_sides_the_other_way_round_is_turned() {
+    let right = Some(as_it_is as Named);
+    let case = case("sides", [right, right, Some(exchanged), right]);
+    let ended = run(&case, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    all_are_near(&case, 0.02);
+}
+
+#[test]
+fn a_joint_that_only_one_view_shows_is_missing_and_the_others_are_not() {
+    let hidden = Some(without_a_wrist as Named);
+    let case = case("wrist", [Some(as_it_is), hidden, hidden, hidden]);
+    let ended = run(&case, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let text = std::fs::read_to_string(case.path("out/pose3d.jsonl")).unwrap();
+    for line in text.lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let truth = joints(line["frame"].as_u64().unwrap() as usize);
+        for (joint, truth) in skeleton::PARSE14.joints.iter().zip(truth) {
+            let at = &line["joints"][joint.name]["position_m"];
+            let axis = |nth: usize| at[nth].as_f64();
+            let error = (|| Some((Point3::new(axis(0)?, axis(1)?, axis(2)?) - truth).norm()))();
+            let is_hidden = joint.name == "right wrist";
+            assert_eq!(error.is_none(), is_hidden, "{}: {line}", joint.name);
+            assert!(error.unwrap_or(0.0) < 0.05, "{}: {error:?}", joint.name);
+        }
+    }
+}
+
+#[test]
+fn a_view_that_sees_nobody_is_accounted_for() {
+    let right = Some(as_it_is as Named);
+    let case = case("nobody", [right, None, right, right]);
+    let ended = run(&case, &["--json"]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    all_are_near(&case, 0.02);
+    let text = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["summary"]["views_present"]["c1"], 0, "{summary}");
+    assert_eq!(summary["summary"]["views_present"]["c0"], N_FRAMES);
+}
+
+#[test]
+fn a_network_whose_output_is_no_number_is_refused_before_anything_starts() {
+    let case = case("nan", [Some(as_it_is as Named); 4]);
+    case.write("net.onnx", network(f32::NAN).file());
+    let ended = run(&case, &[]);
+    assert_ne!(ended.status.code(), Some(0));
+    assert!(ended.stderr.contains("net.onnx"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("maps"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
+    let case = case("blind", [Some(as_it_is as Named); 4]);
+    case.write("det.onnx", detector(0.01).file());
+    let ended = run(&case, &[]);
+    assert!(
+        ended.stdout.contains("3D            0 of 12 frames"),
+        "{}",
+        ended.stdout
+    );
+    assert!(ended.stdout.contains("12 empty"), "{}", ended.stdout);
+    assert!(found(&case).iter().all(|it| it.1.is_infinite()));
+}
+
+#[test]
+fn what_belongs_to_filters_is_refused_beside_a_network() {
+    let case = case("beside", [Some(as_it_is as Named); 4]);
+    for (set, words) in [
+        ("quality.network=shipped", "quality.network"),
+        ("fuse.consistency=shipped", "fuse.consistency"),
+        ("pose.network_card=nowhere.toml", "nowhere.toml"),
+    ] {
+        let ended = run(&case, &["--set", set]);
+        assert_ne!(ended.status.code(), Some(0), "{set}");
+        assert!(ended.stderr.contains(words), "{set}: {}", ended.stderr);
+    }
+    let ended = case
+        .start(&["run", "deployment.toml", "--set", "fuse.views=all"])
+        .wait();
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    all_are_near(&case, 0.15);
+}
+
+/// Keypoints in the layout of OpenPose, in place of the pictures.
+fn with_keypoints(case: &Case) {
+    let rig = rig();
+    let mut text = String::from("name = \"dots\"\nrig = \"rig.toml\"\noutput = \"out\"\n");
+    text.push_str("[capture]\nframe_rate_hz = 30.0\n");
+    for camera in rig.cameras() {
+        let folder = case.path(&camera.name);
+        for frame in 0..N_FRAMES {
+            std::fs::remove_file(folder.join(format!("{frame:04}.png"))).unwrap();
+            let numbers = joints(frame).map(|it| {
+                let at = camera.project(&it).unwrap();
+                format!("{:.2},{:.2},0.9", at.x, at.y)
+            });
+            let file = folder.join(format!("{}_{frame:012}_keypoints.json", camera.name));
+            let person = numbers.join(",");
+            let json = format!("{{\"people\":[{{\"pose_keypoints_2d\":[{person}]}}]}}");
+            std::fs::write(file, json).unwrap();
+        }
+        let name = &camera.name;
+        writeln!(
+            text,
+            "[[camera]]\nname = {name:?}\nkeypoints = {name:?}\nkeypoint_names = \"lsp-14\""
+        )
+        .unwrap();
+    }
+    let own = std::fs::read_to_string(case.path("deployment.toml")).unwrap();
+    let name = own.lines().find(|it| it.starts_with("name")).unwrap();
+    case.write("deployment.toml", text.replacen("name = \"dots\"", name, 1));
+}
+
+#[test]
+fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_of_one_frame() {
+    let case = case("json", [Some(as_it_is as Named); 4]);
+    with_keypoints(&case);
+    let ended = run(&case, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    all_are_near(&case, 0.02);
+    let damaged = case.path("c2").join("c2_000000000005_keypoints.json");
+    std::fs::write(damaged, "{\"people\":[{\"pose_keypoints_2d\":[1,2").unwrap();
+    let ended = run(&case, &[]);
+    assert!(ended.stderr.contains("c2_000000000005"), "{}", ended.stderr);
+    all_are_near(&case, 0.02);
+    let text = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(summary["summary"]["views_present"]["c2"], N_FRAMES - 1);
+}
