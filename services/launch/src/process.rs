@@ -203,6 +203,7 @@ fn view_step(
     let settings = NetworkSettings {
         n_people: config.people,
         find_every: config.find_every,
+        least_heat: config.least_heat,
         keypoint_sigma: config.keypoint_sigma,
         ..NetworkSettings::default()
     };

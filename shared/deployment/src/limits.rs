@@ -57,6 +57,8 @@ fn capture(it: &capture::Config) -> Result<(), Complaint> {
 
 fn pose(it: &pose::Config) -> Result<(), Complaint> {
     between("pose.min_separation", it.min_separation)?;
+    between("pose.least_heat", it.least_heat)?;
+    between("pose.keypoint_sigma", it.keypoint_sigma)?;
     between("pose.tracked_margin", it.tracked_margin)?;
     let drop = f64::from(it.tracked_max_drop);
     between("pose.tracked_max_drop", drop)?;

@@ -33,6 +33,8 @@ pub struct Config {
     pub springs: PathBuf,
     /// `network`: people are looked for in every n-th frame, and wherever nobody is seen; between, the network looks where they were.
     pub find_every: u64,
+    /// `network`, keypoints: least mean heat (or confidence) of the joints of somebody who is seen, 0 to 1.
+    pub least_heat: f64,
     /// Standard deviation of keypoints that another program found (`keypoints` of a `[[camera]]`), share of the height of the person's
     /// box enlarged by a quarter.
     pub keypoint_sigma: f64,
@@ -99,6 +101,7 @@ impl Default for Config {
             detector_card: None,
             springs: PathBuf::from(SHIPPED),
             find_every: 10,
+            least_heat: 0.2,
             keypoint_sigma: 0.02,
             people: 3,
             onnx_runtime: None,

@@ -18,7 +18,7 @@ const MOST_FRAMES: f64 = 1e12;
 /// `camera` the length of the list.
 ///
 /// Whole numbers are among them: all of these are exact.
-pub(crate) const RANGES: [(&str, f64, f64); 42] = [
+pub(crate) const RANGES: [(&str, f64, f64); 43] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
     ("capture.frame_rate_hz", 0.001, 1e5),
@@ -27,6 +27,7 @@ pub(crate) const RANGES: [(&str, f64, f64); 42] = [
     ("capture.n_frames", 1.0, MOST_FRAMES),
     ("pose.candidates", 1.0, MAX_CANDIDATES as f64),
     ("pose.find_every", 1.0, 1e6),
+    ("pose.least_heat", 0.0, 1.0),
     ("pose.keypoint_sigma", 0.001, 0.5),
     ("pose.people", 1.0, MAX_CANDIDATES as f64),
     ("pose.threads", 1.0, 256.0),

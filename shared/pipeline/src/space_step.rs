@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fmp::{Placement, Pose, Responses};
+use fmp::{Placement, Pose, Responses, Window};
 use multiview::{
     AllViewsEstimate, JointEvidence, SeenPerson, SolvedPerson, SpaceSettings, SpaceView, ViewPlan,
     same_person, solve_person,
@@ -46,9 +46,12 @@ pub struct SpaceStep {
 
 /// The responses of a view near one person, as evidence for joints.
 struct PersonEvidence<'a> {
-    plan: &'a ViewPlan,
-    responses: &'a Responses<'a>,
-    level: u16,
+    /// The responses of the level, joint by joint.
+    maps: &'a [f32],
+    window: Window,
+    /// The pixel at the centre of the window's first cell, and pixels for each cell.
+    first_px: [f64; 2],
+    cell_px: f64,
     /// The part of the picture where the person may be: left, top, right, bottom, pixels.
     near: [f64; 4],
     floor: f32,
@@ -58,7 +61,7 @@ struct PersonEvidence<'a> {
 }
 
 impl<'a> PersonEvidence<'a> {
-    fn new(plan: &'a ViewPlan, responses: &'a Responses<'a>, pose: &Pose, floor: f32) -> Self {
+    fn new(plan: &ViewPlan, responses: &Responses<'a>, pose: &Pose, floor: f32) -> Self {
         let mut near = [
             f64::INFINITY,
             f64::INFINITY,
@@ -74,11 +77,14 @@ impl<'a> PersonEvidence<'a> {
             ];
         }
         let longer = (near[2] - near[0]).max(near[3] - near[1]);
+        let level = usize::from(pose.level);
+        let window = responses.window(level);
         let more = BEYOND * longer;
         let mut evidence = Self {
-            plan,
-            responses,
-            level: pose.level,
+            maps: responses.maps(level),
+            first_px: first_cell(plan, level, &window),
+            cell_px: plan.scale(level),
+            window,
             near: [
                 near[0] - more,
                 near[1] - more,
@@ -95,14 +101,14 @@ impl<'a> PersonEvidence<'a> {
 
     /// The highest maxima of a joint's map near the person: pixels of the frame, and the evidence there.
     fn highest(&self, joint: usize) -> Vec<([f64; 2], f32)> {
-        let level = usize::from(self.level);
-        let window = self.responses.window(level);
-        let map = self.responses.map(level, joint);
+        let window = &self.window;
+        let map = self.map(joint);
         let mut found: Vec<([f64; 2], f32)> = Vec::new();
         for row in 0..window.rows {
             for column in 0..window.cols {
                 let here = map[row * window.cols + column];
-                if here <= self.floor + 1e-3 {
+                let at = self.pixel(row, column);
+                if here <= self.floor + 1e-3 || !self.is_near(at) {
                     continue;
                 }
                 let rows = row.saturating_sub(1)..(row + 2).min(window.rows);
@@ -114,18 +120,7 @@ impl<'a> PersonEvidence<'a> {
                         .all(|other| *other <= here)
                 });
                 if is_highest {
-                    let at = self.plan.layout().centre(
-                        level,
-                        [1, 1],
-                        Placement {
-                            x: (window.left + column) as u16,
-                            y: (window.top + row) as u16,
-                            mixture: 0,
-                        },
-                    );
-                    if self.is_near(at) {
-                        found.push((at, here));
-                    }
+                    found.push((at, here));
                 }
             }
         }
@@ -134,10 +129,31 @@ impl<'a> PersonEvidence<'a> {
         found
     }
 
+    fn map(&self, joint: usize) -> &'a [f32] {
+        let area = self.window.rows * self.window.cols;
+        &self.maps[joint * area..(joint + 1) * area]
+    }
+
+    /// The centre of a cell of the window, pixels of the frame.
+    fn pixel(&self, row: usize, column: usize) -> [f64; 2] {
+        let cell = [column as f64, row as f64];
+        [0, 1].map(|axis| self.first_px[axis] + cell[axis] * self.cell_px)
+    }
+
     fn is_near(&self, [x, y]: [f64; 2]) -> bool {
         let [left, top, right, bottom] = self.near;
         (left..=right).contains(&x) && (top..=bottom).contains(&y)
     }
+}
+
+/// The centre of the first cell of a window, pixels of the frame.
+fn first_cell(plan: &ViewPlan, level: usize, window: &Window) -> [f64; 2] {
+    let at = Placement {
+        x: window.left as u16,
+        y: window.top as u16,
+        mixture: 0,
+    };
+    plan.layout().centre(level, [1, 1], at)
 }
 
 impl JointEvidence for PersonEvidence<'_> {
@@ -145,12 +161,9 @@ impl JointEvidence for PersonEvidence<'_> {
         if !self.is_near(point) {
             return self.floor;
         }
-        let level = usize::from(self.level);
-        let window = self.responses.window(level);
-        let cell = cell_at(self.plan.layout(), self.level, point);
-        let cell = [cell[0] - window.left as f64, cell[1] - window.top as f64];
-        let map = self.responses.map(level, joint);
-        interpolate(map, [window.cols, window.rows], cell).unwrap_or(self.floor)
+        let cell = [0, 1].map(|axis| (point[axis] - self.first_px[axis]) / self.cell_px);
+        let map = self.map(joint);
+        interpolate(map, [self.window.cols, self.window.rows], cell).unwrap_or(self.floor)
     }
 
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)] {

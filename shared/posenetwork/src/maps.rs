@@ -30,6 +30,16 @@ impl MapSettings {
     pub fn heat(&self, evidence: f32) -> f64 {
         ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
     }
+
+    /// The evidence of a heat. One below a hundred-thousandth counts as none, which spares most cells the logarithm.
+    ///
+    /// * `floor`: [`Self::floor`].
+    fn of_heat(&self, heat: f64, floor: f32) -> f32 {
+        if heat < 1e-5 {
+            return floor;
+        }
+        (self.lambda * (heat + self.eps).ln()) as f32
+    }
 }
 
 impl Default for MapSettings {
@@ -39,12 +49,6 @@ impl Default for MapSettings {
             eps: 0.02,
             point_sigma: 0.02,
         }
-    }
-}
-
-impl MapSettings {
-    fn of_heat(&self, heat: f64) -> f32 {
-        (self.lambda * (heat.max(0.0) + self.eps).ln()) as f32
     }
 }
 
@@ -138,7 +142,7 @@ impl JointMaps {
         settings: &MapSettings,
         sigma: f64,
     ) -> bool {
-        self.floor = (settings.lambda * settings.eps.ln()) as f32;
+        self.floor = settings.floor();
         self.step = [1.0; 2];
         self.window =
             keypoints::outline(keypoints).and_then(|it| Window::grid(it, BOX_MARGIN, MOST_ROWS));
@@ -178,12 +182,13 @@ impl JointMaps {
         settings: &MapSettings,
     ) {
         let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
+        let floor = self.floor;
         let cells = &mut self.values[joint * area..(joint + 1) * area];
         for (cell, value) in cells.iter_mut().enumerate() {
             let x = (cell % columns) as f64 * step[0] - at[0];
             let y = (cell / columns) as f64 * step[1] - at[1];
             let gauss = (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
-            *value = settings.of_heat(score.clamp(0.0, 1.0) * gauss);
+            *value = settings.of_heat(score.clamp(0.0, 1.0) * gauss, floor);
         }
     }
 
@@ -197,7 +202,8 @@ impl JointMaps {
     ) {
         let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
         let size = sight.network().size();
-        let heat = |value: f64| settings.of_heat(value);
+        let floor = self.floor;
+        let heat = |value: f64| settings.of_heat(value, floor);
         let cells = self.values[joint * area..(joint + 1) * area].iter_mut();
         let cells = cells
             .enumerate()
@@ -442,10 +448,12 @@ impl Tap {
                 is_inside,
             };
         }
-        let first = cell.floor() as i64 - 1;
+        // The cell that it lies in or behind: `floor` of a number of at least -1, for processors without an instruction for it.
+        let lower = (cell + 1.0) as i64 - 1;
+        let first = lower - 1;
         Self {
             cells: [0, 1, 2, 3].map(|it| (first + it).clamp(0, n as i64 - 1) as usize),
-            weights: cubic((cell - cell.floor()) as f32),
+            weights: cubic((cell - lower as f64) as f32),
             is_inside,
         }
     }

@@ -119,6 +119,11 @@ const ROWS: &[Row] = &[
         &["1", "30"],
     ),
     (
+        "pose.least_heat",
+        &[("-0.1", "is -0.1"), ("1.1", "expected 0 to 1")],
+        &["0.0", "0.5"],
+    ),
+    (
         "pose.keypoint_sigma",
         &[("0", "expected 0.001 to 0.5"), ("nan", "is NaN")],
         &["0.05"],
@@ -461,7 +466,8 @@ fn what_is_hardly_meant_is_named_with_its_number() {
 #[test]
 fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
     let of_camera = |lines: &str| {
-        let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n");
+        let network = "[pose]\nnetwork = 'n.onnx'\n";
+        let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n{network}");
         let read = Loaded::parse(&text, Path::new("/room/deployment.toml"), &[], &AnyMachine);
         read.map_err(|it| it.to_string())
     };
