@@ -197,7 +197,9 @@ fn view_step(
     let deployment = &resolved.deployment;
     if !deployment.has_maps() {
         let step = ViewStep::new(prepared.model, layout, prepared.settings.view);
-        return Ok(pose::Step::Filters(step.or_fail(ExitKind::Config)?));
+        return Ok(pose::Step::Filters(Box::new(
+            step.or_fail(ExitKind::Config)?,
+        )));
     }
     let config = &deployment.pose;
     let settings = NetworkSettings {

@@ -1,24 +1,12 @@
 //! Takes what another program found in a frame.
 
 use keypoints::Keypoint;
-use keypoints::files::SeenKeypoints;
 use messages::{Searched, Stamp, Status};
-use pipeline::NetworkMemory;
 use runtime::Failure;
 
 use crate::job::Keypoints;
+use crate::memory::KeypointState;
 use crate::view::{Found, View};
-
-/// What is kept from frame to frame.
-#[derive(Debug, Default)]
-pub(crate) struct KeypointState {
-    memory: NetworkMemory,
-    people: Vec<SeenKeypoints>,
-    /// Responses that do not lie in shared memory.
-    responses: Vec<f32>,
-    /// Whether a file that cannot be read was told.
-    has_failed: bool,
-}
 
 impl View<'_> {
     /// Takes the people of a frame. A frame whose file cannot be read is refused, with a warning the first time; one that no file

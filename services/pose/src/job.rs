@@ -23,7 +23,7 @@ pub struct Keypoints {
 #[derive(Debug)]
 pub enum Step {
     /// By the filters of a model.
-    Filters(ViewStep),
+    Filters(Box<ViewStep>),
     /// By a network that finds keypoints.
     Network(Box<NetworkStep>),
     /// By keypoints that another program found.

@@ -4,6 +4,7 @@
 mod by_keypoints;
 mod by_network;
 mod job;
+mod memory;
 mod service;
 mod settings;
 mod view;

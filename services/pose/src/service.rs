@@ -5,7 +5,8 @@ use runtime::{Failure, Service};
 use stage::{Range, Stage};
 
 use crate::job::{Job, Step};
-use crate::view::{Memory, View};
+use crate::memory::Memory;
+use crate::view::View;
 
 /// Searches every frame of one view, until the footage ends or a stop is requested.
 ///

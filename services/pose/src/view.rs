@@ -10,17 +10,8 @@ use pipeline::{ViewEstimate, ViewStep};
 use runtime::{ExitKind, Failure, Loan, OrFail as _, Sample, Service, SlicePublisher, now_nanos};
 use stage::{Output, StreamFrame, Turn};
 
-use crate::by_keypoints::KeypointState;
-use crate::by_network::NetworkState;
 use crate::job::{Job, Step};
-
-/// What is kept from frame to frame.
-pub(crate) enum Memory {
-    /// The last pose, and responses that do not lie in shared memory.
-    Filters(Tracker, Vec<f32>),
-    Network(Box<NetworkState>),
-    Keypoints(Box<KeypointState>),
-}
+use crate::memory::Memory;
 
 /// What was found in a frame, and its evidence if a process receives it.
 pub(crate) struct Found<'a> {

@@ -73,19 +73,23 @@ impl FrameRecord {
     }
 
     /// The candidate of a view that is the person, as far as the view itself can tell: the best one of the filters; of the people that a
-    /// network sees, the one nearest to where fusion put the person, or the only one.
+    /// network sees, the one nearest to where fusion put the person; the largest one where fusion left out the view.
     pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Pose> {
         let candidates = self.candidates(scene, view);
         if !scene.has_maps || candidates.len() < 2 {
             return candidates.into_iter().next();
         }
         let pose = &self.pose3d;
-        let fused = pose.views.get(view).filter(|it| {
-            view < pose.n_views as usize && it.status == Status::OK && it.n_parts > 0
-        })?;
+        let fused = pose
+            .views
+            .get(view)
+            .filter(|it| view < pose.n_views as usize && it.status == Status::OK && it.n_parts > 0);
         let layout = &scene.views[view].layout;
         let distance = |it: &Pose| -> f64 {
             let centres = it.centres(&scene.model, layout);
+            let Some(fused) = fused else {
+                return -geometry::longer_side(centres.into_iter()).unwrap_or(0.0);
+            };
             let both = centres.iter().zip(&fused.centres_px);
             both.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
         };

@@ -149,10 +149,8 @@ fn pose(it: &pose::Config) -> Result<(), Complaint> {
 /// Checks what goes with a network that finds keypoints, and what does not.
 fn maps(deployment: &Deployment) -> Result<(), Complaint> {
     let it = &deployment.pose;
-    let cameras = 0..deployment.cameras.len();
-    let has_network = cameras
-        .clone()
-        .any(|it| deployment.pose_network(it).is_some());
+    let mut cameras = 0..deployment.cameras.len();
+    let has_network = cameras.any(|it| deployment.pose_network(it).is_some());
     let beside = [
         (
             "pose.network_card",
@@ -170,7 +168,36 @@ fn maps(deployment: &Deployment) -> Result<(), Complaint> {
             "none without `pose.network`",
         )?;
     }
-    for (camera, nth) in deployment.cameras.iter().zip(cameras) {
+    demand(
+        it.detector_card.is_none() || it.detector.is_some(),
+        "pose.detector_card",
+        "given",
+        "none without `pose.detector`",
+    )?;
+    maps_of_cameras(deployment)?;
+    let of_filters = [
+        ("quality.network", deployment.quality.network.is_some()),
+        ("quality.table", deployment.quality.table.is_some()),
+        ("fuse.consistency", deployment.fuse.consistency.is_some()),
+        (
+            "fuse.compatibility",
+            !deployment.fuse.compatibility.is_empty(),
+        ),
+    ];
+    for (key, is_given) in of_filters {
+        demand(
+            !is_given || !deployment.has_maps(),
+            key,
+            "given",
+            "none with networks or keypoints: it is about poses that the filters find",
+        )?;
+    }
+    Ok(())
+}
+
+/// Every camera has maps, or none has.
+fn maps_of_cameras(deployment: &Deployment) -> Result<(), Complaint> {
+    for (nth, camera) in deployment.cameras.iter().enumerate() {
         demand(
             camera.network_card.is_none() || camera.network.is_some(),
             "camera.network_card",
@@ -189,29 +216,6 @@ fn maps(deployment: &Deployment) -> Result<(), Complaint> {
             "camera.network",
             &format!("not given for {:?}", camera.name),
             "`pose.network`, or a network or keypoints for every camera: maps and filters do not go together",
-        )?;
-    }
-    demand(
-        it.detector_card.is_none() || it.detector.is_some(),
-        "pose.detector_card",
-        "given",
-        "none without `pose.detector`",
-    )?;
-    let of_filters = [
-        ("quality.network", deployment.quality.network.is_some()),
-        ("quality.table", deployment.quality.table.is_some()),
-        ("fuse.consistency", deployment.fuse.consistency.is_some()),
-        (
-            "fuse.compatibility",
-            !deployment.fuse.compatibility.is_empty(),
-        ),
-    ];
-    for (key, is_given) in of_filters {
-        demand(
-            !is_given || !deployment.has_maps(),
-            key,
-            "given",
-            "none with networks or keypoints: it is about poses that the filters find",
         )?;
     }
     Ok(())

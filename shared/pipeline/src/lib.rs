@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod bodies;
+mod disagreement;
 mod following;
 mod fuse_step;
 mod fused;

@@ -312,7 +312,7 @@ impl NetworkStep {
             };
             if let Some(pose) = found {
                 memory.outlines.extend(self.outline(&pose));
-                candidates.extend(self.at_level(&pose, &scope));
+                candidates.push(self.at_level(pose, &scope));
             }
         }
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -356,10 +356,10 @@ impl NetworkStep {
     }
 
     /// The same pose on the level of a scope.
-    fn at_level(&self, pose: &Pose, scope: &Scope) -> Option<Pose> {
+    fn at_level(&self, pose: Pose, scope: &Scope) -> Pose {
         let level = scope.levels().start;
         if pose.level == level {
-            return Some(pose.clone());
+            return pose;
         }
         let window = self.layout.window(scope, usize::from(level));
         let mut moved = pose.clone();
@@ -376,7 +376,7 @@ impl NetworkStep {
                 mixture: at.mixture,
             };
         }
-        Some(moved)
+        moved
     }
 }
 
@@ -406,8 +406,7 @@ fn find(
         Boxes::Detector(detector) => {
             let mut found = detector.people(image, values)?;
             // Who is sure and large first: the frame has room for a few.
-            let weight =
-                |it: &keypoints::PersonBox| f64::from(it.score) * (it.outline[3] - it.outline[1]);
+            let weight = |it: &keypoints::PersonBox| it.score * (it.outline[3] - it.outline[1]);
             found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
             Ok(found.into_iter().map(|it| it.outline).collect())
         }

@@ -14,6 +14,7 @@ use nalgebra::UnitVector3;
 use skeleton::{JointSet, PARSE14};
 
 use crate::bodies::{Bodies, Body, NoJoint};
+use crate::disagreement;
 use crate::fused::Fused;
 use crate::fused_view::{Candidate, Candidates, FusedView, fuse};
 use crate::people::{Person, people};
@@ -135,7 +136,12 @@ impl SkeletonStep {
         let (views, kept) = self.better(solved, self.starts(&frame, exchanged));
         let n_joints = self.space.settings.joints.joints.len();
         let expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
-        let of_body_px = self.expected_errors(answers, exchanged, &PARSE14);
+        // The check of the body knows nothing of expected errors, but of what was not seen.
+        let of_body_px = if self.space.settings.in_space && self.space.can_exchange() {
+            self.expected_errors(answers, exchanged, &PARSE14)
+        } else {
+            Vec::new()
+        };
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
             Some(map) => Cow::from(map.from_parts(centres)),
             None => self.space.settings.joints.from_parts(centres).into(),
@@ -143,7 +149,15 @@ impl SkeletonStep {
         let joints = self
             .space
             .triangulate(&views, n_joints, points, &expected_px);
-        let (joints, body) = self.as_body(joints, &views, &of_body_px);
+        let (mut joints, body) = self.as_body(joints, &views, &of_body_px);
+        if self.space.settings.in_space {
+            disagreement::measure(
+                &self.space,
+                answers,
+                self.space.settings.joints,
+                &mut joints,
+            );
+        }
         Skeleton {
             joints,
             body,
@@ -174,8 +188,6 @@ impl SkeletonStep {
             joints.clone()
         } else {
             let points = |centres: &[[f64; 2]]| Cow::from(PARSE14.from_parts(centres));
-            // The check of the body knows nothing of expected errors, but of what was not seen.
-            let expected_px = if settings.in_space { expected_px } else { &[] };
             self.space
                 .triangulate(views, PARSE14.joints.len(), points, expected_px)
         };

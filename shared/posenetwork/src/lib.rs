@@ -6,6 +6,7 @@
 //! (Yang & Ramanan 2013 with the unary of Chen & Yuille 2014, without their image-dependent part).
 #![forbid(unsafe_code)]
 
+mod between;
 mod detector;
 mod expected;
 mod maps;
@@ -13,8 +14,9 @@ mod network;
 mod outline;
 pub mod springs;
 
+pub use between::interpolate;
 pub use detector::Detector;
 pub use expected::expected_error;
-pub use maps::{JointMaps, MapSettings, interpolate};
+pub use maps::{JointMaps, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};
 pub use outline::{outline_of, overlap};

@@ -1,0 +1,61 @@
+//! What a view keeps from frame to frame.
+
+use fmp::Tracker;
+use keypoints::files::SeenKeypoints;
+use messages::Stamp;
+use pipeline::NetworkMemory;
+
+/// What is kept from frame to frame.
+pub(crate) enum Memory {
+    /// The last pose, and responses that do not lie in shared memory.
+    Filters(Tracker, Vec<f32>),
+    Network(Box<NetworkState>),
+    Keypoints(Box<KeypointState>),
+}
+
+/// How long nobody is seen before a warning says so, nanoseconds: a minute.
+const LONG_NANOS: u64 = 60_000_000_000;
+
+/// What is kept of a view that a network looks at.
+#[derive(Debug, Default)]
+pub(crate) struct NetworkState {
+    pub(crate) memory: NetworkMemory,
+    /// Responses that do not lie in shared memory.
+    pub(crate) responses: Vec<f32>,
+    /// When somebody was seen last, or a warning was given, and the number of frames since.
+    pub(crate) nobody: Option<(u64, u64)>,
+    /// Whether a failure of the network was told.
+    pub(crate) has_failed: bool,
+}
+
+impl NetworkState {
+    /// Warns if nobody has been seen for a minute.
+    pub(crate) fn sees(&mut self, is_somebody: bool, stamp: &Stamp) {
+        let now = stamp.captured_at_nanos;
+        let (since, n) = self.nobody.unwrap_or((now, 0));
+        if is_somebody {
+            self.nobody = None;
+        } else if now.saturating_sub(since) >= LONG_NANOS {
+            tracing::warn!(
+                "nobody was seen in the last {} frames ({} s): is somebody there, and does the detector fit (pose.detector, \
+                 pose.detector_card)?",
+                n + 1,
+                now.saturating_sub(since) / 1_000_000_000
+            );
+            self.nobody = Some((now, 0));
+        } else {
+            self.nobody = Some((since, n + 1));
+        }
+    }
+}
+
+/// What is kept of a view whose keypoints another program found.
+#[derive(Debug, Default)]
+pub(crate) struct KeypointState {
+    pub(crate) memory: NetworkMemory,
+    pub(crate) people: Vec<SeenKeypoints>,
+    /// Responses that do not lie in shared memory.
+    pub(crate) responses: Vec<f32>,
+    /// Whether a file that cannot be read was told.
+    pub(crate) has_failed: bool,
+}

@@ -1,0 +1,82 @@
+//! How far what every view found by itself lies from the result.
+
+use geometry::Triangulated;
+use multiview::Exchanges;
+use nalgebra::Point2;
+use skeleton::JointSet;
+
+use crate::bodies::NoJoint;
+use crate::space::Space;
+use crate::view_result::ViewResult;
+
+/// Measures the joints of a result that was solved in space against the poses that the views found by themselves.
+///
+/// The poses that come from such a solution are its own projections: they agree with it whatever the views show. What a view found is the
+/// candidate that lies nearest, with its sides as they are or exchanged; of a view that was left out as well. The residuals of
+/// every joint are replaced, and with them their root mean square.
+pub(crate) fn measure(
+    space: &Space,
+    answers: &[Option<ViewResult>],
+    set: &JointSet,
+    joints: &mut [Result<Triangulated, NoJoint>],
+) {
+    for it in joints.iter_mut().flatten() {
+        it.residuals_px.fill(f64::NAN);
+    }
+    for (view, answer) in answers.iter().enumerate() {
+        let Some(answer) = answer else {
+            continue;
+        };
+        let camera = space.plans[view].camera();
+        let [width, height] = camera.intrinsics.size.map(f64::from);
+        let inside =
+            |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
+        let projected: Vec<Option<Point2<f64>>> = joints
+            .iter()
+            .map(|it| camera.project(&it.as_ref().ok()?.in_world).filter(inside))
+            .collect();
+        let nearest = readings(space, view, answer, set)
+            .map(|points| {
+                let both = projected.iter().zip(&points);
+                let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
+                    at.map_or(f64::NAN, |at| (at - Point2::from(*point)).norm())
+                };
+                both.map(distance).collect::<Vec<f64>>()
+            })
+            .min_by(|a, b| sum(a).total_cmp(&sum(b)));
+        for (joint, residual) in joints.iter_mut().zip(nearest.unwrap_or_default()) {
+            if let Ok(joint) = joint {
+                joint.residuals_px[view] = residual;
+            }
+        }
+    }
+    for it in joints.iter_mut().flatten() {
+        let known = it.residuals_px.iter().filter(|it| it.is_finite());
+        let squares: Vec<f64> = known.map(|it| it * it).collect();
+        if !squares.is_empty() {
+            it.reprojection_px = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        }
+    }
+}
+
+/// The joints of all candidates of a view, with their sides as they are and exchanged.
+fn readings<'a>(
+    space: &'a Space,
+    view: usize,
+    answer: &'a ViewResult,
+    set: &'a JointSet,
+) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
+    let each = answer.candidates.iter().flat_map(move |pose| {
+        [0, Exchanges::MAX].map(|exchanges| (pose, space.mirror(view, exchanges)))
+    });
+    each.map(move |(pose, mirror)| {
+        let plan = &space.plans[view];
+        let centre = |part: usize| plan.centre(pose, mirror.map_or(part, |it| it[part]));
+        let centres: Vec<[f64; 2]> = (0..pose.parts.len()).map(centre).collect();
+        set.from_parts(&centres)
+    })
+}
+
+fn sum(distances: &[f64]) -> f64 {
+    distances.iter().filter(|it| it.is_finite()).sum()
+}
