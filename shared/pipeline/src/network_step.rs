@@ -137,6 +137,9 @@ impl NetworkStep {
 
     /// Looks at a frame; returns what of it the responses will cover, or `None` if nobody is seen well.
     ///
+    /// Where boxes are looked for, those of a detector come before those of the frame before, so that no box shrinks or wanders off
+    /// unnoticed; those of the filters come after. Up to twice as many people as are kept are then looked at, and the largest kept.
+    ///
     /// # Errors
     ///
     /// [`LookError`] if the network or the detector fails, or gives numbers that are not finite.
@@ -153,22 +156,45 @@ impl NetworkStep {
         let is_due = memory.since.is_none_or(|it| it >= self.settings.find_every);
         memory.n_seen = 0;
         let tracked = core::mem::take(&mut memory.outlines);
-        for outline in &tracked {
-            self.see((network, image), *outline, memory)?;
-        }
-        if is_due || memory.n_seen == 0 {
+        let with = (&**network, image);
+        if is_due && matches!(boxes, Boxes::Detector(_)) {
+            let found = find(boxes, image, &mut memory.values)?;
+            self.see_all(with, &found, memory)?;
+            self.see_all(with, &tracked, memory)?;
             memory.since = Some(0);
-            for outline in find(boxes, image, &mut memory.values)? {
-                let is_known = |it: &Seen| overlap(it.outline, outline) > SAME;
-                if memory.n_seen < self.settings.n_people && !memory.people().iter().any(is_known) {
-                    self.see((network, image), outline, memory)?;
-                }
+        } else {
+            self.see_all(with, &tracked, memory)?;
+            if is_due || memory.n_seen == 0 {
+                let found = find(boxes, image, &mut memory.values)?;
+                self.see_all(with, &found, memory)?;
+                memory.since = Some(0);
             }
         }
+        let size = |it: &Seen| it.heat * (it.outline[3] - it.outline[1]);
+        let n_seen = memory.n_seen;
+        memory.seen[..n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
+        memory.n_seen = n_seen.min(self.settings.n_people);
         // The memory of the list is kept.
         memory.outlines = tracked;
         memory.outlines.clear();
         Ok(self.scope(memory))
+    }
+
+    /// Looks into boxes in which nobody is known yet.
+    fn see_all(
+        &self,
+        with: (&PoseNetwork, Rgb8View<'_>),
+        outlines: &[[f64; 4]],
+        memory: &mut NetworkMemory,
+    ) -> Result<(), LookError> {
+        for outline in outlines {
+            let is_known = |it: &Seen| overlap(it.outline, *outline) > SAME;
+            let has_room = memory.n_seen < 2 * self.settings.n_people;
+            if has_room && !memory.people().iter().any(is_known) {
+                self.see(with, *outline, memory)?;
+            }
+        }
+        Ok(())
     }
 
     /// Looks at the person in a box, and keeps what is seen well.
