@@ -199,7 +199,10 @@ impl Report {
                 .latency_budget_ms
                 .map(|it| Budget::new(it, recorded.latency())),
             search_size: resolved.search_size.clone(),
-            outside: recorded.outside(resolved.deployment.capture.size.is_some()),
+            // A network sees everybody in a window of its own size.
+            outside: recorded
+                .outside(resolved.deployment.capture.size.is_some())
+                .filter(|_| !resolved.deployment.has_maps()),
             measured: measured(outcome),
             recorded,
         }

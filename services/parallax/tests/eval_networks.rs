@@ -20,7 +20,7 @@ codec = "heat-map"
 set = "lsp-14"
 "#;
 
-const DETECTOR: &str = r#"
+pub(crate) const DETECTOR: &str = r#"
 format = "parallax-detector"
 version = 1
 name = "The same box always"
@@ -53,12 +53,17 @@ fn network() -> Network {
 
 /// One box of a picture, whatever it shows: its score is `score` and a ten-thousandth of the mean colour.
 fn detector(score: f32) -> Network {
+    detector_of([20.0, 4.0, 44.0, 50.0], score)
+}
+
+/// The same with a box of choice: left, top, right, bottom, pixels of its input of 64 by 64.
+pub(crate) fn detector_of([left, top, right, bottom]: [f32; 4], score: f32) -> Network {
     let mut net = Network::default();
     net.inputs
         .push(("picture".to_owned(), sides([1, 3, 64, 64])));
     net.outputs
         .push(("dets".to_owned(), [1, 1, 5].map(Side::Fixed).to_vec()));
-    net.floats("box", &[1, 1, 5], vec![20.0, 4.0, 44.0, 50.0, score]);
+    net.floats("box", &[1, 1, 5], vec![left, top, right, bottom, score]);
     net.floats("little", &[1], vec![1e-4]);
     net.ints("flat", vec![1, 1, 1]);
     net.floats("mixture", &[1, 3, 1, 1], vec![1.0 / 3.0; 3]);

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
+use crate::eval_networks::{DETECTOR as DETECTOR_CARD, detector_of};
 
 use core::fmt::Write as _;
 
@@ -17,6 +18,8 @@ const SIZE: [u32; 2] = [200, 240];
 const N: usize = 14;
 const N_FRAMES: usize = 40;
 const RIGHT_WRIST: usize = 6;
+/// The box of the detector, pixels of its input.
+const BOX: [f32; 4] = [8.0, 6.0, 46.0, 58.0];
 
 /// A man who stands with one arm raised, metres; joints of `skeleton::PARSE14`, z up.
 const STANDING: [[f64; 3]; N] = [
@@ -53,14 +56,6 @@ codec = "heat-map"
 set = "lsp-14"
 "#;
 
-const DETECTOR_CARD: &str = r#"
-format = "parallax-detector"
-version = 1
-name = "The same box always"
-input = { width = 64, height = 64, scale = 0.00392156862745098 }
-output = { codec = "list", boxes = "dets" }
-"#;
-
 /// Fourteen directions in the space of colours, as far apart as a spiral puts them.
 fn directions() -> [[f64; 3]; N] {
     core::array::from_fn(|nth| {
@@ -91,30 +86,6 @@ fn network(bias: f32) -> Network {
         net.node("Conv", &["picture", "weights", "bias"], "sums", one);
         net.node("Relu", &["sums"], "maps", vec![]);
     }
-    net
-}
-
-/// One box in the middle of every picture.
-fn detector(score: f32) -> Network {
-    let mut net = Network::default();
-    net.inputs.push((
-        "picture".to_owned(),
-        [1, 3, 64, 64].map(Side::Fixed).to_vec(),
-    ));
-    net.outputs
-        .push(("dets".to_owned(), [1, 1, 5].map(Side::Fixed).to_vec()));
-    net.floats("box", &[1, 1, 5], vec![8.0, 6.0, 46.0, 58.0, score]);
-    net.floats("nothing", &[1], vec![0.0]);
-    net.ints("flat", vec![1, 1, 1]);
-    net.floats("mixture", &[1, 3, 1, 1], vec![1.0 / 3.0; 3]);
-    let whole = || Attribute::Ints(vec![64, 64]);
-    let attributes = vec![("kernel_shape", whole()), ("strides", whole())];
-    net.node("AveragePool", &["picture"], "colours", attributes);
-    let one = vec![("kernel_shape", Attribute::Ints(vec![1, 1]))];
-    net.node("Conv", &["colours", "mixture"], "mean", one);
-    net.node("Mul", &["mean", "nothing"], "zero", vec![]);
-    net.node("Reshape", &["zero", "flat"], "offset", vec![]);
-    net.node("Add", &["box", "offset"], "dets", vec![]);
     net
 }
 
@@ -188,7 +159,7 @@ fn case(name: &str, views: [Option<Named>; 4]) -> Case {
     let case = Case::with_rig(&rig, name, &[0; 4], "");
     case.write("net.onnx", network(-3.0).file());
     case.write("net.toml", CARD);
-    case.write("det.onnx", detector(0.9).file());
+    case.write("det.onnx", detector_of(BOX, 0.9).file());
     case.write("det.toml", DETECTOR_CARD);
     for (camera, named) in rig.cameras().iter().zip(views) {
         for frame in 0..N_FRAMES {
@@ -327,7 +298,7 @@ fn a_network_whose_output_is_no_number_is_refused_before_anything_starts() {
 #[test]
 fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
     let case = case("blind", [Some(as_it_is as Named); 4]);
-    case.write("det.onnx", detector(0.01).file());
+    case.write("det.onnx", detector_of(BOX, 0.01).file());
     let ended = run(&case, &[]);
     assert!(
         ended.stdout.contains("3D            0 of 40 frames"),
