@@ -119,7 +119,8 @@ fn contradicts(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<usiz
     Some(worst.0)
 }
 
-/// The share of the joints that may fall short by less than a view's [`shortfall`]: three quarters fall short by more, or by less.
+/// Share of the joints that fall short by at most the [`shortfall`] of a view: one that holds for a quarter only is exceeded by three
+/// quarters.
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 

@@ -11,7 +11,8 @@ use kernels::Rgb8View;
 use keypoints::Keypoint;
 use posenetwork::springs::{WINDOW_CELLS, joint_of};
 use posenetwork::{
-    Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of, overlap,
+    Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of,
+    outline_of_parts, overlap,
 };
 
 use crate::view_step::{ViewEstimate, ViewStep};
@@ -52,7 +53,7 @@ pub struct NetworkSettings {
 impl Default for NetworkSettings {
     fn default() -> Self {
         Self {
-            n_people: 4,
+            n_people: 3,
             find_every: 10,
             least_heat: 0.2,
             maps: MapSettings::default(),
@@ -65,8 +66,6 @@ impl Default for NetworkSettings {
 const SAME: f64 = 0.5;
 /// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
 const TWIN: f64 = 0.05;
-/// How far the boxes of the filters' parts are widened, share of their sides, on each side.
-const WIDENED: f64 = 0.1;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
 pub const MOST_VALUES: usize = 1 << 20;
 
@@ -440,16 +439,7 @@ fn find(
             let whole = Scope::whole(step.layout());
             values.resize(values.len().max(step.layout().n_values(&whole)), 0.0);
             let found = step.run(image, whole, values);
-            let outline = |it: &Pose| {
-                let [left, top, right, bottom] = step.bounding_box(it);
-                let more = [right - left, bottom - top].map(|it| WIDENED * it);
-                [
-                    left - more[0],
-                    top - more[1],
-                    right + more[0],
-                    bottom + more[1],
-                ]
-            };
+            let outline = |it: &Pose| outline_of_parts(step.bounding_box(it));
             Ok(found.candidates.iter().map(outline).collect())
         }
     }

@@ -19,4 +19,4 @@ pub use detector::Detector;
 pub use expected::expected_error;
 pub use maps::{JointMaps, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Workspace};
-pub use outline::{outline_of, overlap};
+pub use outline::{OF_FILTERS, outline_of, outline_of_parts, overlap};

@@ -2,6 +2,7 @@
 
 mod consistency;
 mod joints;
+mod marked;
 mod orientation;
 mod people;
 mod quality;

@@ -6,7 +6,7 @@ use launch::output;
 use offline::network;
 use offline::pictures::{Picture, Searched};
 use offline::sheet::{Sheet, Skeleton};
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
+use posenetwork::{JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Workspace, outline_of_parts};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
 use skeleton::PARSE14;
@@ -16,9 +16,6 @@ use crate::commands::network::keypoints_json;
 
 /// Longest side of a picture in which the filters search for boxes, pixels.
 pub(super) const SIZE: usize = 640;
-
-/// By how much the box of the filters' parts is enlarged on every side, share of its extent.
-const WIDENED: f64 = 0.1;
 
 /// A person in a box.
 struct Person {
@@ -79,23 +76,12 @@ impl Detector<'_> {
     /// The box of a pose: all boxes of its parts, widened; pixels of the picture.
     fn outline(&self, searched: &Searched, pose: &Pose) -> [f64; 4] {
         let (model, layout) = (&self.search.model, searched.layout());
-        let mut low = [f64::INFINITY; 2];
-        let mut high = [f64::NEG_INFINITY; 2];
-        for part in 0..model.n_parts() {
-            let [x1, y1, x2, y2] = pose.part_box(model, layout, part);
-            let (first, last) = (searched.in_picture([x1, y1]), searched.in_picture([x2, y2]));
-            for axis in 0..2 {
-                low[axis] = low[axis].min(first[axis]);
-                high[axis] = high[axis].max(last[axis]);
-            }
-        }
-        let more = [0, 1].map(|axis| WIDENED * (high[axis] - low[axis]));
-        [
-            low[0] - more[0],
-            low[1] - more[1],
-            high[0] + more[0],
-            high[1] + more[1],
-        ]
+        let [left, top, right, bottom] = pose.bounding_box(model, layout);
+        let (first, last) = (
+            searched.in_picture([left, top]),
+            searched.in_picture([right, bottom]),
+        );
+        outline_of_parts([first[0], first[1], last[0], last[1]])
     }
 
     fn report_people(
@@ -134,7 +120,7 @@ impl Detector<'_> {
             Some([width, height]) => format!(
                 "boxes by the filters at {width}x{height} of {}, widened by {:.0} %",
                 picture.size,
-                100.0 * WIDENED
+                100.0 * OF_FILTERS
             ),
             None => "box given".to_owned(),
         };

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use clap::Args;
 use offline::joints::Learned;
-use offline::person::Chosen;
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::json;
 
+use super::marked::Marked;
 use crate::globals::Globals;
 use crate::terminal::Terminal;
 use launch::{inputs, output};
@@ -41,19 +41,8 @@ pub(crate) struct Arguments {
     /// The model file, of 26 parts; "shipped": the one that ships.
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// Annotated people: folders or files, as for `train fmp`.
-    #[arg(value_name = "DATASET", required = true)]
-    datasets: Vec<PathBuf>,
-    /// People of a data set to learn from, all if not given.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    only: Vec<String>,
-    /// People of a data set to leave out, for example a test set.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    without: Vec<String>,
-    /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
-    /// `marked` if not given.
-    #[arg(long, value_name = "[DATASET=]SIDES")]
-    sides: Vec<String>,
+    #[command(flatten)]
+    people: Marked,
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -77,13 +66,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     let model = inputs::model_or_shipped(file)?;
     offline::judged::check(&model, &arguments.model.display().to_string())?;
     let fingerprint = checksum::fnv1a(&inputs::model_bytes(file)?);
-    let chosen = Chosen {
-        datasets: arguments.datasets.clone(),
-        only: arguments.only.clone(),
-        without: arguments.without.clone(),
-        sides: arguments.sides.clone(),
-        ..Chosen::default()
-    };
+    let chosen = arguments.people.chosen();
     let terminal = Terminal::without_bar(globals.quiet, arguments.json);
     let of = (&Arc::clone(&model), fingerprint);
     let train = || offline::joints::train(&chosen, &arguments.out, of, (&stop, &terminal));

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use launch::output;
-use offline::person::Chosen;
 use posenetwork::springs::SpringSettings;
 use runtime::Failure;
 use serde_json::json;
 
+use super::marked::Marked;
 use crate::globals::Globals;
 use crate::terminal::Terminal;
 
@@ -30,19 +30,8 @@ Example:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Annotated people: folders or files, as for `train fmp`.
-    #[arg(value_name = "DATASET", required = true)]
-    datasets: Vec<PathBuf>,
-    /// People of a data set to learn from, all if not given.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    only: Vec<String>,
-    /// People of a data set to leave out, for example a test set.
-    #[arg(long, value_name = "[DATASET=]SELECTION")]
-    without: Vec<String>,
-    /// Meaning of left and right: `marked` as in the data set; `seen` exchanges them for people seen from behind.
-    /// `marked` if not given.
-    #[arg(long, value_name = "[DATASET=]SIDES")]
-    sides: Vec<String>,
+    #[command(flatten)]
+    people: Marked,
     /// Types of every joint.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=64))]
     types: u16,
@@ -56,13 +45,7 @@ pub(crate) struct Arguments {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
-    let chosen = Chosen {
-        datasets: arguments.datasets.clone(),
-        only: arguments.only.clone(),
-        without: arguments.without.clone(),
-        sides: arguments.sides.clone(),
-        ..Chosen::default()
-    };
+    let chosen = arguments.people.chosen();
     let settings = SpringSettings {
         n_types: usize::from(arguments.types),
         ..SpringSettings::default()
