@@ -240,6 +240,36 @@ fn without_a_box_the_filters_find_it_and_that_is_said() {
 }
 
 #[test]
+fn a_network_is_judged_on_marked_people() {
+    let case = case("network-judge");
+    // The head and the hips where the blocks are, to the middle of a cell of the maps; what the network does not know elsewhere.
+    let mut marks = [[8.0, 120.0]; 14];
+    for (joint, block) in [(13, 0), (3, 1), (2, 2)] {
+        marks[joint] = BLOCKS[block].map(|it| f64::from(it) + 3.5);
+    }
+    let person = serde_json::json!({"image": "blocks.png", "joints": marks});
+    case.write("people.jsonl", format!("{person}\n"));
+    let judge = ["model", "judge", "net.onnx", "people.jsonl"];
+    let card = ["--card", "card.toml"];
+    let report = json(&run(&case, &[&judge[..], &card, &["--json"]].concat()));
+    assert_eq!(report["images"], 1, "{report}");
+    let of = |which: &str, group: &str| report[which]["pck"]["0.2"][group].as_f64().unwrap();
+    for which in ["peaks", "springs"] {
+        assert_eq!(of(which, "hip"), 100.0, "{which}: {report}");
+        assert!(report[which]["intervals"]["pck"]["0.2"][0].is_number());
+    }
+    assert_eq!(of("peaks", "knee"), 0.0, "{report}");
+    let ended = run(&case, &[&judge[..], &card].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(ended.stdout.contains("held together by springs: 1 images"));
+    let ended = run(&case, &[&judge[..], &card, &["--offsets"]].concat());
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    let ended = run(&case, &judge);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
+}
+
+#[test]
 fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
     let case = case("network-broken");
     let bytes = network("Relu").file();

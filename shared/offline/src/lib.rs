@@ -33,6 +33,7 @@ pub mod eval;
 pub mod examples;
 pub mod joints;
 pub mod judged;
+pub mod judged_network;
 pub mod network;
 pub mod orientation;
 pub mod person;

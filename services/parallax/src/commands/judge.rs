@@ -1,17 +1,19 @@
 //! `parallax model judge`: evaluates a model on annotated people.
 
+mod network;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use datasets::{ReadOptions, Selection, Sides, SkeletonTable};
+use datasets::{People, ReadOptions, Selection, Sides, SkeletonTable};
 use evaluation::Bootstrap;
 use experiment::Judged;
 use fmp::Search;
 use launch::inputs::{self, Joints};
 use launch::output;
 use offline::judged::{self, Reader};
-use runtime::Failure;
+use runtime::{ExitKind, Failure};
 use serde_json::json;
 use skeleton::PARSE14;
 
@@ -31,10 +33,16 @@ Percentages, of every stick or joint and in \"total\".
 person, found within 0.2 of the person's size, the mean along its bone (positive beyond the mark, seen from the trunk) and
 across it (positive outwards), percent of the height of the person, and their intervals.
 
-Example:
-    parallax model judge person.fmp PARSE --only 101-200")]
+A network that finds keypoints (.onnx, docs/networks.md) is asked for every person in the box around the marked joints, widened
+by 5 % on each side: \"peaks\" are the joints at the maxima of its maps, \"springs\" those that the tree of springs chooses on
+the same maps. With --json these two stand in place of \"best\" and \"on_person\", each also with \"intervals\": of the totals, 95 %
+over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}.
+
+Examples:
+    parallax model judge person.fmp PARSE --only 101-200
+    parallax model judge pose.onnx PARSE --card configs/networks/rtmpose-coco17.toml --only 101-200")]
 pub(crate) struct Arguments {
-    /// The model file, of 26 parts.
+    /// The model file, of 26 parts; or a network that finds keypoints (.onnx).
     model: PathBuf,
     /// The data set: people with 14 joints.
     dataset: PathBuf,
@@ -54,9 +62,29 @@ pub(crate) struct Arguments {
     /// Also print the mean offset of every joint along and across its bone, with 95 % intervals.
     #[arg(long)]
     offsets: bool,
+    /// The card of a network; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    #[arg(long, value_name = "CARD")]
+    card: Option<PathBuf>,
+    /// The tree of springs for the maps of a network; if not given, the one that ships.
+    #[arg(long, value_name = "FILE")]
+    springs: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    /// The people to evaluate.
+    fn people(&self) -> Result<People, Failure> {
+        let options = options(self.only.as_ref(), self.without.as_ref());
+        let read = datasets::read(&self.dataset, &options);
+        let mut people = read.map_err(offline::dataset_failure)?;
+        let table = SkeletonTable::published();
+        let sided = people.people.into_iter();
+        let sided = sided.map(|it| self.sides.of(it, table.joint_mirror()));
+        people.people = sided.collect();
+        Ok(people)
+    }
 }
 
 pub(super) fn selection(text: &str) -> Result<Selection, String> {
@@ -65,15 +93,20 @@ pub(super) fn selection(text: &str) -> Result<Selection, String> {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let is_network = arguments.model.extension();
+    if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
+        return network::run(arguments);
+    }
+    if arguments.card.is_some() || arguments.springs.is_some() {
+        let message = format!(
+            "{}: --card and --springs are for networks, files that end in .onnx",
+            arguments.model.display()
+        );
+        return Err(Failure::new(ExitKind::Usage, message));
+    }
     let model = inputs::model(&arguments.model)?;
     judged::check(&model, &arguments.model.display().to_string())?;
-    let options = options(arguments.only.as_ref(), arguments.without.as_ref());
-    let read = datasets::read(&arguments.dataset, &options);
-    let mut people = read.map_err(offline::dataset_failure)?;
-    let table = SkeletonTable::published();
-    let sided = people.people.into_iter();
-    let sided = sided.map(|it| arguments.sides.of(it, table.joint_mirror()));
-    people.people = sided.collect();
+    let people = arguments.people()?;
     let joints = Joints::of(&arguments.joint_map, Some(&arguments.model))?;
     let reader = Reader {
         search: Search::new(model),

@@ -1,0 +1,130 @@
+//! A network on pictures of people whose joints are known: what it finds in their true boxes.
+
+use datasets::{People, Person, Picture};
+use experiment::{Joints, Pictures};
+use fmp::{Layout, Pose, Region, Responses, Scope, Solver};
+use keypoints::Keypoint;
+use posenetwork::springs::{WINDOW_CELLS, joint_of};
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
+use runtime::{ExitKind, Failure, OrFail as _};
+use skeleton::PARSE14;
+
+use crate::judged::truth;
+
+/// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
+/// are more exact.
+const SAME: f64 = 1.5;
+
+/// A network, and the tree of springs that holds its maps together.
+#[derive(Debug)]
+pub struct NetworkReader {
+    /// The network.
+    pub network: PoseNetwork,
+    /// Solves the tree of springs.
+    pub springs: Solver,
+}
+
+/// Tries a network on people, each in the box around the marked joints. The detections of [`Pictures::found`] are the joints at
+/// the maxima of the maps, and those that the springs choose.
+///
+/// * `name`: of the data set.
+/// * `message`: is given a message about everybody who was left out.
+///
+/// # Errors
+///
+/// An image cannot be read, or the network fails on it.
+pub fn judged(
+    reader: &NetworkReader,
+    name: &str,
+    people: &People,
+    message: impl Fn(&str),
+) -> Result<Pictures, Failure> {
+    for problem in &people.problems {
+        message(&format!("left out: {problem}: {}", problem.fault));
+    }
+    let mut workspace = Workspace::default();
+    let mut maps = JointMaps::default();
+    let mut found = Vec::with_capacity(people.people.len());
+    for person in &people.people {
+        found.push(reader.find(person, &mut workspace, &mut maps)?);
+    }
+    Ok(Pictures {
+        name: name.to_owned(),
+        n_left_out: people.problems.len(),
+        truths: people.people.iter().map(truth).collect(),
+        found,
+    })
+}
+
+impl NetworkReader {
+    fn find(
+        &self,
+        person: &Person,
+        workspace: &mut Workspace,
+        maps: &mut JointMaps,
+    ) -> Result<[Option<Joints>; 2], Failure> {
+        let Some(outline) = outline_of(truth(person)) else {
+            return Ok([None, None]);
+        };
+        let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
+        let sight = self.network.look(picture.view(), outline, workspace);
+        let Some(sight) = sight.or_fail(ExitKind::Input)? else {
+            return Ok([None, None]);
+        };
+        let settings = MapSettings::default();
+        maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
+        let peaks = at_peaks(maps.peaks());
+        let size = picture.size();
+        let layout = Layout::new(self.springs.model(), size.width, size.height).ok();
+        let held = layout.and_then(|it| self.hold(&it, maps));
+        Ok([Some(peaks), held])
+    }
+
+    /// The joints that the springs choose on the maps of a person.
+    fn hold(&self, layout: &Layout, maps: &mut JointMaps) -> Option<Joints> {
+        let [left, top, right, bottom] = maps.extent();
+        let cell = (bottom - top) / WINDOW_CELLS;
+        let distance = |level: usize| (layout.levels[level].scale / cell).ln().abs();
+        let levels = 0..layout.levels.len();
+        let level = levels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
+        let levels = [u16::try_from(level).ok()?];
+        let within = |from: f64, to: f64, side: usize| {
+            [from.floor(), to.ceil()].map(|it| it.clamp(0.0, side as f64) as u32)
+        };
+        let [width, height] = layout.image_size;
+        let region = Region {
+            x: within(left, right, width),
+            y: within(top, bottom, height),
+        };
+        let scope = Scope::new(layout, levels[0]..levels[0] + 1, region).ok()?;
+        let mut responses = vec![0.0; layout.n_values(&scope)];
+        maps.fill(layout, &scope, &mut responses);
+        let evidence = Responses::within(layout, &responses, &levels, scope);
+        let pose = self.springs.best(&evidence, None)?;
+        Some(self.joints(layout, &pose, maps.peaks()))
+    }
+
+    fn joints(&self, layout: &Layout, pose: &Pose, peaks: &[Option<Keypoint>]) -> Joints {
+        let model = self.springs.model();
+        let near = SAME * layout.levels[usize::from(pose.level)].scale;
+        let mut joints = [[f64::NAN; 2]; PARSE14.joints.len()];
+        for part in 0..pose.parts.len() {
+            let Some(joint) = joint_of(part) else {
+                continue;
+            };
+            let [x, y] = pose.centre(model, layout, part);
+            let peak = peaks.get(joint).copied().flatten().map(|it| it.at);
+            let is_near = |it: &[f64; 2]| (it[0] - x).hypot(it[1] - y) < near;
+            joints[joint] = peak.filter(is_near).unwrap_or([x, y]);
+        }
+        joints
+    }
+}
+
+/// The joints at the maxima of their maps; not finite where the keypoints do not tell a joint.
+fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
+    core::array::from_fn(|joint| {
+        let peak = peaks.get(joint).copied().flatten();
+        peak.map_or([f64::NAN; 2], |it| it.at)
+    })
+}
