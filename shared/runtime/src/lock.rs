@@ -83,7 +83,7 @@ pub struct DeploymentLock {
     namespace: Namespace,
     config: Config,
     root: Root,
-    _file: File,
+    _file: Locked,
 }
 
 impl Namespace {
@@ -163,8 +163,21 @@ impl Drop for DeploymentLock {
     }
 }
 
+/// A locked file. It is unlocked when it is dropped: to close it is not enough, as a child process that another thread has just
+/// forked holds the same lock until it runs its program.
+#[derive(Debug)]
+struct Locked(File);
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        if let Err(error) = flock(&self.0, FlockOperation::Unlock) {
+            tracing::debug!(%error, "cannot unlock the lock file");
+        }
+    }
+}
+
 /// Opens and locks the lock file, which another run may remove at the same time.
-fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
+fn lock_file(namespace: &Namespace) -> Result<(Root, Locked), LockError> {
     let path = namespace.root().join(LOCK_FILE);
     let failed = |source: io::Error| LockError::File {
         path: path.clone(),
@@ -176,8 +189,8 @@ fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
             Err(Errno::NOENT) => continue,
             opened => opened.map_err(|error| failed(error.into()))?,
         };
-        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => {}
+        let mut locked = match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => Locked(file),
             Err(Errno::WOULDBLOCK) => {
                 let mut pid = String::new();
                 file.read_to_string(&mut pid).map_err(failed)?;
@@ -187,13 +200,14 @@ fn lock_file(namespace: &Namespace) -> Result<(Root, File), LockError> {
                 });
             }
             Err(error) => return Err(failed(error.into())),
-        }
+        };
+        let file = &mut locked.0;
         let own = file.metadata().map_err(failed)?.ino();
         if beneath::stat_in(&root, c"lock").is_ok_and(|stat| stat.st_ino == own) {
             file.set_len(0).map_err(failed)?;
             file.rewind().map_err(failed)?;
             write!(file, "{}", std::process::id()).map_err(failed)?;
-            return Ok((root, file));
+            return Ok((root, locked));
         }
     }
 }
