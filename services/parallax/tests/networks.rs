@@ -264,6 +264,11 @@ fn a_network_is_judged_on_marked_people() {
     assert!(ended.stdout.contains("held together by springs: 1 images"));
     let ended = run(&case, &[&judge[..], &card, &["--offsets"]].concat());
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    let ended = run(
+        &case,
+        &[&["model", "judge", "model.plx", "people.jsonl"], &card[..]].concat(),
+    );
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
     let ended = run(&case, &judge);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);

@@ -55,9 +55,6 @@ pub fn judged(
     is_over: impl Fn() -> bool + Sync,
     message: impl Fn(&str),
 ) -> Result<Pictures, Failure> {
-    for problem in &people.problems {
-        message(&format!("left out: {problem}: {}", problem.fault));
-    }
     let find = |person: &Person| {
         if is_over() {
             return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
@@ -65,12 +62,28 @@ pub fn judged(
         let found = find(&reader.search, person)?;
         Ok(found.map(|it| it.and_then(|it| reader.joints(&it))))
     };
-    let found: Result<Vec<_>, Failure> = people.people.par_iter().map(find).collect();
+    pictures(name, people, message, |people| {
+        people.par_iter().map(find).collect()
+    })
+}
+
+/// What was found on people, beside the truth.
+///
+/// * `find`: the detections of every person.
+pub(crate) fn pictures(
+    name: &str,
+    people: &People,
+    message: impl Fn(&str),
+    find: impl FnOnce(&[Person]) -> Result<Vec<[Option<Joints>; 2]>, Failure>,
+) -> Result<Pictures, Failure> {
+    for problem in &people.problems {
+        message(&format!("left out: {problem}: {}", problem.fault));
+    }
     Ok(Pictures {
         name: name.to_owned(),
         n_left_out: people.problems.len(),
         truths: people.people.iter().map(truth).collect(),
-        found: found?,
+        found: find(&people.people)?,
     })
 }
 

@@ -2,14 +2,14 @@
 
 use datasets::{People, Person, Picture};
 use experiment::{Joints, Pictures};
-use fmp::{Layout, Pose, Region, Responses, Scope, Solver};
+use fmp::{Layout, Pose, Solver};
 use keypoints::Keypoint;
-use posenetwork::springs::{WINDOW_CELLS, joint_of};
+use posenetwork::springs::joint_of;
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _};
 use skeleton::PARSE14;
 
-use crate::judged::truth;
+use crate::judged::{pictures, truth};
 
 /// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
 /// are more exact.
@@ -27,7 +27,6 @@ pub struct NetworkReader {
 /// Tries a network on people, each in the box around the marked joints. The detections of [`Pictures::found`] are the joints at
 /// the maxima of the maps, and those that the springs choose.
 ///
-/// * `name`: of the data set.
 /// * `message`: is given a message about everybody who was left out.
 ///
 /// # Errors
@@ -35,24 +34,14 @@ pub struct NetworkReader {
 /// An image cannot be read, or the network fails on it.
 pub fn judged(
     reader: &NetworkReader,
-    name: &str,
     people: &People,
     message: impl Fn(&str),
 ) -> Result<Pictures, Failure> {
-    for problem in &people.problems {
-        message(&format!("left out: {problem}: {}", problem.fault));
-    }
     let mut workspace = Workspace::default();
     let mut maps = JointMaps::default();
-    let mut found = Vec::with_capacity(people.people.len());
-    for person in &people.people {
-        found.push(reader.find(person, &mut workspace, &mut maps)?);
-    }
-    Ok(Pictures {
-        name: name.to_owned(),
-        n_left_out: people.problems.len(),
-        truths: people.people.iter().map(truth).collect(),
-        found,
+    let find = |person: &Person| reader.find(person, &mut workspace, &mut maps);
+    pictures("", people, message, |people| {
+        people.iter().map(find).collect()
     })
 }
 
@@ -76,34 +65,14 @@ impl NetworkReader {
         let peaks = at_peaks(maps.peaks());
         let size = picture.size();
         let layout = Layout::new(self.springs.model(), size.width, size.height).ok();
-        let held = layout.and_then(|it| self.hold(&it, maps));
+        let held = layout.and_then(|layout| {
+            let pose = maps.pose(&self.springs, &layout, &mut Vec::new())?;
+            Some(self.joints(&layout, &pose, maps.peaks()))
+        });
         Ok([Some(peaks), held])
     }
 
-    /// The joints that the springs choose on the maps of a person.
-    fn hold(&self, layout: &Layout, maps: &mut JointMaps) -> Option<Joints> {
-        let [left, top, right, bottom] = maps.extent();
-        let cell = (bottom - top) / WINDOW_CELLS;
-        let distance = |level: usize| (layout.levels[level].scale / cell).ln().abs();
-        let levels = 0..layout.levels.len();
-        let level = levels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
-        let levels = [u16::try_from(level).ok()?];
-        let within = |from: f64, to: f64, side: usize| {
-            [from.floor(), to.ceil()].map(|it| it.clamp(0.0, side as f64) as u32)
-        };
-        let [width, height] = layout.image_size;
-        let region = Region {
-            x: within(left, right, width),
-            y: within(top, bottom, height),
-        };
-        let scope = Scope::new(layout, levels[0]..levels[0] + 1, region).ok()?;
-        let mut responses = vec![0.0; layout.n_values(&scope)];
-        maps.fill(layout, &scope, &mut responses);
-        let evidence = Responses::within(layout, &responses, &levels, scope);
-        let pose = self.springs.best(&evidence, None)?;
-        Some(self.joints(layout, &pose, maps.peaks()))
-    }
-
+    /// The joints of a pose that the springs chose.
     fn joints(&self, layout: &Layout, pose: &Pose, peaks: &[Option<Keypoint>]) -> Joints {
         let model = self.springs.model();
         let near = SAME * layout.levels[usize::from(pose.level)].scale;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solver, local_scores};
 use kernels::Rgb8View;
 use keypoints::Keypoint;
-use posenetwork::springs::{WINDOW_CELLS, joint_of};
+use posenetwork::springs::joint_of;
 use posenetwork::{
     Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of,
     outline_of_parts, overlap,
@@ -259,34 +259,9 @@ impl NetworkStep {
         let peaks = seen.maps.peaks().iter();
         let heat: f64 = peaks.flatten().map(|it| it.score.clamp(0.0, 1.0)).sum();
         seen.heat = heat / seen.maps.peaks().len().max(1) as f64;
-        let is_inside = self.region(&seen.maps).is_some();
-        seen.level = self.level(&seen.maps);
+        let is_inside = seen.maps.region(&self.layout).is_some();
+        seen.level = seen.maps.level(&self.layout);
         seen.heat >= self.settings.least_heat && is_inside
-    }
-
-    /// The level whose cells are nearest to those that the springs were learned with.
-    fn level(&self, maps: &JointMaps) -> u16 {
-        let [_, top, _, bottom] = maps.extent();
-        let cell = (bottom - top) / WINDOW_CELLS;
-        let distance = |level: usize| (self.layout.levels[level].scale / cell).ln().abs();
-        let levels = 0..self.layout.levels.len();
-        let nearest = levels.min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-        nearest.unwrap_or(0) as u16
-    }
-
-    /// The pixels of the frame that maps cover; `None` if they lie beyond it.
-    fn region(&self, maps: &JointMaps) -> Option<Region> {
-        let [left, top, right, bottom] = maps.extent();
-        let along = |from: f64, to: f64, side: usize| {
-            let from = from.floor().clamp(0.0, side as f64) as u32;
-            let to = to.ceil().clamp(0.0, side as f64) as u32;
-            (from < to).then_some([from, to])
-        };
-        let [width, height] = self.layout.image_size;
-        Some(Region {
-            x: along(left, right, width)?,
-            y: along(top, bottom, height)?,
-        })
     }
 
     /// What the responses of the people of a frame cover: one level, fine enough for the smallest of them if there is room.
@@ -299,7 +274,9 @@ impl NetworkStep {
             }
         };
         let people = memory.people().iter();
-        let region = people.filter_map(|it| self.region(&it.maps)).reduce(join)?;
+        let region = people
+            .filter_map(|it| it.maps.region(&self.layout))
+            .reduce(join)?;
         let finest = memory.people().iter().map(|it| it.level).min()?;
         let mut levels = finest..self.layout.levels.len() as u16;
         levels.find_map(|level| {
@@ -333,7 +310,10 @@ impl NetworkStep {
             let found = if n_seen == 1 && seen.level == level {
                 self.best(responses, scope)
             } else {
-                self.alone(seen)
+                let Seen {
+                    maps, responses, ..
+                } = seen;
+                maps.pose(&self.solver, &self.layout, responses)
             };
             if let Some(pose) = found {
                 memory.outlines.extend(self.outline(&pose));
@@ -361,16 +341,6 @@ impl NetworkStep {
         let levels: Vec<u16> = scope.levels().collect();
         let evidence = Responses::within(&self.layout, responses, &levels, scope);
         self.solver.best(&evidence, None)
-    }
-
-    /// The best pose of a person on the maps of the person alone.
-    fn alone(&self, seen: &mut Seen) -> Option<Pose> {
-        let region = self.region(&seen.maps)?;
-        let scope = Scope::new(&self.layout, seen.level..seen.level + 1, region).ok()?;
-        let n_values = self.layout.n_values(&scope);
-        seen.responses.resize(n_values, 0.0);
-        seen.maps.fill(&self.layout, &scope, &mut seen.responses);
-        self.best(&seen.responses, scope)
     }
 
     /// The box of a pose for the next frame.

@@ -6,6 +6,7 @@
 //! (Yang & Ramanan 2013 with the unary of Chen & Yuille 2014, without their image-dependent part).
 #![forbid(unsafe_code)]
 
+mod alone;
 mod between;
 mod detector;
 mod expected;

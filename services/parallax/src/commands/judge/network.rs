@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         springs: Solver::new(inputs::springs(springs)?),
     };
     let people = arguments.people()?;
-    let pictures = judged_network::judged(&reader, "", &people, |text| output::message(text))?;
+    let pictures = judged_network::judged(&reader, &people, |text| output::message(text))?;
     if arguments.json {
         let mut report = json!({
             "schema_version": 1,
