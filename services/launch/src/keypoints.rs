@@ -9,6 +9,7 @@ use footage::Size;
 use geometry::Rig;
 use keypointfiles::KeypointSource;
 use keypoints::files::NameSet;
+use messages::MAX_KEYPOINTS;
 use runtime::{ExitKind, Failure, OrFail as _};
 
 use crate::inputs;
@@ -34,6 +35,44 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
         Failure::new(ExitKind::Input, error).with_hint(hint)
     })?;
     Ok(Some(source))
+}
+
+/// Names of the keypoints that the cameras' networks and keypoint files have beside the joints, each once, in the order of the cameras.
+///
+/// # Errors
+///
+/// They cannot be read, or are more than a message has room for.
+pub(crate) fn extra_names(deployment: &Deployment) -> Result<Vec<String>, Failure> {
+    let mut extra: Vec<String> = Vec::new();
+    let mut known = Vec::new();
+    for (index, camera) in deployment.cameras.iter().enumerate() {
+        let names = if let Some(source) = of_camera(camera)? {
+            source.names().names().to_vec()
+        } else {
+            let network = deployment.pose_network(index);
+            if network.is_none() || known.contains(&network) {
+                continue;
+            }
+            known.push(network);
+            inputs::keypoint_names(deployment, index)?
+        };
+        let names = names.into_iter().filter(|it| !::keypoints::is_joint(it));
+        for name in names {
+            if !extra.contains(&name) {
+                extra.push(name);
+            }
+        }
+    }
+    if extra.len() > MAX_KEYPOINTS {
+        let message = format!(
+            "the networks and keypoint files of the cameras have {} different keypoints beside the joints, and there is room for \
+             {MAX_KEYPOINTS}",
+            extra.len()
+        );
+        let hint = "use the same set of keypoints for all cameras";
+        return Err(Failure::new(ExitKind::Config, message).with_hint(hint));
+    }
+    Ok(extra)
 }
 
 /// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.

@@ -41,6 +41,7 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
         deployment: deployment.clone(),
         search_size: None,
+        extra_keypoints: keypoints::extra_names(deployment)?,
         recording: None,
         replay: None,
     };

@@ -9,8 +9,8 @@ use fmp::{Layout, Solver};
 use messages::topic;
 use multiview::SpaceSettings;
 use pipeline::{
-    Boxes, Eyes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep, ViewSettings,
-    ViewStep, Views,
+    Boxes, ExtrasStep, Eyes, FuseStep, NetworkSettings, NetworkStep, SkeletonStep, SpaceStep,
+    ViewSettings, ViewStep, Views,
 };
 use posenetwork::MapSettings;
 use rayon::ThreadPoolBuilder;
@@ -177,6 +177,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     let job = pose::Job {
         view,
         step: view_step(resolved, prepared, view, layout)?,
+        n_extras: resolved.extra_keypoints.len(),
         n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
         start_frame: resolved.deployment.capture.start_frame,
@@ -210,11 +211,12 @@ fn view_step(
         ..NetworkSettings::default()
     };
     if let Some(source) = keypoints::of_camera(&deployment.cameras[view])? {
+        let extras = extras(resolved, source.names().names());
         let eyes = Eyes::Keypoints(::keypoints::joint_rows(source.names().names()));
         let frame_from_source = prepared.views[view].framing.output_from_source();
         let solver = Solver::new(prepared.model);
         return Ok(pose::Step::Keypoints(Box::new(pose::Keypoints {
-            step: NetworkStep::new(eyes, solver, layout, settings),
+            step: NetworkStep::new(eyes, solver, layout, settings).with_extras(extras),
             source,
             frame_from_source,
         })));
@@ -226,10 +228,17 @@ fn view_step(
         Some(detector) => Boxes::Detector(Box::new(detector)),
         None => Boxes::Filters(Box::new(filters(resolved, &prepared, view)?)),
     };
+    let extras = extras(resolved, network.names());
     let eyes = Eyes::Network(Box::new(network), boxes);
     let solver = Solver::new(prepared.model);
-    let step = NetworkStep::new(eyes, solver, layout, settings);
+    let step = NetworkStep::new(eyes, solver, layout, settings).with_extras(extras);
     Ok(pose::Step::Network(Box::new(step)))
+}
+
+/// Of every extra keypoint of the deployment its number among the names of a camera.
+fn extras(resolved: &Resolved, names: &[String]) -> Vec<Option<usize>> {
+    let number = |wanted: &String| names.iter().position(|it| it == wanted);
+    resolved.extra_keypoints.iter().map(number).collect()
 }
 
 /// The search of the filters over the whole frame, which finds boxes for a network.
@@ -310,6 +319,11 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     let prepared = Prepared::new(resolved)?;
     let topology = resolved.topology();
     let plans = prepared.plans();
+    let extras = ExtrasStep::new(
+        &resolved.extra_keypoints,
+        plans.clone(),
+        prepared.settings.skeleton.triangulation,
+    );
     let step = SkeletonStep::new(
         plans.clone(),
         prepared.up_in_world,
@@ -317,6 +331,7 @@ fn triangulate(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
     );
     let job = triangulate::Job {
         plans,
+        extras,
         views: prepared.settings.views,
         n_workers: topology.n_workers(),
         n_consumers: topology.receivers_of(&topic::pose3d()),
@@ -341,6 +356,7 @@ fn results(service: &Service, resolved: &Resolved) -> Result<(), Failure> {
         model: prepared.model,
         has_maps: deployment.has_maps(),
         joints: prepared.settings.skeleton.joints,
+        extra_keypoints: resolved.extra_keypoints.clone(),
         frame_rate_hz: resolved.frame_rate_hz(),
         frame_step: deployment.capture.frame_step,
         follow: deployment.person.follow,

@@ -22,6 +22,10 @@ pub struct Resolved {
     /// the images then.
     #[serde(default)]
     pub search_size: Option<SearchSize>,
+    /// Names of the keypoints that the networks and keypoint files of the cameras have beside the joints, each once. Not in the
+    /// recordings of earlier versions.
+    #[serde(default)]
+    pub extra_keypoints: Vec<String>,
     /// The recording to write, if there is one.
     #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,

@@ -10,6 +10,7 @@ use core::fmt::Write as _;
 use common::{Case, Ended};
 use footage::{Canvas, Size};
 use geometry::{Camera, Intrinsics, Lens, LensModel, Rig};
+use keypoints::{HALPE_26, LSP_14};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use onnx::{Attribute, Network, Side};
 use serde_json::Value;
@@ -328,19 +329,45 @@ fn what_belongs_to_filters_is_refused_beside_a_network() {
     all_are_near(&case, 0.15);
 }
 
+/// Where a keypoint is in a frame: a joint of that name, or something at its ankle, between the hips, or at the head.
+fn place(name: &str, frame: usize) -> Point3<f64> {
+    let joints = joints(frame);
+    let named = |name: &str| {
+        let number = skeleton::PARSE14
+            .joints
+            .iter()
+            .position(|it| it.name == name);
+        joints[number.unwrap()]
+    };
+    let by = |x: f64, z: f64| Vector3::new(x, 0.0, z);
+    match name.split_once(' ').unwrap_or((name, "")) {
+        ("nose", _) => named("head") + by(0.1, -0.1),
+        ("pelvis", _) => nalgebra::center(&named("left hip"), &named("right hip")),
+        ("head", _) => named("head"),
+        (side, "big toe" | "small toe") => named(&format!("{side} ankle")) + by(0.15, -0.05),
+        (side, "heel") => named(&format!("{side} ankle")) + by(-0.05, -0.05),
+        (_, "eye" | "ear") => named("head") + by(0.0, -0.05),
+        _ => named(name),
+    }
+}
+
 /// Keypoints in the layout of OpenPose, in place of the pictures.
-fn with_keypoints(case: &Case) {
+///
+/// * `names`: of a set, as the view calls them.
+fn with_keypoints(case: &Case, set: &str, names: impl Fn(usize) -> Vec<String>) {
     let rig = rig();
     let mut text = String::from("name = \"dots\"\nrig = \"rig.toml\"\noutput = \"out\"\n");
     text.push_str("[capture]\nframe_rate_hz = 30.0\n");
-    for camera in rig.cameras() {
+    for (view, camera) in rig.cameras().iter().enumerate() {
         let folder = case.path(&camera.name);
         for frame in 0..N_FRAMES {
             std::fs::remove_file(folder.join(format!("{frame:04}.png"))).unwrap();
-            let numbers = joints(frame).map(|it| {
-                let at = camera.project(&it).unwrap();
+            let names = names(view);
+            let numbers = names.iter().map(|it| {
+                let at = camera.project(&place(it, frame)).unwrap();
                 format!("{:.2},{:.2},0.9", at.x, at.y)
             });
+            let numbers: Vec<String> = numbers.collect();
             let file = folder.join(format!("{}_{frame:012}_keypoints.json", camera.name));
             let person = numbers.join(",");
             let json = format!("{{\"people\":[{{\"pose_keypoints_2d\":[{person}]}}]}}");
@@ -349,7 +376,7 @@ fn with_keypoints(case: &Case) {
         let name = &camera.name;
         writeln!(
             text,
-            "[[camera]]\nname = {name:?}\nkeypoints = {name:?}\nkeypoint_names = \"lsp-14\""
+            "[[camera]]\nname = {name:?}\nkeypoints = {name:?}\nkeypoint_names = {set:?}"
         )
         .unwrap();
     }
@@ -361,7 +388,7 @@ fn with_keypoints(case: &Case) {
 #[test]
 fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_of_one_frame() {
     let case = case("json", [Some(as_it_is as Named); 4]);
-    with_keypoints(&case);
+    with_keypoints(&case, "lsp-14", |_| LSP_14.map(str::to_owned).to_vec());
     let ended = run(&case, &[]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     all_are_near(&case, 0.02);
@@ -373,4 +400,38 @@ fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_
     let text = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(summary["summary"]["views_present"]["c2"], N_FRAMES - 1);
+}
+
+#[test]
+fn what_keypoints_have_beside_the_joints_is_written_by_name() {
+    let case = case("extra", [Some(as_it_is as Named); 4]);
+    // The third view names the legs the wrong way round.
+    let named = |view: usize, name: &str| {
+        let leg = ["hip", "knee", "ankle", "toe", "heel"];
+        let is_leg = leg.iter().any(|it| name.ends_with(it));
+        let other = keypoints::mirrored(name).filter(|_| view == 2 && is_leg);
+        other.unwrap_or_else(|| name.to_owned())
+    };
+    with_keypoints(&case, "halpe-26", |view| {
+        HALPE_26.map(|it| named(view, it)).to_vec()
+    });
+    let ended = run(&case, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let read = |name: &str| std::fs::read_to_string(case.path(&format!("out/{name}"))).unwrap();
+    for line in read("pose3d.jsonl").lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let frame = line["frame"].as_u64().unwrap() as usize;
+        let extra = line["keypoints"].as_object().unwrap();
+        assert_eq!(extra.len(), 12, "5 of the face, the pelvis, 6 of the feet");
+        for (name, it) in extra {
+            let at = &it["position_m"];
+            let at = [0, 1, 2].map(|axis| at[axis].as_f64().unwrap_or(f64::NAN));
+            let off = (Point3::from(at) - place(name, frame)).norm();
+            assert!(off < 0.01, "frame {frame}, {name}: {off} m");
+            assert_eq!(it["views"].as_array().unwrap().len(), 4, "{name}");
+        }
+    }
+    assert_eq!(read("pose3d.csv").lines().count(), 1 + N_FRAMES * 26);
+    let trc = read("pose3d.trc");
+    assert!(trc.contains("\tleft_heel\t"), "{trc}");
 }

@@ -11,8 +11,8 @@ use std::time::Instant;
 use common::started::signal;
 use common::{Case, Ended, PACED, Started, planted};
 use messages::{
-    EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_VIEWS, PairPose,
-    Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
+    EvidenceHeader, FrameHeader, FusedView, Health, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS,
+    PairPose, Pose3d, Searched, Stamp, Status, Timing, ViewPose, topic,
 };
 use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Stop, Waiter, now_nanos};
 use serde_json::Value;
@@ -391,9 +391,10 @@ fn odd_result(stamp: Stamp, timing: Timing) -> Pose3d {
         sides: messages::Sides(9),
         kept: messages::Kept(9),
         n_people: u32::MAX,
-        reserved: 0,
+        n_keypoints: MAX_KEYPOINTS as u32,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
+        keypoints: [Joint3d::default(); MAX_KEYPOINTS],
     }
 }
 

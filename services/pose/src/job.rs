@@ -48,6 +48,8 @@ pub struct Job {
     pub view: usize,
     /// The single-view step.
     pub step: Step,
+    /// Number of extra keypoints of a candidate.
+    pub n_extras: usize,
     /// Processes that receive the candidates.
     pub n_pose_consumers: usize,
     /// Processes that receive the evidence.

@@ -1,11 +1,11 @@
-//! Pictures of a view: its single-view pose, the fused pose, and one part's epipolar lines.
+//! Pictures of a view: its single-view pose, the fused pose, the extra keypoints, and one part's epipolar lines.
 
 use footage::{ACCENT, CENTRE, Canvas, FAINT, Limb, Side, Size, draw_limbs, line_width};
 use geometry::epipolar::epipolar_curve;
 use messages::{FusedView, MAX_PARTS, Status};
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 
-use crate::{FrameRecord, Scene};
+use crate::{FrameRecord, Scene, pose3d};
 
 /// Points of one epipolar line.
 const N_POINTS: usize = 64;
@@ -38,6 +38,7 @@ pub(crate) fn draw(
             canvas.ring(*at, 10.0 / 3.0 * width, width, ACCENT);
         }
     }
+    draw_keypoints(&mut canvas, scene, record, view);
     let facing = match fused.map(|it| it.exchanged) {
         Some(1) => ", from behind",
         _ => "",
@@ -79,6 +80,28 @@ fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: u
     }
 }
 
+/// Where the extra keypoints of the result lie in the view.
+fn draw_keypoints(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
+    let camera = scene.views[view].framing.camera();
+    let width = line_width(canvas.size());
+    for (name, it) in pose3d::keypoints(scene, &record.pose3d) {
+        let place = pose3d::is_placed(it).then(|| Point3::from(it.in_world));
+        if let Some(at) = place.and_then(|it| camera.project(&it)) {
+            canvas.disc(at.into(), 1.5 * width, side_of(name).colour());
+        }
+    }
+}
+
+fn side_of(name: &str) -> Side {
+    if name.starts_with("right") {
+        Side::Right
+    } else if name.starts_with("left") {
+        Side::Left
+    } else {
+        Side::Centre
+    }
+}
+
 /// Where the part's point in every other view may lie in this one.
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
@@ -104,8 +127,7 @@ fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
 
 fn limbs(scene: &Scene) -> Vec<Limb> {
     let side = |joint: usize| match scene.joints.joints[joint].parts {
-        [one] if skeleton::PART_NAMES[*one].starts_with("right") => Side::Right,
-        [one] if skeleton::PART_NAMES[*one].starts_with("left") => Side::Left,
+        [one] => side_of(skeleton::PART_NAMES[*one]),
         _ => Side::Centre,
     };
     let limbs = scene.joints.limbs.iter();
@@ -155,6 +177,30 @@ mod tests {
     fn something_is_drawn() {
         let canvas = draw(&scene(), &with_picture(), 0, 0).unwrap();
         assert!(canvas.rgb().iter().any(|it| *it > 0));
+    }
+
+    #[test]
+    fn extra_keypoints_are_drawn_where_the_view_sees_them() {
+        let mut scene = scene();
+        let mut record = with_picture();
+        let without = draw(&scene, &record, 0, 0).unwrap();
+        scene.extra_keypoints = vec!["right heel".to_owned(), "nose".to_owned()];
+        record.pose3d.n_keypoints = 2;
+        record.pose3d.keypoints[0].in_world = [0.1, 0.1, 1.0];
+        record.pose3d.keypoints[1].status = Status::TOO_FEW_VIEWS;
+        let with = draw(&scene, &record, 0, 0).unwrap();
+        let pixels = |it: &Canvas| -> Vec<[u8; 3]> { it.rgb().as_chunks().0.to_vec() };
+        let (with, without) = (pixels(&with), pixels(&without));
+        let changed: Vec<usize> = (0..with.len())
+            .filter(|&it| with[it] != without[it])
+            .collect();
+        assert!(!changed.is_empty());
+        // A pixel of the frame is two of the footage, whose middle is (79.5, 59.5): the point lies at 4 m.
+        for it in changed {
+            let (x, y) = ((it % 80) as f64, (it / 80) as f64);
+            let off = (x - 41.5).hypot(y - 31.5);
+            assert!(off < 4.0, "({x}, {y})");
+        }
     }
 
     #[test]

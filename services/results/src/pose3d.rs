@@ -16,7 +16,7 @@ cov_yy_m2,cov_yz_m2,cov_zz_m2,reprojection_px,views,status";
 pub(crate) fn joints<'a>(
     scene: &'a Scene,
     pose: &'a Pose3d,
-) -> impl Iterator<Item = (&'static str, &'a Joint3d)> {
+) -> impl Iterator<Item = (&'a str, &'a Joint3d)> {
     let n = pose.n_joints as usize;
     scene
         .joints
@@ -24,6 +24,16 @@ pub(crate) fn joints<'a>(
         .iter()
         .map(|it| it.name)
         .zip(pose.joints.iter().take(n))
+}
+
+/// The extra keypoints of a message with their names, as many as both sides know.
+pub(crate) fn keypoints<'a>(
+    scene: &'a Scene,
+    pose: &'a Pose3d,
+) -> impl Iterator<Item = (&'a str, &'a Joint3d)> {
+    let n = pose.n_keypoints as usize;
+    let names = scene.extra_keypoints.iter().map(String::as_str);
+    names.zip(pose.keypoints.iter().take(n))
 }
 
 /// Whether a joint has a position that can be written down.
@@ -42,6 +52,9 @@ pub(crate) fn line(scene: &Scene, record: &FrameRecord) -> FrameLine {
         facing_margin: finite(pose.facing_margin),
         frame: pose.stamp.frame,
         joints: joints
+            .map(|(name, it)| (name.to_owned(), joint(scene, it)))
+            .collect(),
+        keypoints: keypoints(scene, pose)
             .map(|(name, it)| (name.to_owned(), joint(scene, it)))
             .collect(),
         kept: Some(match pose.kept {
@@ -81,6 +94,7 @@ pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
         facing_margin: None,
         frame: it.frame,
         joints: BTreeMap::new(),
+        keypoints: BTreeMap::new(),
         kept: None,
         pairs: 0,
         people: None,
@@ -112,7 +126,8 @@ pub(crate) fn nothing(scene: &Scene, frame: u64) -> Pose3d {
     pose.stamp.frame = frame;
     pose.status = Status::NO_FRAME;
     pose.n_joints = scene.joints.joints.len() as u32;
-    for it in &mut pose.joints {
+    pose.n_keypoints = scene.extra_keypoints.len() as u32;
+    for it in pose.joints.iter_mut().chain(&mut pose.keypoints) {
         it.status = Status::NO_FRAME;
     }
     pose
@@ -149,6 +164,7 @@ pub(crate) fn csv_rows(scene: &Scene, pose: &Pose3d) -> String {
         .time_s(frame)
         .map_or(String::new(), |it| format!("{it:.6}"));
     joints(scene, pose)
+        .chain(keypoints(scene, pose))
         .map(|(name, it)| {
             let views = scene.names(it.views_used).join("+");
             let numbers = if is_placed(it) {
@@ -229,6 +245,32 @@ mod tests {
         for row in rows.lines() {
             assert_eq!(row.split(',').count(), columns, "{row}");
         }
+    }
+
+    #[test]
+    fn extra_keypoints_are_written_by_name_after_the_joints() {
+        let mut scene = scene();
+        scene.extra_keypoints = vec!["nose".to_owned(), "left heel".to_owned()];
+        let mut record = record(7);
+        record.pose3d.n_keypoints = 2;
+        record.pose3d.keypoints[1].status = Status::IMPLAUSIBLE;
+        let text = runfiles::to_line(&line(&scene, &record)).unwrap();
+        let line: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            line["keypoints"]["nose"]["position_m"],
+            json!([1.0, 2.0, 3.0])
+        );
+        assert_eq!(line["joints"].get("nose"), None);
+        let heel = &line["keypoints"]["left heel"];
+        assert_eq!(*heel, json!({ "status": Status::IMPLAUSIBLE.reason() }));
+        let rows = csv_rows(&scene, &record.pose3d);
+        assert_eq!(rows.lines().count(), 16);
+        assert!(
+            rows.lines().nth(14).unwrap().contains(",nose,1.0"),
+            "{rows}"
+        );
+        let rows = csv_rows(&scene, &nothing(&scene, 8));
+        assert_eq!(rows.lines().count(), 16, "{rows}");
     }
 
     #[test]

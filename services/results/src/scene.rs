@@ -30,6 +30,8 @@ pub struct Scene {
     pub has_maps: bool,
     /// The joints of the result.
     pub joints: &'static JointSet,
+    /// Names of the extra keypoints of the result.
+    pub extra_keypoints: Vec<String>,
     /// Frames of the footage per second, where known.
     pub frame_rate_hz: Option<f64>,
     /// Distance between the frames used.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use fmp::{Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose};
 use geometry::{Camera, Framing, Intrinsics, Lens, OutSize};
 use messages::{
-    FusedView, Joint3d, MAX_JOINTS, MAX_VIEWS, Pose3d, Stamp, Status, Timing, ViewPose,
+    FusedView, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS, Pose3d, Stamp, Status, Timing,
+    ViewPose,
 };
 use nalgebra::{Isometry3, Vector3};
 
@@ -39,6 +40,7 @@ pub(crate) fn scene() -> Scene {
         model,
         views: views.into(),
         joints: &skeleton::PARSE14,
+        extra_keypoints: Vec::new(),
         frame_rate_hz: Some(60.0),
         frame_step: 2,
         has_maps: false,
@@ -104,9 +106,10 @@ pub(crate) fn pose3d(frame: u64) -> Pose3d {
         sides: messages::Sides::SURE,
         kept: messages::Kept::SOLVED,
         n_people: 0,
-        reserved: 0,
+        n_keypoints: 0,
         joints: [joint; MAX_JOINTS],
         views: [fused; MAX_VIEWS],
+        keypoints: [joint; MAX_KEYPOINTS],
     }
 }
 

@@ -4,7 +4,7 @@ use messages::Pose3d;
 use nalgebra::Vector3;
 
 use crate::Scene;
-use crate::pose3d::{is_placed, joints};
+use crate::pose3d::{is_placed, joints, keypoints};
 
 /// One row, with its end; a missing joint leaves its three cells empty.
 ///
@@ -13,6 +13,7 @@ pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
     let axes = scene.opensim_from_world();
     let time = scene.time_s(pose.stamp.frame).unwrap_or(0.0);
     let points = joints(scene, pose)
+        .chain(keypoints(scene, pose))
         .map(|(_, joint)| is_placed(joint).then(|| (axes * Vector3::from(joint.in_world)).into()));
     ::trc::row(row, time, points)
 }
@@ -22,8 +23,9 @@ pub(crate) fn row(scene: &Scene, row: u64, pose: &Pose3d) -> String {
 /// * `n_rows`: rows that follow.
 pub(crate) fn header(scene: &Scene, n_rows: u64) -> String {
     let rate = scene.frame_rate_hz.unwrap_or(1.0) / scene.frame_step.max(1) as f64;
-    let joints = scene.joints.joints.iter();
-    let names: Vec<String> = joints.map(|it| it.name.replace(' ', "_")).collect();
+    let joints = scene.joints.joints.iter().map(|it| it.name);
+    let names = joints.chain(scene.extra_keypoints.iter().map(String::as_str));
+    let names: Vec<String> = names.map(|it| it.replace(' ', "_")).collect();
     let heading = ::trc::Heading {
         file_name: "pose3d.trc",
         rate_hz: rate,
@@ -63,6 +65,19 @@ mod tests {
         assert_eq!(got.frames.len(), 2);
         // z is up in the scene: (y, z, x).
         assert_eq!(got.frames[1][0], Some([0.5, 1.75, -0.25]));
+    }
+
+    #[test]
+    fn extra_keypoints_are_markers_after_the_joints() {
+        let mut scene = scene();
+        scene.extra_keypoints = vec!["left heel".to_owned()];
+        let mut pose = pose3d(0);
+        pose.n_keypoints = 1;
+        pose.keypoints[0].in_world = [-0.25, 0.5, 1.75];
+        let text = header(&scene, 1) + &row(&scene, 1, &pose);
+        let got = Trc::parse(&text).unwrap();
+        assert_eq!(got.markers[14], "left_heel");
+        assert_eq!(got.frames[0][14], Some([0.5, 1.75, -0.25]));
     }
 
     #[test]

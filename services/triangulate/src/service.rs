@@ -6,7 +6,9 @@ use std::sync::Arc;
 use fmp::Pose;
 use messages::{PairPose, ViewPose, topic};
 use multiview::{FrontEvidence, ViewPlan};
-use pipeline::{PairResult, Skeleton, SkeletonStep, ViewResult, Views};
+use pipeline::{
+    ExtraKeypoint, ExtrasStep, FoundExtras, PairResult, Skeleton, SkeletonStep, ViewResult, Views,
+};
 use runtime::{ExitKind, Failure, OrFail as _, Service};
 use stage::{Frame, Item, Stage};
 use wire::WireError;
@@ -21,6 +23,8 @@ pub struct Job {
     /// The pairs of the deployment; if all views are solved at once: the first view with each other one. They are assigned
     /// to the workers in turn.
     pub pairs: Vec<[usize; 2]>,
+    /// Triangulates the extra keypoints.
+    pub extras: ExtrasStep,
     /// Number of fusion workers.
     pub n_workers: usize,
     /// Processes that receive the result.
@@ -43,7 +47,13 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
             let front = wire::front_from_message(pose, candidates.len())?;
-            Ok(Input::Candidates(candidates, front))
+            let extras =
+                wire::extras_from_message(pose, job.extras.n_keypoints(), candidates.len())?;
+            Ok(Input::Candidates(Found {
+                candidates,
+                front,
+                extras,
+            }))
         })?;
     }
     let pairs = stage.pair_inputs(job.n_workers, job.pairs.len(), |pair| {
@@ -54,16 +64,20 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
         let pairs: Vec<PairInput> = (pairs..pairs + job.pairs.len())
             .filter_map(|slot| match frame.take(slot)?.value {
                 Input::Pair(pair) => Some(*pair),
-                Input::Candidates(..) => None,
+                Input::Candidates(_) => None,
             })
             .collect();
-        let views = view_answers(frame, n_views, &pairs);
+        let (views, found) = view_answers(frame, n_views, &pairs);
         let present = (0..n_views).filter(|view| views[*view].is_some());
         let views_present = present.fold(0, |mask, view| mask | 1_u32 << view);
         let skeleton = skeleton(job.views, &views, pairs, &mut step);
         let n_people = skeleton.people.len() as u32;
         service.health().counted_people(n_people);
-        let message = wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
+        let mut message =
+            wire::skeleton_to_message(&skeleton, views_present).or_fail(ExitKind::Run)?;
+        let found = found_extras(&views, &found);
+        let keypoints = job.extras.run(&skeleton, &found);
+        wire::keypoints_to_message(&mut message, &keypoints).or_fail(ExitKind::Run)?;
         skeletons.send_and_account(frame.turn(), 0, message)
     })
 }
@@ -71,9 +85,18 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
 /// A decoded message.
 #[derive(Debug)]
 enum Input {
-    /// With what their pictures say about the direction in which they face.
-    Candidates(Vec<Pose>, Vec<FrontEvidence>),
+    Candidates(Found),
     Pair(Box<PairInput>),
+}
+
+/// What a view found.
+#[derive(Debug)]
+struct Found {
+    candidates: Vec<Pose>,
+    /// What their pictures say about the direction in which they face.
+    front: Vec<FrontEvidence>,
+    /// The extra keypoints of one candidate after the other.
+    extras: Vec<ExtraKeypoint>,
 }
 
 /// The poses of a pair, and the expected errors of both views that its worker used.
@@ -99,33 +122,49 @@ fn decode_pair(job: &Job, message: &PairPose) -> Result<PairInput, WireError> {
     })
 }
 
-/// The single-view poses with the expected errors that fusion used: the latest if workers used different ones.
+/// The single-view poses with the expected errors that fusion used (the latest if workers used different ones), and the extra
+/// keypoints of every view.
 fn view_answers(
     frame: &mut Frame<'_, Input>,
     n_views: usize,
     pairs: &[PairInput],
-) -> Vec<Option<ViewResult>> {
-    let answer = |view: usize| {
+) -> (Vec<Option<ViewResult>>, Vec<Vec<ExtraKeypoint>>) {
+    let mut answer = |view: usize| {
         let Some(Item {
-            value: Input::Candidates(candidates, front),
+            value: Input::Candidates(found),
             ..
         }) = frame.take(view)
         else {
-            return None;
+            return (None, Vec::new());
         };
         let of_view = pairs.iter().filter_map(|pair| {
             let side = pair.views.iter().position(|other| *other == view)?;
             pair.sigma_px[side].as_ref()
         });
         let latest = of_view.min_by_key(|(age, _)| *age);
-        (!candidates.is_empty()).then(|| ViewResult {
-            candidates,
-            front,
+        let result = (!found.candidates.is_empty()).then(|| ViewResult {
+            candidates: found.candidates,
+            front: found.front,
             sigma_px: latest.map(|(_, sigma_px)| sigma_px.clone()),
             tau_px: None,
+        });
+        (result, found.extras)
+    };
+    (0..n_views).map(&mut answer).unzip()
+}
+
+/// The candidates of every view with their extra keypoints.
+fn found_extras<'a>(
+    views: &'a [Option<ViewResult>],
+    extras: &'a [Vec<ExtraKeypoint>],
+) -> Vec<Option<FoundExtras<'a>>> {
+    let found = |(view, extras): (&'a Option<ViewResult>, &'a Vec<ExtraKeypoint>)| {
+        Some(FoundExtras {
+            candidates: &view.as_ref()?.candidates,
+            extras,
         })
     };
-    (0..n_views).map(answer).collect()
+    views.iter().zip(extras).map(found).collect()
 }
 
 /// The skeleton from the fused and the single-view poses. A pair is used only if the single-view poses of both views were

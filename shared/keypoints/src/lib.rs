@@ -31,7 +31,8 @@ pub use card::{
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
 pub use detector::{Boxes, DetectorCard, PersonBox};
 pub use names::{
-    BODY_25, BODY_25B, COCO_17, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS, joint_rows,
+    BODY_25, BODY_25B, COCO_17, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS, is_joint, joint_rows,
+    mirrored,
 };
 pub use shipped::SHIPPED;
 pub use window::{Window, outline};

@@ -212,6 +212,20 @@ pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     PARSE14.joints.iter().map(|it| joint(it.name)).collect()
 }
 
+/// Whether a keypoint is a joint of `skeleton::PARSE14` by its name; all others are extra keypoints.
+pub fn is_joint(name: &str) -> bool {
+    name == "head top" || PARSE14.joints.iter().any(|it| it.name == name)
+}
+
+/// The name on the other side of the body: `left heel` of `right heel`; `None` for a name without a side.
+pub fn mirrored(name: &str) -> Option<String> {
+    let other = |from: &str, to: &str| {
+        let rest = name.strip_prefix(from)?;
+        Some(format!("{to}{rest}"))
+    };
+    other("left", "right").or_else(|| other("right", "left"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,6 +265,24 @@ mod tests {
         let joints = PARSE14.joints.iter().map(|it| it.name);
         let same = joints.zip(LSP_14).filter(|(a, b)| a == b).count();
         assert_eq!(same, 13, "all but the name of the top of the head");
+    }
+
+    #[test]
+    fn keypoints_that_are_no_joints_are_extra() {
+        let extra = |names: &[&'static str]| -> Vec<&str> {
+            let names = names.iter().copied();
+            names.filter(|it| !is_joint(it)).collect()
+        };
+        assert_eq!(extra(&LSP_14), [""; 0]);
+        assert_eq!(extra(&COCO_17), COCO_17[..5]);
+        assert_eq!(extra(&HALPE_26)[5..], HALPE_26[19..]);
+    }
+
+    #[test]
+    fn a_name_with_a_side_has_one_on_the_other() {
+        assert_eq!(mirrored("left heel").as_deref(), Some("right heel"));
+        assert_eq!(mirrored("right_hand_3").as_deref(), Some("left_hand_3"));
+        assert_eq!(mirrored("nose"), None);
     }
 
     #[test]

@@ -38,6 +38,10 @@ pub const MAX_VIEWS: usize = 16;
 pub const MAX_CANDIDATES: usize = 8;
 /// Largest number of joints of a joint set.
 pub const MAX_JOINTS: usize = 32;
+/// Largest number of extra keypoints of a person: those of networks beside the joints.
+pub const MAX_KEYPOINTS: usize = 128;
+/// Largest number of extra keypoints of all candidates of a view.
+pub const MAX_VIEW_KEYPOINTS: usize = 384;
 /// Largest number of levels of a pyramid (96 is enough for 15 000 pixels at ten levels per octave).
 pub const MAX_LEVELS: usize = 96;
 
@@ -48,12 +52,12 @@ const _: () = {
     assert!(size_of::<EvidenceHeader>() == 1088);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
-    assert!(size_of::<ViewPose>() == 1872);
+    assert!(size_of::<ViewPose>() == 1872 + MAX_VIEW_KEYPOINTS * 12);
     assert!(size_of::<ViewQuality>() == 344);
     assert!(size_of::<PairPose>() == 1064);
     assert!(size_of::<Joint3d>() == 88);
     assert!(size_of::<FusedView>() == 544);
-    assert!(size_of::<Pose3d>() == 11640);
+    assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
     assert!(size_of::<Metrics>() == 176 + MAX_ROWS * 56);

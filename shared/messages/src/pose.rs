@@ -1,9 +1,10 @@
 //! Poses in one view and in pairs of views.
 
+use bytemuck::Zeroable as _;
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_CANDIDATES, MAX_PARTS, Stamp, Status, Timing};
+use crate::{MAX_CANDIDATES, MAX_PARTS, MAX_VIEW_KEYPOINTS, Stamp, Status, Timing};
 
 /// One pose: `fmp::Pose`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -63,8 +64,8 @@ impl Searched {
 }
 
 /// The single-view result: distinct candidates, best first.
-#[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v4")]
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
+#[type_name("ViewPose.v5")]
 #[repr(C)]
 pub struct ViewPose {
     /// The frame and the view.
@@ -83,8 +84,8 @@ pub struct ViewPose {
     pub evidence_bytes: u64,
     /// What was searched.
     pub searched: Searched,
-    /// Explicit padding.
-    pub reserved: u32,
+    /// Number of extra keypoints of a candidate, as many as all views of the deployment know together.
+    pub n_keypoints: u32,
     /// The candidates.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
     /// Local scores of the parts of the first candidate.
@@ -93,6 +94,15 @@ pub struct ViewPose {
     /// `multiview::FrontEvidence`, `[towards the right of the picture, towards the camera]`; zeros where
     /// there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
+    /// The extra keypoints of one candidate after the other, for as many candidates as there is room: `[column, row, standard
+    /// deviation along one axis]`, pixels of the frame; a deviation of 0 for one that was not found.
+    pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],
+}
+
+impl Default for ViewPose {
+    fn default() -> Self {
+        Self::zeroed()
+    }
 }
 
 /// The result of a pair of views under one assumption about facing.

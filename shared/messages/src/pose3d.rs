@@ -3,7 +3,7 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
+use crate::{MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEWS, Stamp, Status, Timing};
 
 /// One joint in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
@@ -95,7 +95,7 @@ impl Kept {
 
 /// The skeleton of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Pose3d.v2")]
+#[type_name("Pose3d.v3")]
 #[repr(C)]
 pub struct Pose3d {
     /// The frame; `view` is 0.
@@ -129,10 +129,12 @@ pub struct Pose3d {
     pub kept: Kept,
     /// Number of people that several views agree on; 0 if it was not counted.
     pub n_people: u32,
-    /// Explicit padding.
-    pub reserved: u32,
+    /// Number of valid extra keypoints.
+    pub n_keypoints: u32,
     /// The joints.
     pub joints: [Joint3d; MAX_JOINTS],
     /// The views.
     pub views: [FusedView; MAX_VIEWS],
+    /// What networks name beside the joints, as the deployment numbers it; nothing holds them together.
+    pub keypoints: [Joint3d; MAX_KEYPOINTS],
 }

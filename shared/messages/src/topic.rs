@@ -12,7 +12,7 @@ pub fn frame(view: usize) -> String {
 /// Single-view candidates of a view: [`ViewPose`](crate::ViewPose).
 #[must_use]
 pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v4/{view}")
+    format!("view-pose/v5/{view}")
 }
 
 /// Response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
@@ -36,7 +36,7 @@ pub fn pair_pose(worker: usize) -> String {
 /// The result: [`Pose3d`](crate::Pose3d).
 #[must_use]
 pub fn pose3d() -> String {
-    "pose3d/v2".to_owned()
+    "pose3d/v3".to_owned()
 }
 
 /// Heartbeats of a process: [`Health`](crate::Health).

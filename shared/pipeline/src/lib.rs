@@ -6,6 +6,7 @@
 
 mod bodies;
 mod disagreement;
+mod extras;
 mod following;
 mod fuse_step;
 mod fused;
@@ -23,6 +24,7 @@ mod estimate;
 
 pub use bodies::{Body, NoJoint};
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
+pub use extras::{ExtrasStep, FoundExtras};
 pub use following::{Follow, Following, Others};
 pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
@@ -33,5 +35,5 @@ pub use people::{Person, people};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use space_step::{SpaceResult, SpaceStep};
-pub use view_result::ViewResult;
+pub use view_result::{ExtraKeypoint, ViewResult};
 pub use view_step::{EvidenceWindow, ViewEstimate, ViewSettings, ViewStep};

@@ -15,6 +15,7 @@ use posenetwork::{
     outline_of_parts, overlap,
 };
 
+use crate::view_result::ExtraKeypoint;
 use crate::view_step::{ViewEstimate, ViewStep};
 
 /// What tells where the joints of people are.
@@ -66,6 +67,8 @@ impl Default for NetworkSettings {
 const SAME: f64 = 0.5;
 /// People half of whose joints are nearer to each other, as a share of the height of the network's window, are one.
 const TWIN: f64 = 0.05;
+/// Least score of an extra keypoint: below it, its place is a guess (0.3 is what mmpose and `Pose2Sim` use).
+const LEAST_SCORE: f64 = 0.3;
 /// Most response values of a frame; the cells of the evidence become larger rather than more.
 pub const MOST_VALUES: usize = 1 << 20;
 
@@ -76,6 +79,7 @@ pub struct NetworkStep {
     solver: Solver,
     layout: Arc<Layout>,
     settings: NetworkSettings,
+    extras: Vec<Option<usize>>,
 }
 
 /// What the step keeps from frame to frame: memory that is used again, and the boxes of the people it sees.
@@ -126,7 +130,16 @@ impl NetworkStep {
             solver,
             layout,
             settings,
+            extras: Vec::new(),
         }
+    }
+
+    /// The step with keypoints that no joint follows from: they are told of every candidate.
+    ///
+    /// * `extras`: of every wanted keypoint its number in the order of the card or of the file; `None` where these do not know it.
+    #[must_use]
+    pub fn with_extras(self, extras: Vec<Option<usize>>) -> Self {
+        Self { extras, ..self }
     }
 
     /// The pyramid of the evidence.
@@ -300,14 +313,14 @@ impl NetworkStep {
     ) -> ViewEstimate {
         let level = scope.levels().start;
         let n_seen = memory.n_seen;
-        let mut candidates: Vec<Pose> = Vec::with_capacity(n_seen);
+        let mut found: Vec<(Pose, usize)> = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             if nth == 0 {
                 seen.maps.fill(&self.layout, &scope, responses);
             } else {
                 seen.maps.raise(&self.layout, &scope, responses);
             }
-            let found = if n_seen == 1 && seen.level == level {
+            let pose = if n_seen == 1 && seen.level == level {
                 self.best(responses, scope)
             } else {
                 let Seen {
@@ -315,12 +328,17 @@ impl NetworkStep {
                 } = seen;
                 maps.pose(&self.solver, &self.layout, responses)
             };
-            if let Some(pose) = found {
+            if let Some(pose) = pose {
                 memory.outlines.extend(self.outline(&pose));
-                candidates.push(self.at_level(pose, &scope));
+                found.push((self.at_level(pose, &scope), nth));
             }
         }
-        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
+        let extras = found
+            .iter()
+            .flat_map(|(_, nth)| self.extras_of(&memory.seen[*nth].maps));
+        let extras: Vec<ExtraKeypoint> = extras.collect();
+        let candidates: Vec<Pose> = found.into_iter().map(|it| it.0).collect();
         let best = candidates.first();
         let local = best.map(|pose| {
             let levels = [level];
@@ -331,10 +349,21 @@ impl NetworkStep {
             local: local.unwrap_or_default(),
             candidates,
             front: Vec::new(),
+            extras,
             levels: vec![level],
             bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),
             scope,
         }
+    }
+
+    /// The extra keypoints of a person.
+    fn extras_of(&self, maps: &JointMaps) -> impl Iterator<Item = ExtraKeypoint> {
+        let each = self.extras.iter();
+        each.map(|it| {
+            let (found, sigma_px) = it.and_then(|it| maps.keypoint(it))?;
+            let is_seen = found.score >= LEAST_SCORE;
+            is_seen.then_some((found.at, sigma_px))
+        })
     }
 
     fn best(&self, responses: &[f32], scope: Scope) -> Option<Pose> {

@@ -229,7 +229,10 @@ pub(crate) struct Seen {
 }
 
 /// Reorders the observations of a joint by the views of the rig.
-fn by_view(mut triangulated: Triangulated, views: impl Iterator<Item = usize>) -> Triangulated {
+pub(crate) fn by_view(
+    mut triangulated: Triangulated,
+    views: impl Iterator<Item = usize>,
+) -> Triangulated {
     let (used, residuals) = (triangulated.views_used, triangulated.residuals_px);
     triangulated.views_used = 0;
     triangulated.residuals_px.fill(f64::NAN);

@@ -11,6 +11,8 @@ use kernels::{NoAmx, Rgb8View};
 use multiview::FrontEvidence;
 use orientation::Detector;
 
+use crate::view_result::ExtraKeypoint;
+
 /// Which levels of the pyramid a view offers as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EvidenceWindow {
@@ -73,6 +75,8 @@ pub struct ViewEstimate {
     /// What the picture says about the direction in which the person of every candidate faces; empty: nothing was
     /// asked.
     pub front: Vec<FrontEvidence>,
+    /// Keypoints that no joint follows from, of one candidate after the other: of each as many as were asked for.
+    pub extras: Vec<ExtraKeypoint>,
     /// Levels whose responses are offered as evidence, ascending.
     pub levels: Vec<u16>,
     /// How well each part of the best pose fits at its position; empty without a pose.
@@ -153,6 +157,7 @@ impl ViewStep {
         let levels = self.settings.window.levels(scope.levels(), &candidates);
         ViewEstimate {
             front: self.front(image, &candidates),
+            extras: Vec::new(),
             candidates,
             local: local.unwrap_or_default(),
             levels,

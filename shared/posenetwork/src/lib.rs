@@ -10,6 +10,7 @@ mod alone;
 mod between;
 mod detector;
 mod expected;
+mod found;
 mod maps;
 mod network;
 mod outline;

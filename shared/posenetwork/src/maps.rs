@@ -1,10 +1,12 @@
 //! The maps of the skeleton's joints, as logarithms: the evidence that a network gives.
 
 use fmp::{Layout, Placement, Scope};
-use keypoints::{Codec, Keypoint, Score, Window, joint_rows};
+use keypoints::{Codec, Keypoint, Window, joint_rows};
 use skeleton::PARSE14;
 
 use crate::between::{Tap, between};
+use crate::expected::expected_error;
+use crate::found::{derived, likelihood, score_of, weighted};
 use crate::network::{LookError, Read, Sight};
 
 /// Number of joints, each with a map.
@@ -66,6 +68,10 @@ pub struct JointMaps {
     window: Option<Window>,
     /// Where each joint's map is highest, pixels of the picture, and its heat there from 0 to 1.
     peaks: Vec<Option<Keypoint>>,
+    /// All keypoints, pixels of the picture; scores as those of the peaks.
+    keypoints: Vec<Option<Keypoint>>,
+    /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` where the heat tells it.
+    sigma_px: Option<f64>,
     /// Across and down: between which cells those of a layout lie.
     taps: [Vec<Tap>; 2],
 }
@@ -78,8 +84,6 @@ const BOX_MARGIN: f64 = 1.25;
 const MOST_ROWS: usize = 64;
 /// Least standard deviation on such a grid, cells: a narrower one would be lost between two.
 const LEAST_SIGMA: f64 = 1.0;
-/// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
-const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
 
 impl JointMaps {
     /// Reads what a network sees.
@@ -113,6 +117,11 @@ impl JointMaps {
         self.values
             .resize(N_JOINTS * self.rows * self.columns, self.floor);
         self.peaks.clear();
+        self.keypoints.clear();
+        self.sigma_px = None;
+        let each = 0..keypoints.len();
+        self.keypoints
+            .extend(each.map(|it| Some(derived(&[(it, 1.0)], &keypoints, sight))));
         for (joint, row) in rows.iter().enumerate() {
             let peak = row.as_ref().map(|row| derived(row, &keypoints, sight));
             self.peaks.push(peak);
@@ -156,9 +165,13 @@ impl JointMaps {
         self.values.resize(n_values, self.floor);
         self.peaks.clear();
         self.peaks.resize(N_JOINTS, None);
+        self.keypoints.clear();
+        self.keypoints.extend_from_slice(keypoints);
         let Some(window) = self.window else {
             return false;
         };
+        let [_, top, _, bottom] = self.extent();
+        self.sigma_px = Some(sigma * (bottom - top));
         let sigma = (sigma * self.rows as f64).max(LEAST_SIGMA);
         for (joint, row) in rows.iter().enumerate().take(N_JOINTS) {
             let found = |at: usize| keypoints[at].filter(|it| it.score > 0.0);
@@ -235,6 +248,19 @@ impl JointMaps {
         }
     }
 
+    /// A keypoint as the network or the other program found it, and the standard deviation of its place along one axis, both pixels of
+    /// the picture: by the score as of the joints ([`expected_error`]), or by the `sigma` of [`Self::of_keypoints`]. `None` for one that
+    /// was not found, and where nobody was looked at.
+    ///
+    /// * `keypoint`: its number in the order of the card or of the file.
+    pub fn keypoint(&self, keypoint: usize) -> Option<(Keypoint, f64)> {
+        let found = self.keypoints.get(keypoint).copied().flatten()?;
+        self.window?;
+        let [_, top, _, bottom] = self.extent();
+        let by_heat = || expected_error(found.score) * (bottom - top);
+        Some((found, self.sigma_px.unwrap_or_else(by_heat)))
+    }
+
     /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that its
     /// keypoints do not tell.
     pub fn peaks(&self) -> &[Option<Keypoint>] {
@@ -304,7 +330,7 @@ impl JointMaps {
         self.floor
     }
 
-    /// Exchanges what the network calls left and right.
+    /// Exchanges what the network calls left and right of the joints; [`Self::keypoint`] stays as it is.
     pub fn exchange_sides(&mut self) {
         let area = self.rows * self.columns;
         for [right, left] in skeleton::SIDES {
@@ -318,7 +344,8 @@ impl JointMaps {
     /// Moves everything in the picture, pixels.
     pub fn shift(&mut self, by: [f64; 2]) {
         self.window = self.window.map(|it| it.shifted(by));
-        for peak in self.peaks.iter_mut().flatten() {
+        let keypoints = self.keypoints.iter_mut();
+        for peak in self.peaks.iter_mut().chain(keypoints).flatten() {
             peak.at = [peak.at[0] + by[0], peak.at[1] + by[1]];
         }
     }
@@ -428,61 +455,6 @@ enum Write {
     Over,
     /// Where they are higher than others.
     Highest,
-}
-
-/// A joint as a weighted sum of keypoints; its score is the lowest of theirs.
-fn derived(row: &[(usize, f64)], keypoints: &[Keypoint], sight: &Sight<'_>) -> Keypoint {
-    let mut peak = weighted(row, |it| Some(keypoints[it])).unwrap_or(NOWHERE);
-    if let (Ok(Read::SimCc(simcc)), [(keypoint, _)]) = (sight.read(), row) {
-        let axis_peak = |axis| {
-            let values = likelihood(simcc.axis(*keypoint, axis), axis, sight);
-            values.into_iter().fold(0.0, f64::max)
-        };
-        peak.score = axis_peak(0) * axis_peak(1);
-    }
-    peak
-}
-
-/// What a row without keypoints would be.
-const NOWHERE: Keypoint = Keypoint {
-    at: [0.0; 2],
-    score: 0.0,
-};
-
-/// A weighted sum of keypoints; its score is the lowest of theirs. `None` where one of them was not found.
-fn weighted(row: &[(usize, f64)], found: impl Fn(usize) -> Option<Keypoint>) -> Option<Keypoint> {
-    let mut sum = Keypoint {
-        score: f64::INFINITY,
-        ..NOWHERE
-    };
-    for &(keypoint, weight) in row {
-        let it = found(keypoint)?;
-        sum.at = [sum.at[0] + weight * it.at[0], sum.at[1] + weight * it.at[1]];
-        sum.score = sum.score.min(it.score);
-    }
-    Some(sum)
-}
-
-/// The likelihood along an axis, as a share of what a label of the published width would give at its middle, at most 1.
-fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<f64> {
-    let nats = match sight.network().card().output {
-        Codec::Simcc { nats, .. } => nats,
-        _ => 1.0,
-    };
-    let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let each = values.iter().map(|it| (nats * f64::from(it - most)).exp());
-    let each: Vec<f64> = each.collect();
-    let sum: f64 = each.iter().sum();
-    let of_label = 1.0 / (SIMCC_SIGMA[axis] * core::f64::consts::TAU.sqrt());
-    let share = |it: f64| (it / sum / of_label).min(1.0);
-    each.into_iter().map(share).collect()
-}
-
-fn score_of(sight: &Sight<'_>) -> Score {
-    match sight.network().card().output {
-        Codec::HeatMap { score, .. } | Codec::Keypoints { score, .. } => score,
-        Codec::Simcc { .. } => Score::Share,
-    }
 }
 
 #[cfg(test)]

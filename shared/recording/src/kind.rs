@@ -55,6 +55,13 @@ impl Kind {
         })
     }
 
+    /// Whether a topic is one of these in another version.
+    pub fn is_of_another_version(name: &str) -> bool {
+        let base = |name: &str| name.split('/').next().map(str::to_owned);
+        let is_ours = |kind: &Self| base(&kind.example()) == base(name);
+        Self::of_topic(name).is_none() && Self::ALL.iter().any(is_ours)
+    }
+
     /// A topic of this kind.
     fn example(self) -> String {
         match self {
@@ -212,6 +219,15 @@ mod tests {
     }
 
     #[test]
+    fn a_topic_of_another_version_is_told_from_a_foreign_one() {
+        assert!(Kind::is_of_another_version("view-pose/v4/0"));
+        assert!(Kind::is_of_another_version("pose3d/v2"));
+        for other in ["view-pose/v5/0", "pose3d/v3", "metrics/v0/a", "camera"] {
+            assert!(!Kind::is_of_another_version(other), "{other}");
+        }
+    }
+
+    #[test]
     fn the_kind_follows_from_the_topic_and_unknown_topics_have_none() {
         for kind in Kind::ALL {
             assert_eq!(Kind::of_topic(&kind.example()), Some(kind));
@@ -222,7 +238,7 @@ mod tests {
             "frame/v2/0",
             "frame/v1",
             "pose3d/v1",
-            "pose3d/v2/0",
+            "pose3d/v3/0",
             "pose3d",
             "",
             "/",

@@ -25,6 +25,9 @@ pub struct FrameLine {
     /// line without a result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kept: Option<Kept>,
+    /// What networks name beside the joints (face, feet, hands), by name; each is triangulated by itself. None without such networks.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub keypoints: BTreeMap<String, JointLine>,
     /// Pairs of views that have a part in the result.
     pub pairs: u32,
     /// How many people the views agree on, of whom one is followed; none in a line without a result, and where the model is

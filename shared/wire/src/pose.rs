@@ -1,8 +1,12 @@
 //! Poses and the candidates of a view.
 
 use fmp::{Layout, LocalScore, Model, Placement, Pose};
-use messages::{LocalMessage, MAX_CANDIDATES, MAX_PARTS, PoseMessage, Status, ViewPose};
+use messages::{
+    LocalMessage, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, PoseMessage,
+    Status, ViewPose,
+};
 use multiview::FrontEvidence;
+use pipeline::ExtraKeypoint;
 
 use crate::WireError;
 use crate::error::{count, equal, finite, index};
@@ -155,6 +159,70 @@ fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvide
     Ok(evidence)
 }
 
+/// Adds the extra keypoints of the candidates, as far as there is room for whole candidates.
+///
+/// * `n`: extra keypoints of a candidate.
+///
+/// # Errors
+///
+/// [`WireError`] if a candidate has more than [`MAX_KEYPOINTS`], or a number is not finite.
+pub fn extras_to_message(
+    message: &mut ViewPose,
+    n: usize,
+    extras: &[ExtraKeypoint],
+) -> Result<(), WireError> {
+    message.n_keypoints = count("n_keypoints", n, MAX_KEYPOINTS)? as u32;
+    let n_sent = room_of(n).min(extras.len());
+    for (entry, (slot, it)) in message
+        .keypoints
+        .iter_mut()
+        .zip(&extras[..n_sent])
+        .enumerate()
+    {
+        if let Some(([x, y], sigma)) = it {
+            *slot = [*x as f32, *y as f32, *sigma as f32];
+            checked_extra(entry, slot)?;
+        }
+    }
+    Ok(())
+}
+
+/// How many entries are of whole candidates of `n` extra keypoints.
+fn room_of(n: usize) -> usize {
+    MAX_VIEW_KEYPOINTS - MAX_VIEW_KEYPOINTS % n.max(1)
+}
+
+/// Reads the extra keypoints of the candidates, one candidate after the other; those of the last ones may be missing.
+///
+/// * `n`: extra keypoints of a candidate, as the deployment has them.
+/// * `n_candidates`: of the message.
+///
+/// # Errors
+///
+/// [`WireError`] if there are as many as another deployment has, or a number is not finite.
+pub fn extras_from_message(
+    message: &ViewPose,
+    n: usize,
+    n_candidates: usize,
+) -> Result<Vec<ExtraKeypoint>, WireError> {
+    if n_candidates == 0 {
+        return Ok(Vec::new());
+    }
+    equal("n_keypoints", message.n_keypoints as usize, n)?;
+    let n_candidates = count("n_candidates", n_candidates, MAX_CANDIDATES)?;
+    let n_sent = (n * n_candidates).min(room_of(n));
+    let sent = message.keypoints[..n_sent].iter().enumerate();
+    sent.map(|(entry, it)| checked_extra(entry, it)).collect()
+}
+
+fn checked_extra(entry: usize, it: &[f32; 3]) -> Result<ExtraKeypoint, WireError> {
+    let [x, y, sigma] = it.map(f64::from);
+    for number in [x, y, sigma] {
+        finite("keypoints", entry, number)?;
+    }
+    Ok((sigma > 0.0).then_some(([x, y], sigma)))
+}
+
 /// Adds the local scores of the parts of the first candidate.
 ///
 /// # Errors
@@ -212,6 +280,23 @@ mod tests {
 
     use super::*;
     use crate::testing::{any_pose, layout, model, pose_message};
+
+    #[test]
+    fn extra_keypoints_of_whole_candidates_survive_a_round_trip() {
+        let extras: Vec<ExtraKeypoint> = (0..500_u32)
+            .map(|it| (it % 3 > 0).then_some(([f64::from(it), 2.0], 0.5)))
+            .collect();
+        let mut message = ViewPose::default();
+        extras_to_message(&mut message, 100, &extras).unwrap();
+        let back = extras_from_message(&message, 100, 5).unwrap();
+        assert_eq!(back, extras[..300], "there is room for three");
+        assert_eq!(extras_from_message(&message, 100, 0).unwrap(), []);
+        assert_eq!(extras_from_message(&message, 100, 2).unwrap().len(), 200);
+        extras_from_message(&message, 99, 5).unwrap_err();
+        message.keypoints[1][2] = f32::NAN;
+        extras_from_message(&message, 100, 5).unwrap_err();
+        extras_to_message(&mut message, MAX_KEYPOINTS + 1, &extras).unwrap_err();
+    }
 
     proptest! {
         #[test]

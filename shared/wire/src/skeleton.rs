@@ -2,8 +2,8 @@
 
 use geometry::Triangulated;
 use messages::{
-    FusedView, Joint3d, Kept, MAX_JOINTS, MAX_PARTS, MAX_VIEWS, Pose3d, Sides, Stamp, Status,
-    Timing,
+    FusedView, Joint3d, Kept, MAX_JOINTS, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEWS, Pose3d, Sides,
+    Stamp, Status, Timing,
 };
 use pipeline::{NoJoint, Skeleton};
 
@@ -56,6 +56,22 @@ pub fn skeleton_to_message(skeleton: &Skeleton, views_present: u32) -> Result<Po
     Ok(message)
 }
 
+/// Adds the extra keypoints.
+///
+/// # Errors
+///
+/// [`WireError::TooMany`] if there are more than fit.
+pub fn keypoints_to_message(
+    message: &mut Pose3d,
+    keypoints: &[Result<Triangulated, NoJoint>],
+) -> Result<(), WireError> {
+    message.n_keypoints = count("n_keypoints", keypoints.len(), MAX_KEYPOINTS)? as u32;
+    for (slot, keypoint) in message.keypoints.iter_mut().zip(keypoints) {
+        *slot = joint_to_message(keypoint);
+    }
+    Ok(())
+}
+
 /// The end of stream of the results.
 pub fn end_of_results(session: u64) -> Pose3d {
     let mut message = empty();
@@ -81,7 +97,9 @@ pub fn check_pose3d(message: &Pose3d, n_views: usize, n_joints: usize) -> Result
             all_finite("centres", view.centres_px[..n].as_flattened())?;
         }
     }
-    for joint in &message.joints[..joints] {
+    let keypoints = count("n_keypoints", message.n_keypoints as usize, MAX_KEYPOINTS)?;
+    let keypoints = &message.keypoints[..keypoints];
+    for joint in message.joints[..joints].iter().chain(keypoints) {
         if joint.status == Status::OK {
             all_finite("in_world", &joint.in_world)?;
         }
@@ -116,9 +134,10 @@ fn empty() -> Pose3d {
         sides: Sides::AS_SEEN,
         kept: Kept::SOLVED,
         n_people: 0,
-        reserved: 0,
+        n_keypoints: 0,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
+        keypoints: [Joint3d::default(); MAX_KEYPOINTS],
     }
 }
 
@@ -248,6 +267,23 @@ mod tests {
         assert_eq!((got.views[0].exchanged, got.views[0].n_pairs), (1, 2));
         assert_eq!(got.views[1].status, Status::NO_DETECTION);
         check_pose3d(&got, 2, 3).unwrap();
+    }
+
+    #[test]
+    fn extra_keypoints_survive_a_round_trip_and_are_checked() {
+        let mut got = skeleton_to_message(&skeleton(), 0b11).unwrap();
+        let extras = [skeleton().joints[0], skeleton().joints[2]];
+        keypoints_to_message(&mut got, &extras).unwrap();
+        assert_eq!(got.n_keypoints, 2);
+        assert_eq!(got.keypoints[0].in_world, [0.1, 0.2, 0.3]);
+        assert_eq!(got.keypoints[1].status, Status::IMPLAUSIBLE);
+        check_pose3d(&got, 2, 3).unwrap();
+        got.keypoints[0].in_world[1] = f64::NAN;
+        check_pose3d(&got, 2, 3).unwrap_err();
+        got.n_keypoints = u32::MAX;
+        check_pose3d(&got, 2, 3).unwrap_err();
+        let many = vec![extras[0]; MAX_KEYPOINTS + 1];
+        keypoints_to_message(&mut got, &many).unwrap_err();
     }
 
     #[test]

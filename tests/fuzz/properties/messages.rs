@@ -9,9 +9,9 @@ use fmp::{
 use geometry::{Camera, Intrinsics, Lens};
 use kernels::Rgb8View;
 use messages::{
-    EvidenceHeader, FrameHeader, FusedView, Joint3d, Kept, MAX_CANDIDATES, MAX_JOINTS, MAX_LEVELS,
-    MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Sides, Stamp, Status, Timing, ViewPose,
-    ViewQuality,
+    EvidenceHeader, FrameHeader, FusedView, Joint3d, Kept, MAX_CANDIDATES, MAX_JOINTS,
+    MAX_KEYPOINTS, MAX_LEVELS, MAX_PARTS, MAX_VIEWS, PairPose, Pose3d, PoseMessage, Sides, Stamp,
+    Status, Timing, ViewPose, ViewQuality,
 };
 use multiview::{Settings, ViewPlan};
 use nalgebra::Isometry3;
@@ -226,10 +226,12 @@ fn frame(input: &[u8]) {
 /// Candidates as they come, changed.
 fn view_pose(input: &[u8]) -> ViewPose {
     let mut message = wire::candidates_to_message(&[pose(), pose()], SIZE).expect("they fit");
+    let extras = [Some(([3.0, 4.0], 1.0)), None, Some(([5.0, 6.0], 2.0)), None];
+    wire::extras_to_message(&mut message, 2, &extras).expect("they fit");
     for it in Change::all(input) {
         let candidate = it.value.to_le_bytes()[7];
         let candidate = &mut message.candidates[usize::from(candidate) % MAX_CANDIDATES];
-        match it.field % 13 {
+        match it.field % 15 {
             field @ 0..6 => change_pose(candidate, field, it),
             6 => message.status = Status(it.value as u32),
             7 => message.n_candidates = it.value as u32,
@@ -237,6 +239,8 @@ fn view_pose(input: &[u8]) -> ViewPose {
             9 => message.height = it.value as u32,
             10 => message.local[it.of(MAX_PARTS)].margin = it.float(),
             11 => message.front[it.of(MAX_CANDIDATES)][1] = it.float(),
+            12 => message.n_keypoints = it.value as u32,
+            13 => message.keypoints[it.of(4)][it.of(3)] = it.float(),
             _ => change_stamp(&mut message.stamp, &mut message.timing, it),
         }
     }
@@ -254,6 +258,15 @@ fn candidates(input: &[u8]) {
     }
     if let Ok(front) = wire::front_from_message(&message, message.n_candidates as usize) {
         assert!(front.as_flattened().iter().all(|it| it.is_finite()));
+    }
+    let extras = wire::extras_from_message(&message, 2, message.n_candidates as usize);
+    if let Ok(extras) = extras {
+        let found = extras.iter().flatten();
+        assert!(
+            found
+                .flat_map(|it| [it.0[0], it.0[1], it.1])
+                .all(f64::is_finite)
+        );
     }
     if let Ok(scores) = wire::local_from_message(&message, model.n_parts()) {
         assert!(scores.iter().all(|it| it.margin.is_finite()));
@@ -359,23 +372,28 @@ fn result(input: &[u8]) {
         sides: Sides::SURE,
         kept: Kept::SOLVED,
         n_people: 1,
-        reserved: 0,
+        n_keypoints: 2,
         joints: [Joint3d::default(); MAX_JOINTS],
         views: [FusedView::default(); MAX_VIEWS],
+        keypoints: [Joint3d::default(); MAX_KEYPOINTS],
     };
     for it in Change::all(input) {
-        match it.field % 6 {
+        match it.field % 8 {
             0 => message.n_joints = it.value as u32,
             1 => message.n_views = it.value as u32,
             2 => message.views[it.of(MAX_VIEWS)].n_parts = it.value as u32,
             3 => message.joints[it.of(MAX_JOINTS)].in_world[0] = it.double(),
             4 => message.views[it.of(MAX_VIEWS)].centres_px[0][1] = it.double(),
+            5 => message.n_keypoints = it.value as u32,
+            6 => message.keypoints[it.of(MAX_KEYPOINTS)].in_world[1] = it.double(),
             _ => message.status = Status(it.value as u32),
         }
     }
     if wire::check_pose3d(&message, 2, 14).is_ok() && message.status == Status::OK {
         assert_eq!((message.n_views, message.n_joints), (2, 14));
-        let joints = message.joints[..14].iter();
+        let keypoints = &message.keypoints[..message.n_keypoints as usize];
+        let found = keypoints.iter().filter(|it| it.status == Status::OK);
+        let joints = message.joints[..14].iter().chain(found);
         assert!(joints.flat_map(|it| it.in_world).all(f64::is_finite));
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use deployment::Deployment;
 use deployment::pose::Config;
 use fmp::Model;
+use keypoints::Card;
 use offline::network::{Library, NetworkFile};
 use posenetwork::{Detector, PoseNetwork};
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
@@ -45,6 +46,23 @@ pub fn pose_network(
     let library = library(&deployment.pose)?;
     let network = NetworkFile::open_with(file, card, &library)?;
     network.fitted().map(Some)
+}
+
+/// The names of the keypoints of a camera's network, as its card has them; none without a network or a card.
+///
+/// # Errors
+///
+/// The network or its card cannot be read.
+pub(crate) fn keypoint_names(
+    deployment: &Deployment,
+    camera: usize,
+) -> Result<Vec<String>, Failure> {
+    let Some((file, card)) = deployment.pose_network(camera) else {
+        return Ok(Vec::new());
+    };
+    let network = NetworkFile::open_with(file, card, &library(&deployment.pose)?)?;
+    let card = network.card().map(|it| &it.0);
+    Ok(card.map(Card::names).unwrap_or_default())
 }
 
 /// Loads the detector of a deployment, if it has one, and tries it once.

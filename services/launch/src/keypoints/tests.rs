@@ -89,6 +89,7 @@ fn footage_of_another_length_than_its_keypoints_is_told_with_both_numbers() {
             deployment: deployment(folder.path(), "source = 'b.mp4'\n", set),
             footage: vec![footage.clone(), footage],
             search_size: None,
+            extra_keypoints: Vec::new(),
             recording: None,
             replay: None,
         };

@@ -143,6 +143,7 @@ fn resolve(
         footage: recorded.footage,
         deployment,
         search_size,
+        extra_keypoints: recorded.extra_keypoints,
         recording: None,
         replay: Some(Replay {
             file: file.to_path_buf(),
@@ -222,7 +223,13 @@ fn check(
         file.display(),
         from.name()
     );
-    Err(Failure::new(ExitKind::Input, message))
+    let failure = Failure::new(ExitKind::Input, message);
+    Err(match recording.counts.keys().find(|it| Kind::is_of_another_version(it)) {
+        Some(topic) => failure.with_hint(format!(
+            "its messages of {topic} have another layout than those of this Parallax: replay it with the one that recorded it"
+        )),
+        None => failure,
+    })
 }
 
 /// The kinds of messages that the stages before `from` send, with their names for the user.

@@ -3,6 +3,7 @@
 use keypoints::{BODY_25, COCO_17};
 
 use super::*;
+use crate::found::NOWHERE;
 
 /// A person of 400 pixels height about column 300, with all scores 0.8; the neck is the second keypoint.
 fn person() -> Vec<Option<Keypoint>> {
@@ -54,6 +55,24 @@ fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
     let beside = maps.at(NECK, [neck.at[0] + 10.0, neck.at[1]]);
     let expected = (0.8 * (-0.5_f32).exp() + 0.02).ln();
     assert!((beside - expected).abs() < 0.05, "{beside} {expected}");
+}
+
+#[test]
+fn a_keypoint_that_is_no_joint_is_told_with_its_deviation() {
+    let mut keypoints = person();
+    let heel = BODY_25.iter().position(|it| *it == "left heel").unwrap();
+    let mut maps = maps(&keypoints);
+    let (found, sigma_px) = maps.keypoint(heel).unwrap();
+    assert_eq!(Some(found), keypoints[heel]);
+    assert!(
+        (sigma_px - 10.0).abs() < 1e-9,
+        "0.02 of the box of 500 pixels: {sigma_px}"
+    );
+    assert_eq!(maps.keypoint(25), None);
+    keypoints[heel] = None;
+    maps.of_keypoints(&keypoints, &rows(&BODY_25), &SETTINGS, 0.02);
+    assert_eq!(maps.keypoint(heel), None);
+    assert_eq!(JointMaps::default().keypoint(0), None);
 }
 
 #[test]

@@ -1,0 +1,230 @@
+//! Extra keypoints: what networks name beside the joints of the skeleton (face, feet, hands), triangulated beside it.
+//!
+//! The tree does not know them, so nothing holds them together: each is triangulated by itself, from the views in which it was found
+//! on the person whom fusion chose.
+
+use std::sync::Arc;
+
+use fmp::Pose;
+use geometry::{Observation, Settings, Triangulated};
+use keypoints::mirrored;
+use multiview::ViewPlan;
+use nalgebra::Point2;
+use skeleton::PARSE14;
+
+use crate::bodies::NoJoint;
+use crate::fused_view::FusedView;
+use crate::skeleton_step::Skeleton;
+use crate::space::by_view;
+use crate::view_result::ExtraKeypoint;
+
+/// A candidate that lies further from the fused pose than this is somebody else: the median distance of the joints, share of the
+/// longer side of the fused pose.
+const SAME: f64 = 0.1;
+/// A view that is further off than so many standard deviations is left out.
+const MOST_SIGMAS: f64 = 3.0;
+/// Least distance at which a view is left out, share of the longer side of the fused pose.
+const LEAST_REACH: f64 = 0.02;
+/// No keypoint of a person is further from every joint, metres.
+const MOST_FROM_JOINTS_M: f64 = 0.5;
+
+/// Pairs of joints of `skeleton::PARSE14`, right and left, by which a view's names of sides are told: knees and ankles, elbows and
+/// wrists, hips and shoulders.
+const LEGS: [[usize; 2]; 2] = [[1, 4], [0, 5]];
+const ARMS: [[usize; 2]; 2] = [[7, 10], [6, 11]];
+const TRUNK: [[usize; 2]; 2] = [[2, 3], [8, 9]];
+
+/// What one view found of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct FoundExtras<'a> {
+    /// Its candidates.
+    pub candidates: &'a [Pose],
+    /// The extra keypoints of one candidate after the other; those of the last ones may be missing.
+    pub extras: &'a [ExtraKeypoint],
+}
+
+/// An extra keypoint.
+#[derive(Debug)]
+struct Extra {
+    /// The number of the one on the other side; its own without a side.
+    mirror: usize,
+    /// The joints whose sides are its own.
+    sides: [[usize; 2]; 2],
+}
+
+/// Triangulates the extra keypoints of a rig.
+#[derive(Debug)]
+pub struct ExtrasStep {
+    plans: Vec<Arc<ViewPlan>>,
+    extras: Vec<Extra>,
+    triangulation: Settings,
+}
+
+/// The person's candidate in a view.
+struct Match<'a> {
+    view: usize,
+    extras: &'a [ExtraKeypoint],
+    /// Where the joints are in the candidate and after fusion, pixels of the frame.
+    joints: [Vec<[f64; 2]>; 2],
+    /// Longer side of the fused pose, pixels of the frame.
+    longer_px: f64,
+}
+
+impl ExtrasStep {
+    /// Prepares the step.
+    ///
+    /// * `names`: of the keypoints, as every view numbers them.
+    pub fn new(names: &[String], plans: Vec<Arc<ViewPlan>>, triangulation: Settings) -> Self {
+        let number = |name: &String| names.iter().position(|it| it == name);
+        let extra = |(own, name): (usize, &String)| Extra {
+            mirror: mirrored(name).and_then(|it| number(&it)).unwrap_or(own),
+            sides: sides_of(name),
+        };
+        Self {
+            extras: names.iter().enumerate().map(extra).collect(),
+            plans,
+            triangulation,
+        }
+    }
+
+    /// Number of extra keypoints of a person.
+    pub fn n_keypoints(&self) -> usize {
+        self.extras.len()
+    }
+
+    /// Triangulates the extra keypoints of a frame.
+    ///
+    /// * `views`: in the rig's order; `None` for a view without a result.
+    /// * Returns one entry for every name.
+    pub fn run(
+        &self,
+        skeleton: &Skeleton,
+        views: &[Option<FoundExtras<'_>>],
+    ) -> Vec<Result<Triangulated, NoJoint>> {
+        let each = views.iter().zip(&skeleton.views).enumerate();
+        let matches: Vec<Match<'_>> = each
+            .filter_map(|(view, (found, fused))| {
+                self.person(view, *found.as_ref()?, fused.as_ref()?)
+            })
+            .collect();
+        let of_extra = |extra: usize| {
+            let found = self.triangulate(extra, &matches)?;
+            let mut known = skeleton.joints.iter().flatten();
+            let is_near =
+                known.any(|it| (it.in_world - found.in_world).norm() < MOST_FROM_JOINTS_M);
+            is_near.then_some(found).ok_or(NoJoint::Implausible)
+        };
+        (0..self.extras.len()).map(of_extra).collect()
+    }
+
+    /// The candidate of a view that is the person.
+    fn person<'a>(
+        &self,
+        view: usize,
+        found: FoundExtras<'a>,
+        fused: &FusedView,
+    ) -> Option<Match<'a>> {
+        if fused.pose.centres_px.len() != skeleton::N_PARTS {
+            return None;
+        }
+        let n = self.extras.len();
+        let joints = PARSE14.from_parts(&fused.pose.centres_px);
+        let longer_px = geometry::longer_side(joints.iter().copied())?;
+        let candidates = found
+            .candidates
+            .iter()
+            .zip(found.extras.chunks_exact(n.max(1)));
+        let of_candidate = candidates.map(|(pose, extras)| {
+            let own = PARSE14.from_parts(&self.plans[view].centres(pose));
+            (middle_distance(&own, &joints), own, extras)
+        });
+        let nearest = of_candidate.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (distance, own, extras) = nearest?;
+        (distance < SAME * longer_px).then_some(Match {
+            view,
+            extras,
+            joints: [own, joints],
+            longer_px,
+        })
+    }
+
+    fn triangulate(&self, extra: usize, matches: &[Match<'_>]) -> Result<Triangulated, NoJoint> {
+        let Extra { mirror, sides } = &self.extras[extra];
+        let mut views = Vec::with_capacity(matches.len());
+        let mut observations = Vec::with_capacity(matches.len());
+        let mut reach: f64 = 0.0;
+        for it in matches {
+            let named = if it.is_exchanged(sides) {
+                *mirror
+            } else {
+                extra
+            };
+            let Some((at, sigma_px)) = it.extras[named] else {
+                continue;
+            };
+            reach = reach.max((MOST_SIGMAS * sigma_px).max(LEAST_REACH * it.longer_px));
+            views.push(it.view);
+            observations.push(Observation {
+                camera: self.plans[it.view].camera(),
+                point_px: Point2::from(at),
+                sigma_px,
+            });
+        }
+        let most = self.triangulation.max_reprojection_px.unwrap_or(reach);
+        let settings = Settings {
+            max_reprojection_px: Some(most.min(reach)),
+            ..self.triangulation
+        };
+        let found = geometry::triangulate(&observations, &settings)?;
+        Ok(by_view(found, views.into_iter()))
+    }
+}
+
+impl Match<'_> {
+    /// Whether what the view calls left is the right side of the person, by two pairs of joints.
+    fn is_exchanged(&self, sides: &[[usize; 2]; 2]) -> bool {
+        let [own, fused] = &self.joints;
+        let distance = |a: usize, b: usize| distance(own[a], fused[b]);
+        let each = sides.iter();
+        let same: f64 = each.map(|&[r, l]| distance(r, r) + distance(l, l)).sum();
+        let each = sides.iter();
+        let other: f64 = each.map(|&[r, l]| distance(r, l) + distance(l, r)).sum();
+        other < same
+    }
+}
+
+/// The joints by which the side of a keypoint is told.
+fn sides_of(name: &str) -> [[usize; 2]; 2] {
+    let has = |words: &[&str]| words.iter().any(|it| name.contains(it));
+    if has(&["toe", "heel", "foot", "ankle", "knee"]) {
+        LEGS
+    } else if has(&["hand", "finger", "thumb", "index", "pinky", "palm", "wrist"]) {
+        ARMS
+    } else {
+        TRUNK
+    }
+}
+
+/// Median distance of the joints, whose sides may be exchanged.
+fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
+    let pairs = [LEGS, ARMS, TRUNK];
+    let mirror = |joint: usize| {
+        let mut pairs = pairs.iter().flatten();
+        let pair = pairs.find(|it| it.contains(&joint));
+        pair.map_or(joint, |&[right, left]| right + left - joint)
+    };
+    let each = (0..own.len()).map(|joint| {
+        let direct = distance(own[joint], fused[joint]);
+        direct.min(distance(own[joint], fused[mirror(joint)]))
+    });
+    let mut each: Vec<f64> = each.collect();
+    each.sort_by(f64::total_cmp);
+    each[each.len() / 2]
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+#[cfg(test)]
+mod tests;

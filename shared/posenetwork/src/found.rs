@@ -1,0 +1,66 @@
+//! What a network found, from the numbers of its output: joints made of keypoints, and how sure it is of them.
+
+use keypoints::{Codec, Keypoint, Score};
+
+use crate::network::{Read, Sight};
+
+/// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
+const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
+
+/// A joint as a weighted sum of keypoints; its score is the lowest of theirs.
+pub(crate) fn derived(row: &[(usize, f64)], keypoints: &[Keypoint], sight: &Sight<'_>) -> Keypoint {
+    let mut peak = weighted(row, |it| Some(keypoints[it])).unwrap_or(NOWHERE);
+    if let (Ok(Read::SimCc(simcc)), [(keypoint, _)]) = (sight.read(), row) {
+        let axis_peak = |axis| {
+            let values = likelihood(simcc.axis(*keypoint, axis), axis, sight);
+            values.into_iter().fold(0.0, f64::max)
+        };
+        peak.score = axis_peak(0) * axis_peak(1);
+    }
+    peak
+}
+
+/// What a row without keypoints would be.
+pub(crate) const NOWHERE: Keypoint = Keypoint {
+    at: [0.0; 2],
+    score: 0.0,
+};
+
+/// A weighted sum of keypoints; its score is the lowest of theirs. `None` where one of them was not found.
+pub(crate) fn weighted(
+    row: &[(usize, f64)],
+    found: impl Fn(usize) -> Option<Keypoint>,
+) -> Option<Keypoint> {
+    let mut sum = Keypoint {
+        score: f64::INFINITY,
+        ..NOWHERE
+    };
+    for &(keypoint, weight) in row {
+        let it = found(keypoint)?;
+        sum.at = [sum.at[0] + weight * it.at[0], sum.at[1] + weight * it.at[1]];
+        sum.score = sum.score.min(it.score);
+    }
+    Some(sum)
+}
+
+/// The likelihood along an axis, as a share of what a label of the published width would give at its middle, at most 1.
+pub(crate) fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<f64> {
+    let nats = match sight.network().card().output {
+        Codec::Simcc { nats, .. } => nats,
+        _ => 1.0,
+    };
+    let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let each = values.iter().map(|it| (nats * f64::from(it - most)).exp());
+    let each: Vec<f64> = each.collect();
+    let sum: f64 = each.iter().sum();
+    let of_label = 1.0 / (SIMCC_SIGMA[axis] * core::f64::consts::TAU.sqrt());
+    let share = |it: f64| (it / sum / of_label).min(1.0);
+    each.into_iter().map(share).collect()
+}
+
+pub(crate) fn score_of(sight: &Sight<'_>) -> Score {
+    match sight.network().card().output {
+        Codec::HeatMap { score, .. } | Codec::Keypoints { score, .. } => score,
+        Codec::Simcc { .. } => Score::Share,
+    }
+}
