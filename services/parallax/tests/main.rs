@@ -8,6 +8,7 @@ mod book;
 mod chaos;
 mod demo;
 mod detect;
+mod detectors;
 mod eval;
 mod eval_networks;
 mod faults;

@@ -29,7 +29,7 @@ names = ["head top", "left hip", "right hip"]
 "#;
 
 /// Three maps of a quarter of the input's sides: the means of red, green and blue; `operator` makes them from these.
-fn network(operator: &str) -> Network {
+pub(crate) fn network(operator: &str) -> Network {
     let mut net = Network::default();
     let [width, height] = SIDES;
     let sides = |n: usize| [1, 3, height / n, width / n].map(Side::Fixed).to_vec();

@@ -27,7 +27,7 @@ pub struct Config {
     pub network_card: Option<PathBuf>,
     /// `network`: an ONNX file of a detector of people, which says where the network looks; without it the filters do.
     pub detector: Option<PathBuf>,
-    /// The card that describes the detector; without it the file beside it.
+    /// The card that describes the detector; without it the file beside it (`.toml` for `.onnx`), or what its metadata say.
     pub detector_card: Option<PathBuf>,
     /// `network`: what holds its maps together: a file that `parallax train springs` made; `"shipped"`: the one that ships.
     pub springs: PathBuf,

@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::names::SETS;
 
-/// The format name of a card.
-const FORMAT: &str = "parallax-keypoint-network";
-/// The version that is read.
-const VERSION: u32 = 1;
+mod kind;
+
+pub use kind::CardKind;
+pub(crate) use kind::{DETECTOR_FORMAT, FORMAT, VERSION, check_head};
+
 /// Longest side of an input, pixels.
 const MAX_SIDE: usize = 2048;
 /// Most keypoints.
@@ -335,14 +336,8 @@ impl Card {
     ///
     /// [`CardError`], naming the key.
     pub fn parse(text: &str) -> Result<Self, CardError> {
+        check_head(text, FORMAT)?;
         let card: Self = toml::from_str(text)?;
-        if card.format != FORMAT || card.version != VERSION {
-            return Err(CardError::Version {
-                format: card.format.chars().take(32).collect(),
-                version: card.version,
-                expected: FORMAT,
-            });
-        }
         card.check()?;
         Ok(card)
     }

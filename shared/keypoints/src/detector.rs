@@ -2,14 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::card::{CardError, Input, Layout, check_input, demand};
+use crate::card::{CardError, DETECTOR_FORMAT, Input, Layout, check_head, check_input, demand};
 use crate::decode::OutputError;
 use crate::decode::finite;
-
-/// The format name of a card.
-const FORMAT: &str = "parallax-detector";
-/// The version that is read.
-const VERSION: u32 = 1;
 
 /// The card of a network that finds the boxes of people.
 ///
@@ -103,14 +98,8 @@ impl DetectorCard {
     ///
     /// [`CardError`], naming the key.
     pub fn parse(text: &str) -> Result<Self, CardError> {
+        check_head(text, DETECTOR_FORMAT)?;
         let card: Self = toml::from_str(text)?;
-        if card.format != FORMAT || card.version != VERSION {
-            return Err(CardError::Version {
-                format: card.format.chars().take(32).collect(),
-                version: card.version,
-                expected: FORMAT,
-            });
-        }
         check_input(&card.input)?;
         for (key, share) in [
             ("least_score", card.least_score),
@@ -176,6 +165,14 @@ impl DetectorCard {
         Ok(kept)
     }
 
+    /// How many boxes the grids of these strides have.
+    ///
+    /// * `strides`: pixels of the input for a cell of each grid, at least 1.
+    pub fn n_cells(&self, strides: &[usize]) -> usize {
+        let [width, height] = [self.input.width, self.input.height];
+        strides.iter().map(|it| (width / it) * (height / it)).sum()
+    }
+
     fn of_grids(
         &self,
         (values, shape): (&[f32], &[usize]),
@@ -184,7 +181,7 @@ impl DetectorCard {
         decoded: bool,
     ) -> Result<Vec<PersonBox>, OutputError> {
         let [width, height] = [self.input.width, self.input.height];
-        let cells: usize = strides.iter().map(|it| (width / it) * (height / it)).sum();
+        let cells = self.n_cells(strides);
         let n = match *shape {
             [1, rows, n] if rows == cells && n > 5 + person && values.len() == rows * n => n,
             _ => {

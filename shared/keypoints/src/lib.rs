@@ -25,8 +25,8 @@ mod shipped;
 mod window;
 
 pub use card::{
-    Card, CardError, Codec, Colour, Crop, Fit, Input, KeypointNames, Layout, ListField, ListUnit,
-    Numbers, Refine, Score, Sides,
+    Card, CardError, CardKind, Codec, Colour, Crop, Fit, Input, KeypointNames, Layout, ListField,
+    ListUnit, Numbers, Refine, Score, Sides,
 };
 pub use decode::{HeatMaps, Keypoint, List, OutputError, SimCc};
 pub use detector::{Boxes, DetectorCard, PersonBox};
@@ -34,5 +34,5 @@ pub use names::{
     BODY_25, BODY_25B, COCO_17, HALPE_26, LSP_14, MPII_16, OPENPOSE_18, SETS, is_joint, joint_rows,
     mirrored,
 };
-pub use shipped::SHIPPED;
+pub use shipped::{SHIPPED, SHIPPED_DETECTORS};
 pub use window::{Window, outline};

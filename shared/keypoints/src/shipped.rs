@@ -36,12 +36,24 @@ pub const SHIPPED: [(&str, &str); 8] = [
     ),
 ];
 
+/// The cards of `configs/detectors`, as [`SHIPPED`].
+pub const SHIPPED_DETECTORS: [(&str, &str); 2] = [
+    (
+        "rtmdet-person",
+        include_str!("../../../configs/detectors/rtmdet-person.toml"),
+    ),
+    (
+        "yolox",
+        include_str!("../../../configs/detectors/yolox.toml"),
+    ),
+];
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{Card, joint_rows};
+    use crate::{Card, DetectorCard, joint_rows};
 
     #[test]
     fn every_card_is_read_and_says_where_all_joints_lie() {
@@ -60,16 +72,32 @@ mod tests {
     }
 
     #[test]
-    fn every_file_of_the_folder_is_listed() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/networks");
-        let files = std::fs::read_dir(folder).unwrap();
-        let names = files.map(|it| it.unwrap().path());
-        let mut names: Vec<_> = names
-            .map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned())
-            .collect();
-        names.sort();
-        let mut listed = SHIPPED.map(|it| it.0);
-        listed.sort_unstable();
-        assert_eq!(names, listed);
+    fn every_card_of_a_detector_is_read() {
+        for (name, text) in SHIPPED_DETECTORS {
+            let card = DetectorCard::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(
+                !card.weights.is_empty() && !card.licence.is_empty(),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_file_of_the_folders_is_listed() {
+        let listed = |folder: &str| {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+            let files = std::fs::read_dir(folder).unwrap();
+            let names = files.map(|it| it.unwrap().path());
+            let mut names: Vec<_> = names
+                .map(|it| it.file_stem().unwrap().to_str().unwrap().to_owned())
+                .collect();
+            names.sort();
+            names
+        };
+        let mut networks = SHIPPED.map(|it| it.0);
+        networks.sort_unstable();
+        assert_eq!(listed("../../configs/networks"), networks);
+        let detectors = SHIPPED_DETECTORS.map(|it| it.0);
+        assert_eq!(listed("../../configs/detectors"), detectors);
     }
 }

@@ -1,16 +1,81 @@
-//! Detectors of people from files.
+//! Detectors of people from files: an ONNX file and its card.
 
 use std::path::{Path, PathBuf};
 
-use keypoints::DetectorCard;
+use footage::{ACCENT, Canvas, line_width};
+use inference::{Description, Session};
+use kernels::Rgb8View;
+use keypoints::{DetectorCard, PersonBox};
 use posenetwork::Detector;
-use runtime::{ExitKind, Failure};
+use runtime::{ExitKind, Failure, in_file};
 
-use crate::network::Library;
+use crate::cards::{CardPlace, OnnxFile, misfit};
+use crate::failures::refused;
+use crate::library::Library;
+use crate::pictures::Picture;
+
+/// A detector that was read.
+#[derive(Debug)]
+pub struct DetectorFile {
+    path: PathBuf,
+    session: Session,
+    card: Option<(DetectorCard, CardPlace)>,
+}
+
+impl DetectorFile {
+    pub(crate) fn of(read: OnnxFile) -> Result<Self, Failure> {
+        let OnnxFile {
+            path,
+            session,
+            card,
+        } = read;
+        let card = card.map(|it| it.read(&path, DetectorCard::parse));
+        Ok(Self {
+            card: card.transpose()?,
+            path,
+            session,
+        })
+    }
+
+    /// What it takes and gives.
+    pub fn description(&self) -> &Description {
+        self.session.description()
+    }
+
+    /// Its card, and where that was found.
+    pub fn card(&self) -> Option<&(DetectorCard, CardPlace)> {
+        self.card.as_ref()
+    }
+
+    /// The detector, which is tried once on an empty picture.
+    ///
+    /// # Errors
+    ///
+    /// It has no card, or does not fit it.
+    pub fn fitted(self) -> Result<Detector, Failure> {
+        let Self {
+            path,
+            session,
+            card,
+        } = self;
+        let Some((card, place)) = card else {
+            let message = format!("{}: the detector has no card", path.display());
+            let hint = format!(
+                "`parallax model show {}` says which of the cards in configs/detectors comes nearest: give it with \
+                 --detector-card, or put it beside the detector as {}; docs/networks.md says how to write one",
+                path.display(),
+                path.with_extension("toml").display()
+            );
+            return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
+        };
+        Detector::new(session, card).map_err(|error| misfit(&path, &place, &error))
+    }
+}
 
 /// Reads a detector and its card, and tries it once.
 ///
-/// * `card`: the file of the card; if not given, the one beside the network with the ending `.toml`.
+/// * `card`: the file of the card; if not given, it is looked for as that of a network is
+///   ([`NetworkFile::open`](crate::network::NetworkFile::open)).
 ///
 /// # Errors
 ///
@@ -25,19 +90,34 @@ pub fn open(path: &Path, card: Option<&Path>) -> Result<Detector, Failure> {
 ///
 /// As for [`open`].
 pub fn open_with(path: &Path, card: Option<&Path>, library: &Library) -> Result<Detector, Failure> {
-    let session = library.session(path)?;
-    let beside = path.with_extension("toml");
-    let card: PathBuf = card.map_or(beside, Path::to_path_buf);
-    let text = std::fs::read_to_string(&card).map_err(|error| {
-        refused(&card, &error).with_hint(
-            "a detector has a card: give it with --detector-card, or put it beside the network; configs/detectors holds some",
-        )
-    })?;
-    let card = DetectorCard::parse(&text).map_err(|error| refused(&card, &error))?;
-    Detector::new(session, card).map_err(|error| refused(path, &error))
+    DetectorFile::of(OnnxFile::open(path, card, library)?)?.fitted()
 }
 
-fn refused(path: &Path, error: &(dyn std::error::Error + 'static)) -> Failure {
-    let message = format!("{}: {}", path.display(), causes::in_one_line(error));
-    Failure::new(ExitKind::Input, message)
+/// The people that a detector finds in a picture, the surest first; pixels.
+///
+/// # Errors
+///
+/// The detector cannot be run, or gives values that are not finite.
+pub fn people(
+    detector: &Detector,
+    picture: &Picture,
+    values: &mut Vec<f32>,
+) -> Result<Vec<PersonBox>, Failure> {
+    let size = picture.size;
+    let image = Rgb8View::new(size.width, size.height, &picture.rgb);
+    let image = image.map_err(|error| in_file(&picture.path, &error))?;
+    let found = detector.people(image, values);
+    found.map_err(|error| refused(&picture.path, &error))
+}
+
+/// Draws the boxes of people over a picture, each with its score; the surest one last, on top.
+pub fn drawn(picture: &Picture, people: &[PersonBox]) -> Canvas {
+    let mut canvas = Canvas::from_rgb(picture.size, &picture.rgb);
+    for it in people.iter().rev() {
+        let [left, top, ..] = it.outline;
+        canvas.frame(it.outline, 0.5 * line_width(picture.size), ACCENT);
+        let corner = [left.max(0.0) + 4.0, top.max(0.0) + 4.0];
+        canvas.label(corner, &format!("{:.2}", it.score), ACCENT);
+    }
+    canvas
 }

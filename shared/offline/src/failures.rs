@@ -1,5 +1,6 @@
-//! Exit status of the errors of data sets, sequences and films.
+//! Exit status of the errors of data sets, sequences, films and networks.
 
+use std::error::Error;
 use std::fs;
 use std::path::Path;
 
@@ -44,4 +45,10 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
         Failure::new(ExitKind::Input, message)
             .with_hint("results go to the folder `output` of the deployment file, or to --out: name one that can be written")
     })
+}
+
+/// What is said of a network that cannot be run.
+pub(crate) fn refused(path: &Path, error: &(dyn Error + 'static)) -> Failure {
+    let message = format!("{}: {}", path.display(), causes::in_one_line(error));
+    Failure::new(ExitKind::Input, message)
 }

@@ -13,7 +13,8 @@
 //! * [`springs`]: the springs between joints, from annotated people.
 //! * [`judged`]: a model tried on people whose joints are known.
 //! * [`examples`]: what a model takes for each type of its parts.
-//! * [`network`]: networks that find keypoints, with their cards.
+//! * [`network`]: networks that find keypoints, with their cards; [`detector`]: detectors of people; [`described`]: whichever a
+//!   file is; [`library`]: what runs them.
 //! * [`pictures`]: pictures and videos that are searched; [`sheet`]: thumbnails with what was found.
 //! * [`synth`]: sequences of people who do not exist, with the truth.
 #![forbid(unsafe_code)]
@@ -27,13 +28,16 @@ mod searches;
 
 pub mod images;
 
+pub mod cards;
 pub mod consistency;
+pub mod described;
 pub mod detector;
 pub mod eval;
 pub mod examples;
 pub mod joints;
 pub mod judged;
 pub mod judged_network;
+pub mod library;
 pub mod network;
 pub mod orientation;
 pub mod person;

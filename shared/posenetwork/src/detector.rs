@@ -1,10 +1,10 @@
 //! A detector of people with its card: a picture in, boxes out.
 
-use inference::{Input, Session, Values};
+use inference::{Input, Session};
 use kernels::Rgb8View;
 use keypoints::{Boxes, DetectorCard, Layout, PersonBox};
 
-use crate::network::{FitError, LookError, input_of, only};
+use crate::network::{FitError, LookError, as_taken, input_of, only};
 
 /// A detector that fits its card.
 #[derive(Debug)]
@@ -77,10 +77,12 @@ impl Detector {
             Layout::Planes => [1, 3, height, width],
             Layout::Pixels => [1, height, width, 3],
         };
+        let (mut whole, mut bytes) = (Vec::new(), Vec::new());
+        let numbers = self.card.input.numbers;
         let input = Input {
             name: &self.input,
             shape: &shape,
-            values: Values::F32(values),
+            values: as_taken(numbers, values, (&mut whole, &mut bytes)),
         };
         let name = || self.output.clone();
         let mut found = Err(LookError::Type { name: name() });

@@ -7,7 +7,8 @@ use deployment::Deployment;
 use deployment::pose::Config;
 use fmp::Model;
 use keypoints::Card;
-use offline::network::{Library, NetworkFile};
+use offline::library::Library;
+use offline::network::NetworkFile;
 use posenetwork::{Detector, PoseNetwork};
 use runtime::{ExitKind, Failure, OrFail as _, in_file};
 

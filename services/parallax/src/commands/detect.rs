@@ -14,13 +14,13 @@ use launch::output;
 use offline::network::NetworkFile;
 use offline::pictures::{self, Frames, Picture, Pictures, Searched};
 use offline::sheet::{Sheet, Skeleton, limbs};
-use posenetwork::PoseNetwork;
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::json;
 use skeleton::JointSet;
 
 use super::network::{Outline, outline};
 use crate::describe::{self, NamedJoints, Placed};
+use by_network::Eyes;
 
 /// Default of `--size`: the longest side of a searched image, pixels.
 const SIZE: usize = 1280;
@@ -48,9 +48,10 @@ With --json one line per image, best detection first:
      \"level\", \"scale\", \"parts\": [{\"x\", \"y\", \"type\", \"box\": [x1, y1, x2, y2]}], \"joints\": {name: [x, y]}}]}
 Pixels of the whole image as it is seen, the centre of its top-left pixel is (0, 0); types and levels count from 1.
 
-With --network a network of your own says where the keypoints are (docs/networks.md). It looks into the box that --box gives; \
-without it into the boxes that the filters find on the picture at 640 pixels (or --size, if smaller), widened by 10 %. A detection is then
-    {\"score\": the mean of its joints', \"box\", \"box_from\": \"given\" or \"filters\",
+With --network a network of your own says where the keypoints are (docs/networks.md). It looks into the box that --box gives, \
+or into those that --detector finds, as they are; without either into the boxes that the filters find on the picture at 640 \
+pixels (or --size, if smaller), widened by 10 %. It looks into every box by itself, at most --max of them. A detection is then
+    {\"score\": the mean of its joints', \"box\", \"box_from\": \"given\", \"detector\" or \"filters\", \"box_score\" (of a detector),
      \"keypoints\": [{\"name\", \"x\", \"y\", \"score\"}], \"joints\": {name: [x, y]}}
 
 Examples:
@@ -59,7 +60,8 @@ Examples:
     parallax detect *.png --overlay drawn/
     parallax detect clip.mp4 --every 10 --frames 20 --overlay drawn/
     parallax detect folder/ --sheet sheet.png
-    parallax detect photo.jpg --network pose.onnx --box 120,40,300,460 --overlay drawn/")]
+    parallax detect photo.jpg --network pose.onnx --box 120,40,300,460 --overlay drawn/
+    parallax detect folder/ --network pose.onnx --detector boxes.onnx --detector-card configs/detectors/yolox.toml --json")]
 pub(crate) struct Arguments {
     /// Images, folders of images, or videos.
     #[arg(required = true)]
@@ -119,16 +121,33 @@ pub(crate) struct Arguments {
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the filters find it.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "network", allow_hyphen_values = true)]
     outline: Option<Outline>,
+    /// Boxes by this detector of people (.onnx) in place of the filters.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "network",
+        conflicts_with_all = ["outline", "model", "threshold", "overlap", "size", "full", "precision"]
+    )]
+    detector: Option<PathBuf>,
+    /// The card of the detector; if not given, the file beside it whose ending is .toml, or its entry `parallax.card`.
+    #[arg(long, value_name = "CARD", requires = "detector")]
+    detector_card: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// The network, if one is named.
-    fn fitted_network(&self) -> Result<Option<PoseNetwork>, Failure> {
+    /// The network, if one is named, and the detector.
+    fn eyes(&self) -> Result<Option<Eyes>, Failure> {
         let Some(file) = &self.network else {
             return Ok(None);
         };
-        let read = NetworkFile::open(file, self.card.as_deref())?;
-        read.fitted().map(Some)
+        let network = NetworkFile::open(file, self.card.as_deref())?.fitted()?;
+        let card = self.detector_card.as_deref();
+        let detector = self.detector.as_ref();
+        let detector = detector.map(|it| offline::detector::open(it, card));
+        Ok(Some(Eyes {
+            network,
+            detector: detector.transpose()?,
+        }))
     }
 
     /// The longest side that is searched; none: all pixels.
@@ -187,7 +206,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
             max: arguments.max,
         },
         search: Search::in_precision(arguments.precision, model).or_fail(ExitKind::Usage)?,
-        network: arguments.fitted_network()?,
+        eyes: arguments.eyes()?,
     };
     if let Some(folder) = &arguments.overlay {
         inputs::make_folder(folder)?;
@@ -236,7 +255,7 @@ struct Detector<'a> {
     joints: NamedJoints,
     search: Search,
     settings: CandidateSettings,
-    network: Option<PoseNetwork>,
+    eyes: Option<Eyes>,
 }
 
 impl Detector<'_> {
@@ -261,8 +280,8 @@ impl Detector<'_> {
                 Ok(None) => return Ok(Ok(())),
                 Err(failure) => return Ok(Err(failure)),
             };
-            if let Some(network) = &self.network {
-                match self.look(network, &picture, sheet.as_deref_mut())? {
+            if let Some(eyes) = &self.eyes {
+                match self.look(eyes, &picture, sheet.as_deref_mut())? {
                     Ok(()) => *n_searched += 1,
                     Err(failure) => return Ok(Err(failure)),
                 }

@@ -14,13 +14,15 @@ use super::{judge, network};
 /// What `show` says of networks.
 const NETWORKS: &str = "\
 Of a network (.onnx) it prints inputs and outputs, and, by its card, what they mean: preparation, codec, keypoints, the joints \
-that follow from them, licence. A network that does not fit its card is named with what differs, and the exit code is 4. Without \
-a card the nearest of configs/networks is named. Cards: docs/networks.md.
+that follow from them, licence. Of a detector of people: which boxes it keeps, and with --image those that it finds. A network that \
+does not fit its card is named with what differs, and the exit code is 4. Without a card the nearest of configs/networks and \
+configs/detectors is named. Cards: docs/networks.md.
 
 Examples:
     parallax model show person.fmp
     parallax model show pose.onnx --card configs/networks/rtmpose-coco17.toml
-    parallax model show pose.onnx --image person.jpg --box 120,40,300,460 --out seen.png";
+    parallax model show pose.onnx --image person.jpg --box 120,40,300,460 --out seen.png
+    parallax model show boxes.onnx --card configs/detectors/yolox.toml --image people.jpg --out boxes.png";
 
 /// The subcommands.
 #[derive(Debug, Subcommand)]
@@ -33,7 +35,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Print the structure of a model, or draw it; explain a network that finds keypoints (.onnx).
+    /// Print the structure of a model, or draw it; explain a network that finds keypoints or people (.onnx).
     #[command(after_help = NETWORKS)]
     Show {
         /// The model file, or the network.

@@ -1,14 +1,18 @@
 //! `parallax model show` of a network that finds keypoints: what it takes and gives, its card, what it sees in a picture.
 
+mod detector;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use inference::{Description, Port, written};
-use keypoints::{Card, Codec, Fit, joint_rows};
+use keypoints::{Card, Codec, Fit, Input, joint_rows};
 use launch::output;
-use offline::network::{self, CardPlace, NetworkFile};
-use offline::pictures::{Frames, Pictures};
+use offline::cards::CardPlace;
+use offline::described::Described;
+use offline::network::{self, NetworkFile};
+use offline::pictures::{Frames, Picture, Pictures};
 use posenetwork::{PoseNetwork, Sight, Workspace};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
@@ -21,7 +25,7 @@ pub(crate) struct Arguments {
     /// `parallax.card` of the network.
     #[arg(long, value_name = "CARD", conflicts_with = "html")]
     card: Option<PathBuf>,
-    /// Of a network: a picture of a person that it shall look at.
+    /// Of a network: a picture of a person that it shall look at; of a detector, of people.
     #[arg(
         long,
         value_name = "PICTURE",
@@ -32,7 +36,7 @@ pub(crate) struct Arguments {
     /// The box around the person, pixels of the picture: left, top, right, bottom; if not given, the whole picture.
     #[arg(long = "box", value_name = "X1,Y1,X2,Y2", value_parser = outline, requires = "image", allow_hyphen_values = true)]
     outline: Option<Outline>,
-    /// Draw the joints, and the map of each, into this PNG file.
+    /// Draw the joints, and the map of each, into this PNG file; of a detector, the boxes.
     #[arg(long, value_name = "FILE", requires = "image")]
     out: Option<PathBuf>,
 }
@@ -62,9 +66,20 @@ pub(crate) fn outline(text: &str) -> Result<Outline, String> {
     })
 }
 
-/// Shows a network.
+/// Shows a network or a detector, whichever its card says that it is.
 pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let read = NetworkFile::open(file, arguments.card.as_deref())?;
+    match Described::open(file, arguments.card.as_deref())? {
+        Described::Network(it) => show_network(file, it, as_json, arguments),
+        Described::Detector(it) => detector::show(file, it, as_json, arguments),
+    }
+}
+
+fn show_network(
+    file: &Path,
+    read: NetworkFile,
+    as_json: bool,
+    arguments: &Arguments,
+) -> Result<ExitCode, Failure> {
     let description = read.description().clone();
     let card = read.card().cloned();
     let fitted = card.is_some().then(|| read.fitted()).transpose();
@@ -83,6 +98,7 @@ pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<
         });
         if card.is_none() {
             value["nearest_cards"] = json!(network::nearest(&description));
+            value["nearest_detector_cards"] = json!(network::nearest_detectors(&description));
         }
         if let Some(found) = &found {
             value["keypoints"] = json!(found);
@@ -119,13 +135,7 @@ pub(crate) fn show(file: &Path, as_json: bool, arguments: &Arguments) -> Result<
 
 /// The keypoints that a network finds in a picture, which is drawn.
 fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Vec<Value>, Failure> {
-    let every = Frames {
-        every: 1,
-        most: Some(1),
-    };
-    let picture = Pictures::open(image, every)?.next_picture()?;
-    let picture = picture
-        .ok_or_else(|| Failure::new(ExitKind::Input, format!("{}: no picture", image.display())))?;
+    let picture = first_picture(image)?;
     let whole = [picture.size.width as f64, picture.size.height as f64];
     let whole = [0.0, 0.0, whole[0] - 1.0, whole[1] - 1.0];
     let outline = arguments.outline.map_or(whole, |it| it.0);
@@ -136,6 +146,16 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
         sheet.save_png(out).or_fail(ExitKind::Input)?;
     }
     keypoints_json(&sight)
+}
+
+/// The picture of a file, or its first one.
+fn first_picture(file: &Path) -> Result<Picture, Failure> {
+    let one = Frames {
+        every: 1,
+        most: Some(1),
+    };
+    let picture = Pictures::open(file, one)?.next_picture()?;
+    picture.ok_or_else(|| Failure::new(ExitKind::Input, format!("{}: no picture", file.display())))
 }
 
 /// The keypoints with their names, pixels of the picture.
@@ -184,18 +204,7 @@ fn in_words(
     card: Option<&(Card, CardPlace)>,
 ) -> Result<(), Failure> {
     output::line(format_args!("{}: a network", file.display()))?;
-    for (what, ports) in [
-        ("input", &description.inputs),
-        ("output", &description.outputs),
-    ] {
-        for it in ports {
-            let sides = match &it.sides[..] {
-                [] => "of sides that the file does not tell".to_owned(),
-                sides => written(sides),
-            };
-            output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
-        }
-    }
+    ports_in_words(description)?;
     let Some((card, place)) = card else {
         return without_card(file, description);
     };
@@ -217,6 +226,22 @@ fn in_words(
     Ok(())
 }
 
+fn ports_in_words(description: &Description) -> Result<(), Failure> {
+    for (what, ports) in [
+        ("input", &description.inputs),
+        ("output", &description.outputs),
+    ] {
+        for it in ports {
+            let sides = match &it.sides[..] {
+                [] => "of sides that the file does not tell".to_owned(),
+                sides => written(sides),
+            };
+            output::line(format_args!("  {what:<6} `{}` {sides}", it.name))?;
+        }
+    }
+    Ok(())
+}
+
 fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
     let mut entries = description.metadata.iter();
     if entries.any(|it| it.0 == viewquality::key::VERSION) {
@@ -224,17 +249,30 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
             "  it predicts the errors of single views (`[quality]` of a deployment), and finds no keypoints",
         );
     }
-    let nearest = network::nearest(description);
     output::line("  no card: none beside it, none in it, none given")?;
-    let said = match &nearest[..] {
-        [] => "none of configs/networks comes near".to_owned(),
-        [one] => format!("configs/networks/{one}.toml comes nearest"),
-        several => format!(
-            "of configs/networks {} come equally near",
-            several.join(".toml, ") + ".toml"
-        ),
-    };
-    output::line(format_args!("  {said}, by the sides of input and outputs"))?;
+    let networks = network::nearest(description);
+    let detectors = network::nearest_detectors(description);
+    if networks.is_empty() && detectors.is_empty() {
+        output::line("  none of configs/networks and configs/detectors comes near")?;
+    }
+    for (folder, of, nearest) in [
+        ("networks", "networks that find keypoints", networks),
+        ("detectors", "detectors of people", detectors),
+    ] {
+        let files: Vec<String> = nearest
+            .iter()
+            .map(|it| format!("configs/{folder}/{it}.toml"))
+            .collect();
+        let come = match &files[..] {
+            [] => continue,
+            [_] => "comes nearest",
+            _ => "come equally near",
+        };
+        output::line(format_args!(
+            "  of the cards of {of} {} {come}, by the sides of input and outputs",
+            files.join(", ")
+        ))?;
+    }
     output::line(format_args!(
         "  copy one to {}, change what differs (docs/networks.md), and show the network again",
         file.with_extension("toml").display()
@@ -242,13 +280,17 @@ fn without_card(file: &Path, description: &Description) -> Result<(), Failure> {
 }
 
 fn taken(card: &Card) -> String {
-    let input = &card.input;
     let fit = match card.crop.fit {
         Fit::Widen => "widened to the shape of the input",
         Fit::Stretch => "stretched to the input",
     };
+    let margin = card.crop.margin;
+    format!("{}; the box x {margin}, {fit}", prepared(&card.input))
+}
+
+fn prepared(input: &Input) -> String {
     format!(
-        "{} wide, {} high, {}, {}, {}; (colour x {} - {:?}) / {:?}; the box x {}, {fit}",
+        "{} wide, {} high, {}, {}, {}; (colour x {} - {:?}) / {:?}",
         input.width,
         input.height,
         word(&json!(input.colour)),
@@ -257,7 +299,6 @@ fn taken(card: &Card) -> String {
         input.scale,
         input.mean,
         input.std,
-        card.crop.margin,
     )
 }
 

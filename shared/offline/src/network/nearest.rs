@@ -1,7 +1,7 @@
 //! Which of the cards that ship a network comes nearest to.
 
-use inference::{Description, Port};
-use keypoints::{Card, Codec, Layout, SHIPPED};
+use inference::{Description, Port, Side};
+use keypoints::{Boxes, Card, Codec, DetectorCard, Input, Layout, SHIPPED, SHIPPED_DETECTORS};
 
 /// The cards of `configs/networks` that agree best with what a network takes and gives, by sides and names; several where
 /// they agree equally well, none where nothing agrees.
@@ -11,21 +11,78 @@ pub fn nearest(description: &Description) -> Vec<&'static str> {
         let points = points(&card, description)?;
         Some((*name, points))
     });
-    let rated: Vec<_> = rated.collect();
+    best(&rated.collect::<Vec<_>>())
+}
+
+/// As [`nearest`], of the cards of `configs/detectors`: those whose input and output can be the network's.
+pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
+    let rated = SHIPPED_DETECTORS.iter().filter_map(|(name, text)| {
+        let card = DetectorCard::parse(text).ok()?;
+        let points = points_of_detector(&card, description)?;
+        Some((*name, points))
+    });
+    best(&rated.collect::<Vec<_>>())
+}
+
+fn best(rated: &[(&'static str, usize)]) -> Vec<&'static str> {
     let best = rated.iter().map(|it| it.1).max();
     let best = rated.iter().filter(|it| Some(it.1) == best);
     best.map(|it| it.0).collect()
 }
 
-/// How well a card agrees; `None` if neither an input nor an output does.
-fn points(card: &Card, description: &Description) -> Option<usize> {
-    let [width, height] = [card.input.width, card.input.height];
-    let sides = match card.input.layout {
+/// How well the card of a detector agrees; `None` unless the output does.
+fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<usize> {
+    let input = of_input(&card.input, description);
+    let outputs = description.outputs.iter();
+    let output = match &card.output {
+        // Of the network's own input, which may be larger than the card's.
+        Boxes::Yolox {
+            person, strides, ..
+        } => {
+            let cells = description.inputs.iter().find_map(|it| cells(it, strides));
+            let many = |it: &Port| match &it.sides[..] {
+                [one, n_cells, Side::Fixed(n)] => {
+                    one.may_be(1) && cells.is_some_and(|it| n_cells.may_be(it)) && *n > 5 + person
+                }
+                _ => false,
+            };
+            outputs.filter(|it| many(it)).map(|_| 2).max()
+        }
+        Boxes::List { boxes } => {
+            let five = |it: &Port| match &it.sides[..] {
+                [one, _, five] => one.may_be(1) && five.may_be(5),
+                _ => false,
+            };
+            let rated = outputs.filter(|it| five(it));
+            rated.map(|it| 2 + usize::from(it.name == *boxes)).max()
+        }
+    };
+    Some(input.unwrap_or(0) + 2 * output?)
+}
+
+/// The cells of grids of these strides over an input.
+fn cells(input: &Port, strides: &[usize]) -> Option<usize> {
+    let &[_, _, Side::Fixed(height), Side::Fixed(width)] = &input.sides[..] else {
+        return None;
+    };
+    Some(strides.iter().map(|it| (width / it) * (height / it)).sum())
+}
+
+/// How many sides of the input are those of a card.
+fn of_input(card: &Input, description: &Description) -> Option<usize> {
+    let [width, height] = [card.width, card.height];
+    let sides = match card.layout {
         Layout::Planes => [1, 3, height, width],
         Layout::Pixels => [1, height, width, 3],
     };
-    let input = description.inputs.iter().map(|it| agreeing(it, &sides));
-    let input = input.flatten().max();
+    let inputs = description.inputs.iter();
+    inputs.filter_map(|it| agreeing(it, &sides)).max()
+}
+
+/// How well a card agrees; `None` if neither an input nor an output does.
+fn points(card: &Card, description: &Description) -> Option<usize> {
+    let [width, height] = [card.input.width, card.input.height];
+    let input = of_input(&card.input, description);
     let outputs = || description.outputs.iter();
     let n = card.names().len();
     let named = |name: &str| usize::from(outputs().any(|it| it.name == name));
@@ -83,6 +140,6 @@ fn agreeing(port: &Port, sides: &[usize]) -> Option<usize> {
             .iter()
             .zip(sides)
             .all(|(side, n)| side.may_be(*n));
-    let fixed = |it: &&inference::Side| matches!(it, inference::Side::Fixed(_));
+    let fixed = |it: &&Side| matches!(it, Side::Fixed(_));
     fits.then(|| port.sides.iter().filter(fixed).count())
 }

@@ -5,6 +5,8 @@ use std::fs;
 use onnx::{Network, Side};
 
 use super::*;
+use crate::cards::METADATA_KEY;
+use crate::described::Described;
 
 const CARD: &str = r#"
 format = "parallax-keypoint-network"
@@ -126,4 +128,55 @@ fn the_nearest_card_has_the_networks_sides() {
         ["blazepose-landmarks"]
     );
     assert!(near(&[1, 7], &[("y", &[1, 7])]).is_empty());
+}
+
+#[test]
+fn the_card_says_whether_a_file_is_a_detector() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.onnx");
+    fs::write(&path, network().file()).unwrap();
+    let opened = |card: &str| {
+        fs::write(path.with_extension("toml"), card).unwrap();
+        Described::open(&path, None)
+    };
+    let it = opened(CARD).unwrap();
+    assert!(matches!(it, Described::Network(it) if it.card().is_some()));
+    let detector = r#"
+format = "parallax-detector"
+version = 1
+name = "boxes"
+input = { width = 12, height = 16 }
+output = { codec = "yolox" }
+"#;
+    let Described::Detector(it) = opened(detector).unwrap() else {
+        panic!("its card says that it is a detector");
+    };
+    assert_eq!(it.description().outputs[0].name, "maps");
+    let refused = it.fitted().unwrap_err().to_string();
+    assert!(
+        refused.contains("net.toml") && refused.contains("expected [1, 2, 6 or more]"),
+        "{refused}"
+    );
+    // Neither: what is missing of the card of a network is said.
+    let refused = opened("format = \"other\"\nversion = 1").unwrap_err();
+    assert!(refused.to_string().contains("`other` version 1"));
+}
+
+#[test]
+fn the_nearest_card_of_a_detector_has_its_kind_of_output() {
+    let near = |input: usize, output: [usize; 3]| {
+        let mut net = Network::default();
+        let sides = [1, 3, input, input].map(Side::Fixed).to_vec();
+        net.inputs.push(("x".to_owned(), sides));
+        let sides = output.map(Side::Fixed).to_vec();
+        net.outputs.push(("dets".to_owned(), sides));
+        net.floats("boxes", &output, vec![0.0; output.iter().product()]);
+        net.node("Relu", &["boxes"], "dets", vec![]);
+        nearest_detectors(Session::parse(net.file()).unwrap().description())
+    };
+    // Grids of 8x8, 4x4 and 2x2 cells; the card's own input is larger.
+    assert_eq!(near(64, [1, 84, 85]), ["yolox"]);
+    assert!(near(96, [1, 84, 85]).is_empty());
+    assert_eq!(near(320, [1, 100, 5]), ["rtmdet-person"]);
+    assert!(near(320, [1, 17, 384]).is_empty());
 }

@@ -1,12 +1,15 @@
-//! People in boxes, by a network that finds keypoints.
+//! People in boxes, by a network that finds keypoints. The boxes are given, or found by a detector or by the filters.
 
 use fmp::Pose;
 use footage::{ACCENT, Canvas, draw_limbs, line_width};
 use launch::output;
-use offline::network;
 use offline::pictures::{Picture, Searched};
 use offline::sheet::{Sheet, Skeleton};
-use posenetwork::{JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Workspace, outline_of_parts};
+use offline::{detector, network};
+use posenetwork::{
+    Detector as BoxDetector, JointMaps, MapSettings, OF_FILTERS, PoseNetwork, Workspace,
+    outline_of_parts,
+};
 use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Map, Value, json};
 use skeleton::PARSE14;
@@ -17,9 +20,34 @@ use crate::commands::network::keypoints_json;
 /// Longest side of a picture in which the filters search for boxes, pixels.
 pub(super) const SIZE: usize = 640;
 
+/// The network that finds keypoints, and the detector of the boxes if there is one.
+pub(super) struct Eyes {
+    pub(super) network: PoseNetwork,
+    pub(super) detector: Option<BoxDetector>,
+}
+
+/// Where boxes come from.
+#[derive(Clone, Copy)]
+enum From {
+    /// From the user.
+    Given,
+    /// From a detector.
+    Detector,
+    /// From the filters, on the picture at this size.
+    Filters([usize; 2]),
+}
+
+/// A box to look into.
+struct Outline {
+    /// Left, top, right, bottom, pixels of the picture.
+    sides: [f64; 4],
+    /// By the detector.
+    score: Option<f64>,
+}
+
 /// A person in a box.
 struct Person {
-    outline: [f64; 4],
+    outline: Outline,
     keypoints: Vec<Value>,
     /// By number in `skeleton::PARSE14`, pixels of the picture; not finite where the keypoints do not tell it.
     joints: Vec<[f64; 2]>,
@@ -34,15 +62,15 @@ impl Detector<'_> {
     /// As for the search: the inner one concerns the picture.
     pub(super) fn look(
         &self,
-        network: &PoseNetwork,
+        eyes: &Eyes,
         picture: &Picture,
         sheet: Option<&mut Sheet>,
     ) -> Result<Result<(), Failure>, Failure> {
-        let (found, searched) = match self.people(network, picture) {
+        let (found, from) = match self.people(eyes, picture) {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
-        self.report_people(picture, searched, &found)?;
+        self.report_people(picture, (eyes, from), &found)?;
         self.draw_people(picture, &found)?;
         if let Some(sheet) = sheet {
             let best = found.first().map(Person::skeleton);
@@ -51,26 +79,36 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// The people, the best first, and the size of what the filters searched, if they did.
-    fn people(
-        &self,
-        network: &PoseNetwork,
-        picture: &Picture,
-    ) -> Result<(Vec<Person>, Option<[usize; 2]>), Failure> {
-        let (outlines, searched) = if let Some(outline) = self.arguments.outline {
-            (vec![outline.0], None)
-        } else {
-            let searched = Searched::new(picture, self.arguments.longest(), &self.search)?;
-            let found = self.detect(searched.image(picture)?, searched.layout());
-            let outlines = found.iter().map(|it| self.outline(&searched, it));
-            (outlines.collect(), Some(searched.layout().image_size))
-        };
+    /// The people, in the order of their boxes: those of whoever found the boxes, the best first.
+    fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
+        let (outlines, from) = self.outlines(eyes, picture)?;
         let mut workspace = Workspace::default();
         let people: Result<Vec<Person>, Failure> = outlines
             .into_iter()
-            .map(|it| Person::seen(network, picture, it, &mut workspace))
+            .map(|it| Person::seen(&eyes.network, picture, it, &mut workspace))
             .collect();
-        Ok((people?, searched))
+        Ok((people?, from))
+    }
+
+    fn outlines(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Outline>, From), Failure> {
+        let plain = |sides| Outline { sides, score: None };
+        if let Some(outline) = self.arguments.outline {
+            return Ok((vec![plain(outline.0)], From::Given));
+        }
+        if let Some(boxes) = &eyes.detector {
+            let mut found = detector::people(boxes, picture, &mut Vec::new())?;
+            found.truncate(self.arguments.max);
+            let outlines = found.into_iter().map(|it| Outline {
+                sides: it.outline,
+                score: Some(it.score),
+            });
+            return Ok((outlines.collect(), From::Detector));
+        }
+        let searched = Searched::new(picture, self.arguments.longest(), &self.search)?;
+        let found = self.detect(searched.image(picture)?, searched.layout());
+        let outlines = found.iter().map(|it| plain(self.outline(&searched, it)));
+        let size = searched.layout().image_size;
+        Ok((outlines.collect(), From::Filters(size)))
     }
 
     /// The box of a pose: all boxes of its parts, widened; pixels of the picture.
@@ -87,42 +125,27 @@ impl Detector<'_> {
     fn report_people(
         &self,
         picture: &Picture,
-        searched: Option<[usize; 2]>,
+        (eyes, from): (&Eyes, From),
         found: &[Person],
     ) -> Result<(), Failure> {
-        let from = if searched.is_some() {
-            "filters"
-        } else {
-            "given"
-        };
         if found.is_empty() {
             output::message(format_args!(
-                "{}: the filters find nobody, so the network was not asked; --box says where to look",
-                picture.title()
+                "{}: {}, so the network was not asked; --box says where to look",
+                picture.title(),
+                nobody(eyes)
             ));
         }
         if self.arguments.json {
-            let detections: Vec<Value> = found.iter().map(|it| it.json(from)).collect();
-            let mut line = json!({
-                "image": picture.path,
-                "width": picture.size.width,
-                "height": picture.size.height,
-                "network": self.arguments.network,
-                "searched": searched,
-                "detections": detections,
-            });
-            if let Some(frame) = picture.frame {
-                line["frame"] = json!(frame);
-            }
-            return output::json(&line);
+            return self.report_json(picture, from, found);
         }
-        let how = match searched {
-            Some([width, height]) => format!(
+        let how = match (from, &eyes.detector) {
+            (From::Filters([width, height]), _) => format!(
                 "boxes by the filters at {width}x{height} of {}, widened by {:.0} %",
                 picture.size,
                 100.0 * OF_FILTERS
             ),
-            None => "box given".to_owned(),
+            (From::Detector, Some(boxes)) => format!("boxes by {}", boxes.card().name),
+            _ => "box given".to_owned(),
         };
         let n = found.len();
         let detections = if n == 1 { "detection" } else { "detections" };
@@ -134,14 +157,40 @@ impl Detector<'_> {
             picture.path.display()
         ))?;
         for person in found {
-            let [x1, y1, x2, y2] = person.outline;
+            let [x1, y1, x2, y2] = person.outline.sides;
+            let score = person.outline.score;
+            let sure = score.map_or(String::new(), |it| format!(" of score {it:.2}"));
             let [x, y] = person.joints.last().copied().unwrap_or([f64::NAN; 2]);
             output::line(format_args!(
-                "  score {:5.2}  box ({x1:.0}, {y1:.0}) to ({x2:.0}, {y2:.0})  head at ({x:.1}, {y:.1})",
+                "  score {:5.2}  box ({x1:.0}, {y1:.0}) to ({x2:.0}, {y2:.0}){sure}  head at ({x:.1}, {y:.1})",
                 person.score
             ))?;
         }
         Ok(())
+    }
+
+    fn report_json(&self, picture: &Picture, from: From, found: &[Person]) -> Result<(), Failure> {
+        let (from, searched) = match from {
+            From::Given => ("given", None),
+            From::Detector => ("detector", None),
+            From::Filters(size) => ("filters", Some(size)),
+        };
+        let detections: Vec<Value> = found.iter().map(|it| it.json(from)).collect();
+        let mut line = json!({
+            "image": picture.path,
+            "width": picture.size.width,
+            "height": picture.size.height,
+            "network": self.arguments.network,
+            "searched": searched,
+            "detections": detections,
+        });
+        if let Some(detector) = &self.arguments.detector {
+            line["detector"] = json!(detector);
+        }
+        if let Some(frame) = picture.frame {
+            line["frame"] = json!(frame);
+        }
+        output::json(&line)
     }
 
     fn draw_people(&self, picture: &Picture, found: &[Person]) -> Result<(), Failure> {
@@ -150,10 +199,10 @@ impl Detector<'_> {
         };
         let mut canvas = Canvas::from_rgb(picture.size, &picture.rgb);
         for person in found.iter().rev() {
-            canvas.frame(person.outline, 0.5 * line_width(picture.size), ACCENT);
+            canvas.frame(person.outline.sides, 0.5 * line_width(picture.size), ACCENT);
             let skeleton = person.skeleton();
             draw_limbs(&mut canvas, &skeleton.points, &skeleton.limbs);
-            let [x, y, ..] = person.outline;
+            let [x, y, ..] = person.outline.sides;
             canvas.label([x + 4.0, y + 4.0], &format!("{:.2}", person.score), ACCENT);
         }
         let file = folder.join(format!("{}.png", picture.stem()));
@@ -165,10 +214,10 @@ impl Person {
     fn seen(
         network: &PoseNetwork,
         picture: &Picture,
-        outline: [f64; 4],
+        outline: Outline,
         workspace: &mut Workspace,
     ) -> Result<Self, Failure> {
-        let sight = network::look(network, picture, outline, workspace)?;
+        let sight = network::look(network, picture, outline.sides, workspace)?;
         let mut maps = JointMaps::default();
         let settings = MapSettings::default();
         maps.read(&sight, &settings).or_fail(ExitKind::Input)?;
@@ -198,12 +247,28 @@ impl Person {
             let at = at.iter().all(|it| it.is_finite()).then_some(at);
             (joint.name.to_owned(), json!(at))
         });
-        json!({
+        let mut value = json!({
             "score": self.score,
-            "box": self.outline,
+            "box": self.outline.sides,
             "box_from": from,
             "keypoints": self.keypoints,
             "joints": joints.collect::<Map<_, _>>(),
-        })
+        });
+        if let Some(score) = self.outline.score {
+            value["box_score"] = json!(score);
+        }
+        value
     }
+}
+
+/// Who finds nobody.
+fn nobody(eyes: &Eyes) -> String {
+    let Some(boxes) = &eyes.detector else {
+        return "the filters find nobody".to_owned();
+    };
+    let card = boxes.card();
+    format!(
+        "{} finds nobody (no box scores `least_score` = {} of its card)",
+        card.name, card.least_score
+    )
 }

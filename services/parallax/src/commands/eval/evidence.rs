@@ -32,7 +32,7 @@ pub(super) struct Options {
     /// The network (ONNX) that finds the boxes of people.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
-    /// The card of the detector; if not given, the one beside it.
+    /// The card of the detector; if not given, the one beside it, or in its metadata.
     #[arg(long, value_name = "FILE", requires = "detector")]
     detector_card: Option<PathBuf>,
     /// What goes wrong, separated by commas: clean, covered:N (half of the person in N views), views:N (only so many),

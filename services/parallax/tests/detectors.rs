@@ -1,0 +1,294 @@
+//! Detectors of people: shown with their cards, and as what finds the boxes of `detect`.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use crate::common;
+
+use common::{Case, Ended, PLAIN};
+use onnx::{Network, Side};
+use serde_json::{Value, json};
+
+const CARD: &str = r#"
+format = "parallax-detector"
+version = 1
+name = "Three boxes always"
+licence = "CC0"
+input = { width = 64, height = 64 }
+output = { codec = "list", boxes = "dets" }
+"#;
+
+/// Three maps of the colours of blocks of four by four pixels.
+const NETWORK_CARD: &str = r#"
+format = "parallax-keypoint-network"
+version = 1
+name = "Three colours"
+[input]
+width = 48
+height = 64
+scale = 0.00392156862745098
+[crop]
+margin = 1.0
+[output]
+codec = "heat-map"
+refine = "none"
+[keypoints]
+names = ["head top", "left hip", "right hip"]
+"#;
+
+/// The boxes of the detector: left, top, right, bottom, pixels of its input, and score.
+const BOXES: [[f32; 5]; 3] = [
+    [0.0, 0.0, 24.0, 32.0, 0.6],
+    [24.0, 16.0, 48.0, 48.0, 0.9],
+    [30.0, 30.0, 40.0, 40.0, 0.1],
+];
+
+/// Gives the same boxes of every picture.
+fn detector() -> Network {
+    let mut net = Network::default();
+    let picture = [1, 3, 64, 64].map(Side::Fixed).to_vec();
+    net.inputs.push(("picture".to_owned(), picture));
+    let n = BOXES.len();
+    let dets = [1, n, 5].map(Side::Fixed).to_vec();
+    net.outputs.push(("dets".to_owned(), dets));
+    net.floats("boxes", &[1, 3, 5], BOXES.concat());
+    net.node("Relu", &["boxes"], "dets", vec![]);
+    net
+}
+
+/// A picture of 128 by 96 pixels with one white pixel block, the networks and their cards.
+fn case(name: &str) -> Case {
+    let case = Case::new(name, &[1, 1], PLAIN);
+    case.write("det.onnx", detector().file());
+    case.write("card.toml", CARD);
+    case.write("net.onnx", crate::networks::network("Relu").file());
+    case.write("net.toml", NETWORK_CARD);
+    let mut picture = image::RgbImage::new(128, 96);
+    for (row, column) in (0..8).flat_map(|row| (0..8).map(move |it| (row, it))) {
+        picture.put_pixel(64 + column, 48 + row, image::Rgb([255; 3]));
+    }
+    picture.save(case.path("people.png")).unwrap();
+    case
+}
+
+fn run(case: &Case, arguments: &[&str], more: &[&str]) -> Ended {
+    case.start(&[arguments, more].concat()).wait()
+}
+
+fn parsed(ended: &Ended) -> Value {
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    serde_json::from_str(ended.stdout.trim()).unwrap()
+}
+
+/// A box of the detector in the picture, which is twice as large as its input.
+fn in_picture(nth: usize) -> Value {
+    let side = |it: f32| (f64::from(it) + 0.5) * 2.0 - 0.5;
+    json!(
+        BOXES[nth][..4]
+            .iter()
+            .map(|it| side(*it))
+            .collect::<Vec<_>>()
+    )
+}
+
+const DETECT: [&str; 6] = [
+    "detect",
+    "people.png",
+    "--network",
+    "net.onnx",
+    "--detector",
+    "det.onnx",
+];
+
+#[test]
+fn the_network_looks_into_every_box_of_the_detector() {
+    let case = case("detector-boxes");
+    let card = ["--detector-card", "card.toml"];
+    let line = parsed(&run(&case, &DETECT, &[&card[..], &["--json"]].concat()));
+    assert_eq!(line["detector"], "det.onnx", "{line}");
+    assert!(line["searched"].is_null(), "{line}");
+    let found = line["detections"].as_array().unwrap();
+    assert_eq!(found.len(), 2, "the third is below the least score: {line}");
+    for (person, nth) in found.iter().zip([1, 0]) {
+        assert_eq!(person["box"], in_picture(nth), "the surest first: {line}");
+        assert_eq!(person["box_from"], "detector");
+        let score = person["box_score"].as_f64().unwrap();
+        assert!((score - f64::from(BOXES[nth][4])).abs() < 1e-6, "{person}");
+    }
+    // The block lies in the first of the two, and in a corner of the other.
+    let head = |nth: usize| found[nth]["keypoints"][0]["score"].as_f64().unwrap();
+    assert!(head(0) > 0.9, "{line}");
+
+    let more = ["--max", "1", "--overlay", "drawn"];
+    let ended = run(&case, &DETECT, &[&card[..], &more].concat());
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for words in [
+        "1 detection by the network; boxes by Three boxes always",
+        "of score 0.90",
+    ] {
+        assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
+    }
+    assert!(case.path("drawn/people.png").is_file());
+}
+
+#[test]
+fn a_card_lies_beside_the_detector_or_in_it() {
+    let case = case("detector-card");
+    let ended = run(&case, &DETECT, &[]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    for words in ["det.onnx: the detector has no card", "--detector-card"] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    let mut net = detector();
+    let entry = |text: &str| ("parallax.card".to_owned(), text.to_owned());
+    net.metadata.push(entry(CARD));
+    case.write("det.onnx", net.file());
+    assert_eq!(run(&case, &DETECT, &[]).status.code(), Some(0));
+    let shown = parsed(&run(&case, &["model", "show", "det.onnx", "--json"], &[]));
+    let card = &shown["detector_card"];
+    assert_eq!(card["from"], "`parallax.card` in the file", "{shown}");
+    case.write("det.onnx.toml", CARD.replace("Three", "Few"));
+    let shown = parsed(&run(&case, &["model", "show", "det.onnx", "--json"], &[]));
+    assert_eq!(shown["detector_card"]["name"], "Few boxes always");
+    std::fs::remove_file(case.path("det.onnx.toml")).unwrap();
+    net.metadata
+        .push(entry(&CARD.replace("[64", "").replace("width", "wide")));
+    case.write("det.onnx", net.file());
+    let ended = run(&case, &DETECT, &[]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    for words in ["det.onnx: `parallax.card`", "wide"] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+}
+
+#[test]
+fn a_detector_that_finds_nobody_says_what_its_card_asks_for() {
+    let case = case("detector-nobody");
+    case.write("det.toml", format!("least_score = 0.95{CARD}"));
+    let ended = run(&case, &DETECT, &[]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(ended.stdout.contains("0 detections"), "{}", ended.stdout);
+    for words in ["finds nobody", "`least_score` = 0.95", "not asked"] {
+        assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+    }
+    let shown = [
+        "model",
+        "show",
+        "det.onnx",
+        "--image",
+        "people.png",
+        "--out",
+        "x.png",
+    ];
+    let ended = run(&case, &shown, &[]);
+    let said = "finds nobody: no box scores 0.95 or more";
+    assert!(ended.stdout.contains(said), "{}", ended.stdout);
+}
+
+#[test]
+fn a_detector_is_explained_by_its_card_and_its_boxes_are_drawn() {
+    let case = case("detector-shown");
+    let show = ["model", "show", "det.onnx", "--card", "card.toml"];
+    let look = ["--image", "people.png", "--out", "boxes.png"];
+    let ended = run(&case, &show, &look);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    for words in [
+        "det.onnx: a detector of people",
+        "`picture` [1, 3, 64, 64]",
+        "`dets` [1, 3, 5]",
+        "card.toml: Three boxes always",
+        "64 wide, 64 high, rgb, planes, f32",
+        "114 beyond it",
+        "`dets`, a list of boxes",
+        "a score of at least 0.3",
+        "licence CC0",
+        "fits its card",
+        "box (   48.5,    32.5) to (   96.5,    96.5)  0.90",
+    ] {
+        assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
+    }
+    let drawn = image::open(case.path("boxes.png")).unwrap().to_rgb8();
+    assert_eq!(drawn.dimensions(), (128, 96));
+    assert_ne!(
+        drawn.get_pixel(70, 32),
+        &image::Rgb([0; 3]),
+        "the upper side"
+    );
+    let shown = parsed(&run(&case, &show, &[&look[..], &["--json"]].concat()));
+    assert_eq!(shown["boxes"][0]["box"], in_picture(1), "{shown}");
+    assert_eq!(shown["boxes"].as_array().unwrap().len(), 2);
+    assert!(shown["misfit"].is_null(), "{shown}");
+    let boxed = [&look[..], &["--box", "0,0,9,9"]].concat();
+    let ended = run(&case, &show, &boxed);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+
+    let shown = parsed(&run(&case, &["model", "show", "det.onnx", "--json"], &[]));
+    assert_eq!(shown["nearest_detector_cards"], json!(["rtmdet-person"]));
+}
+
+#[test]
+fn what_does_not_fit_is_named_with_the_numbers() {
+    let case = case("detector-misfit");
+    let grids = ("codec = \"list\", boxes = \"dets\"", "codec = \"yolox\"");
+    for ((from, to), words) in [
+        (
+            ("width = 64", "width = 96"),
+            &["[1, 3, 64, 64]", "[1, 3, 64, 96]"][..],
+        ),
+        (("\"dets\"", "\"boxes\""), &["`boxes`", "`dets` [1, 3, 5]"]),
+        (grids, &["`dets`", "[1, 3, 5]", "[1, 84, 6 or more]"]),
+        (("version = 1", "version = 2"), &["wrong.toml", "version 2"]),
+        (
+            ("name =", "least_score = 7\nname ="),
+            &["wrong.toml", "`least_score` is 7"],
+        ),
+        (("-detector", "-keypoint-network"), &["wrong.toml"]),
+    ] {
+        case.write("wrong.toml", CARD.replace(from, to));
+        let detect = run(&case, &DETECT, &["--detector-card", "wrong.toml"]);
+        let show = ["model", "show", "det.onnx", "--card", "wrong.toml"];
+        for ended in [detect, run(&case, &show, &[])] {
+            assert_eq!(ended.status.code(), Some(4), "{to}: {}", ended.stderr);
+            for words in words {
+                assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
+            }
+        }
+    }
+    // The card of a network that finds keypoints.
+    let ended = run(&case, &DETECT, &["--detector-card", "net.toml"]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    let said = "`parallax-keypoint-network` version 1, expected `parallax-detector` version 1";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    // Options of the filters, and of nobody.
+    for more in [
+        &["--threshold", "0"][..],
+        &["--box", "0,0,9,9"],
+        &["--full"],
+    ] {
+        let ended = run(
+            &case,
+            &DETECT,
+            &[&["--detector-card", "card.toml"], more].concat(),
+        );
+        assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.stderr);
+    }
+    let alone = ["detect", "people.png", "--detector", "det.onnx"];
+    assert_eq!(run(&case, &alone, &[]).status.code(), Some(2));
+}
+
+#[test]
+fn numbers_are_of_the_type_that_the_card_says() {
+    let case = case("detector-numbers");
+    let net = crate::eval_networks::detector_of([8.0, 8.0, 40.0, 40.0], 0.9);
+    case.write("det.onnx", net.file());
+    case.write("det.toml", CARD);
+    let show = ["model", "show", "det.onnx"];
+    assert_eq!(run(&case, &show, &[]).status.code(), Some(0));
+    // It takes single precision: bytes are refused, and not passed as something else.
+    case.write(
+        "det.toml",
+        CARD.replace("height = 64", "height = 64, numbers = \"u8\""),
+    );
+    let ended = run(&case, &show, &[]);
+    assert_eq!(ended.status.code(), Some(4), "{}", ended.stdout);
+    let said = "det.onnx does not fit its card (det.toml)";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+}

@@ -1,0 +1,53 @@
+//! What a card says that it is, before its keys are read.
+
+use serde::Deserialize;
+
+use super::CardError;
+
+/// The format name of a card.
+pub(crate) const FORMAT: &str = "parallax-keypoint-network";
+/// The format name of the card of a detector.
+pub(crate) const DETECTOR_FORMAT: &str = "parallax-detector";
+/// The version of either that is read.
+pub(crate) const VERSION: u32 = 1;
+
+/// What a card is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CardKind {
+    /// A network that finds keypoints: [`Card`](crate::Card).
+    Keypoints,
+    /// A detector of people: [`DetectorCard`](crate::DetectorCard).
+    Detector,
+}
+
+impl CardKind {
+    /// What a text says that it is; `None` if it says neither.
+    pub fn of(text: &str) -> Option<Self> {
+        let head: Head = toml::from_str(text).ok()?;
+        match head.format.as_str() {
+            FORMAT => Some(Self::Keypoints),
+            DETECTOR_FORMAT => Some(Self::Detector),
+            _ => None,
+        }
+    }
+}
+
+/// What any card begins with.
+#[derive(Debug, Deserialize)]
+struct Head {
+    format: String,
+    version: u32,
+}
+
+/// Checks what a text says that it is, before its keys are checked.
+pub(crate) fn check_head(text: &str, expected: &'static str) -> Result<(), CardError> {
+    let head: Head = toml::from_str(text)?;
+    if head.format == expected && head.version == VERSION {
+        return Ok(());
+    }
+    Err(CardError::Version {
+        format: head.format.chars().take(32).collect(),
+        version: head.version,
+        expected,
+    })
+}
