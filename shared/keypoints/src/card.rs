@@ -155,8 +155,8 @@ pub enum Codec {
         /// Maps after those of the keypoints that are not read: the background, fields between joints.
         #[serde(default)]
         further: usize,
-        /// Whether the corner cells lie on the corner pixels (UDP: Huang et al. 2020); else a cell covers a whole number of
-        /// pixels from the corner of the input on.
+        /// Whether the corner cells lie on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
+        /// [`Window`](crate::Window)); else a cell covers a whole number of pixels from the corner of the input on.
         #[serde(default)]
         udp: bool,
         /// How a maximum is refined.

@@ -1,6 +1,6 @@
 //! The window of a picture that a network sees.
 
-use crate::card::{Card, Fit, Layout};
+use crate::card::{Card, Codec, Fit, Layout};
 use crate::decode::Keypoint;
 
 /// Least side of the window over a grid, pixels of the picture.
@@ -10,8 +10,17 @@ const MOST_SLENDER: f64 = 4.0;
 
 /// Where the input of a network lies in a picture.
 ///
-/// Coordinates have pixel centres at integers, in the picture and in the input; the middle of the window is half the width and
-/// half the height of the input, as in the published recipes (mmpose).
+/// Coordinates have pixel centres at integers, in the picture and in the input. A box `s` pixels wide about `c` becomes the `W`
+/// columns of the input in one of two ways; rows likewise.
+///
+/// * Usually `u = (x - c) W / s + W / 2`: lengths are counted in pixels. The left edge of the box comes to the centre of the
+///   first pixel, its right edge one pixel beyond the centre of the last (mmpose's plain recipe).
+/// * Where the card says `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`: unbiased data processing (Huang et al. 2020)
+///   counts lengths in steps from one pixel centre to the next, of which `W` pixels have `W - 1`. The edges of the box come to
+///   the centres of the first and the last pixel, its middle to the middle between them (mmpose's `TopdownAffine` with
+///   `use_udp`). The shape of the box is still that of the input, `W / H`, so that the steps across and down differ a
+///   little. The corner cells of the maps lie on the corner pixels ([`HeatMaps::step`](crate::HeatMaps::step)), and hence on the
+///   edges of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// Its middle in the picture, pixels.
@@ -20,6 +29,8 @@ pub struct Window {
     step: [f64; 2],
     /// Width and height of the input.
     input: [usize; 2],
+    /// Where the middle of the window lies in the input.
+    middle: [f64; 2],
 }
 
 impl Window {
@@ -42,10 +53,16 @@ impl Window {
                 size[1].max(size[0] * height / width),
             ];
         }
+        let lengths = if is_unbiased(card) {
+            [width - 1.0, height - 1.0]
+        } else {
+            [width, height]
+        };
         Some(Self {
             centre: [f64::midpoint(left, right), f64::midpoint(top, bottom)],
-            step: [size[0] / width, size[1] / height],
+            step: [size[0] / lengths[0], size[1] / lengths[1]],
             input,
+            middle: lengths.map(|it| it / 2.0),
         })
     }
 
@@ -70,10 +87,12 @@ impl Window {
         let rows = height.ceil().min(most_rows as f64);
         let step = height / rows;
         let columns = (width / step).ceil().max(1.0);
+        let input = [columns as usize, rows as usize];
         Some(Self {
             centre: [f64::midpoint(left, right), f64::midpoint(top, bottom)],
             step: [step; 2],
-            input: [columns as usize, rows as usize],
+            input,
+            middle: input.map(|it| it as f64 / 2.0),
         })
     }
 
@@ -84,18 +103,12 @@ impl Window {
 
     /// The point of the picture at a point of the input.
     pub fn in_picture(&self, at: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|axis| {
-            let middle = self.input[axis] as f64 / 2.0;
-            self.centre[axis] + (at[axis] - middle) * self.step[axis]
-        })
+        [0, 1].map(|axis| self.centre[axis] + (at[axis] - self.middle[axis]) * self.step[axis])
     }
 
     /// The point of the input at a point of the picture.
     pub fn in_input(&self, at: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|axis| {
-            let middle = self.input[axis] as f64 / 2.0;
-            (at[axis] - self.centre[axis]) / self.step[axis] + middle
-        })
+        [0, 1].map(|axis| (at[axis] - self.centre[axis]) / self.step[axis] + self.middle[axis])
     }
 
     /// The same window elsewhere in the picture.
@@ -137,6 +150,11 @@ impl Window {
             }
         }
     }
+}
+
+/// Whether the network was trained with unbiased data processing.
+fn is_unbiased(card: &Card) -> bool {
+    matches!(card.output, Codec::HeatMap { udp: true, .. })
 }
 
 /// The box around the keypoints that were found with a score above 0: left, top, right, bottom.
@@ -199,138 +217,4 @@ fn sample_anywhere(
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::card::{Colour, tests::card};
-
-    #[test]
-    fn a_widened_box_has_the_shape_of_the_input_and_holds_the_box() {
-        // 96 wide, 128 high; the box is 100 by 100, with its margin 125 by 125.
-        let window = Window::new(&card(), [50.0, 50.0, 150.0, 150.0]).unwrap();
-        assert_eq!(window.step()[0], window.step()[1]);
-        assert_eq!(window.in_picture([48.0, 64.0]), [100.0, 100.0]);
-        let [left, _] = window.in_picture([0.0, 0.0]);
-        assert!((left - (100.0 - 62.5)).abs() < 1e-9, "{left}");
-    }
-
-    #[test]
-    fn a_stretched_box_fills_the_input() {
-        let mut card = card();
-        card.crop.fit = Fit::Stretch;
-        card.crop.margin = 1.0;
-        let window = Window::new(&card, [50.0, 60.0, 150.0, 100.0]).unwrap();
-        assert_eq!(window.in_picture([0.0, 0.0]), [50.0, 60.0]);
-        assert_eq!(window.in_picture([96.0, 128.0]), [150.0, 100.0]);
-    }
-
-    proptest! {
-        #[test]
-        fn a_point_has_the_same_colour_either_way(
-            x in -2.0..9.0_f64,
-            y in -2.0..7.0_f64,
-            whole in any::<bool>(),
-            rgb in proptest::collection::vec(any::<u8>(), 3 * 7 * 5),
-        ) {
-            let at = if whole { [x.floor(), y.floor()] } else { [x, y] };
-            let both = [sample, sample_anywhere].map(|it| it(&rgb, [7, 5], at, 12.5));
-            prop_assert_eq!(both[0], both[1]);
-        }
-    }
-
-    #[test]
-    fn a_box_without_extent_has_no_window() {
-        for outline in [
-            [1.0, 1.0, 1.0, 5.0],
-            [5.0, 1.0, 2.0, 5.0],
-            [f64::NAN, 1.0, 2.0, 5.0],
-            [0.0, 1.0, f64::INFINITY, 5.0],
-        ] {
-            assert_eq!(Window::new(&card(), outline), None, "{outline:?}");
-        }
-    }
-
-    #[test]
-    fn the_input_is_the_picture_prepared_as_the_card_says() {
-        let mut card = card();
-        (card.crop.margin, card.crop.fill) = (1.0, 9);
-        (card.input.scale, card.input.mean, card.input.std) =
-            (0.5, [1.0, 2.0, 3.0], [2.0, 4.0, 8.0]);
-        // A picture of one colour, in the middle of the window one pixel for one.
-        let rgb: Vec<u8> = [10, 20, 30].repeat(96 * 128);
-        let window = Window::new(&card, [0.0, 0.0, 96.0, 128.0]).unwrap();
-        let mut values = vec![f32::NAN; 3 * 96 * 128];
-        window.fill(&card, &rgb, [96, 128], &mut values);
-        let plane = 96 * 128;
-        assert_eq!(
-            [values[0], values[plane], values[2 * plane]],
-            [2.0, 2.0, 1.5]
-        );
-        card.input.colour = Colour::Bgr;
-        card.input.layout = Layout::Pixels;
-        window.fill(&card, &rgb, [96, 128], &mut values);
-        assert_eq!(values[..3], [7.0, 2.0, 0.25]);
-        // Beyond the picture.
-        let far = Window::new(&card, [500.0, 0.0, 596.0, 128.0]).unwrap();
-        far.fill(&card, &rgb, [96, 128], &mut values);
-        assert_eq!(values[..3], [1.75, 0.625, 0.1875]);
-    }
-
-    proptest! {
-        #[test]
-        fn there_and_back_is_the_same_place(
-            corner in [-500.0..2000.0, -500.0..2000.0_f64], size in [1.0..900.0, 1.0..900.0_f64],
-            at in [-100.0..500.0, -100.0..500.0_f64],
-        ) {
-            let outline = [corner[0], corner[1], corner[0] + size[0], corner[1] + size[1]];
-            let window = Window::new(&card(), outline).unwrap();
-            let back = window.in_input(window.in_picture(at));
-            prop_assert!((0..2).all(|axis| (back[axis] - at[axis]).abs() < 1e-6), "{:?}", back);
-        }
-    }
-
-    #[test]
-    fn a_grid_holds_the_box_in_square_cells() {
-        let window = Window::grid([100.0, 50.0, 300.0, 450.0], 1.25, 64).unwrap();
-        assert_eq!(window.input(), [32, 64]);
-        assert_eq!(window.step(), [7.8125; 2]);
-        assert_eq!(window.in_picture([16.0, 32.0]), [200.0, 250.0]);
-        let small = Window::grid([0.0, 0.0, 20.0, 24.0], 1.25, 64).unwrap();
-        assert_eq!((small.input(), small.step()), ([25, 30], [1.0; 2]));
-    }
-
-    #[test]
-    fn a_grid_over_a_line_or_a_point_is_widened_and_stays_small() {
-        for outline in [
-            [10.0, 5.0, 900.0, 5.0],
-            [10.0, 5.0, 10.0, 900.0],
-            [10.0, 5.0, 10.0, 5.0],
-            [-1e6, -1e6, 1e6, 1e6],
-        ] {
-            let window = Window::grid(outline, 1.25, 64).unwrap();
-            let [columns, rows] = window.input();
-            assert!((8..=64).contains(&rows) && (8..=257).contains(&columns));
-            for corner in [[outline[0], outline[1]], [outline[2], outline[3]]] {
-                let [x, y] = window.in_input(corner);
-                assert!(x >= 0.0 && x <= columns as f64 && y >= 0.0 && y <= rows as f64);
-            }
-        }
-        assert_eq!(Window::grid([0.0, 0.0, f64::NAN, 1.0], 1.25, 64), None);
-        assert_eq!(Window::grid([5.0, 0.0, 1.0, 1.0], 1.25, 64), None);
-        assert_eq!(Window::grid([f64::MIN, 0.0, f64::MAX, 1.0], 1.25, 64), None);
-    }
-
-    #[test]
-    fn the_box_of_keypoints_is_of_those_that_were_found() {
-        let at = |x, y, score| Some(Keypoint { at: [x, y], score });
-        let all = [
-            at(5.0, 9.0, 0.1),
-            None,
-            at(0.0, 0.0, 0.0),
-            at(7.0, 2.0, 1.0),
-        ];
-        assert_eq!(outline(&all), Some([5.0, 2.0, 7.0, 9.0]));
-        assert_eq!(outline(&all[1..3]), None);
-    }
-}
+mod tests;
