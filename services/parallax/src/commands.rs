@@ -46,7 +46,7 @@ pub(crate) fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::FuseFrame(it) => fuse_frame::run(&it),
         Command::Eval(it) => eval::run(&it, cli.globals),
         Command::Train(it) => train::run(it, cli.globals),
-        Command::Model(it) => model::run(&it),
+        Command::Model(it) => model::run(&it, cli.globals),
         Command::Calib(it) => calib::run(&it),
         Command::Config(it) => config::run(&it),
         Command::Status(it) => deployments::status(&it),

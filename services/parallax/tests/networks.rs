@@ -3,6 +3,7 @@
 
 use crate::common;
 
+use common::started::signal;
 use common::{Case, Ended, PLAIN};
 use onnx::{Attribute, Network, Side};
 use serde_json::Value;
@@ -272,6 +273,36 @@ fn a_network_is_judged_on_marked_people() {
     let ended = run(&case, &judge);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
     assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
+}
+
+#[test]
+fn judging_ends_early_when_it_is_interrupted() {
+    let case = case("network-interrupted");
+    // One who is left out, so that it is known when the others begin; these last for minutes.
+    let mut marks = vec![[f64::NAN; 2]; 14];
+    let line = |marks: &[[f64; 2]]| {
+        let person = serde_json::json!({"image": "blocks.png", "joints": marks});
+        format!("{person}\n")
+    };
+    let mut people = line(&marks);
+    for nth in 0..20_000 {
+        for (joint, it) in marks.iter_mut().enumerate() {
+            let column = 5.0 + f64::from(nth) / 1000.0 + joint as f64;
+            *it = [column, 20.0 + 5.0 * joint as f64];
+        }
+        people += &line(&marks);
+    }
+    case.write("people.jsonl", people);
+    for model in [&["net.onnx", "--card", "card.toml"][..], &["model.plx"]] {
+        let judge = [&["model", "judge"], model, &["people.jsonl"]].concat();
+        let mut started = case.start(&judge);
+        started.until_said("left out");
+        signal("INT", started.id());
+        let ended = started.wait();
+        assert_eq!(ended.status.code(), Some(130), "{}", ended.stderr);
+        assert!(ended.stderr.contains("interrupted"), "{}", ended.stderr);
+        assert_eq!(ended.stdout, "", "no figures of a part");
+    }
 }
 
 #[test]

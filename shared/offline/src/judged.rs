@@ -10,9 +10,11 @@ use evaluation::{
 use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Search};
 use rayon::prelude::*;
-use runtime::{ExitKind, Failure, OrFail as _};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 use skeleton::{JointMap, N_PARTS, PARSE14};
+
+use crate::console::Console;
 
 /// Most detections that are looked through for the one that lies on the person.
 const MOST: usize = 10_000;
@@ -42,8 +44,8 @@ impl Reader {
 /// Tries a model on people, on rayon's current pool.
 ///
 /// * `name`: of the data set.
-/// * `is_over`: whether to give up.
-/// * `message`: is given a message about everybody who was left out.
+/// * `stop`: whether to give up, asked before every person.
+/// * `console`: is given a message about everybody who was left out, and every person who is done.
 ///
 /// # Errors
 ///
@@ -52,38 +54,49 @@ pub fn judged(
     reader: &Reader,
     name: &str,
     people: &People,
-    is_over: impl Fn() -> bool + Sync,
-    message: impl Fn(&str),
+    stop: &Stop,
+    console: &dyn Console,
 ) -> Result<Pictures, Failure> {
     let find = |person: &Person| {
-        if is_over() {
-            return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
-        }
+        go_on(stop)?;
         let found = find(&reader.search, person)?;
+        console.advance(1);
         Ok(found.map(|it| it.and_then(|it| reader.joints(&it))))
     };
-    pictures(name, people, message, |people| {
+    pictures(name, people, console, |people| {
         people.par_iter().map(find).collect()
     })
 }
 
+/// Gives up if a stop was requested.
+pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
+    if stop.is_requested() {
+        return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
+    }
+    Ok(())
+}
+
 /// What was found on people, beside the truth.
 ///
-/// * `find`: the detections of every person.
+/// * `find`: the detections of every person; it advances the bar of the console.
 pub(crate) fn pictures(
     name: &str,
     people: &People,
-    message: impl Fn(&str),
+    console: &dyn Console,
     find: impl FnOnce(&[Person]) -> Result<Vec<[Option<Joints>; 2]>, Failure>,
 ) -> Result<Pictures, Failure> {
     for problem in &people.problems {
-        message(&format!("left out: {problem}: {}", problem.fault));
+        console.message(&format!("left out: {problem}: {}", problem.fault));
     }
+    console.set(0, people.people.len());
+    console.begin(name, "");
+    let found = find(&people.people);
+    console.finish();
     Ok(Pictures {
         name: name.to_owned(),
         n_left_out: people.problems.len(),
         truths: people.people.iter().map(truth).collect(),
-        found: find(&people.people)?,
+        found: found?,
     })
 }
 

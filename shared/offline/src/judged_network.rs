@@ -6,10 +6,11 @@ use fmp::{Layout, Pose, Solver};
 use keypoints::Keypoint;
 use posenetwork::springs::joint_of;
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
-use runtime::{ExitKind, Failure, OrFail as _};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
 
-use crate::judged::{pictures, truth};
+use crate::console::Console;
+use crate::judged::{go_on, pictures, truth};
 
 /// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
 /// are more exact.
@@ -27,20 +28,27 @@ pub struct NetworkReader {
 /// Tries a network on people, each in the box around the marked joints. The detections of [`Pictures::found`] are the joints at
 /// the maxima of the maps, and those that the springs choose.
 ///
-/// * `message`: is given a message about everybody who was left out.
+/// * `stop`: whether to give up, asked before every person.
+/// * `console`: is given a message about everybody who was left out, and every person who is done.
 ///
 /// # Errors
 ///
-/// An image cannot be read, or the network fails on it.
+/// An image cannot be read, or the network fails on it; it was given up ([`ExitKind::Interrupted`]).
 pub fn judged(
     reader: &NetworkReader,
     people: &People,
-    message: impl Fn(&str),
+    stop: &Stop,
+    console: &dyn Console,
 ) -> Result<Pictures, Failure> {
     let mut workspace = Workspace::default();
     let mut maps = JointMaps::default();
-    let find = |person: &Person| reader.find(person, &mut workspace, &mut maps);
-    pictures("", people, message, |people| {
+    let find = |person: &Person| {
+        go_on(stop)?;
+        let found = reader.find(person, &mut workspace, &mut maps)?;
+        console.advance(1);
+        Ok(found)
+    };
+    pictures("", people, console, |people| {
         people.iter().map(find).collect()
     })
 }

@@ -182,7 +182,7 @@ fn share(text: &str) -> Result<[f64; 2], String> {
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     if are_pictures(arguments)? {
-        return pictures::run(arguments, &stop);
+        return pictures::run(arguments, globals, &stop);
     }
     let evidence = &arguments.evidence;
     match (&evidence.network_evidence, &evidence.detector) {

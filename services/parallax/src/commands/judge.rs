@@ -13,9 +13,16 @@ use fmp::Search;
 use launch::inputs::{self, Joints};
 use launch::output;
 use offline::judged::{self, Reader};
-use runtime::{ExitKind, Failure};
+use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::json;
 use skeleton::PARSE14;
+
+use crate::globals::Globals;
+use crate::terminal::Terminal;
+
+/// The progress bar.
+pub(super) const BAR: &str =
+    "{elapsed_precise} {bar:20} {pos}/{len} people, {per_sec}, {eta} left {prefix}";
 
 /// Options of `parallax model judge`.
 #[derive(Debug, Args)]
@@ -23,6 +30,9 @@ use skeleton::PARSE14;
 DATASET and SELECTION are those of `parallax train fmp`. Two detections of an image are judged: the \
 best one of the image, which is how PCP is published, and the best one that covers 30 % of the box \
 around the person's joints, which is how PCK is (Yang & Ramanan). Bad labels are reported and left out.
+
+On a terminal a bar shows how many people are done. Ctrl-C ends the command after the person that it is at (exit code 130); nothing \
+is printed then.
 
 With --json one object:
     {\"images\", \"left_out\", \"best\" | \"on_person\":
@@ -92,10 +102,12 @@ pub(super) fn selection(text: &str) -> Result<Selection, String> {
 }
 
 /// Runs the command.
-pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
+    let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
+    let terminal = Terminal::with_bar(globals.quiet, false, BAR);
     let is_network = arguments.model.extension();
     if is_network.is_some_and(|it| it.eq_ignore_ascii_case("onnx")) {
-        return network::run(arguments);
+        return network::run(arguments, &stop, &terminal);
     }
     if arguments.card.is_some() || arguments.springs.is_some() {
         let message = format!(
@@ -112,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         search: Search::new(model),
         joint_map: joints.map(None, &PARSE14),
     };
-    let pictures = judged::judged(&reader, "", &people, || false, |text| output::message(text))?;
+    let pictures = judged::judged(&reader, "", &people, &stop, &terminal)?;
     let [best, on_person] = Judged::ALL.map(|it| pictures.report(it));
     if arguments.json {
         let mut report = json!({

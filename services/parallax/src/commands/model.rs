@@ -10,6 +10,7 @@ use runtime::{ExitKind, Failure, OrFail as _};
 use serde_json::{Value, json};
 
 use super::{judge, network};
+use crate::globals::Globals;
 
 /// What `show` says of networks.
 const NETWORKS: &str = "\
@@ -60,10 +61,10 @@ pub(crate) enum Command {
 }
 
 /// Runs the subcommand.
-pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
+pub(crate) fn run(command: &Command, globals: Globals) -> Result<ExitCode, Failure> {
     match command {
         Command::Import { file, out } => import(file, out),
-        Command::Judge(it) => judge::run(it),
+        Command::Judge(it) => judge::run(it, globals),
         Command::Show {
             file,
             html: Some(html),

@@ -140,6 +140,13 @@ impl Started {
         });
     }
 
+    /// Waits until it has said something on standard error while it runs.
+    pub(crate) fn until_said(&mut self, words: &str) {
+        let file = self.log.with_extension("err");
+        let said = || fs::read_to_string(&file).is_ok_and(|it| it.contains(words));
+        self.until(words, |_| said());
+    }
+
     /// Whether it has ended.
     pub(crate) fn is_over(&mut self) -> bool {
         self.child.try_wait().unwrap().is_some()

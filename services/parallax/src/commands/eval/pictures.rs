@@ -14,9 +14,15 @@ use skeleton::PARSE14;
 
 use super::Arguments;
 use crate::commands::judge;
+use crate::globals::Globals;
+use crate::terminal::Terminal;
 
 /// Runs the evaluation.
-pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failure> {
+pub(super) fn run(
+    arguments: &Arguments,
+    globals: Globals,
+    stop: &Stop,
+) -> Result<ExitCode, Failure> {
     refuse_sequence_options(arguments)?;
     let options = judge::options(arguments.only.as_ref(), arguments.without.as_ref());
     let mut all: Vec<(String, People)> = Vec::new();
@@ -47,15 +53,8 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<ExitCode, Failur
     };
     let mut sets = Vec::new();
     for (name, people) in &all {
-        let found = pool.install(|| {
-            judged::judged(
-                &reader,
-                name,
-                people,
-                || stop.is_requested(),
-                |text| output::message(text),
-            )
-        });
+        let terminal = Terminal::with_bar(globals.quiet, false, judge::BAR);
+        let found = pool.install(|| judged::judged(&reader, name, people, stop, &terminal));
         let set = found?;
         pictures::write_found(&poses, people, &set)?;
         sets.push(set);

@@ -7,10 +7,11 @@ use evaluation::{Bootstrap, PCK_SHARES};
 use experiment::{Intervals, Judged, Pictures};
 use fmp::Solver;
 use launch::{inputs, output};
+use offline::Console;
 use offline::judged;
 use offline::judged_network::{self, NetworkReader};
 use offline::network::NetworkFile;
-use runtime::{ExitKind, Failure};
+use runtime::{ExitKind, Failure, Stop};
 use serde_json::{Value, json};
 
 use super::Arguments;
@@ -22,7 +23,11 @@ const NAMES: [(&str, &str); 2] = [
 ];
 
 /// Runs the command.
-pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+pub(super) fn run(
+    arguments: &Arguments,
+    stop: &Stop,
+    console: &dyn Console,
+) -> Result<ExitCode, Failure> {
     refuse(arguments)?;
     let file = NetworkFile::open(&arguments.model, arguments.card.as_deref())?;
     let shipped = Path::new(deployment::SHIPPED);
@@ -32,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         springs: Solver::new(inputs::springs(springs)?),
     };
     let people = arguments.people()?;
-    let pictures = judged_network::judged(&reader, &people, |text| output::message(text))?;
+    let pictures = judged_network::judged(&reader, &people, stop, console)?;
     if arguments.json {
         let mut report = json!({
             "schema_version": 1,
