@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::card::{CardError, DETECTOR_FORMAT, Input, Layout, check_head, check_input, demand};
 use crate::decode::OutputError;
 use crate::decode::finite;
+use crate::window::sample;
 
 /// The card of a network that finds the boxes of people.
 ///
@@ -247,7 +248,7 @@ impl DetectorCard {
         step
     }
 
-    /// The mean colour of the pixels of the picture that a pixel of the input covers; at least one.
+    /// The mean colour of the pixels of the picture that a pixel of the input covers; bilinear in a picture that is enlarged.
     fn cell(&self, rgb: &[u8], size: [usize; 2], (at, step): ([usize; 2], f64)) -> [f32; 3] {
         let span = [0, 1].map(|axis| {
             let begin = (at[axis] as f64 * step) as usize;
@@ -257,6 +258,13 @@ impl DetectorCard {
         let [columns, rows] = span;
         if columns.is_empty() || rows.is_empty() {
             return [f32::from(self.fill); 3];
+        }
+        if step < 1.0 {
+            let place = |axis: usize| {
+                let place = (at[axis] as f64 + 0.5) * step - 0.5;
+                place.clamp(0.0, size[axis] as f64 - 1.0)
+            };
+            return sample(rgb, size, [place(0), place(1)], f32::from(self.fill));
         }
         let n = (columns.len() * rows.len()) as f32;
         let mut sum = [0_u32; 3];
@@ -381,6 +389,17 @@ output = { codec = "yolox", strides = [16, 32] }
                 "{name}"
             );
         }
+    }
+
+    #[test]
+    fn a_picture_that_is_enlarged_is_bilinear() {
+        let card = DetectorCard::parse(YOLOX).unwrap();
+        // Two by one pixels become 64 by 32: half of the input's width lies between the two middles.
+        let mut values = vec![f32::NAN; 3 * 64 * 32];
+        let step = card.fill(&[0, 0, 0, 64, 64, 64], [2, 1], &mut values);
+        assert_eq!(step, 1.0 / 32.0);
+        let line: Vec<f32> = [0, 15, 16, 31, 32, 48, 63].map(|it| values[it]).to_vec();
+        assert_eq!(line, [0.0, 0.0, 1.0, 31.0, 33.0, 64.0, 64.0]);
     }
 
     #[test]

@@ -169,7 +169,7 @@ pub fn outline(keypoints: &[Option<Keypoint>]) -> Option<[f64; 4]> {
 
 /// The colour at a point, between four pixels; `fill` for those beyond the picture. The same bits as [`sample_anywhere`], without its
 /// question for every pixel whether it is in the picture.
-fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) -> [f32; 3] {
+pub(crate) fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) -> [f32; 3] {
     let [width, height] = size;
     if !(x >= 0.0 && y >= 0.0 && x + 1.0 < width as f64 && y + 1.0 < height as f64) {
         return sample_anywhere(rgb, size, [x, y], fill);
