@@ -43,12 +43,27 @@ pub struct Others {
     of_views: Vec<u64>,
     /// Bit `v` is set if view `v` sees others, but not the one who is followed.
     without: u64,
+    /// The candidate of every view that is the one who is followed.
+    own: Vec<Option<usize>>,
 }
 
 impl Others {
+    fn of(found: &Found, followed: Option<usize>) -> Self {
+        Self {
+            of_views: found.others(followed),
+            without: followed.map_or(0, |it| found.without(it)),
+            own: followed.map_or_else(Vec::new, |it| found.people[it].candidates.clone()),
+        }
+    }
+
     /// Bit `c` is set if candidate `c` of a view is somebody else.
     pub fn of_view(&self, view: usize) -> u64 {
         self.of_views.get(view).copied().unwrap_or(0)
+    }
+
+    /// The candidate of a view that is the one who is followed; `None` if the view does not see it, or nobody is followed.
+    pub fn own(&self, view: usize) -> Option<usize> {
+        self.own.get(view).copied().flatten()
     }
 
     /// Whether a view sees others, but not the one who is followed: it has no part in the frame.
@@ -70,10 +85,7 @@ impl Following {
     pub fn others(&mut self, plans: &[Arc<ViewPlan>], answers: &[Option<ViewResult>]) -> Others {
         let found = find(plans, answers);
         let followed = self.choose(&found);
-        Others {
-            of_views: found.others(followed),
-            without: followed.map_or(0, |it| found.without(it)),
-        }
+        Others::of(&found, followed)
     }
 
     /// The one who is followed; `None` if that is none of those who were found.
@@ -145,6 +157,20 @@ mod tests {
         assert_eq!(chosen(Follow::Last, &frames), last);
         let clearest = [Some(-0.5), Some(1.0), Some(1.0), Some(1.0)];
         assert_eq!(chosen(Follow::Clearest, &frames), clearest);
+    }
+
+    #[test]
+    fn the_candidates_of_the_one_who_is_followed_are_told() {
+        // The order of the people differs from view to view.
+        let people: &[([f64; 2], f64)] = &[([-0.5, 0.0], 1.0), ([1.0, 0.5], 0.8)];
+        let cameras: Vec<_> = (0..4).map(camera).collect();
+        let found = found(&cameras, people);
+        let followed = Following::new(Follow::Clearest).choose(&found);
+        let others = Others::of(&found, followed);
+        let own: Vec<Option<usize>> = (0..4).map(|view| others.own(view)).collect();
+        assert_eq!(own, [Some(0), Some(1), Some(0), Some(1)]);
+        let nobody = Others::of(&found, None);
+        assert_eq!(nobody.own(0), None);
     }
 
     #[test]

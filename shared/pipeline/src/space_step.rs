@@ -228,7 +228,8 @@ impl SpaceStep {
         self.result(&found, &views, &each)
     }
 
-    /// The candidate of every view that is the same person, among those who are nobody else.
+    /// The candidate of every view that is the same person: the one who is followed where the view sees it, else among those who are
+    /// nobody else.
     fn candidates(
         &self,
         answers: &[Option<ViewResult>],
@@ -245,7 +246,8 @@ impl SpaceStep {
                 continue;
             }
             for (index, pose) in answer.candidates.iter().enumerate() {
-                if others.of_view(view) >> index & 1 == 0 {
+                let is_own = others.own(view).is_none_or(|own| own == index);
+                if is_own && others.of_view(view) >> index & 1 == 0 {
                     indices[view].push(index);
                     people[view].push(self.seen(view, pose, evidence));
                 }
