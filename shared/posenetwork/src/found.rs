@@ -7,17 +7,23 @@ use crate::network::{Read, Sight};
 /// Standard deviation of the labels of `SimCC` along columns and rows, bins (mmpose's `RTMPose`, 192x256).
 const SIMCC_SIGMA: [f64; 2] = [4.9, 5.66];
 
-/// A joint as a weighted sum of keypoints; its score is the lowest of theirs.
-pub(crate) fn derived(row: &[(usize, f64)], keypoints: &[Keypoint], sight: &Sight<'_>) -> Keypoint {
-    let mut peak = weighted(row, |it| Some(keypoints[it])).unwrap_or(NOWHERE);
-    if let (Ok(Read::SimCc(simcc)), [(keypoint, _)]) = (sight.read(), row) {
-        let axis_peak = |axis| {
-            let values = likelihood(simcc.axis(*keypoint, axis), axis, sight);
-            values.into_iter().fold(0.0, f64::max)
-        };
-        peak.score = axis_peak(0) * axis_peak(1);
+/// A keypoint with its score from 0 to 1; of distributions over columns and rows the likelihood of their highest bins.
+pub(crate) fn scored(
+    nth: usize,
+    keypoint: Keypoint,
+    (read, sight): (&Read<'_>, &Sight<'_>),
+) -> Keypoint {
+    let Read::SimCc(simcc) = read else {
+        return keypoint;
+    };
+    let highest = |axis| {
+        let values = likelihood(simcc.axis(nth, axis), axis, sight);
+        values.into_iter().fold(0.0, f64::max)
+    };
+    Keypoint {
+        score: highest(0) * highest(1),
+        ..keypoint
     }
-    peak
 }
 
 /// What a row without keypoints would be.

@@ -6,7 +6,7 @@ use skeleton::PARSE14;
 
 use crate::between::{Tap, between};
 use crate::expected::expected_error;
-use crate::found::{derived, likelihood, score_of, weighted};
+use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
 
 /// Number of joints, each with a map.
@@ -119,11 +119,12 @@ impl JointMaps {
         self.peaks.clear();
         self.keypoints.clear();
         self.sigma_px = None;
-        let each = 0..keypoints.len();
+        let each = keypoints.iter().enumerate();
         self.keypoints
-            .extend(each.map(|it| Some(derived(&[(it, 1.0)], &keypoints, sight))));
+            .extend(each.map(|(nth, it)| Some(scored(nth, *it, (&read, sight)))));
         for (joint, row) in rows.iter().enumerate() {
-            let peak = row.as_ref().map(|row| derived(row, &keypoints, sight));
+            let found = |it: usize| self.keypoints[it];
+            let peak = row.as_ref().and_then(|row| weighted(row, found));
             self.peaks.push(peak);
             if let (Some(row), Some(peak)) = (row, peak) {
                 self.fill_joint(joint, (row, peak), (&read, sight), settings);
@@ -218,26 +219,30 @@ impl JointMaps {
         let size = sight.network().size();
         let floor = self.floor;
         let heat = |value: f64| settings.of_heat(value, floor);
-        let cells = self.values[joint * area..(joint + 1) * area].iter_mut();
-        let cells = cells
-            .enumerate()
-            .map(|(cell, value)| ([cell % columns, cell / columns], value));
+        let lines = self.values[joint * area..(joint + 1) * area].chunks_exact_mut(columns);
+        let lines = lines.enumerate();
         match (read, row) {
             (Read::Maps(maps), [(keypoint, _)]) => {
                 let score = score_of(sight);
-                for ([column, row], value) in cells {
-                    *value = heat(score.of(f64::from(maps.value(*keypoint, row, column))));
+                for (row, line) in lines {
+                    for (column, value) in line.iter_mut().enumerate() {
+                        *value = heat(score.of(f64::from(maps.value(*keypoint, row, column))));
+                    }
                 }
             }
             (Read::SimCc(simcc), [(keypoint, _)]) => {
-                let axes = [0, 1].map(|axis| likelihood(simcc.axis(*keypoint, axis), axis, sight));
-                let bin = |cell: usize, axis: usize| {
-                    let bins = axes[axis].len() as f64 / size[axis] as f64;
-                    let at = (cell as f64 * step[axis] * bins).round() as usize;
-                    axes[axis][at.min(axes[axis].len() - 1)]
+                let of_cells = |axis: usize, n: usize| -> Vec<f64> {
+                    let bins = likelihood(simcc.axis(*keypoint, axis), axis, sight);
+                    let of_pixel = bins.len() as f64 / size[axis] as f64;
+                    let bin = |cell: usize| (cell as f64 * step[axis] * of_pixel).round() as usize;
+                    let cells = 0..n;
+                    cells.map(|it| bins[bin(it).min(bins.len() - 1)]).collect()
                 };
-                for ([column, row], value) in cells {
-                    *value = heat(bin(column, 0) * bin(row, 1));
+                let (across, down) = (of_cells(0, columns), of_cells(1, self.rows));
+                for ((_, line), down) in lines.zip(down) {
+                    for (value, across) in line.iter_mut().zip(&across) {
+                        *value = heat(across * down);
+                    }
                 }
             }
             _ => {
