@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use inference::Session;
-use runtime::{ExitKind, Failure, in_file};
+use runtime::{Failure, in_file};
 
 use crate::failures::refused;
 
@@ -47,7 +47,7 @@ impl Library {
             "{}: ONNX Runtime, but this Parallax was built without it: build it with --features ort",
             file.display()
         );
-        Err(Failure::new(ExitKind::Config, message))
+        Err(Failure::new(runtime::ExitKind::Config, message))
     }
 
     /// Loads a network.
