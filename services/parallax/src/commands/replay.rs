@@ -207,24 +207,25 @@ fn check(
         from == Stage::Pose || (from == Stage::Quality && resolved.deployment.has_network());
     let needs_evidence = (Stage::Quality..=Stage::Fuse).contains(&from) && n_pairs > 0;
     let missing = if needs_pixels && without.pixels {
-        Some("the pixels of its frames")
+        Some((Kind::Frame, "the pixels of its frames"))
     } else if needs_evidence && without.evidence {
-        Some("evidence")
+        Some((Kind::Evidence, "evidence"))
     } else {
-        needed(resolved, from).find_map(|(kind, what)| {
-            let tracks = recording.tracks.values().filter(|it| it.kind == kind);
-            let n = tracks.map(|it| it.entries.len()).sum::<usize>();
-            (n == 0).then_some(what)
+        needed(resolved, from).find(|(kind, _)| {
+            let tracks = recording.tracks.values().filter(|it| it.kind == *kind);
+            tracks.map(|it| it.entries.len()).sum::<usize>() == 0
         })
     };
-    let Some(what) = missing else { return Ok(()) };
+    let Some((kind, what)) = missing else {
+        return Ok(());
+    };
     let message = format!(
         "{} lacks {what}, which --from {} needs",
         file.display(),
         from.name()
     );
     let failure = Failure::new(ExitKind::Input, message);
-    Err(match recording.counts.keys().find(|it| Kind::is_of_another_version(it)) {
+    Err(match recording.counts.keys().find(|it| kind.is_of_another_version(it)) {
         Some(topic) => failure.with_hint(format!(
             "its messages of {topic} have another layout than those of this Parallax: replay it with the one that recorded it"
         )),
