@@ -260,6 +260,9 @@ fn a_network_is_judged_on_marked_people() {
         assert!(report[which]["intervals"]["pck"]["0.2"][0].is_number());
     }
     assert_eq!(of("peaks", "knee"), 0.0, "{report}");
+    let expected = &report["expected_errors"];
+    let [n, n_far] = ["joints", "off_by_half_a_head"].map(|it| expected[it].as_u64().unwrap());
+    assert!(n > n_far && n <= 14, "{expected}");
     let ended = run(&case, &[&judge[..], &card].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     assert!(ended.stdout.contains("held together by springs: 1 images"));

@@ -81,10 +81,37 @@ impl Bootstrap {
                 means.push(drawn.sum / drawn.n);
             }
         }
+        self.percentiles(means)
+    }
+
+    /// The percentile interval of any number that is computed from the values of all frames. Frames are drawn one by one,
+    /// whatever `block` is.
+    ///
+    /// * `of`: the number; `None` where the values give none: such a resample is skipped.
+    /// * Returns the lower and the upper end; `None` if no resample gives a number.
+    pub fn interval_of<T: Copy>(
+        &self,
+        frames: &[Vec<T>],
+        of: impl Fn(&[T]) -> Option<f64>,
+    ) -> Option<[f64; 2]> {
+        let mut random = fastrand::Rng::with_seed(self.seed);
+        let mut drawn = Vec::new();
+        let mut numbers = Vec::with_capacity(self.n_resamples);
+        for _ in 0..self.n_resamples.max(1) {
+            drawn.clear();
+            for _ in 0..frames.len() {
+                drawn.extend_from_slice(&frames[random.usize(0..frames.len())]);
+            }
+            numbers.extend(of(&drawn));
+        }
+        self.percentiles(numbers)
+    }
+
+    fn percentiles(&self, numbers: Vec<f64>) -> Option<[f64; 2]> {
         let outside = (1.0 - self.confidence.clamp(0.0, 1.0)) / 2.0;
-        let means = Sorted::new(means);
-        let low = means.interpolated(outside)?;
-        let high = means.interpolated(1.0 - outside)?;
+        let numbers = Sorted::new(numbers);
+        let low = numbers.interpolated(outside)?;
+        let high = numbers.interpolated(1.0 - outside)?;
         Some([low, high])
     }
 }
@@ -122,6 +149,24 @@ mod tests {
         let [low, high] = settings.interval(&frames(&coin)).unwrap();
         let expected = 2.0 * 1.96 * (0.25_f64 / 400.0).sqrt();
         assert!(((high - low) / expected - 1.0).abs() < 0.1, "{low} {high}");
+    }
+
+    #[test]
+    fn the_interval_of_any_number_is_that_of_the_mean_for_the_mean() {
+        let coin: Vec<Vec<f64>> = (0..400).map(|it| vec![f64::from(it % 2)]).collect();
+        let mean = |it: &[f64]| {
+            let n = it.len() as f64;
+            (n > 0.0).then(|| it.iter().sum::<f64>() / n)
+        };
+        let settings = Bootstrap {
+            n_resamples: 4000,
+            ..Bootstrap::default()
+        };
+        let [low, high] = settings.interval_of(&coin, mean).unwrap();
+        let expected = 2.0 * 1.96 * (0.25_f64 / 400.0).sqrt();
+        assert!(((high - low) / expected - 1.0).abs() < 0.1, "{low} {high}");
+        assert_eq!(settings.interval_of(&coin, |_| None), None);
+        assert_eq!(settings.interval_of(&[], mean), None);
     }
 
     #[test]

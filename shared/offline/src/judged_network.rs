@@ -5,13 +5,16 @@ use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Solver};
 use keypoints::Keypoint;
 use posenetwork::springs::joint_of;
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, expected_error, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
 
 use crate::console::Console;
 use crate::judged::{go_on, pictures, truth};
 
+/// Of the neck and the top of the head in `skeleton::PARSE14`.
+const NECK: usize = 12;
+const HEAD: usize = 13;
 /// A joint lies where its map is highest if the springs put it nearer than this, cells: between cells the maxima of the maps
 /// are more exact.
 const SAME: f64 = 1.5;
@@ -25,8 +28,34 @@ pub struct NetworkReader {
     pub springs: Solver,
 }
 
-/// Tries a network on people, each in the box around the marked joints. The detections of [`Pictures::found`] are the joints at
-/// the maxima of the maps, and those that the springs choose.
+/// What a network found on people.
+#[derive(Debug)]
+pub struct Seen {
+    /// The joints at the maxima of the maps, and those that the springs choose, as [`Pictures::found`].
+    pub pictures: Pictures,
+    /// Of every person, the joints with a mark and a maximum.
+    pub errors: Vec<Vec<JointError>>,
+}
+
+/// How far a joint at the maximum of its map is off, and how far it was expected to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointError {
+    /// By the heat of the map, share of the height of the network's window: [`posenetwork::expected_error`].
+    pub expected: f64,
+    /// Share of that height as well.
+    pub error: f64,
+    /// The same distance, lengths of the person's head: from the top of the head to the neck as they are marked.
+    pub in_heads: f64,
+}
+
+impl JointError {
+    /// Whether it is off by more than half a head.
+    pub fn is_far(&self) -> bool {
+        self.in_heads > 0.5
+    }
+}
+
+/// Tries a network on people, each in the box around the marked joints.
 ///
 /// * `stop`: whether to give up, asked before every person.
 /// * `console`: is given a message about everybody who was left out, and every person who is done.
@@ -39,18 +68,41 @@ pub fn judged(
     people: &People,
     stop: &Stop,
     console: &dyn Console,
-) -> Result<Pictures, Failure> {
+) -> Result<Seen, Failure> {
+    let mut errors = Vec::new();
     let mut workspace = Workspace::default();
     let mut maps = JointMaps::default();
     let find = |person: &Person| {
         go_on(stop)?;
         let found = reader.find(person, &mut workspace, &mut maps)?;
+        if found[0].is_some() {
+            errors.push(errors_of(&maps, &truth(person)));
+        }
         console.advance(1);
         Ok(found)
     };
-    pictures("", people, console, |people| {
+    let pictures = pictures("", people, console, |people| {
         people.iter().map(find).collect()
-    })
+    })?;
+    Ok(Seen { pictures, errors })
+}
+
+/// The errors of the joints of a person; none where the head has no length.
+fn errors_of(maps: &JointMaps, truth: &Joints) -> Vec<JointError> {
+    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let head = distance(truth[NECK], truth[HEAD]);
+    let [_, top, _, bottom] = maps.extent();
+    let both = maps.peaks().iter().zip(truth);
+    let each = both.filter_map(|(peak, truth)| {
+        let peak = (*peak)?;
+        let off = distance(peak.at, *truth);
+        (off.is_finite() && head > 0.0).then(|| JointError {
+            expected: expected_error(peak.score),
+            error: off / (bottom - top),
+            in_heads: off / head,
+        })
+    });
+    each.collect()
 }
 
 impl NetworkReader {

@@ -46,7 +46,9 @@ across it (positive outwards), percent of the height of the person, and their in
 A network that finds keypoints (.onnx, docs/networks.md) is asked for every person in the box around the marked joints, widened
 by 5 % on each side: \"peaks\" are the joints at the maxima of its maps, \"springs\" those that the tree of springs chooses on
 the same maps. With --json these two stand in place of \"best\" and \"on_person\", each also with \"intervals\": of the totals, 95 %
-over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}.
+over the people, {\"pcp\": {\"mean_of_ends\", \"both_ends\"}, \"pck\": {\"0.1\", \"0.2\"}}. \"expected_errors\" says how well the \
+height of the maxima tells how far off the joints are: {\"joints\", \"off_by_half_a_head\", \"auc\" (of telling these), \
+\"auc_interval\", \"rank_correlation\"}.
 
 Examples:
     parallax model judge person.fmp PARSE --only 101-200

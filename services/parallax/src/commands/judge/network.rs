@@ -1,15 +1,16 @@
 //! `parallax model judge` of a network that finds keypoints.
 
+use core::fmt;
 use std::path::Path;
 use std::process::ExitCode;
 
-use evaluation::{Bootstrap, PCK_SHARES};
+use evaluation::{Bootstrap, PCK_SHARES, area_under_roc, rank_correlation};
 use experiment::{Intervals, Judged, Pictures};
 use fmp::Solver;
 use launch::{inputs, output};
 use offline::Console;
 use offline::judged;
-use offline::judged_network::{self, NetworkReader};
+use offline::judged_network::{self, JointError, NetworkReader, Seen};
 use offline::network::NetworkFile;
 use runtime::{ExitKind, Failure, Stop};
 use serde_json::{Value, json};
@@ -37,7 +38,8 @@ pub(super) fn run(
         springs: Solver::new(inputs::springs(springs)?),
     };
     let people = arguments.people()?;
-    let pictures = judged_network::judged(&reader, &people, stop, console)?;
+    let Seen { pictures, errors } = judged_network::judged(&reader, &people, stop, console)?;
+    let expected = Expected::of(&errors);
     if arguments.json {
         let mut report = json!({
             "schema_version": 1,
@@ -48,6 +50,7 @@ pub(super) fn run(
         for ((key, _), which) in NAMES.into_iter().zip(Judged::ALL) {
             report[key] = numbers(&pictures, which);
         }
+        report["expected_errors"] = expected.json();
         output::json(&report)?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -61,7 +64,64 @@ pub(super) fn run(
             "95 % intervals of the totals: PCP mean of ends {mean_of_ends}, both ends {both_ends}; PCK {near}, {far}"
         ))?;
     }
+    output::line(format_args!("\n{expected}"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// How well the heat of the maps tells how far off a joint is.
+struct Expected {
+    n_joints: usize,
+    n_far: usize,
+    /// With its interval.
+    auc: Option<(f64, [f64; 2])>,
+    rank_correlation: Option<f64>,
+}
+
+impl Expected {
+    /// * `people`: the joints of each.
+    fn of(people: &[Vec<JointError>]) -> Self {
+        let auc = |errors: &[JointError]| {
+            let each = errors.iter().map(|it| (it.expected, it.is_far()));
+            area_under_roc(&each.collect::<Vec<_>>())
+        };
+        let errors = people.concat();
+        let both: Vec<(f64, f64)> = errors.iter().map(|it| (it.expected, it.error)).collect();
+        Self {
+            n_joints: errors.len(),
+            n_far: errors.iter().filter(|it| it.is_far()).count(),
+            auc: auc(&errors).zip(Bootstrap::default().interval_of(people, auc)),
+            rank_correlation: rank_correlation(&both),
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "joints": self.n_joints,
+            "off_by_half_a_head": self.n_far,
+            "auc": self.auc.map(|it| it.0),
+            "auc_interval": self.auc.map(|it| it.1),
+            "rank_correlation": self.rank_correlation,
+        })
+    }
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let auc = self.auc.map_or_else(
+            || "unknown".to_owned(),
+            |(auc, [low, high])| format!("{auc:.3} ({low:.3} to {high:.3})"),
+        );
+        let number =
+            |it: Option<f64>| it.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"));
+        write!(
+            to,
+            "errors expected by the heat of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
+            auc,
+            self.n_far,
+            self.n_joints,
+            number(self.rank_correlation)
+        )
+    }
 }
 
 /// Refuses what only models of parts have.
