@@ -16,24 +16,6 @@ input = { width = 64, height = 64 }
 output = { codec = "list", boxes = "dets" }
 "#;
 
-/// Three maps of the colours of blocks of four by four pixels.
-const NETWORK_CARD: &str = r#"
-format = "parallax-keypoint-network"
-version = 1
-name = "Three colours"
-[input]
-width = 48
-height = 64
-scale = 0.00392156862745098
-[crop]
-margin = 1.0
-[output]
-codec = "heat-map"
-refine = "none"
-[keypoints]
-names = ["head top", "left hip", "right hip"]
-"#;
-
 /// The boxes of the detector: left, top, right, bottom, pixels of its input, and score.
 const BOXES: [[f32; 5]; 3] = [
     [0.0, 0.0, 24.0, 32.0, 0.6],
@@ -60,7 +42,7 @@ fn case(name: &str) -> Case {
     case.write("det.onnx", detector().file());
     case.write("card.toml", CARD);
     case.write("net.onnx", crate::networks::network("Relu").file());
-    case.write("net.toml", NETWORK_CARD);
+    case.write("net.toml", crate::networks::CARD);
     let mut picture = image::RgbImage::new(128, 96);
     for (row, column) in (0..8).flat_map(|row| (0..8).map(move |it| (row, it))) {
         picture.put_pixel(64 + column, 48 + row, image::Rgb([255; 3]));

@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Columns and rows of the input.
 const SIDES: [usize; 2] = [48, 64];
 
-const CARD: &str = r#"
+pub(crate) const CARD: &str = r#"
 format = "parallax-keypoint-network"
 version = 1
 name = "Three colours"

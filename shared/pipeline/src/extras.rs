@@ -10,7 +10,7 @@ use geometry::{Observation, Settings, Triangulated};
 use keypoints::mirrored;
 use multiview::ViewPlan;
 use nalgebra::Point2;
-use skeleton::PARSE14;
+use skeleton::{PARSE14, SIDES};
 
 use crate::bodies::NoJoint;
 use crate::fused_view::FusedView;
@@ -30,9 +30,9 @@ const MOST_FROM_JOINTS_M: f64 = 0.5;
 
 /// Pairs of joints of `skeleton::PARSE14`, right and left, by which a view's names of sides are told: knees and ankles, elbows and
 /// wrists, hips and shoulders.
-const LEGS: [[usize; 2]; 2] = [[1, 4], [0, 5]];
-const ARMS: [[usize; 2]; 2] = [[7, 10], [6, 11]];
-const TRUNK: [[usize; 2]; 2] = [[2, 3], [8, 9]];
+const LEGS: [[usize; 2]; 2] = [SIDES[0], SIDES[1]];
+const ARMS: [[usize; 2]; 2] = [SIDES[3], SIDES[4]];
+const TRUNK: [[usize; 2]; 2] = [SIDES[2], SIDES[5]];
 
 /// What one view found of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -207,10 +207,8 @@ fn sides_of(name: &str) -> [[usize; 2]; 2] {
 
 /// Median distance of the joints, whose sides may be exchanged.
 fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
-    let pairs = [LEGS, ARMS, TRUNK];
     let mirror = |joint: usize| {
-        let mut pairs = pairs.iter().flatten();
-        let pair = pairs.find(|it| it.contains(&joint));
+        let pair = SIDES.iter().find(|it| it.contains(&joint));
         pair.map_or(joint, |&[right, left]| right + left - joint)
     };
     let each = (0..own.len()).map(|joint| {
