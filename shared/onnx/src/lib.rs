@@ -3,6 +3,7 @@
 //! Numbers of fields are those of `onnx.proto` of the published schema, intermediate representation 8.
 #![forbid(unsafe_code)]
 
+mod half;
 mod message;
 
 use message::Message;
@@ -10,6 +11,7 @@ use message::Message;
 const IR_VERSION: i64 = 8;
 const FLOAT: i64 = 1;
 const INT64: i64 = 7;
+const FLOAT16: i64 = 10;
 
 /// One side of the shape of an input or output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +49,8 @@ pub struct Node {
 pub enum Values {
     /// Single precision.
     F32(Vec<f32>),
+    /// Half precision: the bits.
+    F16(Vec<u16>),
     /// Whole numbers: shapes, indices.
     I64(Vec<i64>),
 }
@@ -125,6 +129,28 @@ impl Network {
         });
     }
 
+    /// Adds constant numbers that are stored in half precision, and become single precision when the file is loaded.
+    ///
+    /// # Panics
+    ///
+    /// Unless there are as many values as the shape asks for.
+    pub fn halves(&mut self, name: &str, shape: &[usize], values: &[f32]) {
+        let n: usize = shape.iter().product();
+        assert_eq!(values.len(), n, "{name}: as many as the shape asks for");
+        let stored = format!("{name}.half");
+        self.constants.push(Constant {
+            name: stored.clone(),
+            shape: shape.to_vec(),
+            values: Values::F16(values.iter().map(|it| half::bits_of(*it)).collect()),
+        });
+        self.node(
+            "Cast",
+            &[&stored],
+            name,
+            vec![("to", Attribute::Int(FLOAT))],
+        );
+    }
+
     /// Adds a list of constant whole numbers.
     pub fn ints(&mut self, name: &str, values: Vec<i64>) {
         self.constants.push(Constant {
@@ -200,6 +226,10 @@ fn attribute(name: &str, value: &Attribute) -> Message {
 fn constant(constant: &Constant) -> Message {
     let (kind, bytes): (i64, Vec<u8>) = match &constant.values {
         Values::F32(all) => (FLOAT, all.iter().flat_map(|it| it.to_le_bytes()).collect()),
+        Values::F16(all) => (
+            FLOAT16,
+            all.iter().flat_map(|it| it.to_le_bytes()).collect(),
+        ),
         Values::I64(all) => (INT64, all.iter().flat_map(|it| it.to_le_bytes()).collect()),
     };
     Message::default()
