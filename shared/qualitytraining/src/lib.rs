@@ -11,8 +11,8 @@ pub mod onnx;
 pub mod parameters;
 pub mod vgg;
 
-pub mod curves;
 pub mod judge;
+pub mod passes;
 pub mod score;
 
 #[cfg(feature = "burn")]

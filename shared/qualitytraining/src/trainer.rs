@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use skeleton::N_PARTS;
 use viewquality::{Card, EVIDENCE_VERSION, Normalisation, TileShape, n_evidence};
 
-use crate::curves::Pass;
 use crate::judge::{self, Judgement};
 use crate::learn::{Batch, Learner, Step};
 use crate::network::{Kind, VGG16};
 use crate::onnx;
 use crate::parameters::{self, Inputs, Parameter};
+use crate::passes::Pass;
 use crate::sample::Sample;
 use crate::settings::Settings;
 use crate::store::{Samples, StoreError, unwrap, wrap};

@@ -5,14 +5,15 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use qualitytraining::curves;
 use qualitytraining::judge::Judgement;
 use qualitytraining::parameters::Parameter;
+use qualitytraining::passes::Pass;
 use qualitytraining::sample::Sample;
 use qualitytraining::settings::Settings;
 use qualitytraining::store::Samples;
 use qualitytraining::trainer::{TrainError, Trainer};
 use qualitytraining::vgg;
+use report::curves::{self, Line, Panel};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use serde_json::json;
 
@@ -35,6 +36,26 @@ pub struct Job {
     pub identity: Option<String>,
     /// Whether to go on from the checkpoint of an interrupted training, if there is one.
     pub resume: bool,
+}
+
+/// The losses above, and the area under the ROC below.
+fn drawn(passes: &[Pass], best: Option<usize>) -> String {
+    let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
+        name,
+        values: passes.iter().map(value).collect(),
+    };
+    let losses = Panel {
+        what: "loss",
+        lines: vec![
+            line("learnt", &|it| f64::from(it.learnt)),
+            line("validated", &|it| f64::from(it.validated)),
+        ],
+    };
+    let area = Panel {
+        what: "area",
+        lines: vec![line("area under the ROC, validated", &|it| it.area)],
+    };
+    curves::svg(&[losses, area], best)
 }
 
 /// Trains a network and writes it.
@@ -77,7 +98,7 @@ pub fn train(
             return Err(failure.with_hint(format!("--resume goes on from {}", kept.display())));
         }
         replace(&kept, &trainer.checkpoint().or_fail(ExitKind::Run)?)?;
-        let drawn = curves::svg(trainer.passes(), trainer.best());
+        let drawn = drawn(trainer.passes(), trainer.best());
         replace(&beside(".svg"), drawn.as_bytes())?;
         say.pass(&trainer)?;
     }

@@ -2,53 +2,57 @@
 
 use std::fmt::Write as _;
 
-use serde::{Deserialize, Serialize};
-
-/// The results of one pass over the samples.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pass {
-    /// Mean training loss.
-    pub learnt: f32,
-    /// Mean validation loss after the pass.
-    pub validated: f32,
-    /// Mean area under the ROC of the validation samples.
-    pub area: f64,
-}
-
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 240.0;
 const MARGIN: f64 = 48.0;
 
-/// Draws the losses above, and the area under the ROC below.
+/// A line of a diagram: one value for every pass; those that are not finite are left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line<'a> {
+    /// What it is called.
+    pub name: &'a str,
+    /// The values.
+    pub values: Vec<f64>,
+}
+
+/// A diagram.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel<'a> {
+    /// What its lines show.
+    pub what: &'a str,
+    /// The lines: at most as many as there are colours, 3.
+    pub lines: Vec<Line<'a>>,
+}
+
+const COLOURS: [&str; 3] = ["#1f6fb4", "#c0392b", "#2e8b57"];
+
+/// Draws diagrams one below the other; names are constants of the program.
 ///
 /// * `best`: the pass that was kept, from 0.
-pub fn svg(passes: &[Pass], best: Option<usize>) -> String {
-    let learnt: Vec<f64> = passes.iter().map(|it| f64::from(it.learnt)).collect();
-    let validated: Vec<f64> = passes.iter().map(|it| f64::from(it.validated)).collect();
-    let area: Vec<f64> = passes.iter().map(|it| it.area).collect();
-    let (width, height) = (WIDTH + 2.0 * MARGIN, 2.0 * (HEIGHT + 2.0 * MARGIN));
+pub fn svg(panels: &[Panel<'_>], best: Option<usize>) -> String {
+    let (width, height) = (
+        WIDTH + 2.0 * MARGIN,
+        panels.len() as f64 * (HEIGHT + 2.0 * MARGIN),
+    );
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
-    let losses = [
-        ("learnt", "#1f6fb4", &learnt),
-        ("validated", "#c0392b", &validated),
-    ];
-    svg.push_str(&panel("loss", &losses, best, 0.0));
-    let areas = [("area under the ROC, validated", "#c0392b", &area)];
-    svg.push_str(&panel("area", &areas, best, HEIGHT + 2.0 * MARGIN));
+    for (nth, it) in panels.iter().enumerate() {
+        svg.push_str(&panel(it, best, nth as f64 * (HEIGHT + 2.0 * MARGIN)));
+    }
     svg.push_str("</svg>\n");
     svg
 }
 
 /// One diagram.
-fn panel(what: &str, lines: &[(&str, &str, &Vec<f64>)], best: Option<usize>, top: f64) -> String {
-    let all = lines.iter().flat_map(|it| it.2).filter(|it| it.is_finite());
+fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> String {
+    let all = lines.iter().flat_map(|it| &it.values);
+    let all = all.filter(|it| it.is_finite());
     let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
         [low.min(*value), high.max(*value)]
     });
-    let n = lines.first().map_or(0, |it| it.2.len());
+    let n = lines.first().map_or(0, |it| it.values.len());
     let x = |at: usize| MARGIN + WIDTH * at as f64 / (n.max(2) - 1) as f64;
     let y = |value: f64| {
         let share = (value - low) / (high - low).max(1e-9);
@@ -82,7 +86,7 @@ fn panel(what: &str, lines: &[(&str, &str, &Vec<f64>)], best: Option<usize>, top
             "<path d=\"M{x:.1} {y:.1}v{HEIGHT}\" stroke=\"#999\" stroke-dasharray=\"4 4\"/>"
         ));
     }
-    for (nth, (name, colour, values)) in lines.iter().enumerate() {
+    for (nth, (Line { name, values }, colour)) in lines.iter().zip(COLOURS).enumerate() {
         let mut path = String::new();
         for (at, value) in values.iter().enumerate().filter(|it| it.1.is_finite()) {
             let to = if path.is_empty() { 'M' } else { 'L' };
@@ -107,12 +111,19 @@ mod tests {
 
     #[test]
     fn curves_are_drawn_from_the_first_pass_to_the_last_and_the_best_is_marked() {
-        let pass = |it: f32| Pass {
-            learnt: it,
-            validated: it + 0.5,
-            area: 0.75,
+        let line = |name, values: [f64; 3]| Line {
+            name,
+            values: values.to_vec(),
         };
-        let drawn = svg(&[pass(3.0), pass(2.0), pass(1.0)], Some(1));
+        let losses = Panel {
+            what: "loss",
+            lines: vec![line("a", [3.0, 2.0, 1.0]), line("b", [3.5, 2.5, 1.5])],
+        };
+        let area = Panel {
+            what: "area",
+            lines: vec![line("c", [0.75, f64::NAN, 0.75])],
+        };
+        let drawn = svg(&[losses, area], Some(1));
         assert!(drawn.starts_with("<svg") && drawn.ends_with("</svg>\n"));
         assert_eq!(drawn.matches("stroke-width").count(), 3);
         assert_eq!(drawn.matches("stroke-dasharray").count(), 2);
@@ -126,7 +137,11 @@ mod tests {
 
     #[test]
     fn no_passes_give_no_curves() {
-        let drawn = svg(&[], None);
+        let nothing = Panel {
+            what: "loss",
+            lines: vec![],
+        };
+        let drawn = svg(&[nothing], None);
         assert!(!drawn.contains("NaN") && !drawn.contains("<path"));
     }
 }
