@@ -41,6 +41,26 @@ pub struct Card {
     pub output: Codec,
     /// What its keypoints are.
     pub keypoints: KeypointNames,
+    /// What it tells beside them.
+    #[serde(default, skip_serializing_if = "Also::is_empty")]
+    pub also: Also,
+}
+
+/// What a network tells beside its keypoints.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Also {
+    /// The output with the direction in which the trunk faces, `[1, 2]`: towards the right of the picture, towards the camera. Twice
+    /// its scalar product with a direction of length 1 is the log-likelihood ratio of facing there over facing away from there.
+    pub front: Option<String>,
+    /// The output with the expected error of every keypoint, `[1, keypoints]`: heights of the input.
+    pub error: Option<String>,
+}
+
+impl Also {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// What a network takes: one picture.

@@ -5,7 +5,7 @@ use experiment::{Joints, Pictures};
 use fmp::{Layout, Pose, Solver};
 use keypoints::Keypoint;
 use posenetwork::springs::joint_of;
-use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, expected_error, outline_of};
+use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace, outline_of};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
 use skeleton::PARSE14;
 
@@ -40,7 +40,7 @@ pub struct Seen {
 /// How far a joint at the maximum of its map is off, and how far it was expected to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointError {
-    /// By the heat of the map, share of the height of the network's window: [`posenetwork::expected_error`].
+    /// Share of the height of the network's window: [`JointMaps::expected_px`].
     pub expected: f64,
     /// Share of that height as well.
     pub error: f64,
@@ -92,12 +92,12 @@ fn errors_of(maps: &JointMaps, truth: &Joints) -> Vec<JointError> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let head = distance(truth[NECK], truth[HEAD]);
     let [_, top, _, bottom] = maps.extent();
-    let both = maps.peaks().iter().zip(truth);
-    let each = both.filter_map(|(peak, truth)| {
-        let peak = (*peak)?;
-        let off = distance(peak.at, *truth);
+    let both = maps.peaks().iter().zip(truth).enumerate();
+    let each = both.filter_map(|(joint, (peak, truth))| {
+        let expected_px = maps.expected_px(joint)?;
+        let off = distance((*peak)?.at, *truth);
         (off.is_finite() && head > 0.0).then(|| JointError {
-            expected: expected_error(peak.score),
+            expected: expected_px / (bottom - top),
             error: off / (bottom - top),
             in_heads: off / head,
         })

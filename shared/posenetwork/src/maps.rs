@@ -70,6 +70,8 @@ pub struct JointMaps {
     peaks: Vec<Option<Keypoint>>,
     /// All keypoints, pixels of the picture; scores as those of the peaks.
     keypoints: Vec<Option<Keypoint>>,
+    /// The expected error of each joint as the network tells it, pixels of the picture; empty if it tells nothing of it.
+    told: Vec<Option<f64>>,
     /// Standard deviation of a keypoint whose score is 1 on the maps themselves; `None` where the heat tells it.
     sigma_px: Option<f64>,
     /// Across and down: between which cells those of a layout lie.
@@ -84,6 +86,9 @@ const BOX_MARGIN: f64 = 1.25;
 const MOST_ROWS: usize = 64;
 /// Least standard deviation on such a grid, cells: a narrower one would be lost between two.
 const LEAST_SIGMA: f64 = 1.0;
+
+/// The standard deviation along one axis of a normal distribution in the plane whose mean distance is 1: sqrt(2 / pi).
+const ALONG_AN_AXIS: f64 = 0.797_884_56;
 
 impl JointMaps {
     /// Reads what a network sees.
@@ -119,6 +124,17 @@ impl JointMaps {
         self.peaks.clear();
         self.keypoints.clear();
         self.sigma_px = None;
+        self.told.clear();
+        if let Some(errors) = sight.errors() {
+            let errors: Vec<f64> = errors.collect();
+            let of_row = |row: &Vec<(usize, f64)>| {
+                row.iter()
+                    .map(|(it, share)| share.abs() * errors[*it])
+                    .sum()
+            };
+            self.told
+                .extend(rows.iter().map(|row| row.as_ref().map(of_row)));
+        }
         let each = keypoints.iter().enumerate();
         self.keypoints
             .extend(each.map(|(nth, it)| Some(scored(nth, *it, (&read, sight)))));
@@ -166,6 +182,7 @@ impl JointMaps {
         self.values.resize(n_values, self.floor);
         self.peaks.clear();
         self.peaks.resize(N_JOINTS, None);
+        self.told.clear();
         self.keypoints.clear();
         self.keypoints.extend_from_slice(keypoints);
         let Some(window) = self.window else {
@@ -264,6 +281,16 @@ impl JointMaps {
         let [_, top, _, bottom] = self.extent();
         let by_heat = || expected_error(found.score) * (bottom - top);
         Some((found, self.sigma_px.unwrap_or_else(by_heat)))
+    }
+
+    /// How far off a joint's peak may be: the standard deviation along one axis, pixels of the picture. As the network tells it, else
+    /// by the heat there ([`expected_error`]). `None` for a joint without a peak.
+    pub fn expected_px(&self, joint: usize) -> Option<f64> {
+        let peak = self.peaks.get(joint).copied().flatten()?;
+        let told = self.told.get(joint).copied().flatten();
+        let [_, top, _, bottom] = self.extent();
+        let by_heat = || expected_error(peak.score) * (bottom - top);
+        Some(told.map_or_else(by_heat, |it| it * ALONG_AN_AXIS))
     }
 
     /// Where the network sees each of the 14 joints, pixels of the picture; scores from 0 to 1. `None` for a joint that its

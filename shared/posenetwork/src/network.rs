@@ -230,6 +230,7 @@ impl PoseNetwork {
             outputs,
         };
         sight.read()?;
+        sight.check_also()?;
         Ok(sight)
     }
 }
@@ -276,6 +277,62 @@ impl<'a> Sight<'a> {
             name: self.network.outputs.join("`, `"),
             error,
         })
+    }
+
+    /// What it tells of the direction in which the trunk faces: towards the right of the picture, towards the camera; `None` if it
+    /// tells nothing of it. See [`keypoints::Also::front`].
+    pub fn front(&self) -> Option<[f32; 2]> {
+        let at = self.also(self.network.card.also.front.as_deref())?;
+        at.values.as_slice().try_into().ok()
+    }
+
+    /// The expected error of every keypoint, pixels of the picture, in the order of the card's names; `None` if it tells nothing of
+    /// it.
+    pub fn errors(&self) -> Option<impl Iterator<Item = f64>> {
+        let [_, height] = self.network.size();
+        let height = height as f64 * self.window.step()[1];
+        let errors = &self.also(self.network.card.also.error.as_deref())?.values;
+        Some(errors.iter().map(move |it| f64::from(*it) * height))
+    }
+
+    fn also(&self, name: Option<&str>) -> Option<&'a Tensor> {
+        let name = name?;
+        let names = self.network.outputs.iter().zip(self.outputs);
+        // Behind those of the codec.
+        names.rev().find(|it| it.0.as_str() == name).map(|it| it.1)
+    }
+
+    /// Whether what it tells beside the keypoints has the shape that the card says, and is finite.
+    fn check_also(&self) -> Result<(), LookError> {
+        let also = &self.network.card.also;
+        for (name, n) in [(&also.front, 2), (&also.error, self.network.names.len())] {
+            let Some(output) = self.also(name.as_deref()) else {
+                continue;
+            };
+            let name = || name.clone().unwrap_or_default();
+            if output.values.len() != n {
+                let (got, expected) = (output.shape.clone(), vec![1, n]);
+                let error = OutputError::Shape {
+                    got,
+                    expected: format!("{expected:?}"),
+                };
+                return Err(LookError::Output {
+                    name: name(),
+                    error,
+                });
+            }
+            if let Some(at) = output.values.iter().position(|it| !it.is_finite()) {
+                let error = OutputError::NotANumber {
+                    index: at,
+                    value: output.values[at],
+                };
+                return Err(LookError::Output {
+                    name: name(),
+                    error,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The keypoints, in pixels of the picture, in the order of the card's names.
@@ -382,8 +439,22 @@ pub(crate) fn input_of(input_card: &keypoints::Input, inputs: &[Port]) -> Result
     Ok(input.name.clone())
 }
 
-/// The names of the outputs that the codec reads.
+/// The names of the outputs that the codec reads, and of those beside them.
 fn outputs_of(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
+    let mut names = outputs_of_codec(card, outputs)?;
+    let also = [
+        (&card.also.front, "also.front"),
+        (&card.also.error, "also.error"),
+    ];
+    for (name, key) in also {
+        if name.is_some() {
+            names.push(only(name.as_ref(), outputs, key)?);
+        }
+    }
+    Ok(names)
+}
+
+fn outputs_of_codec(card: &Card, outputs: &[Port]) -> Result<Vec<String>, FitError> {
     match &card.output {
         Codec::HeatMap { maps, .. } => Ok(vec![only(maps.as_ref(), outputs, "output.maps")?]),
         Codec::Simcc { x, y, .. } => Ok(vec![
