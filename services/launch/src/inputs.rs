@@ -29,7 +29,7 @@ use crate::shipped::Shipped;
 use runtime::no_text;
 
 pub use joints::Joints;
-pub(crate) use maps::{check_maps, keypoint_names};
+pub(crate) use maps::{check_maps, network_card};
 pub use maps::{detector, pose_network, springs};
 pub use runtime::{in_file, read_text as text};
 

@@ -8,6 +8,7 @@ use deployment::capture::{Camera, Config};
 use footage::Size;
 use geometry::Rig;
 use keypointfiles::KeypointSource;
+use keypoints::Sides;
 use keypoints::files::NameSet;
 use messages::MAX_KEYPOINTS;
 use runtime::{ExitKind, Failure, OrFail as _};
@@ -37,13 +38,25 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
     Ok(Some(source))
 }
 
-/// Names of the keypoints that the cameras' networks and keypoint files have beside the joints, each once, in the order of the cameras.
+/// What is known of the keypoints that the networks and keypoint files of the cameras find.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    /// Names of those beside the joints, each once, in the order of the cameras.
+    pub(crate) extra: Vec<String>,
+    /// Whether left and right of a network follow the picture.
+    pub(crate) as_seen: bool,
+}
+
+/// What the cards and the names of the keypoints of a deployment say.
 ///
 /// # Errors
 ///
 /// They cannot be read, or are more than a message has room for.
-pub(crate) fn extra_names(deployment: &Deployment) -> Result<Vec<String>, Failure> {
-    let mut extra: Vec<String> = Vec::new();
+pub(crate) fn found(deployment: &Deployment) -> Result<Found, Failure> {
+    let Found {
+        mut extra,
+        mut as_seen,
+    } = Found::default();
     let mut known = Vec::new();
     for (index, camera) in deployment.cameras.iter().enumerate() {
         let names = if let Some(source) = of_camera(camera)? {
@@ -54,7 +67,11 @@ pub(crate) fn extra_names(deployment: &Deployment) -> Result<Vec<String>, Failur
                 continue;
             }
             known.push(network);
-            inputs::keypoint_names(deployment, index)?
+            let card = inputs::network_card(deployment, index)?;
+            as_seen |= card
+                .as_ref()
+                .is_some_and(|it| it.keypoints.sides == Sides::Seen);
+            card.map(|it| it.names()).unwrap_or_default()
         };
         let names = names.into_iter().filter(|it| !::keypoints::is_joint(it));
         for name in names {
@@ -72,7 +89,7 @@ pub(crate) fn extra_names(deployment: &Deployment) -> Result<Vec<String>, Failur
         let hint = "use the same set of keypoints for all cameras";
         return Err(Failure::new(ExitKind::Config, message).with_hint(hint));
     }
-    Ok(extra)
+    Ok(Found { extra, as_seen })
 }
 
 /// Number of frames of the keypoints of every camera, from the first frame of the footage on; none for a camera without them.

@@ -37,11 +37,13 @@ pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     let lengths = keypoints::lengths(deployment)?;
     let deployment = &keypoints::with_pictures(deployment.clone(), &lengths)?;
     let footage = inputs::footage(deployment);
+    let found = keypoints::found(deployment)?;
     let mut resolved = Resolved {
         footage: footage.map_err(|it| inputs::of_deployment(it, deployment))?,
         deployment: deployment.clone(),
         search_size: None,
-        extra_keypoints: keypoints::extra_names(deployment)?,
+        extra_keypoints: found.extra,
+        sides_as_seen: found.as_seen,
         recording: None,
         replay: None,
     };

@@ -77,7 +77,8 @@ impl Prepared {
                 plan,
             });
         }
-        let settings = settings(deployment, &model, &views)?;
+        let mut settings = settings(deployment, &model, &views)?;
+        settings.skeleton.facing |= deployment.fuse.facing && resolved.sides_as_seen;
         let named = views.iter().map(|it| it.name.as_str()).zip(sizes);
         let named: Vec<_> = named.collect();
         let size = deployment.capture.size;
@@ -295,7 +296,7 @@ fn skeleton_settings(
         } else {
             BodySettings::NONE
         },
-        // Networks name the sides of the body.
+        // Networks name the sides of the body; where they do not, see `Prepared::new`.
         facing: deployment.fuse.facing && !deployment.has_maps(),
         ..defaults
     })

@@ -300,7 +300,10 @@ fn fuse(service: &Service, resolved: &Resolved, worker: usize) -> Result<(), Fai
         space: (prepared.settings.views == Views::Space).then(|| {
             SpaceStep::new(
                 plans.clone(),
-                SpaceSettings::default(),
+                SpaceSettings {
+                    as_seen: resolved.sides_as_seen,
+                    ..SpaceSettings::default()
+                },
                 MapSettings::default(),
             )
         }),

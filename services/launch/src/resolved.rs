@@ -26,6 +26,10 @@ pub struct Resolved {
     /// recordings of earlier versions.
     #[serde(default)]
     pub extra_keypoints: Vec<String>,
+    /// Whether left and right of a network follow the picture: which are those of the person is decided over all views. Not in the
+    /// recordings of earlier versions.
+    #[serde(default)]
+    pub sides_as_seen: bool,
     /// The recording to write, if there is one.
     #[serde(default, alias = "tape")]
     pub recording: Option<RecordingPlan>,

@@ -2,7 +2,10 @@
 
 use evaluation::Point;
 use geometry::Camera;
-use multiview::{JointEvidence, SeenPerson, SpaceSettings, SpaceView, solve_person};
+use multiview::{
+    FrontEvidence, JointEvidence, SeenPerson, SpaceSettings, SpaceView, front, front_in_view,
+    front_log_ratio, solve_person,
+};
 use nalgebra::Point3;
 use posenetwork::JointMaps;
 
@@ -46,6 +49,8 @@ impl Method {
 pub struct NetworkView {
     maps: JointMaps,
     maxima: Vec<Vec<([f64; 2], f32)>>,
+    /// What the network tells of the direction in which the person faces.
+    front: Option<FrontEvidence>,
 }
 
 impl NetworkView {
@@ -61,12 +66,30 @@ impl NetworkView {
         Self {
             maxima: (0..N).map(maxima).collect(),
             maps,
+            front: None,
         }
+    }
+
+    /// The view with what the network tells of the direction in which the person faces.
+    #[must_use]
+    pub fn with_front(self, front: Option<FrontEvidence>) -> Self {
+        Self { front, ..self }
+    }
+
+    /// What the network tells of that direction.
+    pub fn front(&self) -> Option<FrontEvidence> {
+        self.front
     }
 
     /// The maps.
     pub fn maps(&self) -> &JointMaps {
         &self.maps
+    }
+
+    fn exchange_sides(&mut self) {
+        let mut maps = core::mem::take(&mut self.maps);
+        maps.exchange_sides();
+        *self = Self::new(maps).with_front(self.front);
     }
 
     /// The person, to be found again in other views.
@@ -93,6 +116,52 @@ impl JointEvidence for NetworkView {
     fn floor(&self) -> f32 {
         self.maps.floor()
     }
+}
+
+/// Gives left and right in views that have them as seen the names of the body's own sides: which views have them exchanged against the
+/// others by the solution in space, and then all of them by what the views tell of the front, of this frame alone.
+///
+/// * Returns the log-likelihood ratio of the choice over its opposite, nats; 0 where nothing was chosen.
+pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
+    let settings = SpaceSettings {
+        as_seen: true,
+        ..SpaceSettings::default()
+    };
+    let each = views.iter().map(|(camera, view)| SpaceView {
+        camera,
+        evidence: view,
+        exchanged: [false; 2],
+    });
+    let each: Vec<SpaceView<'_>> = each.collect();
+    let Some(found) = solve_person(&each, &settings) else {
+        return 0.0;
+    };
+    for ((_, view), used) in views.iter_mut().zip(&found.views) {
+        if used.is_some_and(|[arms, _]| arms) {
+            view.exchange_sides();
+        }
+    }
+    let joints = &found.pose.joints;
+    let known = joints.iter().flatten();
+    let middle: Vec<Point3<f64>> = known.copied().collect();
+    let sum: nalgebra::Vector3<f64> = middle.iter().map(|it| it.coords).sum();
+    let place = Point3::from(sum / middle.len().max(1) as f64);
+    let Some(front) = front(joints) else {
+        return 0.0;
+    };
+    let ratios = views.iter().filter_map(|(camera, view)| {
+        Some(front_log_ratio(
+            front_in_view(camera, &place, &front),
+            view.front?,
+        ))
+    });
+    let ratio: f64 = ratios.sum();
+    if ratio < 0.0 {
+        for (_, view) in views {
+            view.exchange_sides();
+        }
+    }
+    ratio.abs()
 }
 
 /// The joints of `skeleton::PARSE14` in space, metres.

@@ -33,7 +33,7 @@ mod published;
 pub mod testing;
 
 pub use bench::{Bench, ErrorPredictor, Expectation, Setup, SingleView, Trial};
-pub use by_network::{Method, NetworkView, joints_by};
+pub use by_network::{Method, NetworkView, joints_by, name_sides};
 pub use film::{Film, FilmError, FilmSettings};
 pub use latex::{latex, number, overall, pictures_latex};
 pub use pictures::{Intervals, Judged, Pictures, Table};

@@ -21,7 +21,8 @@ pub struct SolvedPerson {
 ///
 /// 1. Where pairs of views put the joints, and the bones of people of any stature, give a first solution.
 /// 2. Unless it fits every view: of three views or more, one whose exchange of left and right gives a better first solution is
-///    exchanged.
+///    exchanged. Where left and right follow the picture ([`SpaceSettings::as_seen`]), those of every view may be exchanged
+///    against those of the first.
 /// 3. The arms or the legs of any view that fit better exchanged are exchanged.
 /// 4. Unless the first solution fits every view: of four views or more, those that contradict all others are left out: their camera
 ///    was moved, or they look at somebody else.
@@ -35,7 +36,9 @@ pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option
     let mut first = coarse(&views, settings)?;
     let fits_view = |it: &SpaceView<'_>| shortfall(it, &first, MOST) <= settings.good_fit;
     let fits = views.iter().all(fits_view);
-    if !fits {
+    if settings.as_seen {
+        first = first_as_seen(&mut views, first, settings)?;
+    } else if !fits {
         first = first_of(&mut views, first, settings)?;
     }
     let mut changed = views.iter().any(|it| it.exchanged != [false; 2]);
@@ -93,6 +96,63 @@ fn first_of(
         views[nth].exchanged = [true; 2];
     }
     Some(best)
+}
+
+/// Most views of which every combination is tried.
+const MOST_COMBINED: usize = 5;
+
+/// The best first solution with any of the views but the first exchanged: of all combinations for a few views, else by exchanging one
+/// after the other as long as that helps.
+///
+/// * `best`: the one with none.
+fn first_as_seen(
+    views: &mut [SpaceView<'_>],
+    mut best: SpacePose,
+    settings: &SpaceSettings,
+) -> Option<SpacePose> {
+    let mut chosen = 0usize;
+    let n = views.len().min(usize::BITS as usize);
+    if n <= MOST_COMBINED {
+        for combination in (2..1usize << n).step_by(2) {
+            if improves(views, combination, (&mut best, settings))? {
+                chosen = combination;
+            }
+        }
+    } else {
+        let mut any = true;
+        while any {
+            any = false;
+            for nth in 1..n {
+                let combination = chosen ^ 1 << nth;
+                if improves(views, combination, (&mut best, settings))? {
+                    (chosen, any) = (combination, true);
+                }
+            }
+        }
+    }
+    set_exchanged(views, chosen);
+    Some(best)
+}
+
+/// Exchanges the views whose bits are set; whether the first solution is better than the best one, which it then becomes.
+fn improves(
+    views: &mut [SpaceView<'_>],
+    combination: usize,
+    (best, settings): (&mut SpacePose, &SpaceSettings),
+) -> Option<bool> {
+    set_exchanged(views, combination);
+    let found = coarse(views, settings)?;
+    let is_better = found.energy > best.energy;
+    if is_better {
+        *best = found;
+    }
+    Some(is_better)
+}
+
+fn set_exchanged(views: &mut [SpaceView<'_>], combination: usize) {
+    for (nth, view) in views.iter_mut().enumerate() {
+        view.exchanged = [combination >> nth & 1 == 1; 2];
+    }
 }
 
 /// The view without which the others agree best, if most of its joints lie elsewhere than in their solution; `None` if there is

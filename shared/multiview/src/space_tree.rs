@@ -71,6 +71,8 @@ pub struct SpaceSettings {
     pub springs: f64,
     /// Most that a bone costs: half the square of so many standard deviations.
     pub cap: f64,
+    /// Whether left and right follow the picture: every view may have them exchanged, whatever the others say.
+    pub as_seen: bool,
     /// By how much exchanged sides must fit a view better.
     pub margin: f64,
     /// The first solution fits a view if three quarters of its joints fit by at most so much less than their own best places: no
@@ -91,6 +93,7 @@ impl Default for SpaceSettings {
         Self {
             springs: 1.0,
             cap: 8.0,
+            as_seen: false,
             margin: 3.0,
             good_fit: 0.7,
             most_misfit: 1.0,

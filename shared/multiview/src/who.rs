@@ -22,9 +22,10 @@ const MOST: usize = 4;
 /// Chooses one person in every view, so that their rays meet; the largest one where several people could be meant.
 ///
 /// * `views`: the camera and the people of every view.
+/// * `as_seen`: whether left and right follow the picture, so that two views may have them exchanged.
 /// * Returns the index of the person of each view; `None` where nobody fits the others. A single view keeps its largest
 ///   person.
-pub fn same_person(views: &[(&Camera, &[SeenPerson])]) -> Vec<Option<usize>> {
+pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Option<usize>> {
     let by_size = |people: &[SeenPerson]| {
         let mut order: Vec<usize> = (0..people.len()).collect();
         order.sort_by(|&a, &b| people[b].height.total_cmp(&people[a].height));
@@ -42,8 +43,14 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])]) -> Vec<Option<usize>> {
                 if other == nth {
                     continue;
                 }
-                let distance =
-                    |it: &usize| apart((*camera, &people[person]), (*their_camera, &theirs[*it]));
+                let distance = |it: &usize| {
+                    let both = [(*camera, &people[person]), (*their_camera, &theirs[*it])];
+                    let as_named = apart(both, |joint| joint);
+                    let exchanged = as_seen
+                        .then(|| apart(both, |joint| MIRROR[joint]))
+                        .flatten();
+                    as_named.into_iter().chain(exchanged).reduce(f64::min)
+                };
                 let near = by_size(theirs)
                     .into_iter()
                     .filter_map(|it| Some((distance(&it)?, it)));
@@ -64,15 +71,21 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])]) -> Vec<Option<usize>> {
     best.1
 }
 
+/// The joint on the other side.
+const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
+
 /// The distance within which the rays of a third of the joints meet that two views show; `None` if they share fewer than three.
-fn apart(a: (&Camera, &SeenPerson), b: (&Camera, &SeenPerson)) -> Option<f64> {
+///
+/// * `named`: what the second view calls a joint of the first.
+fn apart([a, b]: [(&Camera, &SeenPerson); 2], named: impl Fn(usize) -> usize) -> Option<f64> {
     let ray = |camera: &Camera, joint: &Option<([f64; 2], f64)>| {
         let (at, score) = (*joint)?;
         (score >= LEAST_SCORE).then(|| camera.ray(&Point2::from(at)))?
     };
-    let both = a.1.joints.iter().zip(&b.1.joints);
-    let mut distances: Vec<f64> = both
-        .filter_map(|(in_a, in_b)| {
+    let joints = a.1.joints.iter().enumerate();
+    let mut distances: Vec<f64> = joints
+        .filter_map(|(joint, in_a)| {
+            let in_b = b.1.joints.get(named(joint))?;
             let (a, b) = (ray(a.0, in_a)?, ray(b.0, in_b)?);
             let normal = a.direction.cross(&b.direction);
             let length = normal.norm();

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use fmp::{Bound, Bounds, Layout, Placement, Pose, Region, Responses, Scope, Solver, local_scores};
 use kernels::Rgb8View;
 use keypoints::Keypoint;
+use multiview::FrontEvidence;
 use posenetwork::springs::joint_of;
 use posenetwork::{
     Detector, JointMaps, LookError, MapSettings, PoseNetwork, Workspace, outline_of,
@@ -103,6 +104,8 @@ struct Seen {
     outline: [f64; 4],
     /// Mean heat of the joints at their peaks, 0 to 1.
     heat: f64,
+    /// In which direction the trunk faces, if the network tells.
+    front: Option<FrontEvidence>,
     level: u16,
     responses: Vec<f32>,
 }
@@ -225,6 +228,7 @@ impl NetworkStep {
         let seen = &mut memory.seen[memory.n_seen];
         seen.maps.read(&sight, &self.settings.maps)?;
         seen.outline = outline;
+        seen.front = sight.front();
         let is_new = self.is_well_seen(seen) && !is_known(&memory.seen, memory.n_seen);
         memory.n_seen += usize::from(is_new);
         Ok(())
@@ -338,6 +342,9 @@ impl NetworkStep {
             .iter()
             .flat_map(|(_, nth)| self.extras_of(&memory.seen[*nth].maps));
         let extras: Vec<ExtraKeypoint> = extras.collect();
+        // Of every candidate, or of none.
+        let fronts = found.iter().map(|(_, nth)| memory.seen[*nth].front);
+        let front: Option<Vec<FrontEvidence>> = fronts.collect();
         let candidates: Vec<Pose> = found.into_iter().map(|it| it.0).collect();
         let best = candidates.first();
         let local = best.map(|pose| {
@@ -348,7 +355,7 @@ impl NetworkStep {
         ViewEstimate {
             local: local.unwrap_or_default(),
             candidates,
-            front: Vec::new(),
+            front: front.unwrap_or_default(),
             extras,
             levels: vec![level],
             bounds: Bounds::new(vec![Bound::UNKNOWN; self.layout.levels.len()]),

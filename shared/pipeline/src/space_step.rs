@@ -255,7 +255,9 @@ impl SpaceStep {
         }
         let views = self.plans.iter().zip(&people);
         let views: Vec<_> = views.map(|(plan, it)| (plan.camera(), &it[..])).collect();
-        let chosen = same_person(&views).into_iter().zip(indices);
+        let chosen = same_person(&views, self.settings.as_seen)
+            .into_iter()
+            .zip(indices);
         chosen.map(|(it, of)| of.get(it?).copied()).collect()
     }
 

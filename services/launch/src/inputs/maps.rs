@@ -49,21 +49,20 @@ pub fn pose_network(
     network.fitted().map(Some)
 }
 
-/// The names of the keypoints of a camera's network, as its card has them; none without a network or a card.
+/// The card of a camera's network; none without a network or a card.
 ///
 /// # Errors
 ///
 /// The network or its card cannot be read.
-pub(crate) fn keypoint_names(
+pub(crate) fn network_card(
     deployment: &Deployment,
     camera: usize,
-) -> Result<Vec<String>, Failure> {
+) -> Result<Option<Card>, Failure> {
     let Some((file, card)) = deployment.pose_network(camera) else {
-        return Ok(Vec::new());
+        return Ok(None);
     };
     let network = NetworkFile::open_with(file, card, &library(&deployment.pose)?)?;
-    let card = network.card().map(|it| &it.0);
-    Ok(card.map(Card::names).unwrap_or_default())
+    Ok(network.card().map(|it| it.0.clone()))
 }
 
 /// Loads the detector of a deployment, if it has one, and tries it once.

@@ -144,6 +144,7 @@ fn resolve(
         deployment,
         search_size,
         extra_keypoints: recorded.extra_keypoints,
+        sides_as_seen: recorded.sides_as_seen,
         recording: None,
         replay: Some(Replay {
             file: file.to_path_buf(),

@@ -2,10 +2,12 @@
 
 use evaluation::{Bootstrap, Point, Share, joint_errors, segment_errors, segments};
 use experiment::{
-    Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, parse14, projected,
+    Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
+    projected,
 };
 use geometry::Camera;
 use kernels::Rgb8View;
+use keypoints::Sides;
 use multiview::{SeenPerson, same_person};
 use posenetwork::{Detector, JointMaps, MapSettings, PoseNetwork, Workspace};
 use runtime::{ExitKind, Failure, OrFail as _, Stop};
@@ -141,7 +143,11 @@ impl EvidenceJob<'_> {
                 };
                 seen.push((view, people));
             }
-            let chosen = chosen(instant, seen, *stress);
+            let as_seen = self.network.card().keypoints.sides == Sides::Seen;
+            let mut chosen = chosen(instant, seen, (*stress, as_seen));
+            if as_seen {
+                name_sides(&mut chosen);
+            }
             let views: Vec<(&Camera, &NetworkView)> =
                 chosen.iter().map(|it| (&it.0, &it.1)).collect();
             let height = instant.cameras.iter().map(|it| it.intrinsics.size[1]).max();
@@ -191,7 +197,7 @@ impl EvidenceJob<'_> {
             maps.read(&sight, &MapSettings::default())
                 .or_fail(ExitKind::Input)?;
             let height = (it.outline[3] - it.outline[1]) / size[1] as f64;
-            let view = NetworkView::new(maps);
+            let view = NetworkView::new(maps).with_front(sight.front());
             people.push((view.person(height), view));
         }
         Ok(people)
@@ -239,7 +245,7 @@ const MOST_PEOPLE: usize = 4;
 fn chosen(
     instant: &Instant<'_>,
     seen: Vec<(usize, Vec<Seen>)>,
-    stress: Stress,
+    (stress, as_seen): (Stress, bool),
 ) -> Vec<(Camera, NetworkView)> {
     let n_views = instant.cameras.len();
     let people: Vec<Vec<SeenPerson>> = seen
@@ -251,7 +257,7 @@ fn chosen(
         .zip(&people)
         .map(|((view, _), people)| (&instant.cameras[*view], &people[..]))
         .collect();
-    let same = same_person(&each);
+    let same = same_person(&each, as_seen);
     let of_view = |((view, people), who): ((usize, Vec<Seen>), Option<usize>)| {
         let (person, found) = people.into_iter().nth(who?)?;
         let camera = &instant.cameras[view];
@@ -267,7 +273,8 @@ fn chosen(
             }
             _ => {}
         }
-        Some((stress.calibrated(camera), NetworkView::new(maps)))
+        let view = NetworkView::new(maps).with_front(found.front());
+        Some((stress.calibrated(camera), view))
     };
     seen.into_iter().zip(same).filter_map(of_view).collect()
 }
