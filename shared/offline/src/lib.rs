@@ -8,6 +8,7 @@
 //! * [`consistency`]: what several views of a person have in common, from sequences with truth.
 //! * [`quality`]: the samples of the network that predicts the errors of single views, and its training.
 //! * [`orientation`]: the network that tells the direction in which a person faces.
+//! * [`posetraining`]: the network that finds joints, from annotated people and scenes.
 //! * [`eval`]: the evaluation on sequences or pictures whose joints are known.
 //! * [`joints`]: where joints lie among the parts of a model, from annotated people.
 //! * [`springs`]: the springs between joints, from annotated people.
@@ -42,6 +43,7 @@ pub mod network;
 pub mod orientation;
 pub mod person;
 pub mod pictures;
+pub mod posetraining;
 pub mod quality;
 pub mod sheet;
 pub mod springs;

@@ -6,6 +6,9 @@
 mod marked;
 mod rendered;
 
+pub(crate) use marked::front as facing;
+pub(crate) use rendered::front_in_view;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -3,6 +3,7 @@
 mod consistency;
 mod joints;
 mod marked;
+mod network;
 mod orientation;
 mod people;
 mod quality;
@@ -76,6 +77,10 @@ pub(crate) enum Command {
     Joints(Box<joints::Arguments>),
     /// Learn the springs that hold the maps of a network together, from the marks of people.
     Springs(Box<springs::Arguments>),
+    /// Prepare people for training the network that finds joints.
+    NetworkPeople(Box<network::people::Arguments>),
+    /// Train the network that finds joints, the direction of the trunk, and how far off it may be.
+    Network(Box<network::learn::Arguments>),
     /// Train a network that predicts the error of every part in a single view.
     Quality(Box<quality::network::Arguments>),
     /// Search pictures with known joints, and write the samples for training the quality network.
@@ -123,6 +128,8 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         Command::Orientation(arguments) => return orientation::run(&arguments, globals),
         Command::Joints(it) => return joints::run(&it, globals),
         Command::Springs(it) => return springs::run(&it, globals),
+        Command::NetworkPeople(it) => return network::people::run(&it, globals),
+        Command::Network(it) => return network::learn::run(&it, globals),
         Command::Quality(arguments) => return quality::network::run(&arguments, globals),
         Command::QualitySamples(arguments) => return quality::samples::run(&arguments, globals),
     };

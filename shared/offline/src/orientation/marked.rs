@@ -146,7 +146,7 @@ fn middle(joints: &[[f64; 2]], a: usize, b: usize) -> [f64; 2] {
 ///
 /// How wide shoulders and hips look tells how much the person faces the camera; where knees, elbows and the head bend to
 /// tells the side, which is less certain: its length is then below 1.
-fn front(joints: &[[f64; 2]]) -> [f32; 2] {
+pub(crate) fn front(joints: &[[f64; 2]]) -> [f32; 2] {
     let [x, y] = trunk(joints);
     let length = x.hypot(y);
     // The right of the picture as the trunk has it.

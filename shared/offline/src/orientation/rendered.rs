@@ -75,7 +75,7 @@ fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
 }
 
 /// Where the person faces, by the true joints in space.
-fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
+pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let joints: Vec<Option<Point3<f64>>> = shown
         .in_world
         .iter()

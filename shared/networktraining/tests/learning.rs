@@ -1,0 +1,194 @@
+//! The network learns, and what it learned can be kept, taken up again and written.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use networktraining::{Backend, N_JOINTS, Person, Settings, Shape, Source, Target, Trainer, plain};
+
+const SIDE: usize = 256;
+
+/// Ten people made of coloured dots: every joint has its own colour.
+fn people(n: usize, seed: u64) -> Vec<Person> {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    (0..n).map(|nth| person(nth, &mut rng)).collect()
+}
+
+fn person(nth: usize, rng: &mut fastrand::Rng) -> Person {
+    let standing: [[f32; 2]; N_JOINTS] = [
+        [-9.0, 40.0],
+        [-9.0, 20.0],
+        [-8.0, 0.0],
+        [8.0, 0.0],
+        [9.0, 20.0],
+        [9.0, 40.0],
+        [-22.0, 2.0],
+        [-20.0, -14.0],
+        [-14.0, -30.0],
+        [14.0, -30.0],
+        [20.0, -14.0],
+        [22.0, 2.0],
+        [0.0, -33.0],
+        [0.0, -45.0],
+    ];
+    let places = standing.map(|at| at.map(|it| 128.0 + 1.6 * it + 8.0 * (rng.f32() - 0.5)));
+    let mut rgb = vec![110u8; 3 * SIDE * SIDE];
+    for (joint, [x, y]) in places.iter().enumerate() {
+        let colour = [37 * joint % 256, 91 * joint % 256, 255 - 17 * joint].map(|it| it as u8);
+        for row in -5i32..=5 {
+            for column in -5i32..=5 {
+                let at = (*y as i32 + row) as usize * SIDE + (*x as i32 + column) as usize;
+                rgb[3 * at..3 * at + 3].copy_from_slice(&colour);
+            }
+        }
+    }
+    Person {
+        source: Source::Scene,
+        name: format!("person {nth}"),
+        rgb,
+        targets: places.map(|at| Target {
+            at,
+            or: None,
+            weight: 1.0,
+            is_marked: true,
+        }),
+        front: [0.0, 0.0, 1.0],
+    }
+}
+
+/// A network that is small enough for a test.
+fn small() -> Settings {
+    let shape = Shape {
+        width: 64,
+        height: 64,
+        stem: 8,
+        channels: [16, 16, 16, 16],
+        blocks: [1, 1, 1, 1],
+        hidden: 8,
+    };
+    Settings {
+        shape,
+        batch: 8,
+        steps: 60,
+        error_steps: 4,
+        rate: 1e-2,
+        averaged: 0.05,
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
+    let (learnt, kept) = (people(10, 1), people(3, 2));
+    let settings = small();
+    let new = |checkpoint: Option<&[u8]>| {
+        let how = (&settings, Backend::Flex);
+        Trainer::new(how, [&learnt, &kept], checkpoint).unwrap()
+    };
+    let mut whole = new(None);
+    for _ in 0..4 {
+        assert!(whole.pass(16, false, &mut |_| true));
+    }
+    assert_eq!(whole.step(), 64);
+    let passes = whole.passes();
+    assert!(
+        passes[2].cost.maps < 0.7 * passes[0].cost.maps,
+        "{passes:?}"
+    );
+    let score = whole.judge(&kept);
+    assert!(score.front > 0.99, "everybody faces the camera: {score:?}");
+
+    let mut begun = new(None);
+    assert!(begun.pass(16, false, &mut |_| true));
+    assert!(begun.pass(16, false, &mut |_| true));
+    let mut calls = 0;
+    let stopped = begun.pass(16, false, &mut |_| {
+        calls += 1;
+        calls < 5
+    });
+    assert!(!stopped, "it was stopped in the middle");
+    let mut resumed = new(Some(&begun.checkpoint().unwrap()));
+    assert!(resumed.pass(16, false, &mut |_| true));
+    assert!(resumed.pass(16, false, &mut |_| true));
+    assert_eq!(whole.parameters(), resumed.parameters());
+}
+
+#[test]
+fn what_is_shown_lies_where_the_heat_is() {
+    let person = &people(1, 3)[0];
+    let shape = small().shape;
+    let sample = plain(person, &shape).unwrap();
+    let [columns, rows] = shape.cells();
+    for (joint, place) in sample.places.iter().enumerate() {
+        let map = &sample.maps[joint * columns * rows..][..columns * rows];
+        let [x, y] = networktraining::peak(map, columns);
+        assert!(
+            (x - place[0]).abs() < 0.51 && (y - place[1]).abs() < 0.51,
+            "{joint}"
+        );
+    }
+}
+
+#[test]
+fn the_file_that_is_written_finds_what_the_trained_network_found() {
+    let people = people(6, 4);
+    let settings = small();
+    let how = (&settings, Backend::Flex);
+    let mut trainer = Trainer::new(how, [&people[..5], &people[5..]], None).unwrap();
+    assert!(trainer.pass(30, false, &mut |_| true));
+    let sample = plain(&people[0], &settings.shape).unwrap();
+    let found = trainer.find(1, &sample.picture);
+    let session = inference::Session::parse(trainer.onnx(&[])).unwrap();
+    let input = inference::Input {
+        name: networktraining::PICTURE,
+        shape: &[1, 3, settings.shape.height, settings.shape.width],
+        values: inference::Values::F32(&sample.picture),
+    };
+    let names = [
+        networktraining::MAPS,
+        networktraining::FRONT,
+        networktraining::ERROR,
+    ];
+    let mut outputs = vec![Vec::new(); names.len()];
+    session
+        .run(&[input], &names, &mut |output| {
+            outputs[output.index] = output.values.unwrap().to_vec();
+        })
+        .unwrap();
+    let expected = [
+        found.maps,
+        found.fronts,
+        found.errors.iter().map(|it| it.exp()).collect(),
+    ];
+    // Weights are stored in half precision.
+    for ((name, got), expected) in names.iter().zip(&outputs).zip(&expected) {
+        assert_eq!(got.len(), expected.len(), "{name}");
+        let scale = expected.iter().fold(0.0f32, |most, it| most.max(it.abs()));
+        let off = got.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        let worst = off.fold(0.0f32, f32::max);
+        assert!(worst < 0.01 * scale, "{name}: {worst} of {scale}");
+    }
+}
+
+#[test]
+fn a_checkpoint_that_was_changed_or_is_of_another_training_is_refused() {
+    let people = people(4, 5);
+    let settings = small();
+    let new = |settings: &Settings, bytes: Option<&[u8]>| {
+        let how = (settings, Backend::Flex);
+        Trainer::new(how, [&people[..3], &people[3..]], bytes).map(|it| it.step())
+    };
+    let how = (&settings, Backend::Flex);
+    let whole = Trainer::new(how, [&people[..3], &people[3..]], None).unwrap();
+    let bytes = whole.checkpoint().unwrap();
+    assert_eq!(new(&settings, Some(&bytes)).unwrap(), 0);
+    let mut changed = bytes.clone();
+    let middle = changed.len() / 2;
+    changed[middle] ^= 1;
+    assert!(new(&settings, Some(&changed)).is_err());
+    assert!(new(&settings, Some(&bytes[..middle])).is_err());
+    let other = Settings {
+        seed: 2,
+        ..settings.clone()
+    };
+    let refused = new(&other, Some(&bytes)).unwrap_err().to_string();
+    assert!(refused.contains("other people or settings"), "{refused}");
+}

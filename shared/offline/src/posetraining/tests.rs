@@ -1,0 +1,81 @@
+use networktraining::{About, N_JOINTS, Source, Target};
+
+use super::*;
+
+fn person(name: &str) -> Person {
+    Person {
+        source: Source::Photograph,
+        name: name.to_owned(),
+        rgb: vec![7; 3 * SIDE * SIDE],
+        targets: [Target::UNKNOWN; N_JOINTS],
+        front: [0.0, 0.0, 1.0],
+    }
+}
+
+#[test]
+fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("people.bin");
+    let people = Prepared {
+        learnt: vec![person("a"), person("b")],
+        kept: vec![person("c")],
+    };
+    write(&file, &people).unwrap();
+    let back = read(&file).unwrap();
+    let names = |of: &[Person]| of.iter().map(|it| it.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&back.learnt), ["a", "b"]);
+    assert_eq!(names(&back.kept), ["c"]);
+    assert_eq!(back.kept[0].rgb, people.kept[0].rgb);
+    let bytes = std::fs::read(&file).unwrap();
+    for n in [0, 5, 9, 100, bytes.len() - 1] {
+        std::fs::write(&file, &bytes[..n]).unwrap();
+        assert!(read(&file).is_err(), "{n} bytes");
+    }
+}
+
+#[test]
+fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
+    let shape = networktraining::Shape::default();
+    let text = networktraining::card(&shape, &About::default());
+    let card = keypoints::Card::parse(&text).unwrap();
+    assert_eq!(
+        [card.input.width, card.input.height],
+        [shape.width, shape.height]
+    );
+    assert_eq!(card.keypoints.sides, keypoints::Sides::Seen);
+    assert_eq!(card.names().len(), N_JOINTS);
+    assert_eq!(card.also.front.as_deref(), Some("front"));
+}
+
+#[test]
+fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
+    let shape = networktraining::Shape {
+        channels: [8, 8, 8, 8],
+        blocks: [1, 1, 1, 1],
+        ..networktraining::Shape::default()
+    };
+    let card = networktraining::card(&shape, &About::default());
+    let parameters = networktraining::initial(&shape, 3);
+    let bytes = networktraining::write(&shape, &parameters, &[]);
+    let session = inference::Session::parse(bytes).unwrap();
+    let card = keypoints::Card::parse(&card).unwrap();
+    let network = PoseNetwork::new(session, card).unwrap();
+    let rgb = vec![90u8; 3 * 100 * 100];
+    let picture = kernels::Rgb8View::new(100, 100, &rgb).unwrap();
+    let mut workspace = posenetwork::Workspace::default();
+    let sight = network.look(picture, [20.0, 10.0, 80.0, 90.0], &mut workspace);
+    let sight = sight.unwrap().unwrap();
+    assert!(sight.front().is_some());
+    // A tenth of the window's height, which is the box and a margin.
+    let errors: Vec<f64> = sight.errors().unwrap().collect();
+    assert_eq!(errors.len(), N_JOINTS);
+    assert!(
+        errors.iter().all(|it| (it - 10.0).abs() < 0.1),
+        "{errors:?}"
+    );
+    let mut maps = posenetwork::JointMaps::default();
+    maps.read(&sight, &posenetwork::MapSettings::default())
+        .unwrap();
+    let expected = maps.expected_px(0).unwrap();
+    assert!((expected - 8.0).abs() < 0.1, "along one axis: {expected}");
+}
