@@ -115,7 +115,7 @@ impl fmt::Display for Expected {
             |it: Option<f64>| it.map_or_else(|| "unknown".to_owned(), |it| format!("{it:.3}"));
         write!(
             to,
-            "errors expected by the heat of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
+            "expected errors of the maxima: area under the ROC {} ({} of {} joints are off by more than half a head), rank correlation {}",
             auc,
             self.n_far,
             self.n_joints,
