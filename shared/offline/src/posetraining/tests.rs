@@ -1,3 +1,5 @@
+//! Prepared people as a file, and the card of a trained network.
+
 use networktraining::{About, N_JOINTS, Source, Target};
 
 use super::*;
