@@ -39,6 +39,7 @@ mod progress;
 mod remains;
 mod scheduling;
 mod stop;
+mod video;
 
 pub use bus::Bus;
 pub use bus_error::BusError;
@@ -74,4 +75,8 @@ pub use service::PortError;
 pub use stop::Stop;
 pub use subscriber::{ReceiveError, Sample, SliceSubscriber, Subscriber};
 pub use topic::{Topic, TopicPlan};
+pub use video::{
+    FourCc, VideoAbout, VideoControl, VideoDevice, VideoError, VideoFormat, VideoMode,
+    VideoPicture, VideoSize, VideoStream, VideoWish, video_devices,
+};
 pub use waiter::{WaitError, Waiter, Woken};

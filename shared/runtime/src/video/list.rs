@@ -1,0 +1,352 @@
+//! What a device offers: formats, sizes, rates, controls.
+
+use super::device::{rate_hz, text};
+use super::raw::{self, QueryControl};
+use super::{FourCc, VideoDevice, VideoError};
+
+/// The most entries of any list that is asked of a driver, which could answer for ever.
+const MOST: u32 = 1024;
+
+/// A format with its sizes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoFormat {
+    /// Its letters.
+    pub format: FourCc,
+    /// As the driver calls it.
+    pub description: String,
+    /// The sizes that it has.
+    pub sizes: Vec<VideoSize>,
+}
+
+/// A size, or a range of sizes, with its rates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoSize {
+    /// The least width and height, pixels.
+    pub least: [u32; 2],
+    /// The most; equal to the least for one size.
+    pub most: [u32; 2],
+    /// Pictures per second, the fastest first; of a range its two ends.
+    pub rates_hz: Vec<f64>,
+}
+
+impl VideoSize {
+    /// `640x480`, or `16x16 to 1920x1080`.
+    pub fn text(&self) -> String {
+        let [least, most] = [self.least, self.most].map(|[w, h]| format!("{w}x{h}"));
+        if self.least == self.most {
+            least
+        } else {
+            format!("{least} to {most}")
+        }
+    }
+
+    fn has(&self, size: [u32; 2]) -> bool {
+        let fits = |axis: usize| (self.least[axis]..=self.most[axis]).contains(&size[axis]);
+        fits(0) && fits(1)
+    }
+}
+
+impl VideoFormat {
+    /// The size itself where it is offered, else the largest that is.
+    pub(super) fn nearest(&self, size: [u32; 2]) -> Option<[u32; 2]> {
+        if self.sizes.iter().any(|it| it.has(size)) {
+            return Some(size);
+        }
+        let all = self.sizes.iter().map(|it| it.most);
+        all.max_by_key(|it| u64::from(it[0]) * u64::from(it[1]))
+    }
+
+    pub(super) fn rates_at(&self, size: [u32; 2]) -> Vec<f64> {
+        let own = self.sizes.iter().find(|it| it.has(size));
+        own.map_or_else(Vec::new, |it| it.rates_hz.clone())
+    }
+}
+
+/// Something of a camera that can be set: a number, a switch, a choice.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VideoControl {
+    /// Its number in the kernel.
+    pub id: u32,
+    /// As in a deployment file: `exposure_time_absolute`.
+    pub name: String,
+    /// The least, the most, and the step.
+    pub range: [i32; 3],
+    /// Where nobody has set it.
+    pub default: i32,
+    /// Now; none if it cannot be read.
+    pub value: Option<i32>,
+    /// The choices of a menu: number and name.
+    pub choices: Vec<(u32, String)>,
+    /// Whether it cannot be set, now or ever.
+    pub is_fixed: bool,
+}
+
+impl VideoControl {
+    /// What it takes, for people.
+    pub fn takes(&self) -> String {
+        if self.choices.is_empty() {
+            let [least, most, step] = self.range;
+            return if step > 1 {
+                format!("{least} to {most} in steps of {step}")
+            } else {
+                format!("{least} to {most}")
+            };
+        }
+        let all = self
+            .choices
+            .iter()
+            .map(|(it, name)| format!("{it} ({name})"));
+        all.collect::<Vec<_>>().join(", ")
+    }
+
+    fn accepts(&self, value: i64) -> bool {
+        let [least, most, _] = self.range.map(i64::from);
+        let is_choice = |it: &(u32, String)| i64::from(it.0) == value;
+        (least..=most).contains(&value)
+            && (self.choices.is_empty() || self.choices.iter().any(is_choice))
+    }
+}
+
+impl VideoDevice {
+    /// Its formats with their sizes and rates.
+    ///
+    /// # Errors
+    ///
+    /// [`VideoError::Request`] if it tells none.
+    pub fn formats(&self) -> Result<Vec<VideoFormat>, VideoError> {
+        let mut formats = Vec::new();
+        for index in 0..MOST {
+            let mut it = raw::FormatDescription {
+                index,
+                kind: raw::VIDEO_CAPTURE,
+                ..raw::FormatDescription::default()
+            };
+            match self.ask(raw::ENUM_FMT, "tell its formats", &mut it) {
+                Ok(()) => formats.push(VideoFormat {
+                    format: FourCc::of_number(it.pixel_format),
+                    description: text(&it.description),
+                    sizes: self.sizes(it.pixel_format),
+                }),
+                Err(error) if formats.is_empty() => return Err(error),
+                Err(_end) => break,
+            }
+        }
+        Ok(formats)
+    }
+
+    fn sizes(&self, pixel_format: u32) -> Vec<VideoSize> {
+        let mut sizes = Vec::new();
+        for index in 0..MOST {
+            let mut it = raw::FrameSize {
+                index,
+                pixel_format,
+                ..raw::FrameSize::default()
+            };
+            if raw::ask(self.fd(), raw::ENUM_FRAMESIZES, &mut it).is_err() {
+                break;
+            }
+            let [a, b, _, d, e, _] = it.numbers;
+            let is_one = it.kind == 1;
+            let (least, most) = if is_one {
+                ([a, b], [a, b])
+            } else {
+                ([a, d], [b, e])
+            };
+            sizes.push(VideoSize {
+                least,
+                most,
+                rates_hz: self.rates(pixel_format, most),
+            });
+            if !is_one {
+                break;
+            }
+        }
+        sizes
+    }
+
+    fn rates(&self, pixel_format: u32, [width, height]: [u32; 2]) -> Vec<f64> {
+        let mut rates = Vec::new();
+        for index in 0..MOST {
+            let mut it = raw::FrameInterval {
+                index,
+                pixel_format,
+                width,
+                height,
+                ..raw::FrameInterval::default()
+            };
+            if raw::ask(self.fd(), raw::ENUM_FRAMEINTERVALS, &mut it).is_err() {
+                break;
+            }
+            let [a, b, c, d, ..] = it.numbers;
+            rates.extend(rate_hz([a, b]));
+            if it.kind != 1 {
+                rates.extend(rate_hz([c, d]));
+                break;
+            }
+        }
+        rates
+    }
+
+    /// Its controls, in the order of the driver.
+    pub fn controls(&self) -> Vec<VideoControl> {
+        let mut controls = Vec::new();
+        let mut last = 0;
+        for _ in 0..MOST {
+            let mut it = QueryControl {
+                id: last | raw::CTRL_FLAG_NEXT_CTRL,
+                ..QueryControl::default()
+            };
+            if raw::ask(self.fd(), raw::QUERYCTRL, &mut it).is_err() || it.id <= last {
+                break;
+            }
+            last = it.id;
+            controls.extend(self.control(&it));
+        }
+        controls
+    }
+
+    fn control(&self, it: &QueryControl) -> Option<VideoControl> {
+        /// `V4L2_CTRL_TYPE_INTEGER`, `BOOLEAN`, `MENU`, `BUTTON`, `BITMASK`, `INTEGER_MENU`.
+        const WITH_NUMBERS: [u32; 6] = [1, 2, 3, 4, 8, 9];
+        if it.flags & raw::CTRL_FLAG_DISABLED != 0 || !WITH_NUMBERS.contains(&it.kind) {
+            return None;
+        }
+        let mut value = raw::Control {
+            id: it.id,
+            value: 0,
+        };
+        let is_read = raw::ask(self.fd(), raw::G_CTRL, &mut value).is_ok();
+        let fixed = raw::CTRL_FLAG_READ_ONLY | raw::CTRL_FLAG_INACTIVE;
+        Some(VideoControl {
+            id: it.id,
+            name: as_key(&text(&it.name)),
+            range: [it.minimum, it.maximum, it.step],
+            default: it.default,
+            value: is_read.then_some(value.value),
+            choices: self.choices(it),
+            is_fixed: it.flags & fixed != 0,
+        })
+    }
+
+    fn choices(&self, it: &QueryControl) -> Vec<(u32, String)> {
+        const MENU: u32 = 3;
+        const NUMBERS: u32 = 9;
+        if ![MENU, NUMBERS].contains(&it.kind) {
+            return Vec::new();
+        }
+        let range = it.minimum.max(0) as u32..=it.maximum.clamp(0, MOST as i32) as u32;
+        let name = |index: u32| {
+            let mut menu = raw::QueryMenu {
+                id: it.id,
+                index,
+                ..raw::QueryMenu::default()
+            };
+            raw::ask(self.fd(), raw::QUERYMENU, &mut menu).ok()?;
+            let name = menu.name;
+            let [a, b, c, d, e, f, g, h, ..] = name;
+            let number = i64::from_ne_bytes([a, b, c, d, e, f, g, h]);
+            let is_menu = it.kind == MENU;
+            Some((
+                index,
+                if is_menu {
+                    text(&name)
+                } else {
+                    number.to_string()
+                },
+            ))
+        };
+        range.filter_map(name).collect()
+    }
+
+    /// Sets a control by its name.
+    ///
+    /// # Errors
+    ///
+    /// [`VideoError::NoControl`] with those that it has; [`VideoError::Value`] with what it takes;
+    /// [`VideoError::Request`] if the device refuses.
+    pub fn set_control(&self, name: &str, value: i64) -> Result<(), VideoError> {
+        let controls = self.controls();
+        let Some(control) = controls.iter().find(|it| it.name == name) else {
+            let names: Vec<&str> = controls.iter().map(|it| it.name.as_str()).collect();
+            let offered = if names.is_empty() {
+                "none".to_owned()
+            } else {
+                names.join(", ")
+            };
+            return Err(VideoError::NoControl {
+                path: self.path().to_owned(),
+                name: name.to_owned(),
+                offered,
+            });
+        };
+        if !control.accepts(value) {
+            return Err(VideoError::Value {
+                path: self.path().to_owned(),
+                name: name.to_owned(),
+                value,
+                expected: control.takes(),
+            });
+        }
+        let mut set = raw::Control {
+            id: control.id,
+            value: value as i32,
+        };
+        self.ask(raw::S_CTRL, "take the value of a control", &mut set)
+    }
+}
+
+/// The driver's name of a control as a key: `Exposure Time, Absolute` is `exposure_time_absolute`.
+fn as_key(name: &str) -> String {
+    let is_plain = |it: char| it.is_ascii_alphanumeric();
+    let words = name.split(|it| !is_plain(it)).filter(|it| !it.is_empty());
+    words.collect::<Vec<_>>().join("_").to_ascii_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn controls_are_named_as_keys() {
+        assert_eq!(as_key("Exposure Time, Absolute"), "exposure_time_absolute");
+        assert_eq!(
+            as_key("White Balance, Automatic"),
+            "white_balance_automatic"
+        );
+    }
+
+    #[test]
+    fn values_out_of_range_and_choices_that_are_not_there_are_not_accepted() {
+        let mut control = VideoControl {
+            id: 1,
+            name: "a".to_owned(),
+            range: [0, 3, 1],
+            default: 0,
+            value: None,
+            choices: Vec::new(),
+            is_fixed: false,
+        };
+        assert!(control.accepts(2) && !control.accepts(4) && !control.accepts(i64::MAX));
+        assert_eq!(control.takes(), "0 to 3");
+        control.choices = vec![(1, "Manual".to_owned()), (3, "Aperture".to_owned())];
+        assert!(control.accepts(1) && !control.accepts(2));
+        assert_eq!(control.takes(), "1 (Manual), 3 (Aperture)");
+    }
+
+    #[test]
+    fn the_nearest_size_is_the_one_asked_for_or_the_largest() {
+        let size = |w, h| VideoSize {
+            least: [w, h],
+            most: [w, h],
+            rates_hz: vec![30.0],
+        };
+        let format = VideoFormat {
+            format: FourCc(*b"MJPG"),
+            description: String::new(),
+            sizes: vec![size(640, 480), size(1280, 720)],
+        };
+        assert_eq!(format.nearest([640, 480]), Some([640, 480]));
+        assert_eq!(format.nearest([100, 100]), Some([1280, 720]));
+        assert_eq!(format.rates_at([640, 480]), [30.0]);
+    }
+}
