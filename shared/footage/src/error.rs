@@ -15,7 +15,7 @@ pub enum FootageError {
         path: String,
     },
     /// A camera, a stream or a device.
-    #[error("{path} is {what}, and live sources are not supported by this version: {instead}")]
+    #[error("{path} is {what}, no footage: {instead}")]
     Live {
         /// As the user wrote it.
         path: String,
@@ -82,6 +82,22 @@ pub enum FootageError {
         /// The first image.
         first: PathBuf,
         /// The size of the first image.
+        expected: Size,
+    },
+    /// A live stream cannot be opened, or has ended.
+    #[error("no pictures from {address}: {message}")]
+    Stream {
+        /// Which, without a password.
+        address: String,
+        /// Message of the decoder.
+        message: String,
+    },
+    /// A live stream has pictures of another size now.
+    #[error("{} no longer has pictures of {expected}", path.display())]
+    SizeChanged {
+        /// Which.
+        path: PathBuf,
+        /// The size that it had.
         expected: Size,
     },
     /// Too small to detect a person.
@@ -152,14 +168,12 @@ pub enum FootageError {
     },
 }
 
-/// A hint for the message: the folder that is missing, or that a number of a webcam is not supported.
+/// A hint for the message: the folder that is missing, or what the source of a webcam is called.
 fn what_is_missing(path: &str) -> String {
     let path = Path::new(path);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_digit()) {
-        return "; if that is the number of a webcam: live sources are not supported by this version, record it to a \
-                file first (`ffmpeg -f v4l2 -i /dev/video0 -t 60 left.mp4`)"
-            .to_owned();
+        return "; if that is the number of a webcam, its source is /dev/video".to_owned() + &name;
     }
     let absent = path
         .ancestors()

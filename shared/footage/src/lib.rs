@@ -10,6 +10,8 @@ mod size;
 mod source;
 mod spec;
 
+mod pixels;
+mod stream;
 mod warp;
 
 mod pacer;
@@ -22,9 +24,12 @@ pub use overlay::{
     Tile, compose, draw_limbs, line_width, text_width,
 };
 pub use pacer::Pacer;
+pub use pixels::PixelFormat;
 pub use size::Size;
 pub use source::{
-    FrameView, Source, SourceInfo, SourceKind, Turn, is_image, is_live, read_image, read_upright,
+    FrameView, LiveAddress, Source, SourceInfo, SourceKind, Turn, is_image, is_live, read_image,
+    read_upright,
 };
 pub use spec::SourceSpec;
+pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};
 pub use warp::{Affine, Fill, Warp, WarpError, resize_map};

@@ -4,17 +4,18 @@ mod decode;
 mod images;
 mod listing;
 mod live;
-mod log;
-mod probe;
+pub(crate) mod log;
+pub(crate) mod probe;
 mod video;
 
 use std::path::Path;
 
 pub use decode::Turn;
+pub(crate) use decode::{jpeg_into, jpeg_is_whole};
 use images::{Images, Still};
 pub use images::{is_image, read_image, read_upright};
 use listing::Listing;
-pub use live::is_live;
+pub use live::{LiveAddress, is_live};
 use video::Video;
 
 use crate::{FootageError, Size, SourceSpec};

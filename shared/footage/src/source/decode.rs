@@ -156,7 +156,7 @@ impl<'a> Encoded<'a> {
 /// Other decoders differ by a few grey levels in every seventh sample, which is enough to break ties of
 /// gradient orientations differently: only 22 of 100 PARSE images then keep their detection to the cell.
 /// The library reports errors by unwinding, which is caught here; the caller tries another decoder.
-fn jpeg_into(bytes: &[u8], rgb: &mut [u8]) -> bool {
+pub(crate) fn jpeg_into(bytes: &[u8], rgb: &mut [u8]) -> bool {
     let decode = || -> std::io::Result<Vec<u8>> {
         let mut lines = mozjpeg::Decompress::new_mem(bytes)?.rgb()?;
         let pixels = lines.read_scanlines::<u8>()?;
@@ -181,7 +181,7 @@ fn size_of(decoder: &impl ImageDecoder) -> Size {
 ///
 /// Decoders fill missing data with grey without an error. The segments in front of the data are
 /// skipped, because a thumbnail in them has an end marker of its own.
-fn jpeg_is_whole(bytes: &[u8]) -> bool {
+pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     const START_OF_SCAN: u8 = 0xda;
     let mut at = 2;
     while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {

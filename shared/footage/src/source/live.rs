@@ -1,22 +1,85 @@
 //! Sources that are not files: cameras, streams, devices.
 
+use core::fmt;
 use std::fs::FileType;
 use std::os::unix::fs::FileTypeExt as _;
+use std::path::PathBuf;
 
-/// Whether a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`.
-pub fn is_live(text: &str) -> bool {
-    what(text).is_some()
+/// Where a live camera is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LiveAddress {
+    /// A video device of this machine: `/dev/video0`.
+    Device(PathBuf),
+    /// A stream on a network: `rtsp://...`.
+    Stream(String),
 }
 
-/// The kind of source that the scheme of an address stands for; `None` for a file.
+impl LiveAddress {
+    /// Reads `v4l2:/dev/video0`, a path under `/dev`, and addresses of streams (`rtsp`, `udp`, `http` and such); none
+    /// for anything else, which is footage.
+    ///
+    /// ```
+    /// use footage::LiveAddress;
+    ///
+    /// let device = LiveAddress::parse("v4l2:/dev/video0");
+    /// assert_eq!(device, Some(LiveAddress::Device("/dev/video0".into())));
+    /// assert_eq!(LiveAddress::parse("walk.mp4"), None);
+    /// ```
+    pub fn parse(text: &str) -> Option<Self> {
+        if text.starts_with("/dev/") {
+            return Some(Self::Device(text.into()));
+        }
+        let (scheme, rest) = text.split_once(':')?;
+        match scheme.to_ascii_lowercase().as_str() {
+            "v4l2" | "video4linux" => Some(Self::Device(rest.into())),
+            "rtsp" | "rtsps" | "rtmp" | "rtp" | "udp" | "tcp" | "srt" | "http" | "https"
+                if rest.starts_with("//") =>
+            {
+                Some(Self::Stream(text.to_owned()))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for LiveAddress {
+    /// Without the name and the password that an address may hold.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Device(path) => write!(f, "{}", path.display()),
+            Self::Stream(address) => f.write_str(&without_password(address)),
+        }
+    }
+}
+
+/// An address without what stands before the `@` of its host.
+fn without_password(address: &str) -> String {
+    let Some((scheme, rest)) = address.split_once("://") else {
+        return address.to_owned();
+    };
+    let end = rest.find('/').unwrap_or(rest.len());
+    let host = rest[..end].rsplit_once('@').map_or(0, |it| it.0.len() + 1);
+    format!("{scheme}://{}", &rest[host..])
+}
+
+/// Whether a text is the address of a camera or a stream: `rtsp://...`, `udp://...`, `http://...`, `v4l2:...`,
+/// `/dev/video0`.
+pub fn is_live(text: &str) -> bool {
+    LiveAddress::parse(text).is_some()
+}
+
+/// What a source is that is no footage: the kind that the scheme of an address stands for; `None` for a file.
 pub(super) fn what(text: &str) -> Option<&'static str> {
+    match LiveAddress::parse(text) {
+        Some(LiveAddress::Device(_)) => return Some("a live camera"),
+        Some(LiveAddress::Stream(_)) => return Some("a live stream"),
+        None => {}
+    }
     let (scheme, _) = text.split_once(':')?;
     match scheme.to_ascii_lowercase().as_str() {
-        "rtsp" | "rtsps" | "rtmp" | "rtp" | "udp" | "tcp" | "srt" | "mms" | "whep" => {
-            Some("a live stream")
-        }
-        "http" | "https" | "ftp" | "sftp" | "s3" => Some("an address on a network"),
-        "v4l2" | "video4linux" | "dshow" | "avfoundation" => Some("a live camera"),
+        "mms" | "whep" => Some("a live stream"),
+        "ftp" | "sftp" | "s3" => Some("an address on a network"),
+        "dshow" | "avfoundation" => Some("a live camera"),
         "file" => Some("an address"),
         _ => None,
     }
@@ -57,6 +120,7 @@ mod tests {
             "UDP://@:5000",
             "http://a/b.mp4",
             "v4l2:/dev/video0",
+            "/dev/v4l/by-id/usb-046d_C920-video-index0",
         ] {
             assert!(is_live(text), "{text}");
         }
@@ -66,10 +130,26 @@ mod tests {
             "frames/%05d.png",
             "synth://humaneva",
             "12:30.mp4",
+            "udp:x.mp4",
             "",
         ] {
             assert!(!is_live(text), "{text}");
         }
+    }
+
+    #[test]
+    fn passwords_are_not_shown() {
+        let shown = |text: &str| LiveAddress::parse(text).unwrap().to_string();
+        let [open, plain] = ["rtsp://10.0.0.5/a@b", "udp://@:5000"].map(shown);
+        assert_eq!(
+            (open.as_str(), plain.as_str()),
+            ("rtsp://10.0.0.5/a@b", "udp://:5000")
+        );
+        assert_eq!(
+            shown("rtsp://me:secret@10.0.0.5:554/a"),
+            "rtsp://10.0.0.5:554/a"
+        );
+        assert_eq!(shown("v4l2:/dev/video2"), "/dev/video2");
     }
 
     #[test]

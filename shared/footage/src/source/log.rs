@@ -14,30 +14,39 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Reads a log to its end in a thread of its own, so that a decoder with much output does not block.
 #[derive(Debug)]
-pub(super) struct Log {
+pub(crate) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
-    times_s: Receiver<f64>,
+    times: Receiver<FrameTime>,
+}
+
+/// What is said of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FrameTime {
+    /// Its presentation time, seconds.
+    pub(crate) time_s: f64,
+    /// Size of what was made of it for this output, bytes.
+    pub(crate) bytes: u64,
 }
 
 impl Log {
-    pub(super) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
-        let (sender, times_s) = sync_channel(MAX_TIMES);
+    pub(crate) fn follow(stream: impl Read + Send + 'static) -> std::io::Result<Self> {
+        let (sender, times) = sync_channel(MAX_TIMES);
         let reader = std::thread::Builder::new()
             .name("decoder log".to_owned())
             .spawn(move || Lines::new(sender).read(stream))?;
         Ok(Self {
             reader: Some(reader),
-            times_s,
+            times,
         })
     }
 
-    /// The time of the next frame, seconds; waits for it for a short time.
-    pub(super) fn next_time_s(&self) -> Option<f64> {
-        self.times_s.recv_timeout(PATIENCE).ok()
+    /// The time of the next frame; waits for it for a short time.
+    pub(crate) fn next_time(&self) -> Option<FrameTime> {
+        self.times.recv_timeout(PATIENCE).ok()
     }
 
     /// Waits for the end of the log, and returns its last messages; empty if there were none.
-    pub(super) fn finish(&mut self) -> String {
+    pub(crate) fn finish(&mut self) -> String {
         let bytes = self.reader.take().and_then(|thread| thread.join().ok());
         summary(&bytes.unwrap_or_default())
     }
@@ -45,7 +54,7 @@ impl Log {
 
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
-    times_s: SyncSender<f64>,
+    times: SyncSender<FrameTime>,
     /// The unit of time from its header, seconds.
     unit_s: f64,
     /// The error messages.
@@ -55,9 +64,9 @@ struct Lines {
 }
 
 impl Lines {
-    fn new(times_s: SyncSender<f64>) -> Self {
+    fn new(times: SyncSender<FrameTime>) -> Self {
         Self {
-            times_s,
+            times,
             unit_s: f64::NAN,
             kept: Vec::new(),
             partial: Vec::new(),
@@ -83,9 +92,10 @@ impl Lines {
         let text = String::from_utf8_lossy(&line);
         if let Some(unit_s) = text.strip_prefix("#tb 0: ") {
             self.unit_s = fraction(unit_s).unwrap_or(f64::NAN);
-        } else if let Some(units) = frame_units(&text) {
+        } else if let Some((units, bytes)) = frame_units(&text) {
+            let time_s = units * self.unit_s;
             // Times are dropped if the receiver is gone or too slow.
-            self.times_s.try_send(units * self.unit_s).ok();
+            self.times.try_send(FrameTime { time_s, bytes }).ok();
         } else if !text.starts_with('#') {
             self.kept.extend_from_slice(&line);
             if self.kept.len() > MAX_BYTES {
@@ -98,18 +108,14 @@ impl Lines {
 /// The time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
 /// presentation time, duration, bytes, checksum. It is written at once, but possibly in the middle of an error
 /// message, which is written in pieces: any text before it is ignored.
-fn frame_units(line: &str) -> Option<f64> {
+fn frame_units(line: &str) -> Option<(f64, u64)> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let [.., stream, _, presented, _, bytes, checksum] = fields[..] else {
         return None;
     };
-    let is_frame =
-        stream.ends_with('0') && checksum.starts_with("0x") && bytes.parse::<u64>().is_ok();
-    presented
-        .parse::<i64>()
-        .ok()
-        .filter(|_| is_frame)
-        .map(|units| units as f64)
+    let is_frame = stream.ends_with('0') && checksum.starts_with("0x");
+    let bytes = bytes.parse().ok().filter(|_| is_frame)?;
+    Some((presented.parse::<i64>().ok()? as f64, bytes))
 }
 
 /// `1/25`.
@@ -120,7 +126,7 @@ fn fraction(text: &str) -> Option<f64> {
 }
 
 /// The last three lines, as one.
-pub(super) fn summary(log: &[u8]) -> String {
+pub(crate) fn summary(log: &[u8]) -> String {
     let text = String::from_utf8_lossy(log);
     let lines: Vec<&str> = text
         .lines()
@@ -145,9 +151,9 @@ mod tests {
 
     /// The messages and the times in a text.
     fn read(text: &str) -> (Vec<u8>, Vec<f64>) {
-        let (sender, times_s) = sync_channel(MAX_TIMES);
+        let (sender, times) = sync_channel(MAX_TIMES);
         let kept = Lines::new(sender).read(text.as_bytes());
-        (kept, times_s.try_iter().collect())
+        (kept, times.try_iter().map(|it| it.time_s).collect())
     }
 
     #[test]

@@ -143,7 +143,7 @@ pub(super) fn input_name(path: &Path) -> std::ffi::OsString {
     name
 }
 
-pub(super) fn missing(executable: &Path, path: &Path, source: io::Error) -> FootageError {
+pub(crate) fn missing(executable: &Path, path: &Path, source: io::Error) -> FootageError {
     FootageError::FfmpegMissing {
         executable: executable.to_path_buf(),
         path: path.to_path_buf(),
@@ -156,14 +156,14 @@ fn number(value: &Value) -> Option<f64> {
 }
 
 /// `"60000/1001"`; `"0/0"` means unknown.
-fn fraction(value: &Value) -> Option<f64> {
+pub(crate) fn fraction(value: &Value) -> Option<f64> {
     let (numerator, denominator) = value.as_str()?.split_once('/')?;
     let rate = numerator.parse::<f64>().ok()? / denominator.parse::<f64>().ok()?;
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
 /// `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`; builds without a number are assumed to be recent.
-fn has_fps_mode(version: &str) -> bool {
+pub(crate) fn has_fps_mode(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')
         .split(|it: char| !it.is_ascii_digit())

@@ -99,10 +99,7 @@ impl Video {
         let Some(rate_hz) = self.probe.regular_hz() else {
             return counted;
         };
-        let by_time = self
-            .log
-            .next_time_s()
-            .map(|time_s| (time_s * rate_hz).round());
+        let by_time = self.log.next_time().map(|it| (it.time_s * rate_hz).round());
         by_time.map_or(counted, |index| counted.max(index as u64))
     }
 

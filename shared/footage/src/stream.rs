@@ -1,0 +1,356 @@
+//! A live stream of a network, decoded by an `ffmpeg` process.
+
+use core::fmt;
+use std::ffi::OsString;
+use std::io::{ErrorKind, Read as _};
+use std::os::unix::process::CommandExt as _;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde_json::Value;
+
+use crate::source::LiveAddress;
+use crate::source::log::{Log, summary};
+use crate::source::probe::{fraction, has_fps_mode, missing};
+use crate::{FootageError, Size};
+
+/// How long a stream may be silent before it counts as gone, seconds.
+const SILENCE_S: u64 = 5;
+/// Slowest and fastest rate that a header is believed, frames per second.
+const RATES_HZ: [f64; 2] = [1.0, 1000.0];
+/// What the decoder says the size of a frame by: rows of the eighth part of the picture in grey.
+const SHARE: usize = 8;
+
+/// How the packets of an RTSP camera travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transport {
+    /// Late packets delay the others.
+    Tcp,
+    /// Late packets are lost.
+    Udp,
+}
+
+/// A stream to open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StreamSpec {
+    /// Its address, `rtsp://...`.
+    pub address: String,
+    /// How RTSP packets travel; as server and decoder agree without it.
+    pub transport: Option<Transport>,
+    /// The `ffmpeg` executable.
+    pub ffmpeg: PathBuf,
+    /// The `ffprobe` executable.
+    pub ffprobe: PathBuf,
+}
+
+/// One frame of a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StreamFrame {
+    /// Its presentation time on the clock of the camera, nanoseconds after any moment; none where the stream has no
+    /// times of its own.
+    pub presented_nanos: Option<i64>,
+}
+
+/// A running decoder of a stream. It is killed when this is dropped.
+#[derive(Debug)]
+pub struct LiveStream {
+    address: String,
+    shown: String,
+    size: Size,
+    has_times: bool,
+    child: StreamEnd,
+    stdout: ChildStdout,
+    log: Log,
+}
+
+/// Ends a stream from another thread than the one that waits for its frames.
+#[derive(Debug, Clone)]
+pub struct StreamEnd(Arc<Mutex<Child>>);
+
+impl StreamEnd {
+    /// Ends the decoder.
+    pub fn end(&self) {
+        let mut child = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // Both fail only if it has ended and was waited for.
+        child.kill().ok();
+        child.wait().ok();
+    }
+}
+
+impl StreamSpec {
+    /// A stream with the `ffmpeg` and `ffprobe` on the search path.
+    pub fn new(address: impl Into<String>) -> Self {
+        Self {
+            address: address.into(),
+            transport: None,
+            ffmpeg: "ffmpeg".into(),
+            ffprobe: "ffprobe".into(),
+        }
+    }
+
+    /// Size and rate of the stream, from its first packets; the rate is unknown where it does not tell.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::Stream`] if nobody answers, or it is no video; [`FootageError::FfmpegMissing`].
+    pub fn probe(&self) -> Result<(Size, Option<f64>), FootageError> {
+        let entries = "stream=width,height,avg_frame_rate,r_frame_rate";
+        let run = Command::new(&self.ffprobe)
+            .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
+            .args(["-show_entries", entries])
+            .args(self.input_options())
+            .arg(&self.address)
+            .stdin(Stdio::null())
+            .process_group(0)
+            .output();
+        let Output {
+            status,
+            stdout,
+            stderr,
+        } = run.map_err(|source| missing(&self.ffprobe, self.shown().as_ref(), source))?;
+        if !status.success() {
+            return Err(self.failed(&summary(&stderr)));
+        }
+        let found: Value = serde_json::from_slice(&stdout).unwrap_or_default();
+        let stream = &found["streams"][0];
+        let side = |key: &str| stream[key].as_u64().unwrap_or(0) as usize;
+        let size = Size::new(side("width"), side("height"));
+        if size.rgb_bytes() == 0 {
+            return Err(self.failed("it has no video"));
+        }
+        let rates = ["r_frame_rate", "avg_frame_rate"].map(|it| fraction(&stream[it]));
+        let is_usual = |it: &f64| (RATES_HZ[0]..=RATES_HZ[1]).contains(it);
+        Ok((size, rates.into_iter().flatten().find(is_usual)))
+    }
+
+    /// Starts the decoder. Frames of another size than `size` end the stream.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::FfmpegMissing`]. Whether somebody answers shows at the first frame.
+    pub fn open(&self, size: Size) -> Result<LiveStream, FootageError> {
+        let not_started = |source| missing(&self.ffmpeg, self.shown().as_ref(), source);
+        let mut child = Command::new(&self.ffmpeg)
+            .args(["-nostdin", "-v", "error"])
+            .args(self.input_options())
+            .args(["-copyts", "-i"])
+            .arg(&self.address)
+            .args(self.outputs())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            // Signals of the terminal end the run, and the run ends the decoder.
+            .process_group(0)
+            .spawn()
+            .map_err(not_started)?;
+        let no_pipe = || not_started(ErrorKind::BrokenPipe.into());
+        let stdout = child.stdout.take().ok_or_else(no_pipe)?;
+        let stderr = child.stderr.take().ok_or_else(no_pipe)?;
+        Ok(LiveStream {
+            address: self.address.clone(),
+            shown: self.shown(),
+            size,
+            has_times: self.has_times(),
+            child: StreamEnd(Arc::new(Mutex::new(child))),
+            stdout,
+            log: Log::follow(stderr).map_err(not_started)?,
+        })
+    }
+
+    /// The address without a password.
+    fn shown(&self) -> String {
+        LiveAddress::Stream(self.address.clone()).to_string()
+    }
+
+    /// The error, without a password that the decoder repeats.
+    fn failed(&self, message: &str) -> FootageError {
+        failed(
+            &self.shown(),
+            &message.replace(&self.address, &self.shown()),
+        )
+    }
+
+    fn is(&self, scheme: &str) -> bool {
+        let own = self.address.split(':').next().unwrap_or_default();
+        own.eq_ignore_ascii_case(scheme)
+    }
+
+    /// Whether the frames have times of their own: those of JPEG pictures over HTTP are made up by the decoder.
+    fn has_times(&self) -> bool {
+        !self.is("http") && !self.is("https")
+    }
+
+    fn input_options(&self) -> Vec<OsString> {
+        let limit = (SILENCE_S * 1_000_000).to_string();
+        let mut options = vec!["-fflags", "nobuffer", "-flags", "low_delay"];
+        options.extend(["-analyzeduration", "1000000", "-probesize", "1000000"]);
+        let is_rtsp = self.is("rtsp") || self.is("rtsps");
+        let listens = self.address.contains("listen");
+        if is_rtsp {
+            options.extend(self.transport.map_or(&[][..], |it| match it {
+                Transport::Tcp => &["-rtsp_transport", "tcp"],
+                Transport::Udp => &["-rtsp_transport", "udp"],
+            }));
+        }
+        let of_silence = if is_rtsp || self.is("udp") {
+            "-timeout"
+        } else {
+            "-rw_timeout"
+        };
+        if !listens && !self.is("rtp") && !self.is("srt") {
+            options.extend([of_silence, &limit]);
+        }
+        options.into_iter().map(OsString::from).collect()
+    }
+
+    /// The pixels; and time and size of each frame on standard error.
+    fn outputs(&self) -> Vec<String> {
+        let mode = if has_fps_mode(&version_of(&self.ffmpeg)) {
+            "-fps_mode"
+        } else {
+            "-vsync"
+        };
+        let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
+        let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
+        let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
+        let times = [
+            "-vf",
+            &shrink,
+            "-enc_time_base",
+            "1:1000000",
+            "-flush_packets",
+            "1",
+        ];
+        let all = [
+            &common[..],
+            &pixels,
+            &common,
+            &times,
+            &["-f", "framecrc", "pipe:2"],
+        ];
+        all.concat().into_iter().map(str::to_owned).collect()
+    }
+}
+
+/// The version of `ffmpeg`; empty if it does not tell.
+fn version_of(ffmpeg: &PathBuf) -> String {
+    let said = Command::new(ffmpeg)
+        .arg("-version")
+        .stdin(Stdio::null())
+        .output();
+    let said = said.map(|it| it.stdout).unwrap_or_default();
+    let text = String::from_utf8_lossy(&said);
+    text.split_whitespace()
+        .nth(2)
+        .unwrap_or_default()
+        .to_owned()
+}
+
+fn failed(shown: &str, message: &str) -> FootageError {
+    FootageError::Stream {
+        address: shown.to_owned(),
+        message: message.to_owned(),
+    }
+}
+
+impl LiveStream {
+    /// Reads the next frame into `rgb`; waits for it.
+    ///
+    /// # Errors
+    ///
+    /// [`FootageError::Stream`] with what the decoder says if the stream has ended;
+    /// [`FootageError::SizeChanged`] if its size has changed.
+    ///
+    /// # Panics
+    ///
+    /// If `rgb` has another length than a frame of the size it was opened with.
+    pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<StreamFrame, FootageError> {
+        assert_eq!(
+            rgb.len(),
+            self.size.rgb_bytes(),
+            "a frame is {} in RGB",
+            self.size
+        );
+        if let Err(error) = self.stdout.read_exact(rgb) {
+            self.child.end();
+            let said = self.log.finish();
+            let message = if said.is_empty() {
+                format!("the stream has ended ({error})")
+            } else {
+                said.replace(&self.address, &self.shown)
+            };
+            return Err(failed(&self.shown, &message));
+        }
+        let Some(time) = self.log.next_time() else {
+            return Err(failed(&self.shown, "the decoder tells no times"));
+        };
+        let rows = self.size.height / SHARE;
+        if time.bytes != (self.size.width * rows) as u64 {
+            return Err(FootageError::SizeChanged {
+                path: self.shown.clone().into(),
+                expected: self.size,
+            });
+        }
+        let nanos = (time.time_s * 1e9).round() as i64;
+        Ok(StreamFrame {
+            presented_nanos: (self.has_times && time.time_s.is_finite()).then_some(nanos),
+        })
+    }
+
+    /// Ends this stream from another thread.
+    pub fn end(&self) -> StreamEnd {
+        self.child.clone()
+    }
+}
+
+impl Drop for LiveStream {
+    fn drop(&mut self) {
+        self.child.end();
+    }
+}
+
+impl fmt::Display for Transport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Tcp => "tcp",
+            Self::Udp => "udp",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_password_is_in_no_error() {
+        let spec = StreamSpec::new("rtsp://me:secret@127.0.0.1:9/a");
+        let said = spec
+            .failed("rtsp://me:secret@127.0.0.1:9/a: Connection refused")
+            .to_string();
+        assert!(!said.contains("secret"), "{said}");
+        assert!(said.contains("Connection refused"), "{said}");
+    }
+
+    #[test]
+    fn the_options_follow_the_kind_of_stream() {
+        let options = |address: &str| {
+            let spec = StreamSpec {
+                transport: Some(Transport::Tcp),
+                ..StreamSpec::new(address)
+            };
+            let all = spec.input_options();
+            all.into_iter()
+                .filter_map(|it| it.into_string().ok())
+                .collect::<Vec<_>>()
+                .join(" ")
+        };
+        assert!(options("rtsp://a/b").contains("-rtsp_transport tcp -timeout 5000000"));
+        assert!(options("http://a/b").contains("-rw_timeout 5000000"));
+        assert!(!options("udp://:5000").contains("rtsp"));
+        assert!(
+            !StreamSpec::new("http://a/b").has_times() && StreamSpec::new("rtsp://a").has_times()
+        );
+    }
+}
