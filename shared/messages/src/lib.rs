@@ -22,7 +22,8 @@ pub use evidence::EvidenceHeader;
 pub use frame::FrameHeader;
 pub use health::Health;
 pub use metrics::{
-    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE, NO_VIEW, Span,
+    CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
+    NO_VIEW, Span,
 };
 pub use pose::{LocalMessage, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose};
 pub use pose3d::{FusedView, Joint3d, Kept, Pose3d, Sides};
@@ -60,5 +61,5 @@ const _: () = {
     assert!(size_of::<Pose3d>() == 11640 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Health>() == 152);
     assert!(size_of::<MetricsRow>() == 56);
-    assert!(size_of::<Metrics>() == 176 + MAX_ROWS * 56);
+    assert!(size_of::<Metrics>() == 256 + MAX_ROWS * 56);
 };

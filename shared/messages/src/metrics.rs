@@ -20,7 +20,7 @@ pub const NO_PEOPLE: u32 = u32::MAX;
 /// when a subscriber connects, and at its end. Percentiles are taken over the whole time, from a
 /// histogram with two significant digits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Metrics.v2")]
+#[type_name("Metrics.v3")]
 #[repr(C)]
 pub struct Metrics {
     /// Run of the deployment.
@@ -62,8 +62,40 @@ pub struct Metrics {
     pub n_rows: u32,
     /// Number of people in the last result, or [`NO_PEOPLE`].
     pub n_people: u32,
+    /// What became of the pictures of its live camera; all 0 without one.
+    pub camera: CameraCounts,
     /// Durations, at most one row for each span and view.
     pub rows: [MetricsRow; MAX_ROWS],
+}
+
+/// What became of the pictures of a live camera since the process began.
+///
+/// Every picture that the camera made is lost by it or delivered; every one that was delivered is used, surplus, overtaken
+/// or refused, but for those under way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
+#[type_name("CameraCounts.v1")]
+#[repr(C)]
+pub struct CameraCounts {
+    /// How often the camera was opened; 0 for footage.
+    pub n_connections: u64,
+    /// Pictures that the camera made: by its own numbers, or by its times where it has none.
+    pub n_made: u64,
+    /// Of these, those that it never delivered.
+    pub n_lost: u64,
+    /// Of these, those that it delivered.
+    pub n_delivered: u64,
+    /// Of the delivered, those that were sent on.
+    pub n_used: u64,
+    /// Those for which there was no place in the grid of common instants.
+    pub n_surplus: u64,
+    /// Those in whose place a newer one was taken, because this process was slow.
+    pub n_overtaken: u64,
+    /// Those that are damaged, frozen or without a time that can be.
+    pub n_refused: u64,
+    /// Pictures per second, in millionths, measured by the times of the camera; 0 if unknown.
+    pub rate_microhertz: u64,
+    /// How long after its common instant the last picture that was used was taken, nanoseconds; negative for before.
+    pub off_grid_nanos: i64,
 }
 
 impl Default for Metrics {
@@ -88,6 +120,7 @@ impl Default for Metrics {
             name: [0; MAX_NAME],
             n_rows: 0,
             n_people: NO_PEOPLE,
+            camera: CameraCounts::default(),
             rows: [MetricsRow::default(); MAX_ROWS],
         }
     }

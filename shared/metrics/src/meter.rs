@@ -2,7 +2,8 @@
 
 use hdrhistogram::Histogram;
 use messages::{
-    Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE, NO_VIEW, Span,
+    CameraCounts, Cause, MAX_NAME, MAX_ROWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
+    NO_VIEW, Span,
 };
 
 /// Longest measurable duration, nanoseconds: an hour.
@@ -34,6 +35,7 @@ pub struct Meter {
     n_people: u32,
     view: u32,
     name: [u8; MAX_NAME],
+    camera: CameraCounts,
 }
 
 #[derive(Debug)]
@@ -53,6 +55,7 @@ impl Default for Meter {
             n_people: NO_PEOPLE,
             view: NO_VIEW,
             name: [0; MAX_NAME],
+            camera: CameraCounts::default(),
         }
     }
 }
@@ -124,6 +127,11 @@ impl Meter {
         self.n_people = n;
     }
 
+    /// Notes what became of the pictures of a live camera so far.
+    pub fn camera(&mut self, counts: CameraCounts) {
+        self.camera = counts;
+    }
+
     /// Counts evidence that was sent.
     pub fn sent_evidence(&mut self, bytes: u64) {
         self.evidence_bytes += bytes;
@@ -166,6 +174,7 @@ impl Meter {
             n_people: self.n_people,
             view: self.view,
             name: self.name,
+            camera: self.camera,
             ..Metrics::default()
         }
     }

@@ -1,8 +1,8 @@
 //! The checked content of another process's metrics message.
 
 use messages::{
-    Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE, NO_QUEUE,
-    NO_VIEW, Span,
+    CameraCounts, Cause, MAX_NAME, MAX_ROWS, MAX_VIEWS, Metrics, MetricsRow, N_CAUSES, NO_PEOPLE,
+    NO_QUEUE, NO_VIEW, Span,
 };
 
 /// A malformed metrics message.
@@ -96,6 +96,8 @@ pub struct Reading {
     pub view: Option<ViewName>,
     /// Whether it has received the end of stream and sent it on.
     pub is_finished: bool,
+    /// What became of the pictures of its live camera, if it has one.
+    pub camera: Option<CameraCounts>,
     /// Durations by stage and view.
     pub times: Vec<Timed>,
 }
@@ -178,6 +180,7 @@ impl Reading {
             n_people: Some(message.n_people).filter(|it| *it != NO_PEOPLE),
             view: view.map(|index| ViewName { index, name }),
             is_finished: message.finished == 1,
+            camera: Some(message.camera).filter(|it| it.n_connections > 0),
             times,
         })
     }
@@ -223,6 +226,7 @@ impl Reading {
             name,
             n_rows: self.times.len().min(MAX_ROWS) as u32,
             n_people: self.n_people.unwrap_or(NO_PEOPLE),
+            camera: self.camera.unwrap_or_default(),
             rows,
         }
     }
@@ -352,6 +356,11 @@ mod tests {
                 n_people,
                 view,
                 is_finished,
+                camera: (counts[10] > 0).then(|| CameraCounts {
+                    n_connections: counts[10],
+                    off_grid_nanos: counts[11].cast_signed(),
+                    ..CameraCounts::default()
+                }),
                 times,
             }
         }

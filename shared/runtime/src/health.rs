@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::{self, JoinHandle};
 
-use messages::{Cause, Health as HealthMessage, Metrics, Refusal, Span, topic};
+use messages::{CameraCounts, Cause, Health as HealthMessage, Metrics, Refusal, Span, topic};
 use metrics::{Meter, Passage, Rates};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -176,6 +176,11 @@ impl Health {
     /// Records how many people there are in a result.
     pub fn counted_people(&self, n: u32) {
         self.counts.meter(|meter| meter.counted_people(n));
+    }
+
+    /// Notes what became of the pictures of a live camera so far.
+    pub fn camera(&self, counts: CameraCounts) {
+        self.counts.meter(|meter| meter.camera(counts));
     }
 
     /// Counts evidence that was sent.
